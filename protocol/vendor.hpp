@@ -43,13 +43,14 @@ struct Option {
   std::string_view default_value;
   std::string_view meaning;
   double lowest = 0, highest = 0;  // of a number, inclusive; 0, 0 = any above 0
+  std::string_view word = {};      // that may stand for a number, beside the default
 };
 /// "number above 0", "number from 5 to 170".
 inline std::string numbers_of(const Option& option) {
   if (option.highest <= 0) return "number above 0";
   char text[64];
   std::snprintf(text, sizeof text, "number from %g to %g", option.lowest, option.highest);
-  return text;
+  return text + (option.word.empty() ? "" : ", or " + std::string(option.word));
 }
 using OptionValues = std::map<std::string, std::string>;
 
@@ -139,6 +140,9 @@ class Dialogue {
   /// A client that says nothing for longer has gone. By the wall's clock, whatever the time is that the dialogue is told of:
   /// clients live by theirs. Nothing: it may be silent.
   virtual std::optional<std::chrono::milliseconds> longest_silence() const { return std::nullopt; }
+  /// Of one with longest_silence() by datagrams: known hosts say nothing while they get pings, so that a computer which answers
+  /// for the host is as good as a word.
+  virtual bool hosts_fall_silent() const { return false; }
   /// A ping was put into this client's outbox: keep-alives only fill silence.
   virtual void on_ping_queued(Time now) = 0;
   /// A ping is ready, made with `made_with` (null: the initial settings); its framed size is `shared_bytes`. Most clients take
@@ -164,7 +168,8 @@ struct Port {
   std::uint16_t number = 0;
   std::chrono::milliseconds period{0};  // of a beacon
   bool on_change = false;               // of a beacon: also sent at once when a client comes or goes
-  Endpoint group{};  // of a udp_stream: its receiver until SetReceivers, often a multicast group; port 0 = none
+  Endpoint group{};        // of a udp_stream: its receiver until SetReceivers, often a multicast group; port 0 = none
+  bool any_group = false;  // of a udp_stream: receivers may be multicast groups that the configuration does not name
   /// Of a udp_stream: least time between two datagrams of a ping. Of a tcp_stream: pause between the parts of a ping that
   /// Vendor::datagrams gives and Vendor::frame holds one behind the other.
   std::chrono::nanoseconds gap{0};

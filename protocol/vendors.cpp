@@ -16,7 +16,7 @@
 namespace sonar::protocol {
 namespace {
 
-std::string quoted(std::string_view text) { return std::string("'").append(text).append("'"); }
+std::string in_quotes(std::string_view text) { return std::string("'").append(text).append("'"); }
 
 const Option* find_option(const Vendor& vendor, std::string_view name) {
   for (const Option& option : vendor.options())
@@ -37,14 +37,15 @@ std::string complaint(const Vendor& vendor, const std::string& name, const std::
   if (option == nullptr) {
     std::vector<std::string_view> names;
     for (const Option& known : vendor.options()) names.push_back(known.name);
-    return "unknown option " + quoted(name) + " of " + std::string(vendor.name()) + text::suggestion(name, names, "options");
+    return "unknown option " + in_quotes(name) + " of " + std::string(vendor.name()) + text::suggestion(name, names, "options");
   }
   if (option->allowed.empty()) {
-    const bool fine = value == option->default_value || is_number_of(*option, value);
-    return fine ? "" : "option " + name + " must be a " + numbers_of(*option) + ", not " + quoted(value);
+    const bool fine =
+        value == option->default_value || (!option->word.empty() && value == option->word) || is_number_of(*option, value);
+    return fine ? "" : "option " + name + " must be a " + numbers_of(*option) + ", not " + in_quotes(value);
   }
   if (std::find(option->allowed.begin(), option->allowed.end(), value) != option->allowed.end()) return "";
-  return "option " + name + " cannot be " + quoted(value) + text::suggestion(value, option->allowed, "values");
+  return "option " + name + " cannot be " + in_quotes(value) + text::suggestion(value, option->allowed, "values");
 }
 
 }  // namespace
@@ -72,7 +73,7 @@ Result<Profile> find_profile(std::string_view profile) {
       names.push_back(model->profile);
     }
   }
-  return failure(ErrorKind::config, "unknown profile " + quoted(profile) + text::suggestion(profile, names, "profiles"));
+  return failure(ErrorKind::config, "unknown profile " + in_quotes(profile) + text::suggestion(profile, names, "profiles"));
 }
 
 }  // namespace sonar::protocol

@@ -20,7 +20,8 @@ TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=u
 
 def bundled(esbuild, source, three, generated, *options):
     # three.js is found by its name, so that any release of it can be bundled.
-    command = [esbuild, str(source), "--bundle", "--minify", "--target=es2022", "--legal-comments=inline", *options]
+    # es2021: esbuild 0.14 of Ubuntu 22.04 knows no later one.
+    command = [esbuild, str(source), "--bundle", "--minify", "--target=es2021", "--legal-comments=inline", *options]
     environment = dict(os.environ, NODE_PATH=os.pathsep.join([str(three), str(generated)]))
     return subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE).stdout
 

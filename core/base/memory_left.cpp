@@ -1,5 +1,7 @@
 #include "core/base/memory_left.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
@@ -74,6 +76,13 @@ std::optional<std::uint64_t> memory_left_bytes() {
     if (controllers == "memory") take(left_of_groups(root / "sys/fs/cgroup/memory", group, version_1));
   }
   return least;
+}
+
+void offer_for_out_of_memory() { std::ofstream("/proc/self/oom_score_adj") << 1000; }
+
+std::optional<std::uint64_t> address_space_bytes() {
+  const auto pages = number_in("/proc/self/statm");
+  return pages ? std::optional(*pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE))) : std::nullopt;
 }
 
 Result<void> check_memory_for(const std::string& what, std::uint64_t bytes) {

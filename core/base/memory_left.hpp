@@ -18,6 +18,11 @@ std::optional<std::uint64_t> memory_left_bytes();
 /// Refused, as unavailable, when `what` needs more than is left, a tenth of it kept back. `bytes` is an estimate of its peak.
 Result<void> check_memory_for(const std::string& what, std::uint64_t bytes);
 
+/// If the system must end a process for want of memory, it ends this one.
+void offer_for_out_of_memory();
+/// Addresses that this process has in use, as RLIMIT_AS counts them.
+std::optional<std::uint64_t> address_space_bytes();
+
 /// Where proc/ and sys/ lie: "/", and another folder in tests, which set it before other threads start.
 std::filesystem::path& memory_root();
 

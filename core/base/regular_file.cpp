@@ -26,13 +26,13 @@ tl::unexpected<Error> not_opened(const std::filesystem::path& file) {
   return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + std::strerror(errno));
 }
 
-std::filesystem::path& readable_folder() {  // empty = all
+std::filesystem::path& folder_to_read() {  // empty = all
   static std::filesystem::path folder;
   return folder;
 }
 
 bool is_readable(const std::filesystem::path& file) {
-  const std::filesystem::path& folder = readable_folder();
+  const std::filesystem::path& folder = folder_to_read();
   if (folder.empty()) return true;
   std::error_code ec;
   const std::filesystem::path place = std::filesystem::canonical(file, ec);
@@ -41,7 +41,8 @@ bool is_readable(const std::filesystem::path& file) {
 
 }  // namespace
 
-void confine_reads(const std::filesystem::path& folder) { readable_folder() = std::filesystem::canonical(folder); }
+void confine_reads(const std::filesystem::path& folder) { folder_to_read() = std::filesystem::canonical(folder); }
+const std::filesystem::path& readable_folder() { return folder_to_read(); }
 
 Result<OpenFile> open_regular(const std::filesystem::path& file) {
   if (!is_readable(file))

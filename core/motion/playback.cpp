@@ -29,9 +29,9 @@ Ns Playback::line(Time clock) const {
   const Wide product = static_cast<Wide>((clock - clock_at_).count()) * rules_.speed.millionths;
   Wide passed = product / one;
   if (product % one < 0) --passed;  // downwards, also before clock_at_
-  constexpr auto farthest = static_cast<Wide>(std::numeric_limits<std::int64_t>::max());
+  constexpr auto last_ns = static_cast<Wide>(std::numeric_limits<std::int64_t>::max());
   // Held at 292 years, farther than stamps of a file may be.
-  return Ns(static_cast<std::int64_t>(std::clamp(place_at_.count() + passed, -farthest, farthest)));
+  return Ns(static_cast<std::int64_t>(std::clamp(place_at_.count() + passed, -last_ns, last_ns)));
 }
 
 Playback::Place Playback::place(Time clock) const {

@@ -11,34 +11,55 @@ namespace {
 
 constexpr std::uint32_t table_samples = noise_table_samples;
 
-}  // namespace
-
-void NoiseTable::prepare(Seed seed, const std::vector<float>& filter) {
-  // Kept while seed and filter stay: a ping only reads the table.
-  const bool same_seed = !white_.empty() && seed == seed_;
-  if (same_seed && filter == filter_) return;
-  // White complex Gaussians, E|z|^2 = 1; a draw of four words makes two of them.
-  if (!same_seed) {
-    white_.resize(2 * table_samples);
-    const RandomKey key = key_of(seed, Domain::noise_table);
-    for (std::uint32_t i = 0; i < table_samples; i += 2) {
-      const Random4 draw = philox(i, 0, 0, key);
-      for (std::uint32_t half = 0; half < 2; ++half) {
-        const ComplexNormal z = complex_normal(draw.v[2 * half], draw.v[2 * half + 1]);
-        white_[2 * (i + half)] = z.re;
-        white_[2 * (i + half) + 1] = z.im;
-      }
+/// White complex Gaussians, E|z|^2 = 1; a draw of four words makes two of them.
+std::vector<float> white_noise(Seed seed) {
+  std::vector<float> white(2 * table_samples);
+  const RandomKey key = key_of(seed, Domain::noise_table);
+  for (std::uint32_t i = 0; i < table_samples; i += 2) {
+    const Random4 draw = philox(i, 0, 0, key);
+    for (std::uint32_t half = 0; half < 2; ++half) {
+      const ComplexNormal z = complex_normal(draw.v[2 * half], draw.v[2 * half + 1]);
+      white[2 * (i + half)] = z.re;
+      white[2 * (i + half) + 1] = z.im;
     }
   }
+  return white;
+}
+
+void add_scaled(float by, const float* __restrict from, std::size_t count, float* __restrict to) {
+  for (std::size_t i = 0; i < count; ++i) to[i] += by * from[i];
+}
+
+/// n[i] = sum_m h[m] w[i - m], h of unit energy (make_noise_filter): the variance stays 1. Circular, so that reading may wrap.
+std::vector<float> filtered(const std::vector<float>& white, const std::vector<float>& filter) {
+  const std::size_t n = white.size();
+  std::vector<float> shaped(n, 0.0f);
+  for (std::size_t tap = 0; tap < filter.size(); ++tap) {
+    const std::size_t shift = 2 * tap;
+    add_scaled(filter[tap], white.data() + n - shift, shift, shaped.data());
+    add_scaled(filter[tap], white.data(), n - shift, shaped.data() + shift);
+  }
+  return shaped;
+}
+
+}  // namespace
+
+void NoiseTable::prepare(Seed seed, const std::vector<float>& filter, std::span<const NoiseTable* const> others) {
+  // Kept while seed and filter stay: a ping only reads the table.
+  const bool same_seed = white_ && seed == seed_;
+  if (same_seed && filter == filter_) return;
+  if (!same_seed) white_.reset();
   seed_ = seed;
   filter_ = filter;
-  shaped_.assign(white_.size(), 0.0f);
-  const std::size_t n = white_.size();
-  // n[i] = sum_m h[m] w[i - m], h of unit energy (make_noise_filter): the variance stays 1.
-  for (std::size_t tap = 0; tap < filter.size(); ++tap) {  // circular, so that reading may wrap
-    const std::size_t shift = 2 * tap;
-    for (std::size_t i = 0; i < n; ++i) shaped_[i] += filter[tap] * white_[i >= shift ? i - shift : n + i - shift];
+  for (const NoiseTable* other : others) {
+    if (other == this || !other->white_ || other->seed_ != seed) continue;
+    white_ = other->white_;
+    if (other->filter_ != filter) continue;
+    shaped_ = other->shaped_;
+    return;
   }
+  if (!white_) white_ = std::make_shared<const std::vector<float>>(white_noise(seed));
+  shaped_ = std::make_shared<const std::vector<float>>(filtered(*white_, filter));
 }
 
 void NoiseTable::add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const {
@@ -59,7 +80,7 @@ void NoiseTable::read(std::uint32_t sonar, std::uint32_t ping, int column_index,
   // The table is periodic: reading goes on at its beginning.
   for (int done = 0; done < samples;) {
     const int run = static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(samples - done), table_samples - at));
-    const float* __restrict from = shaped_.data() + 2 * at;
+    const float* __restrict from = shaped_->data() + 2 * at;
     float* __restrict to = column + 2 * static_cast<std::ptrdiff_t>(done);
     // Times i: (re, im) -> (-im, re).
     if (place.quarter)

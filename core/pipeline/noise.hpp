@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "core/base/units.hpp"
@@ -12,14 +14,14 @@ namespace sonar {
 
 class NoiseTable {
  public:
-  /// Draws the table anew when seed or filter changed. E|n|^2 = 1 per sample.
-  void prepare(Seed seed, const std::vector<float>& filter);
+  /// Draws the table anew when seed or filter changed, or shares that of `others` which have the same. E|n|^2 = 1 per sample.
+  void prepare(Seed seed, const std::vector<float>& filter, std::span<const NoiseTable* const> others = {});
   /// column[2 n], column[2 n + 1] += rms * noise for n in [0, samples). A function of (seed, sonar, ping, column, n) alone.
   void add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The same in place of what is there.
   void set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The table that add() reads: noise_table_samples complex values (core/pipeline/arithmetic/noise_place.hpp).
-  const std::vector<float>& shaped() const { return shaped_; }
+  const std::vector<float>& shaped() const { return *shaped_; }
 
  private:
   template <class Put>
@@ -27,7 +29,7 @@ class NoiseTable {
 
   Seed seed_{};
   std::vector<float> filter_;
-  std::vector<float> white_, shaped_;  // complex, interleaved
+  std::shared_ptr<const std::vector<float>> white_, shaped_ = std::make_shared<std::vector<float>>();  // complex, interleaved
 };
 
 /// The draws of one ping of one sonar; `table` null = none.

@@ -20,8 +20,8 @@
 namespace sonar {
 
 /// Instruction sets the hot loops are compiled for; chosen at run time.
-enum class SimdLevel { automatic, portable, avx2, avx512 };
-inline constexpr std::array<std::string_view, 4> simd_level_names = {"auto", "portable", "avx2", "avx512"};
+enum class SimdLevel { automatic, portable, avx2, avx512, neon };
+inline constexpr std::array<std::string_view, 5> simd_level_names = {"auto", "portable", "avx2", "avx512", "neon"};
 
 struct EngineOptions {
   SimdLevel simd = SimdLevel::automatic;

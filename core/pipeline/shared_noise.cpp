@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <cstdlib>
 #include <limits>
 #include <string>
 
 #include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/pipeline/arithmetic/noise_place.hpp"
+#include "core/pipeline/focused_array.hpp"
 #include "core/pipeline/interference.hpp"
 #include "core/pipeline/ping_plan.hpp"
 
@@ -23,7 +23,7 @@ constexpr double margin = 3, fades_from = 2;
 /// Of a part, blocks of samples of a beam are left out that are nowhere louder than this share of the channels' own noise (30),
 /// over the number of parts.
 constexpr double silent = 0.03;
-constexpr std::size_t block_samples = 32;
+constexpr std::size_t block_samples = SharedNoiseTable::block_samples;
 
 constexpr int most_groups = 32;  // each has a table
 // Of a table's complex values, 1 GiB, and of its sums: some 10 s.
@@ -32,9 +32,6 @@ constexpr double most_values = 1 << 27, most_steps = 1e9;
 /// Mean over the beams of what they receive of the leak, re the sum of the channels' powers: where it is less, the beams point
 /// at its nulls, and are not given the level of (31) nonetheless.
 constexpr double faint = 1e-3;
-
-/// Adding and subtracting it leaves a whole number.
-constexpr float whole = 12582912;
 
 bool has_noise(const SharedNoise& law) { return static_cast<double>(law.level_db) > none_db; }
 int parts_of(const SharedNoise& law) { return law.channels / (law.group / 2) + 2; }
@@ -58,56 +55,74 @@ Reach reach_of(const FrequencyMode& mode, const PingSettings& settings, double w
   return {margin * leaves_m + std::max(0.0, -focus_m(law, settings)), (margin - fades_from) * leaves_m};
 }
 
-/// Complex [parts][beams]: sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}, d the delay of a channel at x against the
-/// array's middle, from a point at a range and sine u. Parts: groups, which overlap by half and whose w^2 add to 1 in every
-/// channel; last, all channels alike.
-class FocusedArray {
+/// Responses of a block of samples, or of fewer focal ranges that stand for theirs: Chebyshev's points in the inverse range, in
+/// which the phases are nearly straight.
+class Responses {
  public:
-  FocusedArray(const std::vector<double>& beam_sines, const SharedNoise& law)
-      : u_(beam_sines.begin(), beam_sines.end()),
-        channels_(law.channels),
-        half_(law.group / 2),
-        parts_(parts_of(law)),
-        d_(1 / (2 * static_cast<double>(law.sine))) {
-    re_.resize(static_cast<std::size_t>(parts_) * u_.size());
-    im_.resize(re_.size());
-  }
-  int parts() const { return parts_; }
-  void focus(double range_in_wavelengths) {
-    std::fill(re_.begin(), re_.end(), 0.0f);
-    std::fill(im_.begin(), im_.end(), 0.0f);
-    const auto r = static_cast<float>(range_in_wavelengths);
-    std::vector<float> cosine(u_.size()), sine(u_.size());
-    for (int m = 0; m < channels_; ++m) {
-      const auto x = static_cast<float>((m - 0.5 * (channels_ - 1)) * d_);
-      for (std::size_t j = 0; j < u_.size(); ++j) {
-        const float beyond = x * (x - 2 * r * u_[j]), delay = beyond / (std::sqrt(larger(r * r + beyond, 0)) + r);
-        const float turns = delay - ((delay + whole) - whole);
-        cosine[j] = sine_of_quarter(0.25f - std::fabs(turns));
-        sine[j] = sine_of_half(turns);
+  /// `focal`: of the samples, in wavelengths.
+  void fill(FocusedArray& array, const std::vector<double>& focal) {
+    beams_ = array.beams();
+    samples_ = focal.size();
+    std::vector<double> ranges = focal;
+    weights_.clear();
+    most_weight_ = 1;
+    const int needed = chebyshev_count(pi * array.turns_between(focal.front(), focal.back()));
+    if (static_cast<std::size_t>(needed) < samples_) choose(focal, needed, ranges);
+    ranges_ = ranges.size();
+    at_.clear();
+    most_.assign(array.sums().size() / 2, 0.0f);
+    for (const double range : ranges) {
+      array.focus(range);
+      at_.insert(at_.end(), array.sums().begin(), array.sums().end());
+      for (std::size_t part = 0; part < static_cast<std::size_t>(array.parts()); ++part) {
+        const float *re = array.sums().data() + 2 * part * beams_, *im = re + beams_;
+        float* most = most_.data() + part * beams_;
+        for (std::size_t j = 0; j < beams_; ++j) most[j] = larger(most[j], re[j] * re[j] + im[j] * im[j]);
       }
-      const double sign = m % 2 == 0 ? 1 : -1, way = pi / 2 * (m % half_ + 0.5) / half_;
-      add(m / half_, sign * std::cos(way), cosine, sine);
-      add(m / half_ + 1, sign * std::sin(way), cosine, sine);
-      add(parts_ - 1, sign, cosine, sine);
     }
   }
-  std::complex<float> of(int part, std::size_t beam) const { return {re_[at(part) + beam], im_[at(part) + beam]}; }
+  /// No sample of it has more power.
+  float most_power(std::size_t part, std::size_t beam) const { return most_[part * beams_ + beam] * most_weight_ * most_weight_; }
+  void of(std::size_t part, std::size_t beam, float* re, float* im) const {
+    for (std::size_t k = 0; k < ranges_; ++k) {
+      const float* at = at_.data() + k * 2 * most_.size() + 2 * part * beams_ + beam;
+      if (weights_.empty()) {
+        re[k] = at[0], im[k] = at[beams_];
+        continue;
+      }
+      const float* weight = weights_.data() + k * block_samples;
+      const float a = at[0], b = at[beams_];
+      for (std::size_t n = 0; n < block_samples; ++n) {
+        re[n] = (k > 0 ? re[n] : 0) + weight[n] * a;
+        im[n] = (k > 0 ? im[n] : 0) + weight[n] * b;
+      }
+    }
+  }
 
  private:
-  std::size_t at(int part) const { return static_cast<std::size_t>(part) * u_.size(); }
-  void add(int part, double weight, const std::vector<float>& cosine, const std::vector<float>& sine) {
-    const auto w = static_cast<float>(weight);
-    float* __restrict re = re_.data() + at(part), * __restrict im = im_.data() + at(part);
-    for (std::size_t j = 0; j < u_.size(); ++j) {
-      re[j] += w * cosine[j];
-      im[j] += w * sine[j];
+  void choose(const std::vector<double>& focal, int count, std::vector<double>& ranges) {
+    std::vector<double> places;
+    for (const double r : focal) places.push_back(1 / r);
+    const std::vector<double> points = chebyshev_points(places.back(), places.front(), count);
+    const std::vector<double> weights = chebyshev_weights(points, places);
+    ranges.clear();
+    weights_.assign(points.size() * block_samples, 0.0f);
+    for (std::size_t n = 0; n < samples_; ++n) {
+      float sum = 0;
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        weights_[k * block_samples + n] = static_cast<float>(weights[k * samples_ + n]);
+        sum += std::fabs(weights_[k * block_samples + n]);
+      }
+      most_weight_ = std::max(most_weight_, sum);
     }
+    for (const double point : points) ranges.push_back(1 / point);
   }
 
-  std::vector<float> u_, re_, im_;
-  int channels_, half_, parts_;
-  double d_;  // spacing of the channels, in wavelengths
+  std::size_t beams_ = 0, samples_ = 0, ranges_ = 0;
+  std::vector<float> weights_;  // [ranges][block_samples]; empty: the ranges are the samples'
+  std::vector<float> at_;       // [ranges][parts][2][beams]
+  std::vector<float> most_;     // [parts][beams]: power at the ranges
+  float most_weight_ = 1;
 };
 
 }  // namespace
@@ -154,10 +169,10 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   const std::size_t beams = plan.beam_sine.size();
   double widest = 0;
   for (const double u : plan.beam_sine) widest = std::max(widest, std::abs(u));
-  const Reach reach = reach_of(plan.mode, plan.settings, widest);
+  const Reach noise_reach = reach_of(plan.mode, plan.settings, widest);
   const auto range_m = [&](int n) { return (n + plan.sample_offset) * plan.sample_spacing_m; };
   const auto leak_samples = static_cast<int>(leak.rms_upa().size());
-  while (samples_ < plan.samples && (range_m(samples_) < reach.end_m || samples_ < leak_samples)) ++samples_;
+  while (samples_ < plan.samples && (range_m(samples_) < noise_reach.end_m || samples_ < leak_samples)) ++samples_;
   // A channel's own noise, by itself, is (30) at a beam's output.
   const double own_upa = plan.column_noise_upa * std::sqrt(plan.beam_weights.weight_energy / law.channels);
   const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) : 0;
@@ -168,57 +183,87 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
   parts_ = static_cast<std::size_t>(array.parts());
   beams_ = beams;
   const auto samples = static_cast<std::size_t>(samples_);
-  response_.resize(2 * parts_ * beams * samples);
-  const double least = faint * law.channels * static_cast<double>(beams);
+  blocks_ = (samples + block_samples - 1) / block_samples;
   for (std::size_t n = 0; n < samples; ++n) {
     const double range = range_m(static_cast<int>(n)), r = std::max(range, plan.sample_spacing_m / 2);
-    array.focus(std::max(range + behind_m, nearest_m) / wavelength_m);
-    double power = 0;
-    for (int part = 0; part < array.parts(); ++part)
-      for (std::size_t j = 0; j < beams; ++j) {
-        const std::complex<float> of_beam = array.of(part, j);
-        float* to = response_.data() + 2 * (static_cast<std::size_t>(part) * beams + j) * samples + n;
-        to[0] = of_beam.real();
-        to[samples] = of_beam.imag();
-        if (part + 1 == array.parts()) power += static_cast<double>(std::norm(of_beam));
-      }
-    const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)) * reach.share(range));
+    const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)) * noise_reach.share(range));
     noise_upa_.push_back(static_cast<float>(upa * std::sqrt(1 - steady)));
     steady_upa_.push_back(static_cast<float>(upa * std::sqrt(steady)));
-    // (31) at the beams' outputs, as a mean over them.
-    const double per_channel = std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams) / std::max(power, least));
-    if (static_cast<int>(n) < leak_samples)
-      leak_upa_.push_back(static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[n]) * per_channel));
   }
-  leave_out(silent / array.parts() * own_upa * own_upa * law.channels);
+  at_.assign(parts_ * beams_ * blocks_, 0);
+  const double least = faint * law.channels * static_cast<double>(beams);
+  const auto audible = static_cast<float>(silent / array.parts() * own_upa * own_upa * law.channels);
+  Responses responses;
+  std::vector<double> focal;
+  float re[block_samples] = {}, im[block_samples] = {};
+  for (std::size_t from = 0, block = 0; from < samples; from += block_samples, ++block) {
+    const std::size_t to = std::min(from + block_samples, samples);
+    focal.clear();
+    for (std::size_t n = from; n < to; ++n)
+      focal.push_back(std::max(range_m(static_cast<int>(n)) + behind_m, nearest_m) / wavelength_m);
+    responses.fill(array, focal);
+    if (from < leak.rms_upa().size()) {
+      double power[block_samples] = {};
+      for (std::size_t j = 0; j < beams; ++j) {
+        responses.of(parts_ - 1, j, re, im);
+        for (std::size_t n = 0; n < to - from; ++n) power[n] += static_cast<double>(re[n] * re[n] + im[n] * im[n]);
+      }
+      // (31) at the beams' outputs, as a mean over them.
+      for (std::size_t n = from; n < std::min(to, leak.rms_upa().size()); ++n) {
+        const double per_channel =
+            std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams) / std::max(power[n - from], least));
+        leak_upa_.push_back(static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[n]) * per_channel));
+      }
+    }
+    for (std::size_t part = 0; part < parts_; ++part) {
+      float upa[block_samples], most_upa = 0;
+      for (std::size_t n = from; n < to; ++n) {
+        upa[n - from] = part + 1 < parts_ ? noise_upa_[n] : steady_upa_[n] + (n < leak_upa_.size() ? leak_upa_[n] : 0);
+        most_upa = std::max(most_upa, upa[n - from]);
+      }
+      for (std::size_t j = 0; j < beams; ++j) {
+        if (most_upa * most_upa * responses.most_power(part, j) <= audible) continue;
+        responses.of(part, j, re, im);
+        float most = 0;
+        for (std::size_t n = 0; n < to - from; ++n) most = std::max(most, upa[n] * upa[n] * (re[n] * re[n] + im[n] * im[n]));
+        if (most <= audible) continue;
+        heard_.insert(heard_.end(), re, re + block_samples);
+        heard_.insert(heard_.end(), im, im + block_samples);
+        at_[(part * beams_ + j) * blocks_ + block] = static_cast<std::uint32_t>(heard_.size() / (2 * block_samples));
+      }
+    }
+  }
+  heard_.shrink_to_fit();
 }
 
-void SharedNoiseTable::leave_out(double power) {
+const float* SharedNoiseTable::heard(std::size_t part, std::size_t beam, std::size_t block) const {
+  const std::size_t at = at_[(part * beams_ + beam) * blocks_ + block];
+  return at == 0 ? nullptr : heard_.data() + 2 * block_samples * (at - 1);
+}
+
+std::vector<float> SharedNoiseTable::response() const {
   const auto samples = static_cast<std::size_t>(samples_);
-  blocks_ = (samples + block_samples - 1) / block_samples;
-  for (std::size_t i = 0; i < parts_ * beams_ * blocks_; ++i) {
-    const bool changes = i / (beams_ * blocks_) + 1 < parts_;
-    const std::size_t from = i % blocks_ * block_samples, to = std::min(from + block_samples, samples);
-    float *re = response_.data() + 2 * (i / blocks_ * samples), *im = re + samples;
-    double most = 0;
-    for (std::size_t n = from; n < to; ++n) {
-      const float upa = changes ? noise_upa_[n] : steady_upa_[n] + (n < leak_upa_.size() ? leak_upa_[n] : 0);
-      most = std::max(most, static_cast<double>(upa * upa * (re[n] * re[n] + im[n] * im[n])));
+  std::vector<float> dense(2 * parts_ * beams_ * samples, 0.0f);
+  for (std::size_t i = 0; i < parts_ * beams_; ++i)
+    for (std::size_t block = 0; block < blocks_; ++block) {
+      const float* r = heard(i / beams_, i % beams_, block);
+      if (r == nullptr) continue;
+      const std::size_t from = block * block_samples, count = std::min(block_samples, samples - from);
+      std::copy(r, r + count, dense.data() + 2 * i * samples + from);
+      std::copy(r + block_samples, r + block_samples + count, dense.data() + (2 * i + 1) * samples + from);
     }
-    is_heard_.push_back(most > power ? 1 : 0);
-    if (most > power) continue;
-    std::fill(re + from, re + to, 0.0f);
-    std::fill(im + from, im + to, 0.0f);
-  }
+  return dense;
 }
 
 double SharedNoiseTable::noise_power(std::size_t beam, std::size_t sample) const {
   if (sample >= noise_upa_.size()) return 0;
   double power = 0;
   for (std::size_t part = 0; part < parts_; ++part) {
-    const float* r = response_.data() + 2 * (part * beams_ + beam) * noise_upa_.size() + sample;
-    const float im = r[noise_upa_.size()], rms = part + 1 < parts_ ? noise_upa_[sample] : steady_upa_[sample];
-    power += static_cast<double>(rms * rms * (r[0] * r[0] + im * im));
+    const float* r = heard(part, beam, sample / block_samples);
+    if (r == nullptr) continue;
+    const float re = r[sample % block_samples], im = r[block_samples + sample % block_samples];
+    const float rms = part + 1 < parts_ ? noise_upa_[sample] : steady_upa_[sample];
+    power += static_cast<double>(rms * rms * (re * re + im * im));
   }
   return power;
 }
@@ -254,9 +299,10 @@ void SharedNoiseTable::add(const std::vector<float>& shared, bool expected_power
       const auto count = static_cast<int>(to - from);
       float re[block_samples] = {}, im[block_samples] = {};
       for (std::size_t part = 0; part < parts_; ++part) {
-        const std::size_t i = part * beams_ + j;
-        if (is_heard_[i * blocks_ + block] == 0) continue;
-        const float* __restrict r = response_.data() + 2 * i * samples + from, * __restrict r_im = r + samples;
+        const float* __restrict r = heard(part, j, block);
+        if (r == nullptr) continue;
+        r += from - block * block_samples;
+        const float* __restrict r_im = r + block_samples;
         const float* __restrict c = shared.data() + 2 * part * samples + from, * __restrict c_im = c + samples;
         for (int n = 0; n < count && expected_power; ++n) re[n] += c[n] * c[n] * (r[n] * r[n] + r_im[n] * r_im[n]);
         for (int n = 0; n < count && !expected_power; ++n) {

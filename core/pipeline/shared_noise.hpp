@@ -22,6 +22,7 @@ std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& s
 /// What the beams make of them, a function of the plan alone.
 class SharedNoiseTable {
  public:
+  static constexpr std::size_t block_samples = 32;  // kept or left out together
   SharedNoiseTable() = default;
   /// Nothing where the receiver has none. Needs the plan's columns and the level of their noise.
   explicit SharedNoiseTable(const PingPlan& plan);
@@ -31,7 +32,8 @@ class SharedNoiseTable {
   std::size_t parts() const { return parts_; }
   /// Real and imaginary part, [parts][beams][2][samples]: of a signal of amplitude 1 in the channels of a group; in the last
   /// part, in all channels.
-  const std::vector<float>& response() const { return response_; }
+  std::vector<float> response() const;
+  std::size_t bytes() const { return sizeof(float) * heard_.size() + sizeof(std::uint32_t) * at_.size(); }
   // In a channel. Of what is new in every ping and by group, rms [samples]; of what is not, amplitude [samples]; of the leak,
   // amplitude [as far as it reaches].
   const std::vector<float>& noise_upa() const { return noise_upa_; }
@@ -44,12 +46,14 @@ class SharedNoiseTable {
   void add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const;
 
  private:
-  void leave_out(double power);
+  /// [2][block_samples] of a part in a beam, or null where it is left out.
+  const float* heard(std::size_t part, std::size_t beam, std::size_t block) const;
 
   int samples_ = 0;
   std::size_t parts_ = 0, beams_ = 0, blocks_ = 0;
-  std::vector<std::uint8_t> is_heard_;  // [parts][beams][blocks]
-  std::vector<float> response_, noise_upa_, steady_upa_, leak_upa_;
+  std::vector<std::uint32_t> at_;  // [parts][beams][blocks]: the how manieth of those heard; 0: none
+  std::vector<float> heard_;       // [blocks heard][2][block_samples]
+  std::vector<float> noise_upa_, steady_upa_, leak_upa_;
 };
 
 }  // namespace sonar

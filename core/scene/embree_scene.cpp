@@ -57,11 +57,17 @@ std::string device_settings(int threads) {
   return isa == std::string_view("avx512") ? settings : settings + ",max_isa=" + isa;
 }
 
+std::string why_not(RTCError error) {
+  if (error == RTC_ERROR_UNSUPPORTED_CPU) return " on this processor";
+  if (error == RTC_ERROR_OUT_OF_MEMORY) return ": not enough memory";
+  return ": code " + std::to_string(error) + "; memory or threads may be short (ulimit -v, ulimit -u)";
+}
+
 // Owners of Embree's reference-counted handles.
 struct Device {
   RTCDevice handle;
   explicit Device(int threads) : handle(rtcNewDevice(device_settings(threads).c_str())) {
-    if (!handle) throw std::runtime_error("the ray tracer (Embree) cannot start on this processor");
+    if (!handle) throw std::runtime_error("the ray tracer (Embree) cannot start" + why_not(rtcGetDeviceError(nullptr)));
   }
   ~Device() { rtcReleaseDevice(handle); }
   Device(const Device&) = delete;

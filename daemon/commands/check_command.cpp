@@ -1,38 +1,35 @@
 #include "daemon/commands/check_command.hpp"
 
 #include <cstdio>
-#include <optional>
 
-#include "daemon/commands/load_progress.hpp"
+#include "daemon/commands/run/prepare_run.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/emulator/world/plausibility.hpp"
-#include "daemon/emulator/world/world_parts.hpp"
 #include "daemon/server/connections/token.hpp"
 
 namespace sonar {
 
 Result<void> run_check(const CheckCommand& command) {
-  const auto config = load_config(command.config);
-  if (!config) return tl::make_unexpected(config.error());
-  if (auto passes = check_time_can_pass(*config); !passes) return passes;
-  if (!config->control.token_file.empty()) {
+  RunCommand run;
+  run.config = command.config;
+  bool json = false;
+  const auto prepared = prepare_run(run, json, [](const Config&) { return LoadProgress::to_console; });
+  if (!prepared) return tl::make_unexpected(prepared.error());
+  const Config& config = prepared->found.config;
+  const Scene& scene = *prepared->scene;
+  if (!config.control.token_file.empty()) {
     std::string warning;
-    if (const auto token = Token::read(config->control.token_file, warning); !token) return tl::make_unexpected(token.error());
+    if (const auto token = Token::read(config.control.token_file, warning); !token) return tl::make_unexpected(token.error());
     if (!warning.empty()) std::fprintf(stderr, "sonard: %s\n", warning.c_str());
   }
-  std::optional<LoadProgress> loading(LoadProgress::to_console);
-  const auto scene = load_scene(config->scene);
-  loading.reset();
-  if (!scene) return tl::make_unexpected(scene.error());
-  if (std::string why = why_not_movable(**scene, *config); !why.empty()) return failure(ErrorKind::config, std::move(why));
-  std::printf("%s: ok, %zu sonar%s; scene %s: ok, %zu triangles\n", command.config.c_str(), config->sonars.size(),
-              config->sonars.size() == 1 ? "" : "s", config->scene.name().c_str(), (*scene)->triangle_count());
-  for (const std::string& note : notes_of_options(*config)) std::printf("%s\n", note.c_str());
-  for (const VehicleConfig& v : config->vehicles)
+  std::printf("%s: ok, %zu sonar%s; scene %s: ok, %zu triangles\n", command.config.c_str(), config.sonars.size(),
+              config.sonars.size() == 1 ? "" : "s", config.scene.name().c_str(), scene.triangle_count());
+  for (const std::string& note : notes_of_options(config)) std::printf("%s\n", note.c_str());
+  for (const VehicleConfig& v : config.vehicles)
     if (v.plan) std::printf("vehicle %s follows %s\n", v.name.c_str(), v.plan.about.c_str());
-  for (const ObjectConfig& o : config->objects)
+  for (const ObjectConfig& o : config.objects)
     if (o.plan) std::printf("object %s follows %s\n", o.name.c_str(), o.plan.about.c_str());
-  for (const Note& note : notes_on(*config, **scene, surroundings_of(*config, **scene)))
+  for (const Note& note : notes_on(config, scene, surroundings_of(config, scene)))
     std::printf("note: %s\n", text_of(note).c_str());
   return {};
 }

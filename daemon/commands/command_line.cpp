@@ -295,6 +295,7 @@ Result<void> override_config(Config& config, const RunCommand& command) {
     return failure(ErrorKind::config, config.faults.plan_place +
                                           ": faults act only when they are armed: add armed: true, or "
                                           "start with sonard run --faults");
+  if (const auto r = check_ports_apart(config); !r) return r;
   return check_time_can_pass(config);
 }
 

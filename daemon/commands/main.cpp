@@ -3,6 +3,9 @@
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <system_error>
+
+#include <boost/system/system_error.hpp>
 
 #include "daemon/commands/check_command.hpp"
 #include "daemon/commands/command_line.hpp"
@@ -26,6 +29,14 @@ int report_error(const Error& error, bool json) {
   else
     std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
   return exit_code(error.kind);
+}
+
+/// Of the standard library's threads, and of Boost's.
+bool is_short_of_threads(const std::exception& e) {
+  if (const auto* error = dynamic_cast<const std::system_error*>(&e))
+    return error->code() == std::errc::resource_unavailable_try_again;
+  const auto* error = dynamic_cast<const boost::system::system_error*>(&e);
+  return error != nullptr && error->code() == boost::system::errc::resource_unavailable_try_again;
 }
 
 Result<int> code_of(const Result<void>& done) {
@@ -61,6 +72,11 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return sonar::report_error({sonar::ErrorKind::unavailable, "not enough memory; use a smaller scene or free some"}, json);
   } catch (const std::exception& e) {
+    if (sonar::is_short_of_threads(e))
+      return sonar::report_error(
+          {sonar::ErrorKind::unavailable,
+           "cannot start a thread: allow this user or service more of them (ulimit -u, TasksMax of the unit)"},
+          json);
     return sonar::report_error({sonar::ErrorKind::bug, std::string(e.what()) + " (this is a bug, please report it)"}, json);
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "core/base/writable_folder.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/strict_yaml.hpp"
 #include "daemon/config/config_parts.hpp"
@@ -97,6 +98,7 @@ void read_addresses(Map& map, SonarConfig& sonar) {
   sonar.netmask = read_ip(netmask);
   for (const Node& to : map.optional("status_to").items(0, 16)) sonar.status_to.push_back(read_endpoint(to, false));
   sonar.has_own_status_to = !sonar.status_to.empty();
+  for (const Node& group : map.optional("groups").items(0, 16)) sonar.groups.push_back(read_ip(group));
   derive_addresses(sonar);
 }
 
@@ -193,9 +195,8 @@ RecordingConfig read_recording(const Node& node, const std::filesystem::path& di
   Map map = node.map();
   const Node folder = map.required("folder");
   const std::filesystem::path path = (directory / folder.text()).lexically_normal();
-  std::error_code ec;
-  if (folder.present() && !std::filesystem::is_directory(path, ec))
-    folder.fail("is not a folder: " + path.string() + "; make it first, writable for sonard");
+  if (const std::string why = folder.present() ? why_no_files_in(path) : ""; !why.empty())
+    folder.fail(why + ": " + path.string() + "; recordings need a folder that is there, writable for sonard");
   return {path};
 }
 

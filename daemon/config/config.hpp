@@ -57,6 +57,7 @@ struct SonarConfig {
   std::vector<Endpoint> status_to;                          // port 0 = the vendor's own
   bool has_own_netmask = false, has_own_status_to = false;  // from the file, not derived from advertise_ip
   std::uint16_t device_id = 0;
+  std::vector<Ipv4> groups;  // broadcast and multicast addresses that clients may name as receivers
   int max_clients = 1;
   WhenClientsFull when_full = WhenClientsFull::close_new;
   int max_observers = 4;            // connections that only receive; 0 = none

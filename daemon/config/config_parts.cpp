@@ -18,7 +18,8 @@ constexpr Range finite_place{.min = -1e7, .max = 1e7};
 std::string read_option(const Node& value, const protocol::Option& option) {
   if (option.allowed.empty()) {
     const Range range = option.highest > 0 ? Range::between(option.lowest, option.highest) : Range::above(0);
-    if (value.text(64) != option.default_value) value.number(range);
+    const std::string text = value.text(64);
+    if (text != option.default_value && (option.word.empty() || text != option.word)) value.number(range);
   } else {
     value.choice_index(option.allowed);
   }

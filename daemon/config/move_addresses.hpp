@@ -1,4 +1,5 @@
-// A second daemon beside the first one on the same computer: `--offset N`.
+// Where the listeners of a configuration are: none in another's way, nor in that of a second daemon on the same computer,
+// `--offset N`.
 #pragma once
 
 #include "daemon/config/config.hpp"
@@ -14,5 +15,8 @@ inline constexpr int ports_an_offset = 10;  // daemons listen on ports next to e
 /// where something would come to lie on something else of the same configuration unmoved. Errors are sentences for the command
 /// line.
 Result<void> move_addresses(Config& config, int offset, bool first_too);
+
+/// Refused, as config, when two listeners of the configuration need the same port. Call after the command line has changed it.
+Result<void> check_ports_apart(const Config& config);
 
 }  // namespace sonar

@@ -60,6 +60,7 @@ struct Listening {
   std::string key;
   Endpoint at;
   bool udp, tcp;
+  bool gives_way = false;  // a default, which is left out when its port is taken
 };
 bool meet(const Listening& a, const Listening& b) {
   const bool same_ip = a.at.ip == b.at.ip || a.at.ip == Ipv4{} || b.at.ip == Ipv4{};
@@ -67,15 +68,25 @@ bool meet(const Listening& a, const Listening& b) {
 }
 std::vector<Listening> listening_of(const Config& c) {
   std::vector<Listening> all;
-  const auto add = [&](const std::string& key, bool enabled, const Endpoint& at, bool udp, bool tcp) {
-    if (enabled && at.port != 0) all.push_back({key, at, udp, tcp});
+  const auto add = [&](const std::string& key, bool enabled, const Endpoint& at, bool udp, bool tcp, bool gives_way = false) {
+    if (enabled && at.port != 0) all.push_back({key, at, udp, tcp, gives_way});
   };
   add("poses.protobuf", c.poses.protobuf.enabled, c.poses.protobuf.at, true, false);
   add("poses.json", c.poses.json.enabled, c.poses.json.at, true, true);
-  add("control.stream", c.control.stream.enabled, c.control.stream.at, false, true);
-  add("control.http", c.control.http.enabled, c.control.http.at, false, true);
+  add("control.stream", c.control.stream.enabled, c.control.stream.at, false, true, !c.control.stream_given);
+  add("control.http", c.control.http.enabled, c.control.http.at, false, true, !c.control.http_given);
   for (const MavlinkConfig& link : c.poses.mavlink) add("poses.mavlink", !link.dials, link.at, true, false);
   return all;
+}
+
+/// TCP ports of a sonar; those of UDP are shared where the protocol wants it.
+void add_tcp_ports(std::vector<Listening>& all, const SonarConfig& sonar) {
+  using Kind = protocol::Port::Kind;
+  for (const protocol::Port& port : sonar.profile.vendor->ports())
+    if (port.kind == Kind::tcp_stream || port.kind == Kind::http)
+      all.push_back({"sonar \"" + sonar.name + "\"", {sonar.bind_ip, port.number}, false, true});
+  if (sonar.max_observers > 0 && sonar.observer_port != 0)
+    all.push_back({"observers.port of sonar \"" + sonar.name + "\"", {sonar.bind_ip, sonar.observer_port}, false, true});
 }
 
 /// What is moved must not be where the daemon of the same configuration that is not moved has something else.
@@ -98,6 +109,18 @@ Result<void> check_apart(const Config& moved, const Config& unmoved) {
 }
 
 }  // namespace
+
+Result<void> check_ports_apart(const Config& config) {
+  std::vector<Listening> all;
+  for (const SonarConfig& sonar : config.sonars) add_tcp_ports(all, sonar);
+  for (Listening& listening : listening_of(config)) all.push_back(std::move(listening));
+  for (auto b = all.begin(); b != all.end(); ++b)
+    for (auto a = all.begin(); a != b; ++a)
+      if (meet(*a, *b) && !a->gives_way && !b->gives_way)
+        return failure(ErrorKind::config, config.source + ": " + a->key + " and " + b->key + " would both listen at " +
+                                              text_of(b->at) + "; give each its own address or port");
+  return {};
+}
 
 Result<void> move_addresses(Config& config, int offset, bool first_too) {
   const Config unmoved = config;

@@ -13,7 +13,7 @@
 namespace sonar {
 namespace {
 
-/// As stop_limit, while recordings are written. Less than the unit's TimeoutStopSec.
+/// As stop_limit, while files are written. Less than the unit's TimeoutStopSec.
 constexpr std::chrono::milliseconds files_limit{8000};
 
 }  // namespace
@@ -26,7 +26,11 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       world_(pose_rules(config_), vehicles_of(config_), bodies_of(*scene, config_), clock_.now()),
       stepped_time_(config_.clock, clock_, world_),
       simulator_(io_, make_engine(scene), compute_niceness),
-      recordings_(io_, config_, log_, compute_niceness, [this] { on_change(); }),
+      writer_(io_, compute_niceness,
+              [this] {
+                if (stopping_) on_change();
+              }),
+      recordings_(writer_, config_, log_, [this] { on_change(); }),
       changes_(
           io_, simulator_, std::move(scene), make_engine, compute_niceness,
           [this](const ScenePointer& now) {
@@ -43,7 +47,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
           world_, clock_, log_, [this] { on_change(); }, &events_, &plausibility_),
       pose_server_(io_, config_.poses, config_.limits, admission_, pose_intake_, log_),
       mavlink_server_(io_, config_, pose_intake_, log_),
-      fault_log_(events_, recordings_),
+      fault_log_(events_, recordings_, writer_, log_),
       fleet_({io_, clock_, admission_, log_, options_.digest}, config_, world_, simulator_, recordings_, events_, fault_log_,
              {[this] { on_change(); },
               [this](const Error& why) {
@@ -70,6 +74,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
   mavlink_server_.inject_failures_with([this](std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
     return fault_operations_.inject(unit, type, instance);
   });
+  changes_.pace_while([this] { return !clock_.stepped() && fleet_.has_clients(); });
   recordings_.use_scene(*changes_.scene());
   log_new_notes();
 }
@@ -154,7 +159,7 @@ void App::stop(const std::string& why) {
   stop_timer_.expires_after(stop_limit);
   stop_timer_.async_wait([this](const error_code& ec) {
     if (ec) return;
-    if (recordings_.idle()) return io_.stop();
+    if (files_are_written()) return io_.stop();
     stop_timer_.expires_after(files_limit - stop_limit);  // pings that still wait for their file
     stop_timer_.async_wait([this](const error_code& again) {
       if (!again) io_.stop();
@@ -176,7 +181,7 @@ bool App::enough_served() const { return options_.exit_after_pings != 0 && fleet
 void App::look() {
   if (stopping_) {
     // These two are the last things that keep run() from returning.
-    if (fleet_.gone() && recordings_.idle()) {
+    if (fleet_.gone() && files_are_written()) {
       signals_.cancel();
       stop_timer_.cancel();
     }

@@ -47,7 +47,7 @@ struct AppOptions {
 class App {
  public:
   /// After stop() run() returns by then, whatever is still under way.
-  static constexpr std::chrono::milliseconds stop_limit{1800};
+  static constexpr std::chrono::milliseconds stop_limit{1500};
 
   /// `make_engine` is kept: later scenes get theirs on another thread. What it refers to must outlive the App.
   App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);
@@ -65,7 +65,7 @@ class App {
   const Scene& scene() const { return *changes_.scene(); }
   const std::string& engine_description() const { return simulator_.engine_description(); }
   /// After run(): the destructor would wait for a scene or a ping that is not needed any more, or for a disk.
-  bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0 || !recordings_.idle(); }
+  bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0 || !files_are_written(); }
   const PoseServer& poses() const { return pose_server_; }
   const MavlinkServer& mavlink() const { return mavlink_server_; }
   const ControlServer& control() const { return control_; }
@@ -83,6 +83,7 @@ class App {
   void on_change();
   void look();  // after a change: end, or take the next step of stepped time
   bool enough_served() const;
+  bool files_are_written() const { return recordings_.idle() && writer_.idle(); }
   void log_new_notes();
   void wait_for_signal();
   Reload::Steps reload_steps();
@@ -100,6 +101,7 @@ class App {
   Plausibility plausibility_;
   SteppedTime stepped_time_;
   Simulator simulator_;
+  WriterThread writer_;
   Recordings recordings_;
   SceneChanges changes_;
   Admission admission_;

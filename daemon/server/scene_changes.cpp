@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <exception>
 #include <new>
 #include <utility>
@@ -15,7 +16,8 @@ SceneChanges::SceneChanges(asio::io_context& io, Simulator& simulator, ScenePoin
       scene_(std::move(scene)),
       make_engine_(std::move(make_engine)),
       in_use_(std::move(in_use)),
-      on_change_(std::move(on_change)) {
+      on_change_(std::move(on_change)),
+      pause_(io) {
   asio::post(thread_, [nice_by] {
     if (nice_by != 0 && ::nice(nice_by) == -1) return;  // costs only smoothness
   });
@@ -26,6 +28,7 @@ SceneChanges::~SceneChanges() { thread_.join(); }
 void SceneChanges::stop() {
   stopped_ = true;
   waiting_.clear();
+  pause_.cancel();
 }
 
 std::chrono::steady_clock::duration SceneChanges::building_for() const {
@@ -42,6 +45,23 @@ void SceneChanges::submit(Change change) {
 void SceneChanges::begin() {
   under_way_ = true;
   if (!waiting_.front().make) return finish(Built{scene_, nullptr});
+  const auto pause = pause_before_engine();
+  if (pause.count() == 0) return build_next();
+  pause_.expires_after(pause);
+  pause_.async_wait([this](const error_code& ec) {
+    if (!ec && !stopped_) build_next();
+  });
+}
+
+std::chrono::steady_clock::duration SceneChanges::pause_before_engine() {
+  const auto now = std::chrono::steady_clock::now();
+  if (!drivers_wait_ || !drivers_wait_()) return {};
+  const auto due = std::max(engine_due_, now - (most_at_once - 1) * between_engines);
+  engine_due_ = due + between_engines;
+  return std::max(due - now, std::chrono::steady_clock::duration{});
+}
+
+void SceneChanges::build_next() {
   building_ = true;
   building_since_ = std::chrono::steady_clock::now();
   // Without `done`: what that holds (a connection, say) must not end on another thread.

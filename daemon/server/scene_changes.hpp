@@ -34,6 +34,9 @@ class SceneChanges {
   /// A new scene is in use: told before its Change is done.
   using InUse = std::function<void(const ScenePointer& scene)>;
   static constexpr std::size_t most_waiting = 64;
+  /// While drivers are served: each engine costs them some of a ping.
+  static constexpr int most_at_once = 8;
+  static constexpr std::chrono::milliseconds between_engines{500};
 
   /// `nice_by` is added to the niceness of the thread; `on_change` is called when a Change is done.
   SceneChanges(asio::io_context& io, Simulator& simulator, ScenePointer scene, EngineFactory make_engine, int nice_by,
@@ -43,6 +46,8 @@ class SceneChanges {
   SceneChanges(const SceneChanges&) = delete;
   SceneChanges& operator=(const SceneChanges&) = delete;
 
+  /// Before the first change: whether drivers are served now, in real time.
+  void pace_while(std::function<bool()> drivers_wait) { drivers_wait_ = std::move(drivers_wait); }
   /// Done before this returns when nothing is to be made and nothing waits.
   void submit(Change change);
   bool busy() const { return under_way_ || !waiting_.empty(); }
@@ -61,6 +66,8 @@ class SceneChanges {
     std::shared_ptr<std::unique_ptr<PingEngine>> engine;  // empty: the scene stays
   };
   void begin();
+  void build_next();
+  std::chrono::steady_clock::duration pause_before_engine();
   Result<Built> build(const Make& make, const ScenePointer& now) const;
   void finish(Result<Built> built);
 
@@ -73,7 +80,9 @@ class SceneChanges {
   std::deque<Change> waiting_;  // the first is under way
   bool under_way_ = false;      // until its `done` has returned, which may submit another
   bool stopped_ = false, building_ = false;
-  std::chrono::steady_clock::time_point building_since_{};
+  std::chrono::steady_clock::time_point building_since_{}, engine_due_{};
+  std::function<bool()> drivers_wait_;
+  asio::steady_timer pause_;
   asio::thread_pool thread_{1};
 };
 

@@ -17,7 +17,7 @@ using PortKind = protocol::Port::Kind;
 constexpr std::array<protocol::Port, 3> port_table{
     {{.kind = PortKind::tcp_stream, .number = command_port},
      {.kind = PortKind::udp_beacon, .number = beacon_port, .period = 1000ms, .on_change = true},
-     {.kind = PortKind::udp_stream, .gap = 20us}}};
+     {.kind = PortKind::udp_stream, .any_group = true, .gap = 20us}}};
 
 class ArisVendor final : public protocol::Vendor {
  public:

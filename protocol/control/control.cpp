@@ -3,6 +3,22 @@
 #include "protocol/control/messages.hpp"
 
 namespace sonar::control {
+namespace {
+
+/// Nothing: it does not end within the bytes.
+std::optional<std::uint64_t> take_varint(BytesView& bytes) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < bytes.size() && i < 10; ++i) {
+    const auto byte = std::to_integer<std::uint64_t>(bytes[i]);
+    value |= (byte & 0x7f) << (7 * i);
+    if ((byte & 0x80) != 0) continue;
+    bytes = bytes.subspan(i + 1);
+    return value;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
 
 Result<PoseSample> decode_pose_datagram(BytesView datagram) {
   v1::PoseUpdate message;
@@ -15,6 +31,25 @@ tl::expected<Request, RefusedRequest> decode_request(BytesView bytes) {
   v1::Request message;
   if (!parse(message, bytes)) return tl::unexpected(RefusedRequest{0, "message is not a Request", false, false});
   return from(message);
+}
+
+bool is_unasked_pose(BytesView rest) {
+  constexpr std::uint64_t varint = 0, with_length = 2;
+  bool has_id = false, is_pose = false;
+  while (!rest.empty()) {
+    const auto key = take_varint(rest);
+    const auto value = key && (*key & 7) <= with_length ? take_varint(rest) : std::nullopt;
+    if (!value) return false;
+    const std::uint64_t field = *key >> 3;
+    if ((*key & 7) == varint) {
+      if (field == v1::Request::kIdFieldNumber) has_id = *value != 0;
+      continue;
+    }
+    if ((*key & 7) != with_length || *value > rest.size()) return false;
+    is_pose = field == v1::Request::kPoseFieldNumber || field == v1::Request::kObjectFieldNumber;  // the last one counts
+    rest = rest.subspan(static_cast<std::size_t>(*value));
+  }
+  return is_pose && !has_id;
 }
 
 Bytes encode_response(v1::Response response) {

@@ -58,6 +58,9 @@ struct RefusedRequest {  // its id is known, for the Response
 };
 /// One message of the stream, without its length. A message that is not protobuf has id 0.
 tl::expected<Request, RefusedRequest> decode_request(BytesView message);
+/// Whether a message of the stream is a pose without an id, which gets no answer. Looks at its outline only: much cheaper than
+/// decode_request().
+bool is_unasked_pose(BytesView message);
 /// Bytes of texts that are no UTF-8 are sent as '?'.
 Bytes encode_response(v1::Response response);
 

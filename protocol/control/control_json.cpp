@@ -13,25 +13,36 @@ namespace sonar::control {
 namespace {
 
 using google::protobuf::Message;
-constexpr std::size_t deepest_request = 16;
+constexpr std::size_t deepest_request = 16, most_values = 4096;  // the longest request needs some dozen
 
 std::string in_quotes(const std::string& name) { return '"' + name.substr(0, 64) + '"'; }
+
+/// protobuf takes "range_m" and "rangeM" for the same field.
+std::string as_protobuf_reads(const std::string& name) {
+  std::string read;
+  bool behind_line = false;
+  for (const char c : name) {
+    if (c != '_') read += behind_line && c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+    behind_line = c == '_';
+  }
+  return read;
+}
 
 /// protobuf's reader also takes names without quotes, 'text' and trailing commas, and the last of two equal keys.
 class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
  public:
   std::string why;  // empty = it is JSON
 
-  bool null() override { return true; }
-  bool boolean(bool) override { return true; }
-  bool number_integer(number_integer_t) override { return true; }
-  bool number_unsigned(number_unsigned_t) override { return true; }
-  bool number_float(number_float_t, const string_t&) override { return true; }
-  bool string(string_t&) override { return true; }
-  bool binary(binary_t&) override { return true; }
+  bool null() override { return count(); }
+  bool boolean(bool) override { return count(); }
+  bool number_integer(number_integer_t) override { return count(); }
+  bool number_unsigned(number_unsigned_t) override { return count(); }
+  bool number_float(number_float_t, const string_t&) override { return count(); }
+  bool string(string_t&) override { return count(); }
+  bool binary(binary_t&) override { return count(); }
   bool start_object(std::size_t) override { return enter(); }
   bool key(string_t& name) override {
-    if (keys_.back().insert(name).second) return true;
+    if (keys_.back().insert(as_protobuf_reads(name)).second) return true;
     why = in_quotes(name) + " is given twice";
     return false;
   }
@@ -44,7 +55,13 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
   }
 
  private:
+  bool count() {
+    if (++values_ <= most_values) return true;
+    why = "more than " + std::to_string(most_values) + " values";
+    return false;
+  }
   bool enter() {
+    if (!count()) return false;
     keys_.emplace_back();
     if (keys_.size() <= deepest_request) return true;
     why = "nested deeper than " + std::to_string(deepest_request) + " levels";
@@ -55,6 +72,7 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
   std::vector<std::set<std::string>> keys_;  // of each open object
+  std::size_t values_ = 0;
 };
 
 /// The expected value for a protobuf type; empty where protobuf's own text is enough.

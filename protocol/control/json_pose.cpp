@@ -1,5 +1,6 @@
 #include "protocol/control/json_pose.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -129,7 +130,21 @@ bool is_json_object(std::string_view line) {
 void LineParser::feed(std::span<const std::byte> received) {
   buffer_.erase(0, start_);  // once for all lines that next() gave out
   start_ = 0;
+  if (in_gap_) {
+    const auto end = std::find(received.begin(), received.end(), std::byte{'\n'});
+    if (end == received.end()) return;
+    received = received.subspan(static_cast<std::size_t>(end - received.begin()) + 1);
+    in_gap_ = false;
+  }
   for (const std::byte b : received) buffer_.push_back(static_cast<char>(b));
+}
+
+void LineParser::skip_gap() {
+  begun_ = in_gap_ = true;
+  const std::size_t last = buffer_.rfind('\n');
+  const bool whole_lines = last != std::string::npos && last >= start_;
+  if (!whole_lines) swallowing_ = false;
+  buffer_.resize(whole_lines ? last + 1 : std::min(start_, buffer_.size()));
 }
 
 /// False: the first bytes may yet become a byte order mark.

@@ -36,6 +36,8 @@ class LineParser {
   };
   void feed(std::span<const std::byte> received);
   std::optional<Line> next();
+  /// Some of the stream is missing here: the line that has begun is dropped, and what comes up to the end of the next one.
+  void skip_gap();
   /// The line that has begun can still become a JSON object: only blanks have come of it, or its first sign is a brace. A request
   /// line of HTTP never can.
   bool may_become_object() const;
@@ -46,6 +48,7 @@ class LineParser {
   std::size_t start_ = 0;  // of the next line
   bool swallowing_ = false;
   bool begun_ = false;  // the stream, after its mark
+  bool in_gap_ = false;
 };
 
 }  // namespace sonar::control

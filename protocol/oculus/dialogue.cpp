@@ -57,9 +57,13 @@ class OculusDialogue final : public protocol::Dialogue {
     return reaction;
   }
 
-  Time next_tick() const override { return greeting_at_ ? std::min(*greeting_at_, dummy_at_) : dummy_at_; }
+  Time next_tick() const override {
+    const Time dummy_at = expects_pings() ? Time::max() : dummy_at_;
+    return greeting_at_ ? std::min(*greeting_at_, dummy_at) : dummy_at;
+  }
   void on_ping_queued(Time now) override {
     is_not_waiting();
+    requested_ping_ = false;
     postpone_dummy(now);
   }
 
@@ -99,10 +103,20 @@ class OculusDialogue final : public protocol::Dialogue {
     const bool one_ping = resolved.settings.triggered && !standby;
     reaction.events.emplace_back(ChangeSettings{resolved.settings, std::make_shared<HeldFire>(*fire), summary(*fire, resolved)});
     if (one_ping) reaction.events.emplace_back(RequestPing{});
+    has_fired_ = true;
+    requested_ping_ = one_ping;
     if (standby && !repeated) {  // drivers expect a dummy as the acknowledgement of standby
       reaction.replies.push_back(make_dummy(device_.id));
       postpone_dummy(now);
     }
+  }
+
+  /// A driver may take a dummy as the echo of standby, and stores that as its ping rate: there is none while it waits for pings,
+  /// however long they take. With network trigger the device waits for the client.
+  bool expects_pings() const {
+    const auto* held = dynamic_cast<const HeldFire*>(device_.settings.get());
+    if (!has_fired_ || held == nullptr || table_rate_hz(held->fire.settings.ping_rate) <= 0) return false;
+    return requested_ping_ || (held->fire.settings.flags & flag::network_trigger) == 0;
   }
 
   static std::string summary(const FireRequest& fire, const ResolvedSettings& resolved) {
@@ -144,6 +158,7 @@ class OculusDialogue final : public protocol::Dialogue {
   protocol::Bytes last_request_;
   DeviceState::StoredAddress stored_;  // as of this call: a read may follow its write in the same bytes
   Time dummy_at_{};
+  bool has_fired_ = false, requested_ping_ = false;
   std::optional<Time> greeting_at_;
   bool greets_silent_ = false;  // only a client that has neither fired nor been sent a ping by then
   std::size_t notices_ = 0;

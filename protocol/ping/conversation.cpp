@@ -23,7 +23,13 @@ double number_option(const protocol::OptionValues& values, std::string_view name
 }
 
 protocol::Option silence_option() {
-  return {option_name::silence_s, {}, "never", "a host that sends nothing for so long is given up, seconds", 5, 600};
+  return {option_name::silence_s,
+          {},
+          "60",
+          "a host by UDP of which nothing is heard for so long is given up, seconds",
+          5,
+          600,
+          "never"};
 }
 protocol::Option type_option(std::string_view usual, std::string_view meaning) {
   return {option_name::device_type, {}, usual, meaning, 0, 255};
@@ -34,7 +40,7 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
   framer_.append(received);
   while (const auto frame = framer_.next()) {
     // One answer a datagram: its sender may be another than it says.
-    const bool is_all = header_size + frame->payload.size() + sum_size == received.size();
+    const bool is_all = header_size + frame->header.length + sum_size == received.size();
     if (!by_datagrams_ || frame->sum_is_right || is_all) on_frame(*frame, now, reaction);
     if (by_datagrams_ && frame->sum_is_right) break;
   }
@@ -44,7 +50,7 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
 
 std::optional<std::chrono::milliseconds> Conversation::longest_silence() const {
   const double s = number_option(device_.options, option_name::silence_s);
-  return s > 0 ? std::optional(std::chrono::milliseconds(static_cast<int>(1000 * s))) : std::nullopt;
+  return by_datagrams_ && s > 0 ? std::optional(std::chrono::milliseconds(static_cast<int>(1000 * s))) : std::nullopt;
 }
 
 void Conversation::on_frame(const Frame& frame, Time now, protocol::Reaction& reaction) {

@@ -1,6 +1,7 @@
 #include "protocol/ping/messages.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace sonar::ping {
 namespace {
@@ -56,43 +57,54 @@ Bytes nack(Id id, std::uint8_t source, std::string_view why) {
   return framed(Id::nack, source, payload);
 }
 
+void Framer::append(BytesView received) {
+  last_size_ = 0;
+  if (begin_ > buffer_.size() / 2) {
+    const auto searched = static_cast<std::ptrdiff_t>(begin_);
+    buffer_.erase(buffer_.begin(), buffer_.begin() + searched);
+    sums_.erase(sums_.begin(), sums_.begin() + searched);
+    erased_ += std::exchange(begin_, 0);
+  }
+  buffer_.insert(buffer_.end(), received.begin(), received.end());
+  for (const std::byte b : received) sums_.push_back(static_cast<std::uint16_t>(sums_.back() + std::to_integer<unsigned>(b)));
+}
+
+void Framer::drop_rest() {
+  erased_ += buffer_.size();
+  buffer_.clear();
+  sums_.assign(1, 0);
+  begin_ = last_size_ = 0;
+}
+
 std::optional<Frame> Framer::next() {
-  std::size_t begin = 0;
-  std::optional<Frame> found;
-  while (!found && begin < buffer_.size()) {
-    const BytesView left = BytesView(buffer_).subspan(begin);
-    if (left[0] != std::byte{'B'} || (left.size() > 1 && left[1] != std::byte{'R'})) {
-      ++begin;
-      continue;
-    }
-    if (left.size() < header_size) {
-      if (!all_is_there_) break;
-      ++begin;
-      continue;
-    }
+  last_size_ = 0;
+  for (; begin_ < buffer_.size(); ++begin_) {
+    const BytesView left = BytesView(buffer_).subspan(begin_);
+    if (left[0] != std::byte{'B'} || (left.size() > 1 && left[1] != std::byte{'R'})) continue;
     Frame frame;
-    wire::Reader reader(left);
-    fields(reader, frame.header);
-    if (frame.header.length > longest_) {
-      ++begin;
-      continue;
+    if (left.size() >= header_size) {
+      wire::Reader reader(left);
+      fields(reader, frame.header);
+      if (frame.header.length > longest_) continue;
     }
     const std::size_t summed = header_size + frame.header.length;
     if (left.size() < summed + sum_size) {
-      if (!all_is_there_) break;
-      ++begin;
+      if (!all_is_there_) return std::nullopt;
       continue;
     }
-    const BytesView payload = reader.block("payload", frame.header.length);
-    frame.payload.assign(payload.begin(), payload.end());
-    std::uint16_t sum = 0;
-    reader("checksum", sum);
-    frame.sum_is_right = sum == sum_of(left.first(summed));
-    begin += frame.sum_is_right ? summed + sum_size : 1;
-    found = std::move(frame);
+    std::uint16_t stated = 0;
+    wire::Reader behind(left.subspan(summed));
+    behind("checksum", stated);
+    frame.sum_is_right = stated == static_cast<std::uint16_t>(sums_[begin_ + summed] - sums_[begin_]);
+    if (frame.sum_is_right) {
+      const BytesView payload = left.subspan(header_size, frame.header.length);
+      frame.payload.assign(payload.begin(), payload.end());
+      last_size_ = summed + sum_size;
+    }
+    begin_ += std::max<std::size_t>(last_size_, 1);
+    return frame;
   }
-  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(begin));
-  return found;
+  return std::nullopt;
 }
 
 bool holds_frame(BytesView datagram) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "protocol/wire/wire.hpp"
 
@@ -76,27 +77,38 @@ Bytes nack(Id id, std::uint8_t source, std::string_view why);
 
 struct Frame {
   Header header;
-  Bytes payload;
+  Bytes payload;  // empty with a wrong sum
   bool sum_is_right = true;
 };
 
 /// Frames of a byte stream, however it is split. A payload stated to be longer than `longest` is no frame, and after a wrong sum
 /// the search goes on behind the start: at most one frame waits to be whole. Of a datagram nothing more comes: with
-/// `all_is_there` the search goes on behind the start of what is not whole.
+/// `all_is_there` the search goes on behind the start of what is not whole. The work is in proportion to the bytes, whatever
+/// they are: each is summed once, and the sum of a frame is a difference.
 class Framer {
  public:
   explicit Framer(std::size_t longest = longest_request, bool all_is_there = false)
       : longest_(longest), all_is_there_(all_is_there) {}
-  void append(BytesView received) { buffer_.insert(buffer_.end(), received.begin(), received.end()); }
+  void append(BytesView received);
+  /// Nothing more comes.
+  void end() { all_is_there_ = true; }
   std::optional<Frame> next();
+  /// The bytes of the last frame whose sum is right, until append().
+  BytesView bytes() const { return BytesView(buffer_).subspan(begin_ - last_size_, last_size_); }
   /// What is not whole yet.
-  void drop_rest() { buffer_.clear(); }
-  std::size_t waiting_bytes() const { return buffer_.size(); }
+  void drop_rest();
+  std::size_t waiting_bytes() const { return buffer_.size() - begin_; }
+  /// How far the search is, from the first byte of all on.
+  std::uint64_t passed() const { return erased_ + begin_; }
 
  private:
   std::size_t longest_;
   bool all_is_there_;
   Bytes buffer_;
+  std::vector<std::uint16_t> sums_{0};  // of the bytes before each place, modulo 2^16
+  std::size_t begin_ = 0;               // of what is not searched yet
+  std::size_t last_size_ = 0;           // of the frame that ends there
+  std::uint64_t erased_ = 0;
 };
 
 /// What devices say alone. No answer to it: two devices would answer each other without end.

@@ -13,6 +13,8 @@ using protocol::Reaction;
 constexpr auto port_table = streaming_ports(51200);
 
 class OmniscanDialogue final : public StreamingConversation<Settings, settings_from> {
+  bool hosts_fall_silent() const override { return true; }  // ping-python; those of a Surveyor answer its requests for the time
+
  public:
   using StreamingConversation::StreamingConversation;
 

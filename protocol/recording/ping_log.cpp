@@ -39,58 +39,56 @@ std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
   }
 }
 
+constexpr std::size_t longest_payload = 65535, chunk_bytes = std::size_t{64} << 10;
+
 class PingLogReader final : public RecordingReader {
  public:
   explicit PingLogReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
 
   std::optional<RecordedMessage> next() override {
-    while (!scan_.peek(1).empty()) {
-      const auto frame = frame_here();
-      if (!frame) {
-        scan_.skip(1);
-        continue;
-      }
-      note_what_is_skipped();
-      const std::size_t size = ping::header_size + frame->payload.size() + ping::sum_size;
-      const BytesView bytes = scan_.read(size);
+    while (const auto frame = next_frame()) {
+      const BytesView bytes = framer_.bytes();
+      note_what_is_skipped(framer_.passed() - bytes.size());
+      whole_to_ = framer_.passed();
       if (const auto ms = power_up_ms(*frame)) at_ = Time(std::chrono::milliseconds(*ms));
-      whole_to_ = scan_.position();
       if (frame->header.id != ping::Id::json_wrapper)
         return RecordedMessage{at_, Origin::device, Carrier::stream, Bytes(bytes.begin(), bytes.end())};
     }
-    note_what_is_skipped();
+    note_what_is_skipped(scan_.position());
+    if (scan_.left() > 0) damages_.add("cannot be read from byte " + std::to_string(scan_.position()) + " on");
     return std::nullopt;
   }
   std::optional<Error> damage() const override { return damages_.error(source_->name()); }
   void rewind() override {
     scan_.seek(0);
+    framer_ = ping::Framer(longest_payload);
     whole_to_ = 0;
     at_ = {};
     damages_.clear();
   }
 
  private:
-  void note_what_is_skipped() {
-    const std::uint64_t here = scan_.position();
-    if (here > whole_to_)
-      damages_.add("bytes " + std::to_string(whole_to_) + " to " + std::to_string(here - 1) + " are no whole frame");
-    whole_to_ = here;
-    if (scan_.left() > 0 && scan_.peek(1).empty()) damages_.add("cannot be read from byte " + std::to_string(here) + " on");
+  /// With the right sum.
+  std::optional<ping::Frame> next_frame() {
+    for (bool ended = false;;) {
+      while (auto frame = framer_.next())
+        if (frame->sum_is_right) return frame;
+      if (ended) return std::nullopt;
+      const BytesView more = scan_.read(chunk_bytes);
+      framer_.append(more);
+      ended = more.empty();
+      if (ended) framer_.end();
+    }
   }
-  /// With the right sum, without moving.
-  std::optional<ping::Frame> frame_here() {
-    ping::Header header;
-    wire::Reader reader(scan_.peek(ping::header_size));
-    fields(reader, header);
-    if (!reader.ok() || header.start != ping::Header{}.start) return std::nullopt;
-    ping::Framer framer(header.length);
-    framer.append(scan_.peek(ping::header_size + header.length + ping::sum_size));
-    auto frame = framer.next();
-    return frame && frame->sum_is_right ? std::move(frame) : std::nullopt;
+  void note_what_is_skipped(std::uint64_t to) {
+    if (to > whole_to_)
+      damages_.add("bytes " + std::to_string(whole_to_) + " to " + std::to_string(to - 1) + " are no whole frame");
+    whole_to_ = to;
   }
 
   std::unique_ptr<Source> source_;
   Scan scan_;
+  ping::Framer framer_{longest_payload};
   std::uint64_t whole_to_ = 0;  // where the last frame ends
   Time at_{};
   Damages damages_;

@@ -137,8 +137,12 @@ Outcome set_udp(Call& call, const Json& posted) {
     return malformed("mode: \"multicast\", \"unicast\" or \"disabled\"");
   const Json ip = posted.value("unicast_destination_ip", Json("")), port = posted.value("unicast_destination_port", Json(0));
   if (!ip.is_string() || !port.is_number_integer() || port < 0 || port > 65535) return malformed("no such destination");
-  if (mode == Json(unicast) && (!text::parse_ipv4(ip.get<std::string>()) || port == 0))
-    return malformed("unicast needs a destination");
+  if (mode == Json(unicast)) {
+    const auto to = text::parse_ipv4(ip.get<std::string>());
+    if (!to || port == 0) return malformed("unicast needs a destination");
+    constexpr unsigned first_multicast = 224;
+    if ((*to)[0] >= first_multicast) return malformed("a unicast destination is the address of one computer");
+  }
   call.settings.udp = mode.get<std::string>();
   call.settings.unicast_ip = ip.get<std::string>();
   call.settings.unicast_port = port.get<std::uint16_t>();
@@ -253,7 +257,8 @@ ResourceReply answer(const protocol::ResourceRequest& request, const DeviceState
     return refused;
   }
   if (request.body.size() > longest_body) return reply_of(413, {{"error", "the body is longer than 1024 bytes"}});
-  const Json posted = Json::parse(request.body, nullptr, false);
+  // Without a body nothing is set: force-sync needs none, every other resource says what it needs.
+  const Json posted = request.body.empty() ? Json::object() : Json::parse(request.body, nullptr, false);
   if (posted.is_discarded()) return reply_of(400, {{"error", "not JSON"}});
   return changed(call, path->post(call, posted));
 }

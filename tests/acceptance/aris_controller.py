@@ -87,11 +87,11 @@ class Frame:
 
 class Controller:
     def __init__(self, address, receiver=True):
-        self.tcp = socket.create_connection((address, COMMANDS), timeout=5)
+        self.tcp = socket.create_connection((address, COMMANDS), timeout=30)
         self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
         self.udp.bind(("127.0.0.1", 0))
-        self.udp.settimeout(10)
+        self.udp.settimeout(30)
         self.sent, self.datagrams, self.incomplete = [], [], 0
         if receiver:
             self.command(RECEIVER, 3, field(1, self.udp.getsockname()[1]) + field(2, b"127.0.0.1"))
@@ -136,7 +136,7 @@ class Beacons:
         self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.udp.bind((address, BEACONS))
 
-    def next(self, patience_s=3.0):
+    def next(self, patience_s=30.0):
         self.udp.settimeout(patience_s)
         data, source = self.udp.recvfrom(256)
         return fields(data), source[0], data

@@ -68,7 +68,7 @@ class PingData:
 
 
 class Host:
-    def __init__(self, address, patience_s=20):
+    def __init__(self, address, patience_s=60):
         self.socket = socket.create_connection((address, PORT), timeout=patience_s)
         self.last_id = 0
         self.hello = None
@@ -141,7 +141,7 @@ class Host:
         return PingData(self.ask(PING, struct.pack("<iI", head, timeout_ms)))
 
 
-def discover(address, patience_s=5):
+def discover(address, patience_s=30):
     """Model, serial and TCP port of the sonar at an address, or None."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
         s.settimeout(patience_s)

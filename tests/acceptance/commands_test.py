@@ -1,9 +1,10 @@
 """What the programs say when asked wrongly: one sentence with what, where and what to do, and the exit code of its class."""
+import os
 import pathlib
 import tempfile
 import unittest
 
-from running_sonard import BUILD, ROOT, SONARCTL, SONARD, free_address, run
+from running_sonard import BUILD, ROOT, SONARCTL, SONARD, run
 
 
 def check(text):
@@ -140,10 +141,91 @@ class Mistakes(unittest.TestCase):
     def test_missing_files_are_66_and_absent_devices_69(self):
         self.expect(run(SONARD, "run", BUILD / "none.yaml"), 66, "none.yaml")
         self.expect(run(SONARCTL, "view", "--png", "x.png", "--from-raw", BUILD / "none.raw"), 66, "none.raw")
-        self.expect(run(SONARCTL, "listen", free_address(), "--wait", "0.1"), 69, "Is sonard running there?")
+        self.expect(run(SONARCTL, "listen", "127.0.0.9", "--wait", "0.1"), 69, "Is sonard running there?")
+
+    def test_what_the_machine_lacks_is_named(self):
+        def short_of(limit):
+            return run("bash", "-c", f"{limit}; exec {SONARD} run --demo")
+
+        self.expect(short_of("ulimit -v 200000"), 69, "memory")
+        if os.geteuid() != 0:  # the superuser has no such limit
+            self.expect(short_of("ulimit -u 1"), 69, "cannot start a thread", "ulimit -u")
+
+    def test_a_token_that_never_comes_is_not_waited_for(self):
+        with tempfile.TemporaryDirectory() as folder:
+            os.mkfifo(pathlib.Path(folder) / "token")
+            for command in (["status"], ["recording", "start", "a.mcap"], ["fault", "list"]):
+                result = run(SONARCTL, *command, "--token-file", pathlib.Path(folder) / "token", patience_s=60)
+                self.expect(result, 66, "cannot read a token from")
 
     def test_an_address_of_another_machine_is_69_with_the_way_out(self):
         self.expect(run(SONARD, "run", "--demo", "--bind", "192.0.2.7"), 69, "192.0.2.7", "--bind")
+
+
+class CheckAndRun(unittest.TestCase):
+    """What `sonard run` refuses before it opens a socket, `sonard check` refuses with the same code and the same sentence."""
+
+    def refused(self, text, code, *words, files=None):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            for file, contents in (files or {}).items():
+                (folder / file).write_text(contents, encoding="utf-8")
+            os.mkfifo(folder / "fifo")
+            config = folder / "test.yaml"
+            config.write_text(text, encoding="utf-8")
+            results = [run(SONARD, command, config, patience_s=300) for command in ("run", "check")]
+        for result in results:
+            self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+            for word in words:
+                self.assertIn(word, result.stderr)
+        ran, checked = (result.stderr.splitlines()[-1] for result in results)
+        self.assertEqual(ran, checked)
+
+    def test_all_of_the_configuration_itself(self):
+        for more, code, *words in [
+                ("faults: {plan: [{do: L05}]}", 78, "faults.plan: faults act only when they are armed"),
+                ("faults: {armed: true, plan: [{do: L99}]}", 78, "is no fault"),
+                ("faults: {armed: true, plan: [{do: U02, sonar: stern}]}", 78, 'sonar "stern" is unknown'),
+                ("faults: {armed: true, plan: [{do: L05, at: {every: 1, phase: 5}}]}", 78, "phase must be below every"),
+                ("faults: {armed: true, journal: missing/j.jsonl}", 74, "journal of faults cannot be written", "No such file"),
+                ("faults: {armed: true, journal: fifo}", 74, "no program reads this FIFO"),
+                ("faults: {armed: true, journal: .}", 74, "Is a directory"),
+                ("clock: lockstep\ncontrol: {stream: off, http: off}", 78, "leave one on"),
+                ("clock: follow\ncontrol: {stream: off, http: off}\nposes: {protobuf: off, json: off}", 78, "leave one on"),
+                ("control: {token_file: none}", 78, "cannot be read; make one"),
+                ("control: {token_file: fifo}", 78, "cannot be read; make one"),
+                ("control: {token_file: short}", 78, "at least 16 characters"),
+                ("control: {http: \"192.0.2.7:8088\"}", 78, "needs control.token_file"),
+                ("recording: {folder: missing}", 78, "is not a folder"),
+                ("recording: {folder: /proc}", 78, "recording.folder", "the kernel's own files"),
+                ("recording: {folder: /sys/kernel}", 78, "recording.folder", "the kernel's own files"),
+                ("objects: [{name: wreck, trajectory: orbit}]", 78, "objects[0]"),
+                ("engine: {mode: paper, multipath: on}", 78, "multipath"),
+                ("limits: {clients: 0}", 78, "limits.clients"),
+                ("nonsense: 1", 78, "nonsense")]:
+            with self.subTest(more=more):
+                self.refused(GOOD + more + "\n", code, *words, files={"short": "x\n"})
+
+    def test_two_listeners_at_one_port(self):
+        same = "poses: {json: \"127.0.0.1:15771\"}\ncontrol: {http: \"127.0.0.1:15771\"}\n"
+        self.refused(GOOD + same, 78, "poses.json and control.http would both listen at 127.0.0.1:15771")
+        self.refused(GOOD + "poses: {json: \"127.0.0.2:52100\"}\n", 78, 'sonar "front" and poses.json would both listen')
+        two = GOOD.replace("bind_ip: 127.0.0.2}", "bind_ip: 127.0.0.2}, {name: rear, profile: oculus-m750d, bind_ip: 0.0.0.0, advertise_ip: 127.0.0.3}")
+        self.refused(two, 78, 'sonar "front" and sonar "rear" would both listen at 0.0.0.0:52100')
+
+    def test_the_scene(self):
+        def with_scene(text):
+            return GOOD.replace(f"{ROOT}/scenes/demo.yaml", text)
+
+        self.refused(with_scene("none.yaml"), 78, "world.scene", "no such file")
+        self.refused(with_scene("fifo"), 78, "world.scene")
+        self.refused(with_scene("scene.yaml"), 65, "scene.yaml:1:", files={"scene.yaml": "objects: [{name: a, sphere: {radius_m: -1}}]\n"})
+        self.refused(with_scene("scene.yaml"), 65, "no mesh file at", files={"scene.yaml": "objects: [{name: a, type: mesh, file: a.obj, material: sand}]\n"})
+
+    def test_the_engine(self):
+        if pathlib.Path("/dev/nvidiactl").exists():
+            self.skipTest("there is a graphics processor")
+        self.refused(GOOD + "engine: {device: cuda}\n", 69, "use --engine cpu or auto")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import tempfile
 import time
 import unittest
 
-from running_sonard import ROOT, SONARD, Sonard, free_address
+from running_sonard import ROOT, SONARD, Sonard
 
 PAGE = ROOT / "docs/control.md"
 PAGE_HOST = "127.0.0.1:8088"
@@ -166,7 +166,7 @@ class Running(unittest.TestCase):
 
 class Starting(unittest.TestCase):
     def start(self, control):
-        address = free_address()
+        address = "127.0.0.9"
         with tempfile.TemporaryDirectory() as folder:
             config = pathlib.Path(folder) / "sonard.yaml"
             config.write_text(f"world: {{scene: {ROOT / 'scenes/demo.yaml'}}}\nvehicles: [{{name: rov}}]\n"
@@ -189,7 +189,7 @@ class Starting(unittest.TestCase):
         self.assertIn("cannot be read", done.stderr)
 
     def test_a_given_address_must_be_free(self):
-        with socket.create_server((free_address(), 0)) as other:
+        with socket.create_server(("127.0.0.9", 0)) as other:
             ip, port = other.getsockname()
             done = self.start(f"{{{{stream: off, http: '{ip}:{port}'}}}}")
         self.assertEqual(done.returncode, 69)

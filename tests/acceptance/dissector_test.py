@@ -160,7 +160,6 @@ class RecordedRun(Dissected):
     def record(self, daemon):
         """[(sender, [messages])] of a conversation with the shipped daemon, and a status datagram while a client is there."""
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener, Client(daemon.address) as client:
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # tests beside this one listen at every address
             listener.bind((daemon.address, 52102))
             listener.settimeout(20)
             turns = [("device", [client.message()[1]])]  # the text sent to every client (option boot_text)

@@ -1,18 +1,18 @@
-"""The example of docs/writing-a-driver-test.md as it is, with its own little driver, on an address of its own."""
+"""The example of docs/writing-a-driver-test.md as it is, with its own little driver."""
 import os
 import subprocess
 import sys
 import time
 import unittest
 
-from running_sonard import ROOT, SONARD, free_address
+from running_sonard import ROOT, SONARD
 
 EXAMPLE = ROOT / "docs/driver-test"
 
 
 def run_example(test, **more):
     """The example's tests, or one of them, as a newcomer runs them."""
-    environment = {**os.environ, "SONARD": str(SONARD.resolve()), "ADDRESS": free_address(), **more}
+    environment = {**os.environ, "SONARD": str(SONARD.resolve()), "ADDRESS": "127.0.0.9", **more}
     if "DRIVER" not in more:
         environment.pop("DRIVER", None)
     return subprocess.run([sys.executable, "-B", "-m", "unittest", "-v", test], cwd=EXAMPLE, env=environment,

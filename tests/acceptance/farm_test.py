@@ -6,11 +6,17 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
-import time
 import unittest
 
-from running_sonard import ROOT, SONARD, SONARCTL, run
+from running_sonard import ROOT, SONARD, SONARCTL, eventually, run
+
+PORT = 4222
+URL = f"nats://127.0.0.1:{PORT}"
+
+sys.path.append(str(ROOT / "tests/reliability"))
+from record import record  # noqa: E402  pylint: disable=wrong-import-position
 
 SERVER = shutil.which("nats-server") or shutil.which("nats-server", path="/usr/sbin:/usr/local/sbin")
 
@@ -26,14 +32,6 @@ sonar: {ping: {range_m: 7, beams: 32, rows: 64}}
 poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10.5], rpy_deg: [0, 10, 0]}}
 """
 TETRAHEDRON = "v 0 0 0.3\nv 0.3 0 -0.2\nv -0.2 0.3 -0.2\nv -0.2 -0.3 -0.2\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n"
-
-
-def eventually(true, patience_s=120):
-    end = time.monotonic() + patience_s
-    while not true():
-        if time.monotonic() > end:
-            raise AssertionError("has not come true")
-        time.sleep(0.05)
 
 
 def why_not():
@@ -52,10 +50,6 @@ class Farm(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.path = pathlib.Path(folder.name)
         self.out = self.path / "farm"
-        with socket.socket() as s:
-            s.bind(("127.0.0.1", 0))
-            self.port = s.getsockname()[1]
-        self.url = f"nats://127.0.0.1:{self.port}"
         self.processes = []
         self.addCleanup(self.end_all)
         self.start_server()
@@ -73,15 +67,15 @@ class Farm(unittest.TestCase):
         return process
 
     def start_server(self):
-        self.server = self.start(SERVER, "-js", "-sd", self.path / "store", "-a", "127.0.0.1", "-p", self.port)
+        self.server = self.start(SERVER, "-js", "-sd", self.path / "store", "-a", "127.0.0.1", "-p", PORT)
         eventually(self.answers)
 
     def answers(self):
         with socket.socket() as s:
-            return s.connect_ex(("127.0.0.1", self.port)) == 0
+            return s.connect_ex(("127.0.0.1", PORT)) == 0
 
     def worker(self, out=None, *more):
-        return self.start(SONARD, "worker", "--nats", self.url, "--out", out or self.out, "--threads", "1", *more)
+        return self.start(SONARD, "worker", "--nats", URL, "--out", out or self.out, "--threads", "1", *more)
 
     def farm(self, *words, code=0):
         result = run(SONARCTL, "farm", *words)
@@ -89,10 +83,10 @@ class Farm(unittest.TestCase):
         return result.stdout + result.stderr
 
     def status(self):
-        return self.farm("status", "--nats", self.url)
+        return self.farm("status", "--nats", URL)
 
     def submit(self, job, *more):
-        text = self.farm("submit", job, "--nats", self.url, "--out", self.out, "--ack-wait", "3", *more)
+        text = self.farm("submit", job, "--nats", URL, "--out", self.out, "--ack-wait", "3", *more)
         return text, self.out / text.split()[0]
 
     def logs(self):
@@ -126,7 +120,6 @@ class Farm(unittest.TestCase):
         eventually(lambda: list(made.glob("shard-*.tar.sha256")))
         self.server.kill()
         self.server.wait()
-        time.sleep(0.3)
         self.start_server()
         self.wait_for(*workers)
         self.assertIn("12 done, 0 running, 0 queued, 0 dead", self.status(), self.logs())
@@ -135,6 +128,7 @@ class Farm(unittest.TestCase):
             if file.name != "job.json":
                 self.assertEqual(file.read_bytes(), (made / file.name).read_bytes(), file.name)
         self.assertEqual(list(made.glob("*.tmp*")), [])
+        record("farm-kill", "12 of 12, of 3 workers", "all, byte for byte those of one process", True, "python3 tests/acceptance/farm_test.py")
         self.assertIn("0 submitted, 0 in the queue already, 12 finished", self.submit(job)[0])
         (made / "shard-000003.tar").unlink()
         self.assertIn("1 submitted", self.submit(job)[0])  # though its id is one that the server has just seen
@@ -191,19 +185,51 @@ class Farm(unittest.TestCase):
         self.wait_for(worker)
         self.assertIn("0 running, 1 queued", self.status())
 
+    def test_numbers_that_are_no_shards_are_removed_from_the_queue(self):
+        with socket.create_connection(("127.0.0.1", self.port), timeout=60) as nats:
+            lines = nats.makefile("rb")
+            nats.sendall(b'CONNECT {"verbose":false}\r\nSUB farm.work.> 1\r\nPING\r\n')
+            while not lines.readline().startswith(b"PONG"):
+                pass
+            _, made = self.submit(self.small_job())
+            job = lines.readline().split(b".")[2]  # MSG farm.work.JOB.SHARD ...
+            for number in (b"6", b"999999999", b"18446744073709551615", b"x"):
+                nats.sendall(b"PUB farm.work." + job + b"." + number + b" 0\r\n\r\n")
+            nats.sendall(b"PING\r\n")
+            while not lines.readline().startswith(b"PONG"):
+                pass
+        self.wait_for(self.worker(None, "--until-empty"))
+        for number in ("6", "999999999", "18446744073709551615"):
+            self.assertIn(f"shard {number} is none of the 6 of", self.logs())
+        self.assertEqual(sorted(f.name for f in made.glob("shard-*.tar")), [f"shard-{n:06}.tar" for n in range(6)])
+        self.assertIn("6 done, 0 running, 0 queued, 0 dead", self.status())
+
     def test_what_is_wrong_is_said(self):
         job = self.small_job()
         outside = self.path / "outside.obj"
         outside.write_text(TETRAHEDRON)
         job.write_text(SMALL.replace("meshes/ball.obj", "../outside.obj"))
         self.assertIn("../outside.obj is not below the job's folder",
-                      self.farm("submit", job, "--nats", self.url, "--out", self.out, code=78))
+                      self.farm("submit", job, "--nats", URL, "--out", self.out, code=78))
         self.assertIn("the farm has no jobs", self.status())
         self.server.kill()
         self.server.wait()
-        for command in ((SONARD, "worker", "--out", self.out), (SONARCTL, "farm", "status")):
-            result = run(*command, "--nats", self.url)
-            self.assertEqual((result.returncode, "no NATS server answers at" in result.stderr), (69, True), result.stderr)
+        result = run(SONARCTL, "farm", "status", "--nats", URL)
+        self.assertEqual((result.returncode, "no NATS server answers at" in result.stderr), (69, True), result.stderr)
+
+    def test_a_worker_that_is_started_before_the_server_waits_for_it(self):
+        self.submit(self.small_job())
+        self.server.kill()
+        self.server.wait()
+        worker, stopped = self.worker(None, "--until-empty"), self.worker()
+        eventually(lambda: self.logs().count("no NATS server answers at") >= 2)
+        self.assertIn("trying again", self.logs())
+        self.assertEqual((worker.poll(), stopped.poll()), (None, None), self.logs())
+        stopped.terminate()
+        self.wait_for(stopped)
+        self.start_server()
+        self.wait_for(worker)
+        self.assertIn("6 done, 0 running", self.status())
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What the README prints is what comes out: tests/tools/first_minutes.sh in a network namespace of its own, line by line beside it.
+"""What the README prints is what comes out: tests/tools/first_minutes.sh, line by line beside it.
 
 Numbers differ from run to run and machine to machine; words must not.
 """
@@ -9,7 +9,6 @@ import unittest
 
 from running_sonard import BUILD, ROOT
 
-ISOLATED = ["unshare", "-rn", "sh", "-c", 'ip link set lo up && exec "$0" "$@"']
 MACHINE = [(r"cpu, \w+, ", "cpu, SIMD, "), (r"CUDA: .*", "CUDA: x"), (r"\(looked in .*\)", "(looked in PLACES)"),
            (r"^(ok|warn) +rate .*", "rate"), (r"^(ok|warn) +ports .*", "ports"), (r"key=[0-9a-f.]+", "key=KEY"),
            (r"\d+ warnings?", "warnings")]
@@ -23,11 +22,8 @@ def words(line):
 
 class FirstMinutes(unittest.TestCase):
     def test_the_readme_prints_what_comes_out(self):
-        possible = subprocess.run([*ISOLATED, "true"], capture_output=True, text=True, check=False)
-        if possible.returncode != 0:
-            self.skipTest(f"no network namespaces here: {possible.stderr.strip()}")
-        run = subprocess.run([*ISOLATED, ROOT / "tests/tools/first_minutes.sh", BUILD.resolve()], stdin=subprocess.DEVNULL,
-                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120, check=False,
+        run = subprocess.run([ROOT / "tests/tools/first_minutes.sh", BUILD.resolve()], stdin=subprocess.DEVNULL,
+                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=280, check=False,
                              env={**os.environ, "LC_ALL": "C.UTF-8"})
         self.assertEqual(run.returncode, 0, run.stdout)
         came_out = {words(line) for line in run.stdout.splitlines()}

@@ -27,7 +27,7 @@ class Closed(Exception):
 
 
 class Viewer:
-    def __init__(self, address, port=8088, path="/", protocols=", ".join(NAMES), headers=None, small_window=False, patience_s=20):
+    def __init__(self, address, port=8088, path="/", protocols=", ".join(NAMES), headers=None, small_window=False, patience_s=60):
         self.socket = socket.socket()
         if small_window:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -153,7 +153,7 @@ class Viewer:
         service, call, length = struct.unpack_from("<III", payload, 1)
         return "answer", (service, call, payload[13:13 + length].decode(), payload[13 + length:])
 
-    def wait_for(self, wanted, patience_s=20):
+    def wait_for(self, wanted, patience_s=60):
         """The first thing received for which wanted(kind, value)."""
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:
@@ -177,7 +177,7 @@ class Viewer:
             new.append({"id": subscription, "channelId": self.channel(topic)})
         self.say(op="subscribe", subscriptions=new)
 
-    def first_of(self, topic, patience_s=20):
+    def first_of(self, topic, patience_s=60):
         """The first message of the channel, decoded; waits for it if there is none yet."""
         found = [payload for name, _, payload in self.messages if name == topic]
         if not found:
@@ -189,7 +189,7 @@ class Viewer:
         assert channel["encoding"] == channel["schemaEncoding"] == "protobuf", channel["encoding"]
         return Schema(base64.b64decode(channel["schema"])).decode(channel["schemaName"], payload)
 
-    def status(self, part="", patience_s=20):
+    def status(self, part="", patience_s=60):
         """The next status word with these words."""
         return self.wait_for(lambda kind, value: kind == "word" and value["op"] == "status" and part in value["message"], patience_s)
 

@@ -6,7 +6,7 @@ import tempfile
 import time
 import unittest
 
-from running_sonard import BUILD, ROOT, SONARCTL, SONARD, Sonard, free_address, run
+from running_sonard import BUILD, ROOT, SONARCTL, SONARD, Sonard, run
 
 
 def objects(test, text):
@@ -28,7 +28,7 @@ class JsonLog(unittest.TestCase):
     def test_standard_output_holds_what_it_held(self):
         for arguments in [["--log-format", "json"], []]:
             with self.subTest(arguments=arguments), tempfile.TemporaryDirectory() as folder:
-                config, log, address = pathlib.Path(folder) / "sonard.yaml", pathlib.Path(folder) / "log", free_address()
+                config, log, address = pathlib.Path(folder) / "sonard.yaml", pathlib.Path(folder) / "log", "127.0.0.9"
                 config.write_text(f"""\
 world: {{scene: {ROOT}/scenes/demo.yaml}}
 vehicles: [{{name: rov}}]

@@ -15,7 +15,7 @@ import time
 import unittest
 
 from oculus_reader import Client, fire_message
-from running_sonard import ROOT, SONARCTL, SONARD, Sonard, free_address, run
+from running_sonard import ROOT, SONARCTL, SONARD, Sonard, run
 
 sys.path.insert(0, str(ROOT / "tests/reliability"))
 from record import record  # noqa: E402  the folder above
@@ -77,7 +77,7 @@ class Started:
     """sonard with the standard streams of the test's choice."""
 
     def __init__(self, case, wrap=None, **streams):
-        self.address = free_address()
+        self.address = "127.0.0.9"
         folder = tempfile.TemporaryDirectory()
         case.addCleanup(folder.cleanup)
         self.config = pathlib.Path(folder.name) / "sonard.yaml"
@@ -284,7 +284,7 @@ class ExitCodes(unittest.TestCase):
                                           "sonars: [{name: a, profile: oculus-m1200d, bind_ip: 127.0.0.2}]\n", encoding="utf-8")
             (here / "scene.yaml").write_text("objects:\n  - {name: a, sphere: {radius_m: -1}}\n", encoding="utf-8")
             (here / "on_scene.yaml").write_text(
-                f"world: {{scene: scene.yaml}}\nvehicles: [{{name: rov}}]\nsonars: [{{name: a, profile: oculus-m1200d, bind_ip: {free_address()}}}]\n",
+                "world: {scene: scene.yaml}\nvehicles: [{name: rov}]\nsonars: [{name: a, profile: oculus-m1200d, bind_ip: 127.0.0.9}]\n",
                 encoding="utf-8")
             (here / "file").write_text("", encoding="utf-8")
             cases = [

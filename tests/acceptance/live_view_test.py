@@ -14,7 +14,7 @@ import urllib.request
 
 from foxglove_viewer import NAMES, Closed, Refused, Viewer
 from oculus_reader import Client, fire_message
-from running_sonard import BUILD, Sonard, free_address
+from running_sonard import BUILD, Sonard, eventually
 
 ORIGINS = ', view_origins: ["https://look.example", {origin: "https://steer.example", steer: true}], hosts: [sonar-lab]'
 
@@ -30,6 +30,15 @@ def refusal(*arguments, **options):
     except Refused as refused:
         return refused
     raise AssertionError("was let in")
+
+
+def let_in(*arguments):
+    """A viewer, or None while there is no place for it."""
+    try:
+        return Viewer(*arguments)
+    except Refused as refused:
+        assert refused.status == 503
+    return None
 
 
 @contextlib.contextmanager
@@ -222,7 +231,7 @@ class Reload(unittest.TestCase):
             Steering.call(viewer, "/sonard/step", b'{"dt_s": 1}')
             for topic in kept:
                 viewer.first_of(topic)
-            config.write_text(text.replace("poses:", SECOND.format(free_address()), 1), encoding="utf-8")
+            config.write_text(text.replace("poses:", SECOND.format("127.0.0.9"), 1), encoding="utf-8")
             daemon.process.send_signal(signal.SIGHUP)
             viewer.wait_for(lambda kind, word: kind == "word" and word["op"] == "advertise")
             first = viewer.info["sessionId"]
@@ -234,7 +243,7 @@ class Reload(unittest.TestCase):
             viewer.times.clear()
             for topic in kept:
                 with self.subTest(topic):
-                    viewer.first_of(topic, patience_s=5)
+                    viewer.first_of(topic)
             self.assertTrue(viewer.times)
 
 
@@ -350,7 +359,7 @@ class Preview(unittest.TestCase):
             with Client(daemon.address) as client:
                 client.send(fire_message())
                 self.assertEqual(client.ping().id, 1, "a driver's first ping")
-                deadline = time.monotonic() + 5  # the view looks ten times a second
+                deadline = time.monotonic() + 60  # the view looks ten times a second
                 while Steering.parameters(viewer, "now", "/front/preview")["/front/preview"]:
                     self.assertLess(time.monotonic(), deadline)
                     time.sleep(0.1)  # a viewer that asks without end is closed
@@ -541,8 +550,7 @@ class Limits(unittest.TestCase):
             viewers = [stack.enter_context(Viewer(daemon.address)).greeted() for _ in range(8)]
             self.assertEqual(refusal(daemon.address).status, 503)
             viewers[0].socket.close()
-            time.sleep(0.5)
-            stack.enter_context(Viewer(daemon.address)).greeted()
+            stack.enter_context(eventually(lambda: let_in(daemon.address))).greeted()
 
     def close_code(self, viewer):
         with self.assertRaises(Closed) as closed:

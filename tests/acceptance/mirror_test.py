@@ -3,11 +3,10 @@
 Places are those of scenes/l-targets.yaml; the spheres' nearest points are 0.1 m in front of their centres.
 """
 import math
-import time
 import unittest
 
 from oculus_reader import Client, fire_message
-from running_sonard import Sonard
+from running_sonard import Sonard, eventually
 
 A, B, C, BELOW = (3.9, -20), (3.9, 10), (6.9, -8), (4.9, 0)  # range m, bearing deg: positive to starboard
 VERBATIM_GAIN = 0x59  # metres, simple result, 512 beams; bit 4: the gain is used as it is in mode 2 too
@@ -54,9 +53,13 @@ class Mirror(unittest.TestCase):
 
     def pose(self, *arguments, json=False):
         port = 14771 if json else 14770
+        before = self.accepted()
         result = self.daemon.ctl_to(f"{self.daemon.address}:{port}", "pose", "once", *arguments, *(["--json"] if json else []))
         self.assertEqual(result.returncode, 0, result.stderr)
-        time.sleep(0.3)
+        eventually(lambda: self.accepted() > before)
+
+    def accepted(self):
+        return int(self.daemon.status()["poses"].get("accepted", 0))
 
     def expect_at(self, found, place):
         self.assertAlmostEqual(found[0], place[0], delta=0.12)

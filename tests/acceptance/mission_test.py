@@ -5,6 +5,7 @@ usage: mission_test.py [--long]     --long: ten minutes of it, 1,200 pings; figu
 """
 import hashlib
 import pathlib
+import resource
 import sys
 import tempfile
 import time
@@ -65,9 +66,14 @@ class WholeMission(unittest.TestCase):
             return digest.hexdigest() == flown.sha256
 
 
+def spent_by_children_s():
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
+
+
 class LongTrajectory(unittest.TestCase):
     def test_an_hour_at_100_hz_is_read_within_a_second(self):
-        """With all that sonard check does besides; the test itself fails at five times that."""
+        """Of the processor, with all that sonard check does besides; the test itself fails at five times that."""
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             with open(folder / "hour.csv", "w", encoding="utf-8") as out:
@@ -76,9 +82,9 @@ class LongTrajectory(unittest.TestCase):
             (folder / "sonard.yaml").write_text(CONFIG.replace("SCENE", str(ROOT / "scenes/tank-rod.yaml")), encoding="utf-8")
             least_s = 60.0
             for _ in range(3):
-                begin = time.monotonic()
+                begin = spent_by_children_s()
                 done = run(SONARD, "check", folder / "sonard.yaml")
-                least_s = min(least_s, time.monotonic() - begin)
+                least_s = min(least_s, spent_by_children_s() - begin)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertIn("360000 poses", done.stdout)
         kept("trajectory-load", f"{least_s:.2f} s, the whole of sonard check", "less than 1 s", least_s < 1)

@@ -9,14 +9,14 @@ import sys
 import tempfile
 import unittest
 
-from running_sonard import BUILD, ROOT, free_address, run
+from running_sonard import BUILD, ROOT, run
 
 sys.path.insert(0, str(ROOT / "tests/architecture"))
 import check_links  # noqa: E402
 
 DOCUMENTS = "usr/share/doc/sonard/"
 WANTED = {
-    "sonard": ["usr/bin/sonard", "usr/bin/sonarctl", "usr/lib/systemd/system/sonard.service", "usr/share/man/man8/sonard.8.gz",
+    "sonard": ["usr/bin/sonard", "usr/bin/sonarctl", "usr/libexec/sonard/sonard-import-mesh", "usr/lib/systemd/system/sonard.service", "usr/share/man/man8/sonard.8.gz",
                "usr/share/man/man1/sonarctl.1.gz", "usr/share/man/man5/sonard.yaml.5.gz", "usr/share/sonard/scenes/demo.yaml",
                "usr/share/sonard/scenes/meshes/wreck.obj", "usr/share/doc/sonard/copyright", DOCUMENTS + "CHANGELOG.md",
                DOCUMENTS + "examples/sonard.yaml", DOCUMENTS + "examples/sonard-blueview.yaml",
@@ -71,10 +71,10 @@ class Installed:
         with tempfile.TemporaryDirectory() as folder:
             config = pathlib.Path(folder) / "my.yaml"
             text = "world: {scene: SCENE}\nvehicles: [{name: rov}]\nsonars: [{name: a, profile: oculus-m1200d, bind_ip: ADDRESS}]\n"
-            config.write_text(text.replace("ADDRESS", free_address()).replace("SCENE", "tank-rod.yaml"), encoding="utf-8")
+            config.write_text(text.replace("ADDRESS", "127.0.0.9").replace("SCENE", "tank-rod.yaml"), encoding="utf-8")
             found = run(self.program("sonard"), "check", config)
             self.assertEqual(found.returncode, 0, found.stderr)
-            config.write_text(text.replace("ADDRESS", free_address()).replace("SCENE", "nowhere.yaml"), encoding="utf-8")
+            config.write_text(text.replace("ADDRESS", "127.0.0.9").replace("SCENE", "nowhere.yaml"), encoding="utf-8")
             error = run(self.program("sonard"), "check", config).stderr
             looked = error.split("looked in ")[1]
             first = looked.strip().replace(" and ", ", ").split(", ")[1]
@@ -114,7 +114,7 @@ class Package(Installed, unittest.TestCase):
         for name, wanted in WANTED.items():
             there = files_below(self.roots[name])
             self.assertEqual([w for w in wanted if w not in there], [], name)
-            allowed = ("usr/bin/", "usr/lib/systemd/", "usr/lib/sonard/", "usr/share/")
+            allowed = ("usr/bin/", "usr/libexec/sonard/", "usr/lib/systemd/", "usr/lib/sonard/", "usr/share/")
             self.assertEqual([t for t in there if not t.startswith(allowed)], [], name)
         self.assertFalse([t for t in files_below(self.root) if "bvtsdk.so" in t], "the libraries have their own package")
 

@@ -7,7 +7,7 @@ import time
 import unittest
 
 from oculus_reader import Client, Ping, expected_bearings, fire_message
-from running_sonard import SONARD, Sonard, free_address
+from running_sonard import SONARD, Sonard
 
 
 class Served(unittest.TestCase):
@@ -111,7 +111,7 @@ class TheReaderOfTheLogEnds(unittest.TestCase):
 
     def test_clients_are_served_all_the_same(self):
         configured = Sonard("tank-rod.yaml", pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}")
-        configured.address = free_address()
+        configured.address = "127.0.0.9"
         self.addCleanup(configured.folder.cleanup)
         daemon = subprocess.Popen([str(SONARD), "run", str(configured.write_config())], stdin=subprocess.DEVNULL,
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT)

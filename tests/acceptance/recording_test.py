@@ -16,7 +16,7 @@ import unittest
 
 import mcap_checker
 from oculus_reader import HEADER, Client, Ping, fire_message
-from running_sonard import ROOT, SONARCTL, SONARD, Sonard, free_address, run
+from running_sonard import ROOT, SONARCTL, SONARD, Sonard, run
 from tshark import messages, tshark, why_not
 
 KINDS = ["pcap", "mcap", "oculus", "raw"]
@@ -48,19 +48,21 @@ def oculus_log_messages(data):
 
 
 class Replay:
-    """sonard replay FILE at an address of its own."""
+    """sonard replay FILE."""
+
+    address = "127.0.0.9"
 
     def __init__(self, path, *arguments):
-        for _ in range(5):
-            self.address = free_address()
-            self.log = tempfile.TemporaryFile()
-            self.process = subprocess.Popen([str(SONARD), "replay", str(path), "--ip", self.address, "--status-to", self.address,
-                                             *arguments], stdin=subprocess.DEVNULL, stdout=self.log, stderr=self.log)
-            deadline = time.monotonic() + 60
-            while "Ctrl-C stops" not in self.text() and self.process.poll() is None and time.monotonic() < deadline:
-                time.sleep(0.01)
-            if self.process.poll() != 69:  # 69: somebody has that address
-                return
+        self.log = tempfile.TemporaryFile()
+        self.process = subprocess.Popen([str(SONARD), "replay", str(path), "--ip", self.address, "--status-to", self.address,
+                                         *arguments], stdin=subprocess.DEVNULL, stdout=self.log, stderr=self.log)
+        self.wait_for("Ctrl-C stops")
+
+    def wait_for(self, text):
+        """Until its log has the text, or it ends."""
+        deadline = time.monotonic() + 60
+        while text not in self.text() and self.process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.01)
 
     def text(self):
         self.log.seek(0)
@@ -318,7 +320,7 @@ class OneIntoAnother(Files):
                     driver.recv(1)
                     if not with_driver:
                         driver.close()
-                        time.sleep(0.2)
+                        replay.wait_for("client left")
                     replay.process.send_signal(signal.SIGTERM)
                     self.assertEqual(replay.process.wait(30), 0, replay.text())
                 self.assertIn("served ", replay.text())

@@ -3,7 +3,9 @@
 A client of a sonar that the edit does not touch sees every ping id once, none is missing; the scene it looks at changes under it.
 What is measured is kept for docs/reliability.md where SONARD_RELIABILITY names a folder.
 """
+import json
 import pathlib
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,9 +13,11 @@ import tempfile
 import threading
 import time
 import unittest
+import urllib.error
+import urllib.request
 
 from oculus_reader import Client, Ping, fire_message
-from running_sonard import ROOT, SONARD, Sonard, free_address
+from running_sonard import ROOT, SONARD, Sonard
 
 sys.path.insert(0, str(ROOT / "tests/reliability"))
 from record import record  # noqa: E402  the folder above
@@ -25,6 +29,12 @@ materials:
   bright: {{lambert_db: -10, roughness_m: 0.003}}
 objects:
   - {{name: ball, type: sphere, material: bright, radius_m: 0.3, pose: {{xyz_m: [{x}, 0, -3]}}}}
+"""
+MESH = """\
+materials:
+  bright: {{lambert_db: -10}}
+objects:
+  - {{name: mesh, type: mesh, material: bright, file: {mesh}}}
 """
 SECOND = """\
   - {{name: second, profile: oculus-m750d, bind_ip: {address}, status_to: [{address}], device_id: {device_id}}}
@@ -84,7 +94,7 @@ class Reload(unittest.TestCase):
             near = self.look(watcher)
 
             daemon.scene.write_text(SCENE.format(x=6), encoding="utf-8")
-            second = free_address()
+            second = "127.0.0.9"
             self.config(daemon).write_text(text.replace("poses:", SECOND.format(address=second, device_id=7002) + "poses:"),
                                            encoding="utf-8")
             self.hang_up(daemon, "reloaded: front untouched, second added")
@@ -112,6 +122,42 @@ class Reload(unittest.TestCase):
             code, _ = daemon.stop()
             self.assertEqual(code, 0, daemon.log())
 
+    def test_pings_go_on_when_a_mesh_cannot_be_imported(self):
+        """Each ended the daemon when it imported meshes itself."""
+        daemon = Sonard(pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}")
+        folder = pathlib.Path(daemon.folder.name)
+        daemon.scene = folder / "reload.yaml"
+        daemon.scene.write_text(SCENE.format(x=3), encoding="utf-8")
+        scenes = {}
+        for mesh, words in (("loop.dae", "contains itself"), ("fan.gltf", "repeats its nodes"), ("list.ply", "of memory")):
+            shutil.copy(ROOT / "tests/fuzz/corpus/mesh_file" / mesh, folder)
+            scenes[folder / f"{mesh}.yaml"] = f"{mesh}: ", words
+            (folder / f"{mesh}.yaml").write_text(MESH.format(mesh=mesh), encoding="utf-8")
+        with daemon, Client(daemon.address) as client:
+            client.send(fire_message(range_=8.0, rate_hz=10))
+            watcher = Watcher(client)
+            near = self.look(watcher)
+            for scene, (name, words) in scenes.items():
+                request = urllib.request.Request(f"http://{daemon.address}:8088/api/v1/load", method="POST",
+                                                 data=json.dumps({"path": str(scene)}).encode(),
+                                                 headers={"Content-Type": "application/json"})
+                with self.assertRaises(urllib.error.HTTPError) as refused:
+                    urllib.request.urlopen(request, timeout=60)
+                answer = refused.exception.read().decode()
+                refused.exception.close()
+                self.assertIn(name, answer)
+                self.assertIn(words, answer)
+                watcher.ping_after(3)
+            for times, (scene, (name, words)) in enumerate(scenes.items(), 1):
+                daemon.scene.write_text(scene.read_text(encoding="utf-8"), encoding="utf-8")
+                self.hang_up(daemon, "the configuration stays as it was", times)
+                self.assertIn(name, daemon.log())
+                self.assertIn(words, daemon.log())
+                watcher.ping_after(3)
+            self.assertAlmostEqual(self.look(watcher), near, delta=0.1)
+            code, _ = daemon.stop()
+            self.assertEqual(code, 0, daemon.log())
+
     def look(self, watcher):
         """Range of the strongest echo, a few pings from now: those from before the reload go first."""
         ping = watcher.ping_after(12)
@@ -121,7 +167,7 @@ class Reload(unittest.TestCase):
 
     def test_the_demo_has_nothing_to_read(self):
         with tempfile.TemporaryFile() as log:
-            demo = subprocess.Popen([str(SONARD), "run", "--demo", "--bind", free_address()], stdin=subprocess.DEVNULL, stdout=log,
+            demo = subprocess.Popen([str(SONARD), "run", "--demo", "--bind", "127.0.0.9"], stdin=subprocess.DEVNULL, stdout=log,
                                     stderr=subprocess.STDOUT)
             try:
                 self.wait_for(log, demo, "ready in")

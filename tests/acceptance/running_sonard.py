@@ -1,7 +1,8 @@
-"""Runs sonard on a separate address, and sonarctl, for the acceptance tests.
+"""Runs sonard and sonarctl for the acceptance tests.
 
 SONARD_BUILD names the build folder, build/release by default; ctest sets it.
 """
+import json
 import os
 import pathlib
 import subprocess
@@ -12,7 +13,7 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "clients/python"))
 
-from sonard_client.daemon import Daemon, free_address  # noqa: E402,F401  pylint: disable=wrong-import-position,unused-import
+from sonard_client.daemon import Daemon  # noqa: E402  pylint: disable=wrong-import-position
 
 BUILD = pathlib.Path(os.environ.get("SONARD_BUILD", ROOT / "build/release"))
 SONARD, SONARCTL = BUILD / "daemon/sonard", BUILD / "clients/sonarctl"
@@ -36,6 +37,28 @@ control: {{stream: "ADDRESS:14770", http: "{http}"{control}}}
 def run(*command, patience_s=120):
     return subprocess.run([str(c) for c in command], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=patience_s,
                           check=False)
+
+
+def eventually(true, patience_s=120):
+    """Until true() is so; its value."""
+    end = time.monotonic() + patience_s
+    while not (value := true()):
+        if time.monotonic() > end:
+            raise AssertionError(f"not so within {patience_s} s")
+        time.sleep(0.02)
+    return value
+
+
+def expect_quiet(udp, for_s=1, patience_s=60):
+    """What is under way arrives; after it nothing for so long."""
+    end = time.monotonic() + patience_s
+    udp.settimeout(for_s)
+    try:
+        while time.monotonic() < end:
+            udp.recv(65536)
+    except TimeoutError:
+        return
+    raise AssertionError(f"datagrams arrive for {patience_s} s")
 
 
 class Sonard(Daemon):
@@ -68,6 +91,10 @@ class Sonard(Daemon):
     def ctl(self, command, *arguments, **options):
         """sonarctl COMMAND ADDRESS ..."""
         return run(SONARCTL, command, self.address, *arguments, **options)
+
+    def status(self):
+        """What sonarctl status says, over the control stream of this address."""
+        return json.loads(run(SONARCTL, "status", "--json", "--control", f"{self.address}:14770").stdout)
 
     def ctl_to(self, endpoint, command, *arguments, **options):
         """sonarctl COMMAND ... --to ENDPOINT, for poses."""

@@ -51,7 +51,7 @@ class Planted(unittest.TestCase):
         for name, header in [
                 ("core/scene/scene.cpp", "embree3/rtcore.h"), ("core/pipeline/a.cpp", "embree4/rtcore.h"),
                 ("core/pipeline/a.cpp", "fftw3.h"), ("daemon/config/config.cpp", "yaml-cpp/yaml.h"),
-                ("core/scene/scene.cpp", "assimp/scene.h"), ("protocol/oculus/a.cpp", "spdlog/spdlog.h"),
+                ("core/scene/files/load_mesh.cpp", "assimp/scene.h"), ("protocol/oculus/a.cpp", "spdlog/spdlog.h"),
                 ("daemon/a.cpp", "google/protobuf/message.h"), ("daemon/server/sonars/session.cpp", "boost/asio.hpp"),
                 ("daemon/emulator/world/world.hpp", "protocol/control/answers.hpp"), ("daemon/server/app.cpp", "protocol/control/answers.hpp"),
                 ("core/base/a.cpp", "boost/container/small_vector.hpp"), ("core/base/parallel.cpp", "tbb/parallel_for.h"),
@@ -116,7 +116,7 @@ class Innocent(unittest.TestCase):
         self.assertEqual(found_in({
             "core/base/parallel.cpp": "#include <thread>\nstd::thread worker(f);\n",
             "core/scene/embree_scene.cpp": '#include <embree3/rtcore.h>\n#include "core/scene/ray_scene.hpp"\n',
-            "core/scene/files/load_mesh.cpp": "#include <assimp/scene.h>\n",
+            "core/scene/import/import_mesh.cpp": "#include <assimp/scene.h>\n",
             "core/text/strict_yaml.cpp": "#include <yaml-cpp/parser.h>\n",
             "protocol/control/control.cpp": '#include "control.pb.h"\n',
             "protocol/oculus/a.cpp": "// reinterpret_cast is not for us\nchar t[9]; int n = std::snprintf(t, 9, \"%d\", 1);\n",

@@ -24,8 +24,7 @@ namespace {
 using blueview::FrameType;
 using testing::HasSubstr;
 
-/// Of this process alone: the ports are those of the products.
-const std::string address = "127.84." + std::to_string(getpid() >> 8 & 255) + "." + std::to_string(getpid() & 255);
+const std::string address = "127.0.0.2";
 
 Socket listening(std::uint16_t port) {
   Socket socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));

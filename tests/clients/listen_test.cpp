@@ -27,7 +27,7 @@ Socket bound(int type, std::uint16_t& port) {
   Socket socket(::socket(AF_INET, type | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  ::inet_pton(AF_INET, "127.83.1.9", &address.sin_addr);
+  ::inet_pton(AF_INET, "127.0.0.2", &address.sin_addr);
   // The casts are the sockets interface's own.
   EXPECT_EQ(::bind(socket.fd(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
   socklen_t size = sizeof address;
@@ -65,7 +65,7 @@ class FakeDevice {
     ::shutdown(listener_.fd(), SHUT_RDWR);
     thread_.join();
   }
-  Endpoint endpoint() const { return {"127.83.1.9", port_}; }
+  Endpoint endpoint() const { return {"127.0.0.2", port_}; }
 
  private:
   void serve(std::uint32_t pings, const Answer& answer) {
@@ -154,7 +154,7 @@ TEST(Listen, RefusesBrokenSizesJunkAndWrongEchoes) {
 /// `--seconds` and the time of the first ping do not include the wait for a device that starts late.
 TEST(Listen, CountsTimeFromTheConnection) {
   SourceOptions source;
-  source.device.host = "127.83.1.9";
+  source.device.host = "127.0.0.2";
   const Socket device = bound(SOCK_STREAM, source.device.port);
   source.connect_patience_s = 20;
   const auto begin = std::chrono::steady_clock::now();
@@ -230,7 +230,7 @@ TEST(Endpoints, TakeWhatIsMissingFromTheDefault) {
 wire::Bytes first_datagram(PoseOptions options) {
   std::uint16_t port = 0;
   const Socket listener = bound(SOCK_DGRAM, port);
-  options.to = "127.83.1.9:" + std::to_string(port);
+  options.to = "127.0.0.2:" + std::to_string(port);
   const Result<void> sent = send_poses(options);
   EXPECT_TRUE(sent) << sent.error().text;
   wire::Bytes datagram(2000);
@@ -288,7 +288,7 @@ TEST(Pose, FailsWithoutAListenerOrWithContradictoryOptions) {
   std::uint16_t free_port = 0;
   { const Socket briefly = bound(SOCK_DGRAM, free_port); }
   PoseOptions options;
-  options.to = "127.83.1.9:" + std::to_string(free_port);
+  options.to = "127.0.0.2:" + std::to_string(free_port);
   EXPECT_THAT(send_poses(options).error().text, HasSubstr("no program listens"));
   options.vehicle = "rov";
   options.object = "diver";

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "protocol/control/answers.hpp"
+#include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 #include "tests/fuzz/byte_script.hpp"
 
@@ -15,6 +16,9 @@ using fuzz::require;
 
 void answer(std::span<const std::byte> message) {
   const auto request = control::decode_request(message);
+  // What is skipped without being decoded has no answer that a client could wait for.
+  if (control::is_unasked_pose(message))
+    require(request ? request->id == 0 && std::holds_alternative<control::PoseSample>(request->op) : request.error().id == 0);
   if (!request) {
     require(!request.error().why.empty());
   } else if (const auto* sample = std::get_if<control::PoseSample>(&request->op)) {

@@ -8,7 +8,7 @@ cd "$(dirname "$0")/../.." || exit 70
 build release load_test sonard || exit
 failed=0
 build/release/tests/load/load_test --gtest_brief=1 || failed=1
-for test in descriptors real_pings; do
+for test in descriptors real_pings beside_driver; do
   SONARD_BUILD=$PWD/build/release python3 -B tests/load/${test}_test.py || failed=1
 done
 exit $failed

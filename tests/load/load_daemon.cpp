@@ -14,13 +14,6 @@
 namespace sonar::load {
 namespace {
 
-/// 127.192 to 127.254, by process and sonar: tests of other programs use lower ones.
-std::string address_of_sonar(int sonar) {
-  const auto process = static_cast<unsigned>(getpid());
-  return "127." + std::to_string(192 + process / 250 % 60) + "." + std::to_string(1 + process % 250) + "." +
-         std::to_string(1 + sonar);
-}
-
 std::string yaml(const LoadSetup& setup, const std::vector<std::string>& addresses) {
   std::string text =
       "world: {scene: scene.yaml}\nvehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}\nsonars:\n";
@@ -44,7 +37,7 @@ struct LoadDaemon::Parts {
 
 LoadDaemon::LoadDaemon(const LoadSetup& setup) : parts_(std::make_unique<Parts>()) {
   Parts& p = *parts_;
-  for (int i = 0; i < setup.sonars; ++i) p.addresses.push_back(address_of_sonar(i));
+  for (int i = 0; i < setup.sonars; ++i) p.addresses.push_back("127.0.0." + std::to_string(2 + i));
   const auto folder = std::filesystem::temp_directory_path() / ("sonard_load." + std::to_string(getpid()));
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "scene.yaml") << "name: test\n";

@@ -75,6 +75,18 @@ TEST(Options, UnknownValueIsRefused) {
   EXPECT_EQ(options.error().text, "option before_first_fire cannot be 'ping'; did you mean \"pings\"?");
 }
 
+TEST(Options, AWordMayStandForANumber) {
+  const auto profile = protocol::find_profile("ping360");
+  ASSERT_TRUE(profile.has_value());
+  const protocol::Vendor& ping360 = *profile->vendor;
+  EXPECT_EQ(protocol::check_options(ping360, {})->at("host_silence_s"), "60");
+  EXPECT_TRUE(protocol::check_options(ping360, {{"host_silence_s", "never"}}).has_value());
+  EXPECT_TRUE(protocol::check_options(ping360, {{"host_silence_s", "5"}}).has_value());
+  const auto wrong = protocol::check_options(ping360, {{"host_silence_s", "always"}});
+  ASSERT_FALSE(wrong.has_value());
+  EXPECT_EQ(wrong.error().text, "option host_silence_s must be a number from 5 to 600, or never, not 'always'");
+}
+
 TEST(Options, NumbersMustBeNumbers) {
   EXPECT_TRUE(protocol::check_options(oculus(), {{"dummy_period_ms", "250"}}).has_value());
   for (const char* bad : {"", "fast", "-1", "0", "nan", "inf", "1e999", "250ms"}) {

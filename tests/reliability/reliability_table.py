@@ -31,6 +31,11 @@ ITEMS = {
         ("junk-rate", "junk at full speed into one sonar and the pose ports: pings lost by another sonar", "0"),
         ("junk-gap", "the same: its longest gap", "at most 250 ms at 40 Hz"),
         ("descriptors", "all file descriptors used up: pings lost by a running stream", "0"),
+        ("viewers", "8 viewers of every channel beside a driver at 10 Hz, 60 s: pings it lost", "0"),
+        ("faults-beside", "a fault every second at another client, 60 s: pings lost by the driver", "0"),
+        ("faults-journal", "the same: entries of the journal in its file", "every one"),
+        ("datagrams", "Ping360, Surveyor and Omniscan by UDP, 20 s each: pings", "served + dropped, one under way at the end"),
+        ("farm-kill", "farm: a worker and the queue's server killed: shards", "all, byte for byte those of one process"),
     ],
     "Life cycle": [
         ("stop-reading", "SIGTERM: reading clients get their message whole, then a FIN", "all"),

@@ -7,7 +7,12 @@ folder=${1:?usage: check_demo.sh BUILD_FOLDER [PICTURE]}
 picture=${2:-out/demo.png}
 # Sand with nothing on it, 5.5 to 7.8 m, 12 degrees to port. tests/acceptance/picture_test.py judges these figures with 256 beams.
 sand=250:350,150:250
-pings=20 memory_limit_mb=300 first_ping_goal_s=1 first_ping_limit_s=5 stop_goal_ms=2000 stop_limit_ms=10000
+pings=20 memory_limit_mb=300 first_ping_goal_s=1 first_ping_limit_s=5 stop_goal_ms=2000 stop_limit_ms=10000 wait_s=10
+# An emulated processor takes so many times as long, and its emulator needs memory of its own.
+if [ -n "${SONARD_DEMO_SLOWNESS:-}" ]; then
+  first_ping_limit_s=$((first_ping_limit_s * SONARD_DEMO_SLOWNESS)) stop_limit_ms=$((stop_limit_ms * SONARD_DEMO_SLOWNESS))
+  wait_s=$((wait_s * SONARD_DEMO_SLOWNESS)) memory_limit_mb=$((2 * memory_limit_mb))
+fi
 
 scratch=$(mktemp -d)
 daemon=
@@ -46,7 +51,7 @@ for attempt in 1 2 3 4 5; do
   started_at=$(date +%s.%N)
   "$folder/daemon/sonard" run "$scratch/sonard.yaml" >"$scratch/log" 2>&1 </dev/null &
   daemon=$!
-  "$folder/clients/sonarctl" listen "$address" --wait 10 --pings $pings --quiet --started-at "$started_at" \
+  "$folder/clients/sonarctl" listen "$address" --wait $wait_s --pings $pings --quiet --started-at "$started_at" \
     --png "$picture" --record "$scratch/raw" >"$scratch/figures" 2>"$scratch/complaint"
   client=$?
   kill -0 "$daemon" 2>/dev/null && break

@@ -30,11 +30,11 @@ one() {
   local name=$1 corpus=build/fuzz/corpus/$1 findings=build/fuzz/findings/$1 log=build/fuzz/$1.log
   local told tried status before=$SECONDS
   mkdir -p "$corpus" "$findings"
-  local bound=$runs promised=500000 words=500,000
+  local bound=$runs promised=500000 words=500,000 patience=20
   if [ "$name" = mesh_file ]; then
-    bound=$((runs / 100)) promised=5000 words="5,000: the importer takes a hundred times as long"
+    bound=$((runs / 100)) patience=700 promised=5000 words="5,000: the importer takes a hundred times as long"
   fi
-  local given=(-runs="$bound" -max_total_time="$longest" -timeout=20 -rss_limit_mb=2560 -entropic=0 -print_final_stats=1
+  local given=(-runs="$bound" -max_total_time="$longest" -timeout="$patience" -rss_limit_mb=2560 -entropic=0 -print_final_stats=1
     -artifact_prefix="$findings/")
   [ -f "tests/fuzz/dictionaries/$name.dict" ] && given+=("-dict=tests/fuzz/dictionaries/$name.dict")
   given+=("$corpus")

@@ -44,7 +44,7 @@ if [ ${#targets[@]} -eq 0 ]; then
     tsan) kinds=(THREADS) ;;
   esac
   mapfile -t targets < <(tests/tools/run_programs.py "build/$preset" --list "${kinds[@]}")
-  [ "$kind" = asan ] || more=(sonard sonarctl dump_oculus bvtsdk_programs)
+  [ "$kind" = asan ] || more=(sonard sonarctl dump_oculus bvtsdk_programs in_own_network)
 fi
 [ ${#targets[@]} -gt 0 ] || { echo "no test program is of kind $kind" >&2; exit 1; }
 timed "sanitizers: build" build "$preset" "${targets[@]}" "${more[@]}" || exit

@@ -1,7 +1,8 @@
 # Prepares a machine and builds: sourced by run.sh, test.sh and .ci/run, from the repository root. Quick when nothing changed.
 # shellcheck shell=bash
 
-# What the programs need on Debian 12 and Ubuntu, and what the tests need besides to be built; all of it from the main archive.
+# What the programs need on Debian 12, 13 and Ubuntu 22.04, 24.04, and what the tests need besides to be built; all of it from
+# their main archives.
 product_packages=(
   g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libtinyxml2-dev libpng-dev zlib1g-dev
   libexpected-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libfftw3-dev libsnappy-dev libnats-dev
@@ -29,7 +30,7 @@ timed() {
   return $status
 }
 
-# need_packages NAME...: installs what is missing, with apt, and says so.
+# need_packages NAME...: installs what is missing, with apt, and says so. What the archives do not have is named, the rest installed.
 need_packages() {
   if ! command -v dpkg-query >/dev/null; then
     echo "not a Debian-like system: expecting the equivalents of these packages: $*"
@@ -50,10 +51,18 @@ need_packages() {
     as_root=(sudo)
   fi
   say "installing ${missing[*]}"
-  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 update </dev/null &&
-    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -y --no-install-recommends -o DPkg::Lock::Timeout=300 \
-      -o Acquire::Retries=3 -o Dpkg::Use-Pty=0 install "${missing[@]}" </dev/null || {
-    echo "apt-get could not install ${missing[*]}: see its message above; with no network, install them by hand" >&2
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 update </dev/null
+  local unknown=() known=()
+  for name in "${missing[@]}"; do
+    if LC_ALL=C apt-cache policy "$name" | grep -q 'Candidate: [^(]'; then known+=("$name"); else unknown+=("$name"); fi
+  done
+  [ ${#known[@]} -eq 0 ] || "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -y --no-install-recommends \
+    -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 -o Dpkg::Use-Pty=0 install "${known[@]}" </dev/null || {
+    echo "apt-get could not install ${known[*]}: see its message above; with no network, install them by hand" >&2
+    return 69
+  }
+  [ ${#unknown[@]} -eq 0 ] || {
+    echo "not in the package archives of this system: ${unknown[*]}; other systems: CONTRIBUTING.md" >&2
     return 69
   }
 }

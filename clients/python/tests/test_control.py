@@ -72,7 +72,7 @@ class WrongPort(unittest.TestCase):
             begin = time.monotonic()
             with self.assertRaisesRegex(error, f"127.0.0.1:{port} {words}.*another program listens there.*8088"):
                 ask(Control(port=port))
-            self.assertLess(time.monotonic() - begin, 6)  # 2 s on a quiet machine; requests alone: 30 s, 330 s, no limit
+            self.assertLess(time.monotonic() - begin, 20)  # 2 s on a quiet machine; requests alone: 30 s, 330 s, no limit
 
     def test_silent_server(self):
         with socket.create_server(("127.0.0.1", 0)) as silent:

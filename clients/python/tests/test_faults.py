@@ -31,7 +31,7 @@ class Faults(unittest.TestCase):
         sonar = OculusClient(self.daemon.address)
         self.addCleanup(sonar.close)
         sonar.fire(range_m=2, rate_hz=40)
-        sonar.ping(timeout=20)
+        sonar.ping(timeout=60)
         return sonar
 
     def acting(self):
@@ -41,7 +41,7 @@ class Faults(unittest.TestCase):
         self.driver()
         with self.control.fault("silent-open", seconds=60) as fault:
             self.assertEqual(self.acting(), ["L05"])
-            deadline = time.monotonic() + 20
+            deadline = time.monotonic() + 60
             while fault.injections() == 0:
                 self.assertLess(time.monotonic(), deadline)
             first = next(entry for entry in fault.journal() if entry["event"] == "injected")
@@ -56,7 +56,7 @@ class Faults(unittest.TestCase):
 
     def test_a_fault_that_is_over_before_its_block_is_no_error(self):
         with self.control.fault("L01", seconds=0.1) as fault:
-            deadline = time.monotonic() + 20
+            deadline = time.monotonic() + 60
             while self.acting():
                 self.assertLess(time.monotonic(), deadline)
             self.assertEqual(fault.journal()[-1]["event"], "ended")
@@ -66,14 +66,14 @@ class Faults(unittest.TestCase):
         with self.control.fault("L05", seconds=60) as fault:
             begin = time.monotonic()
             self.assertFalse(fault.noticed_within(0.5))
-            self.assertLess(time.monotonic() - begin, 10)
+            self.assertLess(time.monotonic() - begin, 50)
 
     def test_a_driver_that_closes_or_reconnects_has_noticed(self):
         sonar = self.driver()
         with self.control.fault("L05", seconds=60) as fault:
             closing = threading.Timer(0.3, sonar.close)
             closing.start()
-            self.assertTrue(fault.noticed_within(20))
+            self.assertTrue(fault.noticed_within(60))
             closing.join()
             self.assertFalse(fault.noticed_within(0.01), "it took longer")
 

@@ -2,9 +2,8 @@
 
 #include <array>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 
+#include "core/base/regular_file.hpp"
 #include "protocol/control/answers.hpp"
 
 namespace sonar::clients {
@@ -20,13 +19,13 @@ std::chrono::milliseconds left_until(Clock::time_point deadline) {
 Result<std::string> token_from(const std::filesystem::path& file) {
   if (file.empty()) return std::string();
   constexpr const char* blanks = " \t\r\n";
-  std::ifstream in(file);
-  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  const std::size_t first = text.find_first_not_of(blanks);
-  if (!in || first == std::string::npos)
+  constexpr std::size_t most_bytes = 4096;
+  const auto text = read_regular(file, most_bytes);  // of a FIFO or a device nothing may ever come
+  const std::size_t first = text ? text->find_first_not_of(blanks) : std::string::npos;
+  if (first == std::string::npos)
     return failure(ErrorKind::missing_file, "cannot read a token from " + file.string() +
                                                 ": it should be the file that control.token_file of sonard names");
-  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+  return text->substr(first, text->find_last_not_of(blanks) - first + 1);
 }
 
 bool starts_as_http(std::span<const std::byte> received) {

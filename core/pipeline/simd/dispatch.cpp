@@ -12,7 +12,7 @@ SimdLevel level_from_environment() {
   const char* given = std::getenv("SONARD_SIMD");
   const std::string name = given == nullptr || *given == '\0' ? "auto" : given;
   if (const auto level = enum_from<SimdLevel>(name, simd_level_names)) return *level;
-  throw std::runtime_error("SONARD_SIMD: unknown instruction set \"" + name + "\"; use auto, portable, avx2 or avx512");
+  throw std::runtime_error("SONARD_SIMD: unknown instruction set \"" + name + "\"; use auto, portable, avx2, avx512 or neon");
 }
 
 }  // namespace
@@ -24,7 +24,9 @@ const Kernels& kernels_for(SimdLevel level) {
   const bool has_avx512 = has_avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
                           __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
   if (has_avx512 && (level == SimdLevel::automatic || level == SimdLevel::avx512)) return avx512_kernels;
-  if (has_avx2 && level != SimdLevel::portable) return avx2_kernels;
+  if (has_avx2 && level != SimdLevel::portable && level != SimdLevel::neon) return avx2_kernels;
+#elif defined(__aarch64__)
+  if (level != SimdLevel::portable) return neon_kernels;
 #else
   static_cast<void>(level);
 #endif

@@ -143,9 +143,10 @@ struct Kernels {
 };
 
 /// The kernels of a level; `automatic` takes the one that the environment variable SONARD_SIMD names, or the best this processor
-/// has. A level it lacks falls back to the next lower one. Throws std::runtime_error when SONARD_SIMD names no level.
+/// has. A level it lacks falls back to the next lower one, AVX to NEON on ARM. Throws std::runtime_error when SONARD_SIMD names
+/// no level.
 const Kernels& kernels_for(SimdLevel level);
 
-extern const Kernels portable_kernels, avx2_kernels, avx512_kernels;
+extern const Kernels portable_kernels, avx2_kernels, avx512_kernels, neon_kernels;
 
 }  // namespace sonar::simd

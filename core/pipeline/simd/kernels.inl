@@ -177,7 +177,7 @@ inline void refocus_block(const float* from, std::ptrdiff_t stride, const FocusT
   LaneNumbers swapped{};
   Lanes sign{};
   for (int l = 0; l < lanes; ++l) swapped[l] = l ^ 1, sign[l] = l % 2 == 0 ? -1.0f : 1.0f;
-  for (int v = 0; v < width; ++v) out[v] = re[v] + sign * __builtin_shuffle(im[v], swapped);
+  for (int v = 0; v < width; ++v) out[v] = re[v] + sign * shuffle(im[v], swapped);
 }
 
 void refocus(const float* from, std::ptrdiff_t stride, const FocusTaps& t, int floats, float* to) {

@@ -1,4 +1,4 @@
-// The hot loops for any x86-64 (or other) processor; see kernels.inl.
+// The hot loops for any processor; see kernels.inl.
 #include <bit>
 #include <cmath>
 #include <cstdint>

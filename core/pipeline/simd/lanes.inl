@@ -10,6 +10,18 @@ inline Lanes load(const float* at) { return *reinterpret_cast<const Lanes*>(at);
 inline void store(float* at, Lanes v) { *reinterpret_cast<Lanes*>(at) = v; }
 inline Lanes all(float x) { return Lanes{} + x; }
 
+#if defined(__clang__)  // has no shuffle by lane numbers that are not constants
+inline Lanes shuffle(Lanes a, Lanes b, LaneNumbers from) {
+  Lanes v;
+  for (int l = 0; l < lanes; ++l) v[l] = from[l] < lanes ? a[from[l]] : b[from[l] - lanes];
+  return v;
+}
+inline Lanes shuffle(Lanes a, LaneNumbers from) { return shuffle(a, a, from); }
+#else
+inline Lanes shuffle(Lanes a, LaneNumbers from) { return __builtin_shuffle(a, from); }
+inline Lanes shuffle(Lanes a, Lanes b, LaneNumbers from) { return __builtin_shuffle(a, b, from); }
+#endif
+
 #if defined(__AVX512F__)
 
 using LaneMask = __mmask16;
@@ -128,6 +140,43 @@ constexpr PackOrders pack_orders = make_pack_orders();
 inline void pack(float* at, LaneMask m, Lanes v) {
   const auto* order = reinterpret_cast<const __m256i*>(pack_orders.lane[bits_of(m)]);
   _mm256_storeu_ps(at, _mm256_permutevar8x32_ps(native(v), _mm256_load_si256(order)));
+}
+
+#elif defined(SONAR_LANES_NEON)
+
+inline float32x4_t native(Lanes v) { return reinterpret_cast<float32x4_t>(v); }
+inline uint32x4_t native(LaneMask m) { return reinterpret_cast<uint32x4_t>(m); }
+inline bool any(LaneMask m) { return vmaxvq_u32(native(m)) != 0; }
+inline int count_of(LaneMask m) { return -vaddvq_s32(reinterpret_cast<int32x4_t>(m)); }
+inline Lanes nearest_whole(Lanes v) { return Lanes(vrndnq_f32(native(v))); }
+inline Lanes square_root(Lanes x) { return Lanes(vsqrtq_f32(native(x))); }
+inline Lanes counts(const std::int16_t* at) { return Lanes(vcvtq_f32_s32(vmovl_s16(vld1_s16(at)))); }
+inline Lanes gather(const float* table, LaneNumbers at) {
+  return Lanes{table[at[0]], table[at[1]], table[at[2]], table[at[3]]};
+}
+/// table[at] and table[at + 1]: both in one load.
+inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
+  const float32x4_t a = vcombine_f32(vld1_f32(table + at[0]), vld1_f32(table + at[1]));
+  const float32x4_t b = vcombine_f32(vld1_f32(table + at[2]), vld1_f32(table + at[3]));
+  first = Lanes(vuzp1q_f32(a, b)), second = Lanes(vuzp2q_f32(a, b));
+}
+
+struct PackOrders {
+  alignas(16) std::uint8_t byte[16][16];
+};
+constexpr PackOrders make_pack_orders() {
+  PackOrders orders{};
+  for (int mask = 0; mask < 16; ++mask)
+    for (int l = 0, n = 0; l < lanes; ++l)
+      if (mask >> l & 1)
+        for (int b = 0; b < 4; ++b) orders.byte[mask][n++] = static_cast<std::uint8_t>(4 * l + b);
+  return orders;
+}
+constexpr PackOrders pack_orders = make_pack_orders();
+/// The lanes of the mask, packed, to `at`; writes a whole vector.
+inline void pack(float* at, LaneMask m, Lanes v) {
+  const std::uint32_t mask = vaddvq_u32(native(m & LaneNumbers{1, 2, 4, 8}));
+  vst1q_f32(at, vreinterpretq_f32_u8(vqtbl1q_u8(vreinterpretq_u8_f32(native(v)), vld1q_u8(pack_orders.byte[mask]))));
 }
 
 #else

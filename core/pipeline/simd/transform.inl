@@ -30,11 +30,11 @@ inline Shuffles shuffles() {
 }
 inline ComplexLanes load_interleaved(const float* at, const Shuffles& s) {
   const Lanes a = *reinterpret_cast<const Lanes*>(at), b = *reinterpret_cast<const Lanes*>(at + lanes);
-  return {__builtin_shuffle(a, b, s.even), __builtin_shuffle(a, b, s.odd)};
+  return {shuffle(a, b, s.even), shuffle(a, b, s.odd)};
 }
 inline void store_interleaved(ComplexLanes v, const Shuffles& s, float* at) {
-  *reinterpret_cast<Lanes*>(at) = __builtin_shuffle(v.re, v.im, s.low);
-  *reinterpret_cast<Lanes*>(at + lanes) = __builtin_shuffle(v.re, v.im, s.high);
+  *reinterpret_cast<Lanes*>(at) = shuffle(v.re, v.im, s.low);
+  *reinterpret_cast<Lanes*>(at + lanes) = shuffle(v.re, v.im, s.high);
 }
 
 /// The discrete Fourier transform of `radix` values side by side, not scaled; inverse: with conjugate roots of unity.
@@ -210,8 +210,8 @@ void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows,
         for (int block = 0; block < lanes; block += 2 * step)
           for (int k = block; k < block + step; ++k) {
             const Lanes a = tile[k], b = tile[k + step];
-            tile[k] = __builtin_shuffle(a, b, keep[n]);
-            tile[k + step] = __builtin_shuffle(a, b, swap[n]);
+            tile[k] = shuffle(a, b, keep[n]);
+            tile[k + step] = shuffle(a, b, swap[n]);
           }
       for (int k = 0; k < lanes; ++k) *reinterpret_cast<Lanes*>(power + (row + k) * width + j) = tile[k];
     }

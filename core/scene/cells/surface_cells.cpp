@@ -104,13 +104,13 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
   for (const CellLevel& level : view.levels) {
     const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
     if (!overlaps) continue;
-    for (const bool side : {false, true}) {
-      if (!(side ? in_side : in_main)) continue;
-      const int wanted = level_of(level) - (side ? view.side_coarser : 0);
+    for (const bool by_side : {false, true}) {
+      if (!(by_side ? in_side : in_main)) continue;
+      const int wanted = level_of(level) - (by_side ? view.side_coarser : 0);
       if (wanted == node.address.level) {
         // Once, also when one level's main fan and another's side lobes both want it.
         if (!node.built && (found.missing.empty() || found.missing.back() != &node)) found.missing.push_back(&node);
-        if (!node.built || node.tile.count > 0) found.in_view.push_back({&node.tile, &level, q, p, patch.object, side});
+        if (!node.built || node.tile.count > 0) found.in_view.push_back({&node.tile, &level, q, p, patch.object, by_side});
       } else if (wanted > node.address.level) {
         finer = true;
       }

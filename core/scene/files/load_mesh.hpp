@@ -18,8 +18,9 @@ enum class UpAxis { y, z };
 struct MeshFile {
   std::filesystem::path file;
   double scale = 1;              // file units to metres
-  std::optional<UpAxis> up;      // which file axis is up; unset: y for glTF/GLB, its own tag for DAE, z otherwise
+  std::optional<UpAxis> up{};    // which file axis is up; unset: y for glTF/GLB, its own tag for DAE, z otherwise
   std::string_view in_memory{};  // the contents, when `file` only names them and says the format
+  std::optional<std::filesystem::path> folder{};  // of the scene; a mesh may name files in it, and in its own folder
 };
 
 struct LoadedMesh {
@@ -28,7 +29,8 @@ struct LoadedMesh {
 };
 
 /// Refused with one sentence: missing, unknown format, unreadable, empty, not finite, beyond 1e7 m, more than 20 million
-/// triangles, no triangle with an area. y up becomes z up by (x, y, z) -> (x, -z, y).
+/// triangles, no triangle with an area, files elsewhere, too much memory or time. y up becomes z up by (x, y, z) -> (x, -z, y).
+/// All but binary STL is read by a program of its own (docs/decisions/0023-meshes-in-a-child.md).
 Result<LoadedMesh> load_mesh(const MeshFile& request);
 
 /// Takes the corners of a triangle and its material.

@@ -52,6 +52,7 @@ Shape ShapeReader::read_mesh_file(Map& keys) {
   const std::string name = file.text(1024);
   MeshFile request;
   request.file = folder / name;
+  request.folder = folder;
   for (const BuiltInFile& f : in_memory)
     if (f.name == name) request.in_memory = f.contents;
   request.scale = keys.optional("scale").number_or(1, text::Range::between(1e-9, 1e9));

@@ -14,8 +14,6 @@
 namespace sonar::dataset {
 namespace {
 
-constexpr std::uint64_t most_pings = 100'000'000;
-
 void read_constraints(const text::Node& node, Constraints& c) {
   text::Map keys = node.map();
   c.in_view = keys.optional("in_view").texts();
@@ -129,7 +127,8 @@ Result<DatasetJob> parse_job(std::string text, const std::string& name, const st
   job.about = root.optional("about").text_or("", 4096);
   text::Map set = root.required("dataset").map();
   job.pings = static_cast<std::uint64_t>(set.required("pings").integer(1, static_cast<std::int64_t>(most_pings)));
-  job.shard_pings = static_cast<std::uint64_t>(set.optional("shard").integer_or(1024, 1, 100000));
+  job.shard_pings =
+      static_cast<std::uint64_t>(set.optional("shard").integer_or(1024, 1, static_cast<std::int64_t>(most_shard_pings)));
   job.seed = Seed{set.optional("seed").unsigned_integer_or(1)};
   job.negatives = set.optional("negatives").number_or(0, text::Range::between(0, 1));
   const text::Node targets = set.optional("targets");

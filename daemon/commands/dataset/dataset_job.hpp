@@ -15,6 +15,8 @@
 
 namespace sonar::dataset {
 
+inline constexpr std::uint64_t most_pings = 100'000'000, most_shard_pings = 100'000;
+
 struct Constraints {
   // Names or labels of objects; above_bed also takes "sonar".
   std::vector<std::string> in_view, above_bed, no_overlap;

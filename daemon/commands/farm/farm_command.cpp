@@ -10,7 +10,9 @@
 #include "core/base/enum_names.hpp"
 #include "core/base/regular_file.hpp"
 #include "core/pipeline/simd/kernels.hpp"
+#include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
+#include "core/text/printable.hpp"
 #include "daemon/commands/dataset/make_dataset.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 #include "daemon/commands/farm/farm_job.hpp"
@@ -96,6 +98,18 @@ Result<std::map<std::string, std::string>> read_table(Queue& queue, Table table)
   return all;
 }
 
+/// Beats and descriptions are written by others: a value of another kind is as none.
+std::string text_in(const json& is, const char* key) {
+  const auto at = is.find(key);
+  return at != is.end() && at->is_string() ? at->get<std::string>() : std::string();
+}
+double number_in(const json& is, const char* key) {
+  const auto at = is.find(key);
+  return at != is.end() && at->is_number() ? std::clamp(at->get<double>(), 0.0, 1e15) : 0.0;
+}
+
+}  // namespace
+
 Result<std::string> describe_farm(Queue& queue) {
   const auto records = read_table(queue, job_table), dead = read_table(queue, dead_table),
              at_work = read_table(queue, beat_table);
@@ -108,38 +122,46 @@ Result<std::string> describe_farm(Queue& queue) {
     const auto waiting = queue.waiting(id);
     if (!waiting) return tl::make_unexpected(waiting.error());
     if (!record) {
-      text += record.error().text + "\n";
+      text += text::printable(record.error().text) + "\n";
       continue;
     }
     std::string dead_lines, workers;
     std::uint64_t dead_shards = 0;
-    for (auto at = dead->lower_bound(id + "."); at != dead->end() && at->first.starts_with(id + "."); ++at, ++dead_shards)
-      dead_lines += "  dead: shard " + at->first.substr(id.size() + 1) + ": " + at->second + "\n";
+    for (auto at = dead->lower_bound(id + "."); at != dead->end() && at->first.starts_with(id + "."); ++at) {
+      const auto shard = text::parse_unsigned(at->first.substr(id.size() + 1));
+      if (!shard || *shard >= record->shards) continue;  // none of the job's
+      ++dead_shards;
+      dead_lines += "  dead: shard " + std::to_string(*shard) + ": " + text::printable(at->second) + "\n";
+    }
     double pings_per_s = 0;
     std::uint64_t running = 0;
     for (const auto& [name, beat] : *at_work) {
       const json is = json::parse(beat, nullptr, false);
-      if (!is.is_object() || is.value("job", "") != id) continue;
-      const double rate = is.value("pings_per_s", 0.0);
+      if (!is.is_object() || text_in(is, "job") != id) continue;
+      const double rate = number_in(is, "pings_per_s");
       pings_per_s += rate;
       running += running < waiting->running ? 1 : 0;  // the others wait for another try
-      workers += text::format("  %s: %s, %.1f pings/s, %llu shards made\n", name.c_str(), is.value("shard", "").c_str(), rate,
-                              static_cast<Ull>(is.value("shards", std::uint64_t{0})));
+      workers += text::format("  %s: %s, %.1f pings/s, %.0f shards made\n", text::printable(name).c_str(),
+                              text::printable(text_in(is, "shard")).c_str(), rate, number_in(is, "shards"));
     }
     const std::uint64_t left = waiting->queued + waiting->running;
     const std::uint64_t done = record->shards - std::min(record->shards, left + dead_shards);
-    text += text::format("%s (%s): %llu shards: %llu done, %llu running, %llu queued, %llu dead", record->folder().c_str(),
-                         record->instruction_set.c_str(), static_cast<Ull>(record->shards), static_cast<Ull>(done),
-                         static_cast<Ull>(running), static_cast<Ull>(left - running), static_cast<Ull>(dead_shards));
+    text += text::format("%s (%s): %llu shards: %llu done, %llu running, %llu queued, %llu dead",
+                         text::printable(record->folder()).c_str(), text::printable(record->instruction_set).c_str(),
+                         static_cast<Ull>(record->shards), static_cast<Ull>(done), static_cast<Ull>(running),
+                         static_cast<Ull>(left - running), static_cast<Ull>(dead_shards));
     if (left > 0 && pings_per_s > 0)
       text += text::format("; %.1f pings/s, about %.0f s left", pings_per_s,
                            static_cast<double>(std::min(left * record->shard_pings, record->pings)) / pings_per_s);
     text += "\n";
-    if (const auto why = records->find(id + ".stopped"); why != records->end()) text += "  STOPPED: " + why->second + "\n";
+    if (const auto why = records->find(id + ".stopped"); why != records->end())
+      text += "  STOPPED: " + text::printable(why->second) + "\n";
     text += dead_lines + workers;
   }
   return text.empty() ? "the farm has no jobs\n" : text;
 }
+
+namespace {
 
 Result<int> status(const FarmCommand& c) {
   const auto queue = connect(c.queue);
@@ -162,7 +184,7 @@ Result<FarmJob> described_in(const path& folder) {
   FarmJob record;
   if (!is.is_object())
     return failure(ErrorKind::bad_data, (folder / "job.json").string() + " cannot be read; submit the job again");
-  record.file = path(is.value("from", "")).filename().string(), record.instruction_set = is.value("instruction_set", "");
+  record.file = path(text_in(is, "from")).filename().string(), record.instruction_set = text_in(is, "instruction_set");
   return record;
 }
 

@@ -8,5 +8,7 @@ namespace sonar::farm {
 /// The exit code. Errors: what the job or the folder have wrong; unavailable: the server; bad_data: shards that are missing or
 /// differ from their digests.
 Result<int> run_farm(const FarmCommand& command);
+/// Jobs, their dead shards and their workers, in lines.
+Result<std::string> describe_farm(Queue& queue);
 
 }  // namespace sonar::farm

@@ -21,6 +21,33 @@ using std::filesystem::path;
 constexpr std::size_t most_in_bucket = std::size_t{8} << 20;
 constexpr std::size_t piece_bytes = std::size_t{512} << 10;  // a server takes messages of 1 MiB unless it is told otherwise
 
+constexpr std::chrono::milliseconds least_patience{100}, most_patience = std::chrono::hours(24);
+
+/// A whole number of a record, within bounds; json::get() would bend what is none.
+Result<std::uint64_t> count_in(const json& words, const char* name, std::uint64_t least, std::uint64_t most) {
+  const json& value = words.at(name);
+  if (value.is_number_unsigned() && value.get<std::uint64_t>() >= least && value.get<std::uint64_t>() <= most)
+    return value.get<std::uint64_t>();
+  return failure(ErrorKind::bad_data, std::string(name) + " is " + value.dump().substr(0, 64) + ", not a whole number from " +
+                                          std::to_string(least) + " to " + std::to_string(most));
+}
+
+/// The counts of a record, as dataset jobs have them.
+Result<void> read_counts(const json& words, FarmJob& record) {
+  const auto pings = count_in(words, "pings", 1, dataset::most_pings);
+  if (!pings) return tl::make_unexpected(pings.error());
+  const auto shard_pings = count_in(words, "shard_pings", 1, dataset::most_shard_pings);
+  if (!shard_pings) return tl::make_unexpected(shard_pings.error());
+  const std::uint64_t needed = (*pings + *shard_pings - 1) / *shard_pings;
+  const auto shards = count_in(words, "shards", needed, needed);
+  if (!shards) return tl::make_unexpected(shards.error());
+  const auto patience = count_in(words, "patience_ms", 0, static_cast<std::uint64_t>(most_patience.count()));
+  if (!patience) return tl::make_unexpected(patience.error());
+  record.pings = *pings, record.shard_pings = *shard_pings, record.shards = *shards;
+  record.patience = std::max(std::chrono::milliseconds(*patience), least_patience);
+  return {};
+}
+
 std::string digest_of(std::string_view bytes) {
   Sha256 hash;
   hash.add(std::as_bytes(std::span(bytes)));
@@ -106,8 +133,9 @@ Result<FarmJob> parse_farm_job(const std::string& id, const std::string& text) {
     const json words = json::parse(text);
     record.version = words.at("version"), record.instruction_set = words.at("instruction_set"), record.file = words.at("file");
     for (const json& f : words.at("files")) record.files.push_back({f.at("name"), f.at("sha256")});
-    record.shards = words.at("shards"), record.shard_pings = words.at("shard_pings"), record.pings = words.at("pings");
-    record.patience = std::chrono::milliseconds(std::max(words.at("patience_ms").get<std::int64_t>(), std::int64_t{100}));
+    if (const auto counts = read_counts(words, record); !counts)
+      return failure(ErrorKind::bad_data,
+                     "the farm's record of job " + id + " cannot be: " + counts.error().text + "; submit the job again");
     record.submitted_unix_s = words.at("submitted_unix_s"), record.in_bucket = words.at("in_bucket");
   } catch (const json::exception& e) {
     return failure(ErrorKind::bad_data, "the farm's record of job " + id + " cannot be read: " + e.what());
@@ -167,6 +195,15 @@ Result<path> receive_files(const FarmJob& record, const path& files, Queue& queu
     if (const auto done = write_below(files, f.name, contents); !done) return tl::make_unexpected(done.error());
   }
   return files / record.file;
+}
+
+Result<dataset::DatasetJob> load_files(const FarmJob& record, const path& file) {
+  auto job = dataset::load_job(file);
+  if (!job) return job;
+  if (job->shards() == record.shards && job->shard_pings == record.shard_pings && job->pings == record.pings) return job;
+  return failure(ErrorKind::bad_data, "the farm's record of job " + record.id + " has " + std::to_string(record.shards) +
+                                          " shards, and its file " + record.file + " makes " + std::to_string(job->shards()) +
+                                          "; submit the job again");
 }
 
 std::string why_unfit(const FarmJob& record) {

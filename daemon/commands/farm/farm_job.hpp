@@ -35,13 +35,17 @@ struct FarmJob {
 
 /// Errors: a file that is not below the job file's folder.
 Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& instruction_set);
-/// bad_data: what is no record, or one whose id does not fit, or whose names lead out of the job's folder.
+/// bad_data: what is no record, or one whose id does not fit, whose counts no job has, or whose names lead out of the job's
+/// folder.
 Result<FarmJob> parse_farm_job(const std::string& id, const std::string& json);
 
 /// Copies the job's files to `files`, and into the queue when they are small enough; says so in the record.
 Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const std::filesystem::path& files, Queue& queue);
 /// Takes from the queue what is not in the folder `files`. The job file's path. missing_file: it is in neither.
 Result<std::filesystem::path> receive_files(const FarmJob& record, const std::filesystem::path& files, Queue& queue);
+
+/// The job in the file that receive_files() gave. bad_data: it is of another size than the record.
+Result<dataset::DatasetJob> load_files(const FarmJob& record, const std::filesystem::path& file);
 
 /// Nothing when this program makes the same bytes as the one that submitted, else a sentence.
 std::string why_unfit(const FarmJob& record);

@@ -5,6 +5,7 @@
 
 #include "core/base/regular_file.hpp"
 #include "core/text/decimal.hpp"
+#include "core/text/printable.hpp"
 #include "daemon/commands/farm/queue.hpp"
 
 namespace sonar::farm {
@@ -48,6 +49,7 @@ class NatsTask final : public Task {
   Result<void> done() override;
   Result<void> again(milliseconds later) override;
   Result<void> bury(const std::string& why) override;
+  Result<void> drop() override;
 
  private:
   NatsQueue& queue_;
@@ -73,13 +75,17 @@ class NatsQueue final : public Queue {
       token->erase(token->find_last_not_of(" \r\n") + 1);
       natsOptions_SetToken(options.get(), token->c_str());
     }
+    if (!o.credentials.empty())  // the library would wait for a FIFO
+      if (const auto file = open_regular(o.credentials); !file) return tl::make_unexpected(file.error());
     if (!o.credentials.empty() &&
         natsOptions_SetUserCredentialsFromFiles(options.get(), o.credentials.c_str(), nullptr) != NATS_OK)
       return failure(ErrorKind::missing_file, o.credentials.string() + ": cannot be read as a NATS credentials file");
-    s = into(connection_, [&](auto** c) { return natsConnection_Connect(c, options.get()); });
-    if (s != NATS_OK)
-      return failure(ErrorKind::unavailable, std::string("no NATS server answers at ") + where_ + ": " + natsStatus_GetText(s) +
-                                                 "; start one with nats-server -js -sd FOLDER, or give --nats its address");
+    while ((s = into(connection_, [&](auto** c) { return natsConnection_Connect(c, options.get()); })) != NATS_OK) {
+      const std::string why = std::string("no NATS server answers at ") + where_ + ": " + natsStatus_GetText(s) +
+                              "; start one with nats-server -js -sd FOLDER, or give --nats its address";
+      const bool is_away = s == NATS_NO_SERVER || s == NATS_TIMEOUT || s == NATS_IO_ERROR || s == NATS_CONNECTION_CLOSED;
+      if (!is_away || !o.try_again || !o.try_again(why)) return failure(ErrorKind::unavailable, why);
+    }
     jsOptions defaults;
     jsOptions_Init(&defaults);
     defaults.Wait = patience_ms;
@@ -202,9 +208,10 @@ class NatsQueue final : public Queue {
 
   tl::unexpected<Error> refused(const std::string& what, natsStatus status, int code = 0) const {
     const char* last = nats_GetLastError(nullptr);
-    return failure(ErrorKind::unavailable,
-                   "NATS server " + where_ + ": " + what + ": " + (last && *last ? last : natsStatus_GetText(status)) +
-                       (code ? " (" + std::to_string(code) + ")" : "") + "; it needs JetStream: nats-server -js -sd FOLDER");
+    return failure(ErrorKind::unavailable, "NATS server " + where_ + ": " + text::printable(what) + ": " +
+                                               (last && *last ? last : natsStatus_GetText(status)) +
+                                               (code ? " (" + std::to_string(code) + ")" : "") +
+                                               "; it needs JetStream: nats-server -js -sd FOLDER");
   }
 
   /// For those who listen; the table is what counts.
@@ -294,9 +301,13 @@ Result<void> NatsTask::bury(const std::string& why) {
   const std::string shard = std::to_string(shard_);
   if (const auto put = queue_.put(dead_table, job_ + "." + shard, why); !put) return put;
   queue_.announce("farm.dead." + job_ + "." + shard, why);
+  return drop();
+}
+
+Result<void> NatsTask::drop() {
   const natsStatus s = natsMsg_Term(message_.get(), nullptr);
   queue_.flush();
-  return s == NATS_OK ? Result<void>{} : queue_.refused("cannot bury a shard", s);
+  return s == NATS_OK ? Result<void>{} : queue_.refused("cannot remove a shard", s);
 }
 
 }  // namespace

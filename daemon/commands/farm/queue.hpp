@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +20,8 @@ struct QueueOptions {
   std::string url = "nats://127.0.0.1:4222";  // several: comma between
   std::filesystem::path credentials;          // a NATS credentials file; empty = none
   std::filesystem::path token_file;
+  /// Called with the reason when no server answers: whether to try again. Empty: once.
+  std::function<bool(const std::string& why)> try_again{};
 };
 
 /// Buckets of keys and values; `name` is the server's.
@@ -45,6 +48,8 @@ class Task {
   virtual Result<void> again(std::chrono::milliseconds later) = 0;
   /// No worker shall have it.
   virtual Result<void> bury(const std::string& why) = 0;
+  /// It is no shard: it leaves the queue without a trace.
+  virtual Result<void> drop() = 0;
 };
 
 struct Waiting {

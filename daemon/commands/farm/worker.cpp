@@ -14,6 +14,7 @@
 
 #include "core/base/confined_reads.hpp"
 #include "core/base/enum_names.hpp"
+#include "core/text/printable.hpp"
 #include "daemon/commands/dataset/make_dataset.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 #include "daemon/commands/farm/farm_job.hpp"
@@ -30,6 +31,14 @@ constexpr int most_tries = 4;
 constexpr milliseconds most_between_beats = 5s, for_a_shard = 2s, least_rest = 500ms, most_rest = 5s;
 
 volatile std::sig_atomic_t stopping = 0;
+
+/// To the console, without control characters: texts of the queue come from other programs.
+void say_to(const WorkerCommand& command, const std::string& words) {
+  if (!command.quiet) std::fprintf(stderr, "%s\n", text::printable(words).c_str());
+}
+void pause_for(milliseconds time) {
+  for (const auto end = Clock::now() + time; Clock::now() < end && !stopping;) std::this_thread::sleep_for(50ms);
+}
 
 class Worker {
  public:
@@ -61,13 +70,11 @@ class Worker {
   }
 
  private:
-  void say(const std::string& words) const {
-    if (!c_.quiet) std::fprintf(stderr, "%s\n", words.c_str());
-  }
+  void say(const std::string& words) const { say_to(c_, words); }
 
   /// Longer each time until a shard is made, so that a thousand idle workers do not keep the server from its work.
   void rest() {
-    for (const auto end = Clock::now() + rest_; Clock::now() < end && !stopping;) std::this_thread::sleep_for(50ms);
+    pause_for(rest_);
     rest_ = std::min(2 * rest_, most_rest);
   }
 
@@ -113,8 +120,15 @@ class Worker {
       const auto stopped = queue_.get(job_table, record.id + ".stopped");
       if (stopped && *stopped) return {};
       auto task = queue_.take(record.id, for_a_shard);
-      if (!task) rest();  // the server is away, or the job is
+      if (!task) {  // the server is away, or the job is
+        say(task.error().text);
+        rest();
+      }
       if (!task || !*task) return {};
+      if ((*task)->shard() >= record.shards) {
+        drop(record, **task);
+        continue;
+      }
       if (const auto done = work(record, **task); !done) return done;
     }
     return {};
@@ -124,7 +138,7 @@ class Worker {
     const path out = path(c_.out) / record.folder();
     const auto file = receive_files(record, out / "files", queue_);
     if (!file) return tl::make_unexpected(file.error());
-    auto job = dataset::load_job(*file);
+    auto job = load_files(record, *file);
     if (!job) return tl::make_unexpected(job.error());
     folder_.reset();
     opened_.clear();
@@ -136,6 +150,16 @@ class Worker {
     if (!folder) return tl::make_unexpected(folder.error());
     folder_ = *std::move(folder), opened_ = record.id, begin_ = Clock::now(), shards_ = 0, pings_ = 0;
     return {};
+  }
+
+  /// Any program that reaches the queue can put any number into it.
+  void drop(const FarmJob& record, Task& task) {
+    say("shard " + std::to_string(task.shard()) + " is none of the " + std::to_string(record.shards) + " of " + record.folder() +
+        "; it is removed from the queue");
+    if (const auto dropped = task.drop(); !dropped) {
+      say(dropped.error().text);
+      rest();
+    }
   }
 
   Result<void> refuse(const FarmJob& record, Task& task, const Error& why) {
@@ -238,15 +262,27 @@ class Worker {
 }  // namespace
 
 Result<int> run_worker(const WorkerCommand& command) {
-  const auto queue = connect(command.queue);
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stopping = 1; });
+  std::signal(SIGPIPE, SIG_IGN);
+  milliseconds rest = least_rest;
+  QueueOptions options = command.queue;
+  options.try_again = [&](const std::string& why) {
+    say_to(command, why + "; trying again");
+    pause_for(std::exchange(rest, std::min(2 * rest, most_rest)));
+    return !stopping;
+  };
+  const auto queue = connect(options);
+  if (stopping) return 0;
   if (!queue) return tl::make_unexpected(queue.error());
+  return work_on(**queue, command);
+}
+
+Result<int> work_on(Queue& queue, const WorkerCommand& command) {
   std::error_code ec;
   std::filesystem::create_directories(command.out, ec);
   if (ec) return failure(ErrorKind::io, "cannot make the folder " + command.out + ": " + ec.message() + "; choose another --out");
   confine_reads(command.out);
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stopping = 1; });
-  std::signal(SIGPIPE, SIG_IGN);
-  return Worker(command, **queue).run();
+  return Worker(command, queue).run();
 }
 
 }  // namespace sonar::farm

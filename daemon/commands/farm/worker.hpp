@@ -5,8 +5,10 @@
 
 namespace sonar::farm {
 
-/// The exit code. Errors: unavailable when no server answers at the start, or all jobs are unfit for this program or processor;
-/// io when the folder cannot be written.
+/// Waits for a server that does not answer yet. The exit code. Errors: unavailable when the server refuses, or all jobs are unfit
+/// for this program or processor; io when the folder cannot be written.
 Result<int> run_worker(const WorkerCommand& command);
+/// The same with a queue, until a signal, or until it is empty where the command says so.
+Result<int> work_on(Queue& queue, const WorkerCommand& command);
 
 }  // namespace sonar::farm

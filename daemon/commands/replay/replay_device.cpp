@@ -37,12 +37,18 @@ void take_aris(ReplayDevice& device, const protocol::Bytes& datagram) {
   }
 }
 
-/// The sonar of the ping protocol that sends such frames; none: several kinds do.
-void take_ping(ReplayDevice& device, const protocol::Bytes& message) {
+std::optional<ping::Header> ping_header(const protocol::Bytes& message) {
   ping::Header header;
   wire::Reader reader(message);
   fields(reader, header);
-  if (!reader.ok() || header.start != ping::Header{}.start) return;
+  return reader.ok() && header.start == ping::Header{}.start ? std::optional(header) : std::nullopt;
+}
+
+/// The sonar of the ping protocol that sends such frames; none: several kinds do.
+void take_ping(ReplayDevice& device, const protocol::Bytes& message) {
+  const auto found = ping_header(message);
+  if (!found) return;
+  const ping::Header& header = *found;
   if (header.id == ping::Id::atof_point_data || header.id == ping::Id::yz_point_data)
     take(device, ping::surveyor::vendor(), ping::surveyor::vendor().models().front());
   if (header.id == ping::Id::os_mono_profile) take(device, ping::omniscan::vendor(), ping::omniscan::vendor().models().front());
@@ -99,12 +105,14 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   ReplayDevice device;
   std::optional<std::uint16_t> id;
   std::uint64_t looked_at = 0;
+  bool speaks_ping = false;  // as a Ping360 does
   while (auto message = reader.next()) {
     looked_at += message->bytes.size();
     if (looked_at > most_looked_at_bytes || (id && device.recorded_status)) break;
     if (message->from != recording::Origin::device) continue;
     take_sender(device, *message);
     if (device.vendor != nullptr) break;
+    speaks_ping = speaks_ping || ping_header(message->bytes).has_value();
     if (message->bytes.size() < oculus::header_size) continue;
     const oculus::MessageHeader header = oculus::header_of(message->bytes);
     if (header.oculus_id != oculus::magic) continue;
@@ -118,6 +126,11 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   const auto damage = reader.damage();
   reader.rewind();
   if (device.vendor != nullptr) return device;
+  if (!id && speaks_ping)
+    return failure(ErrorKind::bad_data,
+                   file +
+                       " holds messages of the ping protocol, but no points and no profile: pings of a Surveyor "
+                       "or an Omniscan can be replayed, those of a Ping360 cannot");
   if (!id)
     return failure(ErrorKind::bad_data, file + " holds no message of a sonar" + (damage ? ": " + damage->text : std::string()));
   if (!device.recorded_status) {

@@ -16,6 +16,7 @@ using std::chrono::nanoseconds;
 
 constexpr double longest_s = 86400;
 constexpr std::uint64_t most_pings = 1'000'000'000;
+constexpr double least_probability = 1e-9;  // below, it never acts: nothing makes so many pings
 
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
@@ -153,8 +154,12 @@ class Check {
     if (at.ping && *at.ping == 0) wrong("at: ping counts from 1");
     if (at.every && (*at.every == 0 || *at.every > most_pings)) wrong("at: every must be from 1 to 1000000000");
     if (at.phase != 0 && !at.every) wrong("at: phase belongs to every");
+    if (at.every && at.phase >= std::max<std::uint64_t>(*at.every, 1))
+      wrong("at: phase must be below every, " + std::to_string(*at.every) + ": no ping's number leaves " +
+            std::to_string(at.phase));
     if (at.time_s && !(*at.time_s >= 0 && *at.time_s <= 1e9)) wrong("at: time_s must be from 0 to 1e9 s since the start");
-    if (at.probability && !(*at.probability > 0 && *at.probability <= 1)) wrong("at: probability must be above 0 and at most 1");
+    if (at.probability && !(*at.probability >= least_probability && *at.probability <= 1))
+      wrong("at: probability must be from 1e-9 to 1");
     if (at.on.empty()) return;
     const auto it = std::find(occasion_names.begin(), occasion_names.end(), at.on);
     if (it == occasion_names.end())
@@ -191,6 +196,9 @@ class Check {
 
   void read_span(const FaultKind& kind, double default_s, Fault& fault) {
     const FaultRecord::For& lasts = record_.lasts;
+    if (manual_ && lasts.seconds.value_or(0) > static_cast<double>(longest_manual_fault.count()))
+      return wrong(
+          "for: a fault of a running daemon ends after 600 s at the latest; a plan in the configuration may last longer");
     if (lasts.seconds && !(*lasts.seconds > 0 && *lasts.seconds <= longest_s))
       return wrong("for: seconds must be above 0 and at most 86400");
     if ((lasts.pings && (*lasts.pings == 0 || *lasts.pings > most_pings)) ||
@@ -198,9 +206,6 @@ class Check {
       return wrong("for: pings and count must be from 1 to 1000000000");
     if (lasts.pings && !kind.per_ping() && kind.stage != FaultStage::payload && kind.stage != FaultStage::framing)
       return wrong(std::string(kind.code) + " lasts for a time: give for: {seconds: ...}");
-    if (manual_ && lasts.seconds.value_or(0) > static_cast<double>(longest_manual_fault.count()))
-      return wrong(
-          "for: a fault of a running daemon ends after 600 s at the latest; a plan in the configuration may last longer");
     const double seconds = lasts.seconds.value_or(lasts.pings || kind.per_ping() ? 0 : default_s);
     fault.span.time = nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9)));
     fault.span.pings = lasts.pings.value_or(seconds > 0 ? 0 : 1);

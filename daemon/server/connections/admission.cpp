@@ -14,6 +14,8 @@ namespace {
 constexpr auto accept_pause = std::chrono::milliseconds(100);  // after an accept that failed
 constexpr auto spell = std::chrono::seconds(60);               // without a refusal: the next one is news again
 
+constexpr std::uint64_t most_kept_for_drivers = 64;
+
 int open_reserve() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
 
 void close_politely(int descriptor) {
@@ -23,13 +25,21 @@ void close_politely(int descriptor) {
   ::shutdown(descriptor, SHUT_WR);
 }
 
-/// The first number that is not for them; the kernel hands out the lowest free one.
-std::uint64_t first_spare(const LimitConfig& limits, Admission::Purpose purpose) {
+std::uint64_t most_descriptors() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return ~std::uint64_t{0};
-  const auto most = static_cast<std::uint64_t>(limit.rlim_cur);
+  return static_cast<std::uint64_t>(limit.rlim_cur);
+}
+
+/// The first number that is not for them; the kernel hands out the lowest free one.
+std::uint64_t first_spare(const LimitConfig& limits, Admission::Purpose purpose) {
+  const std::uint64_t most = most_descriptors();
   const auto spare = std::min(static_cast<std::uint64_t>(limits.spare_descriptors), most / 2);
   return most - (purpose == Admission::Purpose::control ? spare / 2 : spare);
+}
+
+std::uint64_t number_of(const tcp::socket& socket) {
+  return static_cast<std::uint64_t>(const_cast<tcp::socket&>(socket).native_handle());
 }
 
 }  // namespace
@@ -61,11 +71,16 @@ void Admission::say(Steady::time_point& last, const char* what) {
 
 bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
   // The descriptor's number says how many are in use below it: all.
-  if (static_cast<std::uint64_t>(const_cast<tcp::socket&>(socket).native_handle()) < first_spare(limits_, purpose)) return true;
+  if (number_of(socket) < first_spare(limits_, purpose)) return true;
   ++for_descriptors_;
   say(descriptors_said_,
       "file descriptors run out: clients are turned away until some are free (raise LimitNOFILE or ulimit -n)");
   return false;
+}
+
+bool Admission::is_drivers(const tcp::socket& socket) const {
+  const std::uint64_t for_drivers = std::min(most_kept_for_drivers, most_descriptors() / 8);
+  return number_of(socket) >= first_spare(limits_, Purpose::client) - for_drivers;
 }
 
 Admission::Place Admission::enter(const tcp::socket& socket) {

@@ -2,7 +2,8 @@
 // Owned by App, asked by every listener for each socket it accepts. I/O thread only.
 //
 // The last descriptors below the process's limit are never given to clients: whatever else the daemon needs one for (a log, a
-// scene) finds one. Of these, half are for control alone, so that the cause can be asked for. Should they run out all
+// scene) finds one. Of these, half are for control alone, so that the cause can be asked for. Some before them are for drivers:
+// pose senders and control get one of these only in exchange for a connection of their own. Should they run out all
 // the same, one kept in reserve lets visitors in to be sent away; without it they would stay in the listener's queue, which would
 // report them again and again.
 #pragma once
@@ -35,6 +36,9 @@ class Admission {
 
   /// For a socket just accepted. An empty place: it must be closed; the log has been told, once for each spell of it.
   Place enter(const tcp::socket& socket);
+  /// Of a socket that is no driver's: its descriptor is one of those for drivers, or beyond. A connection of the same listener
+  /// must go for it.
+  bool is_drivers(const tcp::socket& socket) const;
   /// The next visitor of a listener, whatever its descriptor. Nothing: the listener is closed.
   asio::awaitable<std::optional<tcp::socket>> accept(tcp::acceptor& acceptor);
   /// The next one of a listener without places of ours, whose descriptor is none of the spare ones. Nothing: likewise.

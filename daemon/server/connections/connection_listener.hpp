@@ -1,5 +1,5 @@
-// A listener whose connections hold a slot each: of both control servers and of sonars' HTTP. When all slots are taken, the
-// longest idle connection is closed.
+// A listener whose connections hold a slot each: of both control servers and of sonars' HTTP. When all slots are taken, one is
+// closed for the newcomer (connection_slots.hpp says which).
 // Where a token is required, clients that have not shown it yet share slots of their own, so that they can only evict each
 // other, first those of the address with most connections. The Connection class reads and writes the socket.
 #pragma once
@@ -27,7 +27,7 @@ class ConnectionListener {
         protocol_(std::move(protocol)),
         make_(std::move(make)),
         listener_(services.io, services.admission, services.purpose),
-        slots_(static_cast<std::size_t>(services.limits.control_clients)) {}
+        slots_(static_cast<std::size_t>(services.limits.control_clients), std::chrono::seconds(1), address_of_client) {}
 
   Result<void> open(Endpoint at) { return listener_.open(at); }
   void start() {
@@ -49,6 +49,7 @@ class ConnectionListener {
  private:
   using Steady = std::chrono::steady_clock;
   static constexpr std::size_t most_untrusted = 16, most_rejected = 16;
+  static std::string address_of_client(const Connection& c) { return c.sender().source; }
 
   void admit(tcp::socket socket) {
     error_code ec;
@@ -64,6 +65,7 @@ class ConnectionListener {
       place = services_.admission.enter(socket);
       if (!place) return close_politely(socket);
     }
+    if (services_.admission.is_drivers(socket)) slots.evict(sender.source, [this](const Connection& c) { say_evicted(c); });
     if (!make_room(slots, sender)) return reject(std::move(socket), sender);
     end_when_silent(socket, services_.limits.dead_peer);
     socket.set_option(tcp::no_delay(true), ec);
@@ -74,13 +76,13 @@ class ConnectionListener {
     run(connection, connection->write(), place);
   }
   bool make_room(ConnectionSlots<Connection>& slots, const Sender& sender) {
-    const bool room = slots.make_room([this](const Connection& evicted) {
-      log_limited(services_.log, services_.notices, LogLevel::info,
-                  services_.server + " connection closed: longest idle, and its slot was needed",
-                  {{"from", evicted.sender().id}});
-    });
+    const bool room = slots.make_room(sender.source, [this](const Connection& evicted) { say_evicted(evicted); });
     if (!room) log_refusal(services_, "all " + std::to_string(slots.most()) + " connection slots are in use", sender.id);
     return room;
+  }
+  void say_evicted(const Connection& evicted) {
+    log_limited(services_.log, services_.notices, LogLevel::info,
+                services_.server + " connection closed: longest idle, and its slot was needed", {{"from", evicted.sender().id}});
   }
   /// After the client has shown the token. False: no slot is free.
   bool claim_slot(const std::shared_ptr<Connection>& connection) {
@@ -91,7 +93,7 @@ class ConnectionListener {
   }
   /// Sends the reason before closing; beyond most_rejected connections, closes at once.
   void reject(tcp::socket socket, const Sender& sender) {
-    if (!rejected_.make_room([](const Connection&) {})) return;
+    if (!rejected_.make_room(sender.source, [](const Connection&) {})) return;
     auto connection = make_(std::move(socket), sender);
     connection->reject();
     rejected_.add(connection);
@@ -117,8 +119,7 @@ class ConnectionListener {
   Make make_;
   Listener listener_;
   ConnectionSlots<Connection> slots_, rejected_{most_rejected};
-  ConnectionSlots<Connection> untrusted_{most_untrusted, Steady::duration{},
-                                         [](const Connection& c) { return c.sender().source; }};
+  ConnectionSlots<Connection> untrusted_{most_untrusted, Steady::duration{}, address_of_client};
   std::size_t running_ = 0;  // coroutines of connections
 };
 

@@ -2,6 +2,16 @@
 
 namespace sonar {
 
+WorkRate::Steady::duration ConnectionServices::pause_after(const Sender& of, std::size_t amount) {
+  constexpr std::chrono::milliseconds worth_a_word{200};
+  const auto pause = work.pause_after(of.source, amount, limits.input_bytes_per_s, WorkRate::Steady::now());
+  if (pause > worth_a_word)
+    log_limited(log, notices, LogLevel::info,
+                server + " clients of an address wait: they ask for more work than limits.input_bytes_per_s (docs/control.md)",
+                {{"from", of.source}});
+  return pause;
+}
+
 void log_refusal(ConnectionServices& services, const std::string& why, const std::string& from) {
   log_limited(services.log, services.refusals, LogLevel::warning, services.server + " refused: " + why, {{"from", from}});
 }

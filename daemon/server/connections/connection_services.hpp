@@ -9,6 +9,7 @@
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/connections/admission.hpp"
 #include "daemon/server/connections/token.hpp"
+#include "daemon/server/connections/work_rate.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
 
@@ -24,6 +25,10 @@ struct ConnectionServices {
   Admission::Purpose purpose = Admission::Purpose::control;
   Token token = {};  // without one every client is trusted
   LogLimiter refusals = {}, notices = {}, faults = {};
+  WorkRate work = {};
+
+  /// How long a client waits after so much work.
+  WorkRate::Steady::duration pause_after(const Sender& of, std::size_t amount);
 };
 
 inline constexpr std::chrono::seconds greeting_limit{10};    // for the Hello, or a whole HTTP request once it has begun

@@ -9,8 +9,6 @@
 #include <boost/beast/http/serializer.hpp>
 #include <boost/beast/http/string_body.hpp>
 
-#include "daemon/server/connections/input_rate.hpp"
-
 namespace sonar {
 namespace {
 
@@ -113,8 +111,8 @@ void HttpConnection::reject() {
 
 asio::awaitable<void> HttpConnection::read() {
   std::vector<std::byte> buffer(16384);
-  InputRate rate(services_.limits.input_bytes_per_s);
   request_limit_->within(greeting_limit);
+  charge(work::of_connection);
   while (!over()) {
     error_code ec;
     if (takeover_) {
@@ -127,20 +125,25 @@ asio::awaitable<void> HttpConnection::read() {
     }
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || over()) break;
-    active_at = Steady::now();
     if (!discards_) {
       if (!reader_.begun()) request_limit_->within(greeting_limit);
       reader_.feed(std::span(buffer).first(n));
-      hand_over();
     }
-    if (const auto pause = rate.pause_after(n, Steady::now()); pause.count() > 0 && !over()) {
-      rest_.expires_after(pause);
-      co_await rest_.async_wait(into(ec));
-    }
+    co_await settle(n);
+    if (!discards_ && !over()) hand_over();
   }
   peer_closed_ = true;
   wake_writer_.cancel();
   if (all_sent_) close();
+}
+
+/// Waits for as long as the work of its address exceeds the limit: what costs less than it is worth is paid for before the next.
+asio::awaitable<void> HttpConnection::settle(std::size_t work) {
+  const auto pause = services_.pause_after(sender_, work);
+  if (pause.count() == 0 || over()) co_return;
+  error_code ec;
+  rest_.expires_after(pause);
+  co_await rest_.async_wait(into(ec));
 }
 
 /// Passes the next complete request to write().
@@ -150,6 +153,9 @@ void HttpConnection::hand_over() {
     refusal_ = next.error();
   } else if (*next) {
     request_ = **std::move(next);
+    active_at = Steady::now();
+    proved = true;
+    charge(work::of_request);
   } else {
     continue_asked_ = reader_.asks_to_continue();
     if (continue_asked_) wake_writer_.cancel();
@@ -197,6 +203,7 @@ asio::awaitable<void> HttpConnection::write() {
       co_await wake_writer_.async_wait(into(ec));
     }
   }
+  charge(std::exchange(unsettled_, 0));
   finish_sending();
 }
 
@@ -218,6 +225,7 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
     co_return;
   }
   if (auto* takeover = std::get_if<std::shared_ptr<HttpTakeover>>(&made)) {
+    charge(work::of_upgrade);
     if (co_await (*takeover)->begin()) {
       takeover_ = *takeover;
       wake_reader_.cancel();
@@ -228,10 +236,12 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
   }
   auto& answer = std::get<HttpAnswer>(made);
   if (!answer.why.empty()) log_refusal(services_, answer.why, sender_.id);
-  if (!co_await write_answer(std::move(answer), head) || head.last)
+  if (!co_await write_answer(std::move(answer), head) || head.last) {
     all_sent_ = true;
-  else
-    next_request();
+    co_return;
+  }
+  co_await settle(std::exchange(unsettled_, 0));
+  if (!over()) next_request();
 }
 
 asio::awaitable<void> HttpConnection::write_stream(HttpStream stream, Head head) {
@@ -254,7 +264,9 @@ asio::awaitable<void> HttpConnection::write_stream(HttpStream stream, Head head)
 
 asio::awaitable<bool> HttpConnection::write_answer(HttpAnswer answer, Head head) {
   const char* connection = head.last ? "close" : head.http_1_0 ? "keep-alive" : "";  // HTTP/1.1 keeps the connection by default
-  return write_whole(bytes_of(std::move(answer), connection, head.without_body ? Part::head : Part::all));
+  std::string bytes = bytes_of(std::move(answer), connection, head.without_body ? Part::head : Part::all);
+  unsettled_ += bytes.size();
+  return write_whole(std::move(bytes));
 }
 
 asio::awaitable<bool> HttpConnection::write_whole(std::string bytes) {

@@ -41,13 +41,20 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   /// For the service while it makes an answer.
   asio::steady_timer& wait_timer() { return wake_operation_; }
 
-  Steady::time_point active_at = Steady::now();
+  /// For a service that has done more than its answer shows.
+  void charge(std::size_t work) { services_.pause_after(sender_, work); }
+  /// How long a takeover waits after so much work.
+  Steady::duration pause_after(std::size_t work) { return services_.pause_after(sender_, work); }
+
+  Steady::time_point active_at = Steady::now();  // a whole request, or an answer
+  bool proved = false;                           // there was a whole request
 
  private:
   struct Head {  // of the answer to a request
     bool http_1_0 = false, without_body = false, last = false;
   };
   void hand_over();
+  asio::awaitable<void> settle(std::size_t work);
   asio::awaitable<void> answer(HttpRequest request);
   bool has_slot(const HttpRequest& request);
   asio::awaitable<void> write_stream(HttpStream stream, Head head);
@@ -69,6 +76,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   std::optional<HttpRefusal> refusal_;  // of a request that cannot be parsed
   std::function<bool()> claim_slot_;    // empty: trusted
   std::shared_ptr<HttpTakeover> takeover_;
+  std::size_t unsettled_ = 0;    // work: of the answer
   bool continue_asked_ = false;  // send "100 Continue"
   bool busy_ = false;            // a request is being answered
   bool discards_ = false;        // input is discarded

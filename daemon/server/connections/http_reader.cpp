@@ -15,6 +15,11 @@ constexpr std::size_t longest_unread = 64u << 10;  // chunk headers and trailers
 
 std::string text_of(boost::beast::string_view view) { return {view.data(), view.size()}; }
 
+bool ends_with_bare_newline(std::string_view line_and_more) {
+  const std::size_t end = line_and_more.find('\n');
+  return end != std::string_view::npos && (end == 0 || line_and_more[end - 1] != '\r');
+}
+
 HttpRefusal refusal_of(const boost::beast::error_code& ec, std::size_t most_body) {
   if (ec == http::error::header_limit) return {431, "the header is longer than 8 KiB"};
   if (ec == http::error::body_limit) return {413, "the body is longer than " + std::to_string(most_body) + " bytes"};
@@ -30,12 +35,19 @@ std::string joined(const http::request<http::string_body>& message, http::field 
   return all;
 }
 
+/// A body whose end another reader would see elsewhere must not be taken as a request (RFC 9112, 6.1).
+bool has_other_coding(const http::request<http::string_body>& head) {
+  return head.count(http::field::transfer_encoding) > 0 &&
+         !boost::beast::iequals(joined(head, http::field::transfer_encoding), "chunked");
+}
+
 tl::expected<std::optional<HttpRequest>, HttpRefusal> request_from(http::request<http::string_body> message) {
   HttpRequest request;
   request.method = text_of(message.method_string());
   request.target = text_of(message.target());
   request.http_1_0 = message.version() == 10;
   if (message.count(http::field::host) > 1) return tl::unexpected(HttpRefusal{400, "more than one Host"});
+  if (message.count(http::field::origin) > 1) return tl::unexpected(HttpRefusal{400, "more than one Origin"});
   request.has_host = message.count(http::field::host) == 1;
   request.has_origin = message.count(http::field::origin) > 0;
   request.host = text_of(message[http::field::host]);
@@ -84,10 +96,14 @@ tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
     boost::beast::error_code ec;
     const std::size_t used = beast.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), ec);
     buffer_.erase(0, used);
+    if (beast.is_header_done() && has_other_coding(beast.get()))
+      return tl::unexpected(HttpRefusal{501, "a Transfer-Encoding other than chunked"});
     if (ec == http::error::need_more) {
       if (buffer_.size() > longest_unread) return tl::unexpected(HttpRefusal{400, "a chunk header is too long"});
       break;
     }
+    if (ec && !beast.is_header_done() && ends_with_bare_newline(buffer_))
+      return tl::unexpected(HttpRefusal{400, "lines of a request end in CR LF, and this one ends in LF alone"});
     if (ec) return tl::unexpected(refusal_of(ec, most_body_));
     if (used == 0) break;
   }

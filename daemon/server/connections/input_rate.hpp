@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <limits>
 
 namespace sonar {
 
@@ -15,6 +16,19 @@ class InputRate {
   explicit InputRate(std::size_t bytes_per_s) : rate_(static_cast<double>(bytes_per_s)), tokens_(rate_) {}
   /// From now on.
   void use(std::size_t bytes_per_s) { rate_ = static_cast<double>(bytes_per_s); }
+
+  /// No pause will be longer from now on.
+  void forgive_beyond(Steady::duration longest) {
+    tokens_ = std::max(tokens_, -rate_ * std::chrono::duration<double>(longest).count());
+  }
+
+  /// What may be read now without a pause after it.
+  std::size_t left(Steady::time_point now) const {
+    if (rate_ <= 0) return std::numeric_limits<std::size_t>::max();
+    const double tokens =
+        begun_ ? std::min(rate_, tokens_ + rate_ * std::chrono::duration<double>(now - last_).count()) : tokens_;
+    return tokens > 0 ? static_cast<std::size_t>(tokens) : 0;
+  }
 
   /// `bytes` were read; 0 = read on.
   Steady::duration pause_after(std::size_t bytes, Steady::time_point now) {

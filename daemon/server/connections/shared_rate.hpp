@@ -28,10 +28,19 @@ class SharedRate {
     return Part(counted_);
   }
 
+  /// Of one client, bytes a second.
+  std::size_t share() const {
+    const auto parts = static_cast<std::size_t>(std::max(counted_.use_count() - 1, 1L));
+    return std::max<std::size_t>(bytes_per_s_ / parts, 1);
+  }
+  /// What may be read of the client now without a pause after it.
+  std::size_t left(const Part& part, Steady::time_point now) const {
+    return std::max(std::min(part.share_.left(now), share()), together_.left(now));
+  }
+
   /// `bytes` of the client were read; 0 = read on.
   Steady::duration pause_after(Part& part, std::size_t bytes, Steady::time_point now) {
-    const auto parts = static_cast<std::size_t>(std::max(counted_.use_count() - 1, 1L));
-    part.share_.use(std::max<std::size_t>(bytes_per_s_ / parts, 1));
+    part.share_.use(share());
     const auto of_all = together_.pause_after(bytes, now);
     return part.share_.pause_after(bytes, now).count() > 0 ? of_all : Steady::duration{};
   }

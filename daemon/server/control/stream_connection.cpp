@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/server/control/http_rules.hpp"
+#include "daemon/server/system/listen.hpp"
 #include "protocol/control/answers.hpp"
 
 namespace sonar {
@@ -15,6 +16,9 @@ using control::StatusCode;
 constexpr std::size_t longest_before_hello = 4096;  // less than a message may have later
 constexpr std::size_t work_of_a_turn = 4096;        // bytes; then other connections have their turn
 constexpr std::size_t least_work = 64;              // cost of a message beside its bytes
+constexpr std::size_t skipping_is_cheaper = 16;     // than taking a pose
+constexpr int receive_buffer = 256 << 10;           // bytes; poses that wait would only be older
+constexpr std::chrono::milliseconds between_looks{10};
 
 StatusCode code_of(OperationResult::Code code) {
   return code == OperationResult::Code::done      ? StatusCode::ok
@@ -55,7 +59,10 @@ StreamConnection::StreamConnection(ConnectionServices& services, ControlTargets&
       wake_writer_(services.io, never),
       rest_(services.io),
       parser_(services.limits.control_message_bytes),
-      rate_(services.limits.input_bytes_per_s) {}
+      rate_(services.limits.input_bytes_per_s) {
+  error_code ec;
+  socket_.set_option(asio::socket_base::receive_buffer_size(receive_buffer), ec);
+}
 
 void StreamConnection::close() {
   error_code ec;
@@ -75,9 +82,12 @@ asio::awaitable<void> StreamConnection::read() {
   greeting_->within(greeting_limit);
   while (!over() && !ending_) {
     error_code ec;
+    if (newest_pose_ && socket_.available(ec) == 0) {
+      co_await take_newest_pose();
+      continue;
+    }
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || over()) break;
-    active_at = Steady::now();
     received += n;
     if (speaks_http(std::span(buffer).first(n))) {
       log_refusal(services_, "HTTP request on the control stream, which is protobuf; use control.http for HTTP", sender_.id);
@@ -93,6 +103,13 @@ asio::awaitable<void> StreamConnection::read() {
         break;
       }
       if (!*message) break;
+      active_at = Steady::now();
+      if (greeted_ && control::is_unasked_pose(**message) && is_beyond_pose_rate()) {
+        newest_pose_.emplace((*message)->begin(), (*message)->end());
+        work.bytes -= std::min(work.bytes, (*message)->size() - (*message)->size() / skipping_is_cheaper);
+        continue;
+      }
+      if (const auto pose = std::exchange(newest_pose_, std::nullopt)) accept(*pose, work);
       ending_ = !accept(**message, work);
       while (!over() && answers_.size() + in_progress_ >= most_open_requests) co_await wake_reader_.async_wait(into(ec));
     }
@@ -103,14 +120,34 @@ asio::awaitable<void> StreamConnection::read() {
   wake_writer_.cancel();  // it writes the remaining answers, then closes
 }
 
-/// Input beyond the limits, or beyond the client's share of poses, waits in the kernel.
+/// Poses beyond the client's share are skipped, but for the newest: none acts long after it was sent.
+bool StreamConnection::is_beyond_pose_rate() {
+  if (!pose_rate_) pose_rate_ = targets_.pose_rate.join(services_.limits.pose_bytes_per_s);
+  return targets_.pose_rate.left(*pose_rate_, Steady::now()) == 0;
+}
+
+/// When the rate allows it, or the client has hung up.
+asio::awaitable<void> StreamConnection::take_newest_pose() {
+  if (is_beyond_pose_rate() && !has_left(socket_)) {
+    error_code ec;
+    rest_.expires_after(between_looks);
+    co_await rest_.async_wait(into(ec));
+    co_return;
+  }
+  Work work;
+  accept(*std::exchange(newest_pose_, std::nullopt), work);
+  co_await limit_rate(work);
+}
+
+/// Input beyond the limits waits in the kernel, as do requests while answers to others of the address have cost too much.
 asio::awaitable<void> StreamConnection::limit_rate(const Work& work) {
   const auto now = Steady::now();
   auto pause = rate_.pause_after(work.bytes, now);
   if (work.pose_bytes > 0) {
     if (!pose_rate_) pose_rate_ = targets_.pose_rate.join(services_.limits.pose_bytes_per_s);
-    pause = std::max(pause, targets_.pose_rate.pause_after(*pose_rate_, work.pose_bytes, now));
+    targets_.pose_rate.pause_after(*pose_rate_, work.pose_bytes, now);
   }
+  if (unsettled_ > 0) pause = std::max(pause, services_.pause_after(sender_, std::exchange(unsettled_, 0)));
   if (pause.count() == 0) co_return;
   error_code ec;
   rest_.expires_after(pause);
@@ -140,7 +177,10 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
   }
   if (const auto* hello = std::get_if<control::Hello>(&request->op)) return greet(request->id, *hello);
   if (!greeted_) return refuse_and_end(request->id, StatusCode::refused, "the first message must be a Hello");
-  if (is_unasked(request->id, request->op)) work.pose_bytes += message.size() + least_work;
+  if (is_unasked(request->id, request->op))
+    work.pose_bytes += message.size() + least_work;
+  else
+    unsettled_ += message.size() + work::of_message;
   return accept_greeted(*request);
 }
 
@@ -158,7 +198,7 @@ bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
     return false;
   }
   claim_slot_ = nullptr;
-  greeted_ = true;
+  greeted_ = proved = true;
   greeting_->none();
   services_.log.debug("control client", {{"from", sender_.id}, {"name", hello.name.substr(0, 64)}});
   answer(greeting(id, StatusCode::ok, ""));
@@ -217,6 +257,7 @@ void StreamConnection::subscribe(const control::Subscribe& wanted) {
 
 void StreamConnection::answer(const v1::Response& response) {
   answers_.push_back(control::delimited(control::encode_response(response)));
+  unsettled_ += answers_.back().size();
   wake_writer_.cancel();
 }
 

@@ -36,7 +36,8 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
 
-  Steady::time_point active_at = Steady::now();  // last read or write: subscribers only read
+  Steady::time_point active_at = Steady::now();  // a whole message, in or out: subscribers only read
+  bool proved = false;                           // it has said Hello
 
  private:
   bool speaks_http(std::span<const std::byte> received);
@@ -44,6 +45,8 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
     std::size_t bytes = 0, pose_bytes = 0;  // pose_bytes: of poses without an answer; included in bytes
   };
   bool accept(control::BytesView message, Work& work);
+  bool is_beyond_pose_rate();
+  asio::awaitable<void> take_newest_pose();
   asio::awaitable<void> limit_rate(const Work& work);
   bool greet(std::uint64_t id, const control::Hello& hello);
   bool accept_greeted(const control::Request& request);
@@ -62,7 +65,9 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   control::DelimitedParser parser_;
   InputRate rate_;
   std::optional<SharedRate::Part> pose_rate_;  // from the first pose without an answer
+  std::optional<control::Bytes> newest_pose_;  // of those beyond the rate
   std::deque<control::Bytes> answers_;         // framed
+  std::size_t unsettled_ = 0;                  // work: answers
   std::size_t in_progress_ = 0;                // requests whose answer is not in answers_ yet
   EventQueue events_;
   Events::Token subscription_;

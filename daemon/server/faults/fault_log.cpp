@@ -1,23 +1,66 @@
 #include "daemon/server/faults/fault_log.hpp"
 
-#include <cerrno>
 #include <chrono>
-#include <cstring>
+#include <utility>
 
 #include "protocol/control/answers.hpp"
 
 namespace sonar {
 
-FaultLog::FaultLog(Events& events, Recordings& recordings) : events_(events), recordings_(recordings) {}
+FaultLog::FaultLog(Events& events, Recordings& recordings, WriterThread& writer, Log& log)
+    : events_(events), recordings_(recordings), writer_(writer), log_(log) {}
 FaultLog::~FaultLog() = default;
 
 Result<void> FaultLog::open(const std::filesystem::path& file) {
-  file_.reset(std::fopen(file.c_str(), "ae"));
-  if (!file_)
-    return failure(ErrorKind::io, "the journal of faults cannot be written: " + file.string() + ": " + std::strerror(errno) +
-                                      "; faults.journal or --fault-journal names another file");
-  std::setvbuf(file_.get(), nullptr, _IOLBF, 4096);
+  auto opened = JournalFile::open(file);
+  if (!opened) return tl::make_unexpected(opened.error());
+  file_ = *std::move(opened);
+  path_ = file;
   return {};
+}
+
+void FaultLog::append(const std::string& json) {
+  if (pending_.size() + json.size() > most_waiting_bytes) return lose(1, "its file is written too slowly");
+  pending_.append(json).append("\n");
+  ++pending_entries_;
+  if (!writing_) write_pending();
+}
+
+/// One batch at a time: what comes meanwhile is the next.
+void FaultLog::write_pending() {
+  writing_ = true;
+  const std::uint64_t entries = std::exchange(pending_entries_, 0);
+  const auto written = std::make_shared<JournalFile::Written>();
+  writer_.run(
+      [file = file_, lines = std::exchange(pending_, {}), written]() -> Result<void> {
+        *written = file->append(lines);
+        return {};
+      },
+      [this, entries, written](const Result<void>& done) {
+        writing_ = false;
+        if (written->lines < entries) {
+          lose(entries - written->lines, done ? written->why : done.error().text);
+        } else if (std::exchange(losing_, false)) {
+          log_limited(log_, limiter_, LogLevel::info, "the journal of faults is written again", about_file());
+        }
+        if (!pending_.empty()) write_pending();
+      });
+}
+
+void FaultLog::lose(std::uint64_t entries, const std::string& why) {
+  lost_ += entries;
+  why_lost_ = why;
+  if (!std::exchange(losing_, true))
+    log_limited(log_, limiter_, LogLevel::error, "entries of the journal of faults are lost: " + why, about_file());
+}
+
+std::vector<LogField> FaultLog::about_file() const { return {{"file", path_.string()}, {"lost", lost_}}; }
+
+std::vector<Note> FaultLog::notes() const {
+  if (lost_ == 0) return {};
+  return {{"", std::to_string(lost_) + " entries of the journal of faults " + path_.string() + " are lost: " + why_lost_,
+           "free its disk or end what delays it; the latest " + std::to_string(most_remembered) +
+               " entries: sonarctl fault journal --json"}};
 }
 
 void FaultLog::write(const FaultEntry& entry) {
@@ -43,7 +86,7 @@ void FaultLog::write(const FaultEntry& entry) {
   if (entry.what == FaultEntry::What::injected) ++injections_[entry.kind->code];
   if (const bool recorded = recordings_.takes(entry.sonar); file_ || recorded) {
     const std::string json = control::json_of(*message);
-    if (file_) std::fputs((json + "\n").c_str(), file_.get());
+    if (file_) append(json);
     if (recorded) recordings_.take_fault(entry.sonar, entry.at, json);
   }
   if (events_.has_listeners()) {

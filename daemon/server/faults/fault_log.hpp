@@ -1,9 +1,8 @@
 // The journal of faults: what each did, as JSON lines in a file, in recordings, as events, as counters, and the last entries in
-// memory. Owned by App; I/O thread only.
+// memory. Owned by App; I/O thread only. The file is written by the writer thread; what it does not take is counted.
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <deque>
 #include <filesystem>
 #include <map>
@@ -12,8 +11,12 @@
 
 #include "core/base/result.hpp"
 #include "daemon/emulator/faults/journal.hpp"
+#include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/server/events.hpp"
+#include "daemon/server/faults/journal_file.hpp"
 #include "daemon/server/recording/recordings.hpp"
+#include "daemon/server/recording/writer_thread.hpp"
+#include "daemon/server/system/log.hpp"
 
 namespace sonar {
 
@@ -25,7 +28,9 @@ class FaultLog final : public FaultJournal {
  public:
   static constexpr std::size_t most_remembered = 1000;
 
-  FaultLog(Events& events, Recordings& recordings);
+  static constexpr std::size_t most_waiting_bytes = 1u << 20;  // for the file
+
+  FaultLog(Events& events, Recordings& recordings, WriterThread& writer, Log& log);
   ~FaultLog() override;
   FaultLog(const FaultLog&) = delete;
   FaultLog& operator=(const FaultLog&) = delete;
@@ -38,15 +43,28 @@ class FaultLog final : public FaultJournal {
   const std::deque<std::shared_ptr<const v1::FaultEntry>>& entries() const { return entries_; }
   /// Injections since the start, by code.
   const std::map<std::string_view, std::uint64_t>& injections() const { return injections_; }
+  /// Entries that are not in the file.
+  std::uint64_t lost() const { return lost_; }
+  /// For the status: that some are lost, and why.
+  std::vector<Note> notes() const;
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
+  void append(const std::string& json);
+  void write_pending();
+  void lose(std::uint64_t entries, const std::string& why);
+  std::vector<LogField> about_file() const;
 
   Events& events_;
   Recordings& recordings_;
-  std::unique_ptr<std::FILE, Close> file_;
+  WriterThread& writer_;
+  Log& log_;
+  std::filesystem::path path_;
+  std::shared_ptr<JournalFile> file_;  // the writer's while it writes
+  std::string pending_;                // lines
+  std::uint64_t pending_entries_ = 0, lost_ = 0;
+  std::string why_lost_;
+  bool writing_ = false, losing_ = false;
+  LogLimiter limiter_;
   std::deque<std::shared_ptr<const v1::FaultEntry>> entries_;
   std::map<std::string_view, std::uint64_t> injections_;
   std::uint64_t written_ = 0;

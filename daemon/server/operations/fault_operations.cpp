@@ -126,6 +126,11 @@ mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureT
   using enum mavlink::MavResult;
   if (unit != mavlink::distance_sensor) return unsupported;
   if (!config_.faults.armed || instance > fleet_.devices().size()) return denied;
+  if (!config_.control.token_file.empty()) {  // HTTP would ask for it, and MAVLink has no place for one
+    log_.warning("failure refused: a command of MAVLink cannot show the token of control.token_file",
+                 {{"client", name_by_mavlink}});
+    return denied;
+  }
   std::vector<Device*> chosen;
   std::uint32_t number = 0;
   for (Device& device : fleet_.devices())

@@ -113,6 +113,7 @@ std::shared_ptr<const v1::DaemonStatus> Monitoring::status() const {
   for (v1::RecordingStatus& recording : of_.recordings.status()) *s.add_recordings() = std::move(recording);
   add_notes(s, of_.plausibility.all());
   add_notes(s, of_.mavlink.notes());
+  add_notes(s, of_.faults.notes());
   s.set_faults_armed(of_.config.faults.armed);
   for (v1::FaultStatus& fault : fault_statuses(of_.fleet, now, false)) *s.add_faults() = std::move(fault);
   add_viewers(s, of_.view.viewers());
@@ -126,6 +127,7 @@ std::string Monitoring::metrics() const {
   for (const Device& d : of_.fleet.devices()) f.sonars.emplace_back(d.config().name, d.figures());
   for (const Device& d : of_.fleet.devices()) f.active_faults.emplace_back(d.config().name, d.sonar().faults().active_count());
   f.fault_injections.assign(of_.faults.injections().begin(), of_.faults.injections().end());
+  f.fault_entries_lost = of_.faults.lost();
   f.poses = of_.world.counters();
   f.clients_now = of_.admission.now();
   f.turned_away_for_places = of_.admission.refused_for_places();

@@ -1,7 +1,11 @@
 #include "daemon/server/poses/pose_server.hpp"
 
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "daemon/server/system/listen.hpp"
@@ -12,9 +16,11 @@ namespace {
 
 constexpr std::size_t most_connections = 32;
 constexpr std::size_t most_lines_of_a_datagram = 64;
-constexpr std::size_t work_of_a_turn = 4096;  // bytes; then others have theirs
-constexpr std::size_t least_work = 64;        // bytes that cost as much as a read, or a line, does beside its own
-constexpr int most_not_json = 8;              // lines in a row that begin as JSON objects and are none
+constexpr std::size_t work_of_a_turn = 4096;            // bytes; then others have theirs
+constexpr std::size_t least_work = 64;                  // bytes that cost as much as a read, or a line, does beside its own
+constexpr int most_not_json = 8;                        // lines in a row that begin as JSON objects and are none
+constexpr std::size_t dropped_per_s = 256u << 20;       // reading away costs little, but not nothing
+constexpr std::chrono::milliseconds between_looks{10};  // at what has come meanwhile
 constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
 
 Sender sender_of(bool json, const char* transport, const asio::ip::address& ip, std::uint16_t port) {
@@ -33,8 +39,9 @@ PoseServer::PoseServer(asio::io_context& io, const PoseConfig& config, const Lim
       admission_(admission),
       intake_(intake),
       log_(log),
-      connections_(most_connections),
-      together_(limits.pose_bytes_per_s) {}
+      connections_(most_connections, std::chrono::seconds(1), [](const Connection& c) { return c.sender.source; }),
+      together_(limits.pose_bytes_per_s),
+      dropping_(dropped_per_s) {}
 
 Result<Endpoint> PoseServer::open(Port& port, Endpoint at) {
   if (port.encoding == Encoding::json) {
@@ -145,11 +152,14 @@ void PoseServer::admit(tcp::socket socket) {
   const Sender sender = sender_of(true, "tcp", peer.address(), peer.port());
   if (!is_admitted(config_.allow_from, peer.address()))
     return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
-  const bool room = connections_.make_room([this](const Connection& evicted) {
+  connections_.forget_if([](Connection& c) { return has_left(c.socket); });
+  const auto say_evicted = [this](const Connection& evicted) {
     log_limited(log_, notices_, LogLevel::info,
                 "pose connection closed: without a pose, or beyond the limits, for longest, and its place was needed",
                 {{"from", evicted.sender.id}});
-  });
+  };
+  if (admission_.is_drivers(socket)) connections_.evict(sender.source, say_evicted);
+  const bool room = connections_.make_room(sender.source, say_evicted);
   if (!room) return intake_.refuse(std::to_string(most_connections) + " connections are open and busy already", sender);
   end_when_silent(socket, limits_.dead_peer);
   auto connection = std::make_shared<Connection>(std::move(socket), sender, limits_.input_bytes_per_s,
@@ -176,8 +186,9 @@ asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
     for (Turn turn = Turn::not_over; turn == Turn::not_over; work = {}) {
       turn = take_turn(c, work);
       if (turn == Turn::end) co_return;
-      co_await rest(c, work);
+      const Rested rested = co_await rest(c, work);
       if (!c.socket.is_open() || stopping_) co_return;
+      if (rested == Rested::leaves_much) co_return take_newest(c);
     }
   }
 }
@@ -201,18 +212,58 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   return Turn::not_over;
 }
 
-/// The others' turns; longer when it sends more than limits allow it, or its share of all: the rest waits in the kernel.
-asio::awaitable<void> PoseServer::rest(Connection& c, const Work& work) {
+/// The others' turns; longer when it sends more than limits allow it, or its share of all.
+asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
-  const auto own = c.rate.pause_after(work.bytes, now), of_all = together_.pause_after(c.of_all, work.bytes, now);
-  if (own.count() > 0)
-    log_limited(log_, notices_, LogLevel::info,
-                "pose connection is read more slowly: it sends more than limits.input_bytes_per_s", {{"from", c.sender.id}});
-  const auto pause = std::max(own, of_all);
-  if (work.has_pose && pause.count() == 0) c.active_at = now;
+  const auto pause = std::max(c.rate.pause_after(work.bytes, now), together_.pause_after(c.of_all, work.bytes, now));
+  const bool within_limits = !drop_backlog(c) && pause.count() == 0;
+  if (!within_limits) c.proved = false;
+  if (work.has_pose && within_limits) {
+    c.proved = true;
+    c.active_at = now;
+  }
+  const auto until = now + pause;
+  do {
+    error_code ec;
+    c.turn.expires_at(std::min(until, std::chrono::steady_clock::now() + between_looks));
+    co_await c.turn.async_wait(into(ec));
+    if (!c.socket.is_open() || stopping_) co_return Rested::goes_on;
+    drop_backlog(c);
+    if (std::chrono::steady_clock::now() >= until) co_return Rested::goes_on;
+  } while (!has_left(c.socket));
+  co_return Rested::leaves_much;
+}
+
+/// Nothing of it acts later than now, and hanging up again and again gains nothing; but its last word counts.
+void PoseServer::take_newest(Connection& c) {
+  std::optional<control::LineParser::Line> newest;
+  std::array<std::byte, work_of_a_turn> buffer;
   error_code ec;
-  c.turn.expires_after(pause);
-  co_await c.turn.async_wait(into(ec));
+  for (std::size_t n = 0; !ec; n = c.socket.read_some(asio::buffer(buffer), ec)) {  // up to the end, which has come
+    c.lines.feed(std::span(buffer).first(n));
+    while (auto line = c.lines.next()) newest = std::move(line);
+  }
+  if (newest) on_line(*newest, c.sender);
+}
+
+/// Of what waits in the kernel, the newest stays: 0.1 s of the allowed rate, however late we are. True: the rest was dropped.
+bool PoseServer::drop_backlog(Connection& c) {
+  int waiting = 0;
+  if (::ioctl(c.socket.native_handle(), FIONREAD, &waiting) != 0 || waiting <= 0) return false;
+  const auto now = std::chrono::steady_clock::now();
+  const std::size_t burst = std::min(limits_.input_bytes_per_s, together_.share()) / 10;
+  const std::size_t kept = std::max(burst, 2 * control::longest_line);
+  if (static_cast<std::size_t>(waiting) <= kept || dropping_.left(now) == 0) return false;
+  // The kernel frees the bytes without copying them (tcp(7), MSG_TRUNC).
+  const ssize_t dropped =
+      ::recv(c.socket.native_handle(), nullptr, static_cast<std::size_t>(waiting) - kept, MSG_TRUNC | MSG_DONTWAIT);
+  if (dropped <= 0) return false;
+  dropping_.pause_after(static_cast<std::size_t>(dropped), now);
+  c.lines.skip_gap();
+  intake_.refuse(
+      "older ones that waited: more than limits.input_bytes_per_s, or than a share of limits.pose_bytes_per_s, was sent",
+      c.sender);
+  return true;
 }
 
 }  // namespace sonar

@@ -1,7 +1,7 @@
 // Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. Owned by App; the control stream is a server of its own
 // (daemon/server/control/). A malformed message costs its sender a counted refusal and, now and then, a log line; a connection
 // that does not speak JSON is closed. What connections send is worked on in turns of bounded work, and no faster than limits
-// allow.
+// allow: of what waits beyond them only the newest is kept, so that no pose acts long after it was sent.
 #pragma once
 
 #include <list>
@@ -45,7 +45,8 @@ class PoseServer {
     udp::socket datagrams;
     Listener lines;  // of JSON only
   };
-  /// One TCP sender; closed by stop(), or when its place is needed and it has sent no pose, or too much, for longest.
+  /// One TCP sender; closed by stop(), or when its place is needed and it has sent no pose, or too much, for longest. One that
+  /// has hung up has no place any more.
   struct Connection {
     Connection(tcp::socket s, Sender from, std::size_t bytes_per_s, SharedRate::Part part)
         : socket(std::move(s)),
@@ -61,6 +62,7 @@ class PoseServer {
     control::LineParser lines;
     int not_json = 0;                                                                    // lines in a row
     std::chrono::steady_clock::time_point active_at = std::chrono::steady_clock::now();  // a pose, within the limits
+    bool proved = false;                                                                 // the last pose was within the limits
     void close() {
       error_code ec;
       socket.close(ec);
@@ -79,7 +81,10 @@ class PoseServer {
     bool has_pose = false;  // one that counts
   };
   Turn take_turn(Connection& connection, Work& work);
-  asio::awaitable<void> rest(Connection& connection, const Work& work);
+  enum class Rested { goes_on, leaves_much };  // it has hung up, and has sent more than limits allow
+  asio::awaitable<Rested> rest(Connection& connection, const Work& work);
+  void take_newest(Connection& connection);
+  bool drop_backlog(Connection& connection);
   void admit(tcp::socket socket);
 
   void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);
@@ -96,6 +101,7 @@ class PoseServer {
   std::list<Port> ports_;
   ConnectionSlots<Connection> connections_;
   SharedRate together_;  // of all connections
+  InputRate dropping_;   // likewise, of bytes that are read away
   Endpoint protobuf_at_, json_at_;
   bool stopping_ = false;
 };

@@ -1,10 +1,6 @@
 #include "daemon/server/recording/recordings.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <exception>
-#include <new>
 #include <utility>
 
 #include "core/scene/instances.hpp"
@@ -40,37 +36,26 @@ struct Recordings::Recording {
   std::shared_ptr<Work> work = std::make_shared<Work>();
 };
 
-Recordings::Recordings(asio::io_context& io, const Config& config, Log& log, int nice_by, std::function<void()> on_change,
+Recordings::Recordings(WriterThread& writer, const Config& config, Log& log, std::function<void()> on_change,
                        std::size_t most_waiting_bytes)
-    : io_(io), config_(config), log_(log), on_change_(std::move(on_change)), most_waiting_bytes_(most_waiting_bytes) {
-  asio::post(thread_, [nice_by] {
-    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // costs only smoothness
-  });
-}
+    : writer_(writer), config_(config), log_(log), on_change_(std::move(on_change)), most_waiting_bytes_(most_waiting_bytes) {}
 
-Recordings::~Recordings() { thread_.join(); }
+Recordings::~Recordings() = default;
 
-/// `job` on the thread, `after` takes here what came of it and how far the file is. The loop lives until then.
+/// `job` on the thread, `after` takes here what came of it and how far the file is.
 template <class Job, class After>
 void Recordings::on_thread(const std::shared_ptr<Work>& work, Job job, After after) {
-  ++under_way_;
-  auto guard = asio::make_work_guard(io_);
-  asio::post(thread_, [this, guard = std::move(guard), work, job = std::move(job), after = std::move(after)]() mutable {
-    Outcome outcome;
-    try {
-      outcome.result = job(*work);
-    } catch (const std::bad_alloc&) {
-      outcome.result = failure(ErrorKind::unavailable, "not enough memory to record");
-    } catch (const std::exception& e) {
-      outcome.result = failure(ErrorKind::bug, std::string("writing it failed: ").append(e.what()));
-    }
-    work->failed |= !outcome.result;
-    if (work->file) outcome.figures = work->file->figures();
-    asio::post(io_, [this, outcome = std::move(outcome), after = std::move(after)]() mutable {
-      --under_way_;
-      after(outcome);
-    });
-  });
+  const auto figures = std::make_shared<RecordingFile::Figures>();
+  writer_.run(
+      [work, figures, job = std::move(job)]() mutable {
+        const Result<void> result = WriterThread::attempt([&] { return job(*work); });
+        work->failed |= !result;
+        if (work->file) *figures = work->file->figures();
+        return result;
+      },
+      [figures, after = std::move(after)](const Result<void>& result) mutable {
+        after(Outcome{result, *figures});
+      });
 }
 
 std::size_t Recordings::running() const {

@@ -1,4 +1,4 @@
-// Recordings inside the daemon: control starts and stops them, devices hand over the pings they send, a thread of its own writes.
+// Recordings inside the daemon: control starts and stops them, devices hand over the pings they send, the writer thread writes.
 // Owned by App; everything here is called on the I/O thread.
 //
 // Pinging never waits for a file: pings wait in memory up to a bound, and beyond it, or when a file fails, the recording ends
@@ -15,7 +15,7 @@
 #include "core/scene/scene.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/server/recording/recording_file.hpp"
-#include "daemon/server/system/asio.hpp"
+#include "daemon/server/recording/writer_thread.hpp"
 #include "daemon/server/system/log.hpp"
 #include "protocol/control/operations.hpp"
 
@@ -32,10 +32,9 @@ class Recordings {
   /// Called once, when it was begun or has ended, before this returns or later; never after finish().
   using Done = std::function<void(const Result<void>&)>;
 
-  /// `nice_by` is added to the niceness of the thread; `on_change` is called when a recording has ended.
-  Recordings(asio::io_context& io, const Config& config, Log& log, int nice_by, std::function<void()> on_change,
+  /// `on_change` is called when a recording has ended.
+  Recordings(WriterThread& writer, const Config& config, Log& log, std::function<void()> on_change,
              std::size_t most_waiting_bytes = default_most_waiting_bytes);
-  /// Waits for what is being written.
   ~Recordings();
   Recordings(const Recordings&) = delete;
   Recordings& operator=(const Recordings&) = delete;
@@ -65,8 +64,8 @@ class Recordings {
 
   /// Those that run, and the last that have ended, oldest first.
   std::vector<v1::RecordingStatus> status() const;
-  /// Nothing is open and nothing is being written.
-  bool idle() const { return under_way_ == 0 && running() == 0; }
+  /// Nothing is open.
+  bool idle() const { return running() == 0; }
 
  private:
   struct Work {  // the thread's
@@ -94,16 +93,14 @@ class Recordings {
   void ended(const Pointer& recording, const Outcome& outcome);
   void remove_oldest();
 
-  asio::io_context& io_;
+  WriterThread& writer_;
   const Config& config_;
   Log& log_;
   std::function<void()> on_change_;
   std::size_t most_waiting_bytes_;
   std::list<Pointer> recordings_;
   std::shared_ptr<const SceneNames> names_ = std::make_shared<const SceneNames>();
-  std::size_t under_way_ = 0;  // jobs of the thread
   bool finishing_ = false;
-  asio::thread_pool thread_{1};
 };
 
 }  // namespace sonar

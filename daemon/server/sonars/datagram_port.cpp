@@ -47,7 +47,8 @@ bool is_closed_port(msghdr& message) {
 Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port) {
   number_ = port;
   Socket& own = sockets_.emplace_back(io_);
-  if (auto r = bind_udp(own.socket, {sonar.bind_ip, port}, true); !r) return r;
+  // Else the system refuses broadcasts: it alone knows all addresses that are such.
+  if (auto r = bind_udp(own.socket, {sonar.bind_ip, port}, !sonar.groups.empty()); !r) return r;
   send_multicast_from(own.socket, sonar.bind_ip);
   return {};
 }
@@ -62,7 +63,7 @@ void DatagramPort::hear_broadcasts(const SonarConfig& sonar) {
 }
 
 void DatagramPort::start() {
-  if (!answer_) return;
+  if (!answer_ && !closed_) return;
   if (closed_) {
     const int on = 1;
     setsockopt(socket().native_handle(), IPPROTO_IP, IP_RECVERR, &on, sizeof on);
@@ -98,7 +99,7 @@ void DatagramPort::receive(Socket& at) {
   at.socket.async_receive_from(asio::buffer(at.datagram), at.from, [this, &at](const error_code& ec, std::size_t size) {
     if (stopping_ || ec == asio::error::operation_aborted) return;
     take_errors();
-    if (!ec && at.from.address().is_v4()) {
+    if (!ec && answer_ && at.from.address().is_v4()) {
       const Endpoint from{at.from.address().to_v4().to_bytes(), at.from.port()};
       // From the sonar's own address: that is how a host learns it. A host that cannot be reached gets no answer.
       error_code ignored;

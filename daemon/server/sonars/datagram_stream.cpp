@@ -1,5 +1,6 @@
 #include "daemon/server/sonars/datagram_stream.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "daemon/server/system/listen.hpp"
@@ -27,12 +28,12 @@ asio::awaitable<void> DatagramStream::send() {
   const auto self = shared_from_this();
   while (true) {
     if (const Outbox::Message message = parent_.next_message(id_)) {
-      const auto receivers = parent_.receivers(id_);  // one list for the whole message
+      auto receivers = parent_.receivers(id_);  // one list for the whole message
       if (receivers.empty()) {
         parent_.on_not_sent(id_);
         continue;
       }
-      if (!co_await send_message(message, receivers)) co_return;
+      if (!co_await send_message(message, std::move(receivers))) co_return;
       parent_.on_written(id_, message);
     } else if (finishing_) {
       co_return;
@@ -42,18 +43,27 @@ asio::awaitable<void> DatagramStream::send() {
   }
 }
 
+void DatagramStream::send_nothing_to(const Endpoint& to) {
+  error_code ignored;
+  socket_.send_to(asio::const_buffer(), {address_of(to.ip), to.port}, 0, ignored);
+}
+
 /// For the next message. A host that was silent for too long is given up.
 asio::awaitable<void> DatagramStream::wait() {
   const auto longest = parent_.longest_silence(id_);
-  wake_.expires_at(longest ? heard_at_ + *longest : asio::steady_timer::time_point::max());
+  wake_.expires_at(longest ? heard_at_ + (looked_ ? *longest : *longest / 2) : asio::steady_timer::time_point::max());
   error_code ec;
   co_await wake_.async_wait(into(ec));
-  if (!ec && longest && std::chrono::steady_clock::now() - heard_at_ >= *longest)
+  if (ec || !longest) co_return;
+  const auto silent_for = std::chrono::steady_clock::now() - heard_at_;
+  if (silent_for >= *longest)
     finish("silent for " + std::to_string(longest->count() / 1000) + " s");
+  else if (silent_for >= *longest / 2 && !std::exchange(looked_, true))
+    parent_.look_for_host(id_);
 }
 
-/// False: the socket was closed before the message was whole.
-asio::awaitable<bool> DatagramStream::send_message(const Outbox::Message& message, const std::vector<Endpoint>& receivers) {
+/// False: the socket was closed before the message was whole. A receiver that goes meanwhile gets no more of it.
+asio::awaitable<bool> DatagramStream::send_message(const Outbox::Message& message, std::vector<Endpoint> receivers) {
   if (message.datagrams == nullptr) co_return co_await send_datagram(*message.bytes, receivers);
   for (std::size_t i = 0; i < message.datagrams->size(); ++i) {
     if (i > 0 && gap_.count() > 0) {
@@ -61,6 +71,10 @@ asio::awaitable<bool> DatagramStream::send_message(const Outbox::Message& messag
       pause_.expires_after(gap_);
       co_await pause_.async_wait(into(ec));
       if (!socket_.is_open()) co_return false;
+    }
+    if (i > 0) {
+      const auto now = parent_.receivers(id_);
+      std::erase_if(receivers, [&](const Endpoint& to) { return std::find(now.begin(), now.end(), to) == now.end(); });
     }
     if (!co_await send_datagram((*message.datagrams)[i], receivers)) co_return false;
   }

@@ -21,9 +21,12 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   void wake() { wake_.cancel(); }
   /// No more pings after the one being sent, and no more of that when the socket is closed.
   void finish(std::string why);
-  /// A request of the host came: it has not gone.
+  /// An empty datagram.
+  void send_nothing_to(const Endpoint& to);
+  /// A request of the host came, or a sign of it: it has not gone.
   void heard() {
     heard_at_ = std::chrono::steady_clock::now();
+    looked_ = false;
     wake_.cancel();  // what it said may limit how long it may be silent
   }
   ConnectionId id() const { return id_; }
@@ -31,7 +34,7 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
  private:
   asio::awaitable<void> send();
   asio::awaitable<void> wait();
-  asio::awaitable<bool> send_message(const Outbox::Message& message, const std::vector<Endpoint>& receivers);
+  asio::awaitable<bool> send_message(const Outbox::Message& message, std::vector<Endpoint> receivers);
   asio::awaitable<bool> send_datagram(const protocol::Bytes& datagram, const std::vector<Endpoint>& receivers);
 
   SessionParent& parent_;
@@ -40,7 +43,7 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   std::chrono::nanoseconds gap_;
   asio::steady_timer wake_, pause_;
   std::chrono::steady_clock::time_point heard_at_ = std::chrono::steady_clock::now();
-  bool finishing_ = false;
+  bool finishing_ = false, looked_ = false;
   std::string why_;
 };
 

@@ -17,6 +17,7 @@ Device::Device(DeviceNetwork& network, Sonar::Surroundings around, const SonarCo
     : network_(network),
       parent_(parent),
       limits_(around.config.limits),
+      hosts_(around.config.control.hosts),
       sonar_(around, config, index, network.clock.now(), network.clock.skipped()),
       observer_listener_(network.io, network.admission, Admission::Purpose::client),
       beacon_(
@@ -48,7 +49,12 @@ Result<void> Device::open(const protocol::Port& port) {
       perform(std::move(made.actions));
       return std::move(made.reply);
     };
-    return http_.emplace_back(network_.io, limits_, network_.admission, network_.log, config().name, answer)
+    const auto names = [this] {
+      std::vector<std::string> all = hosts_;
+      all.push_back(sonar::text_of(config().advertise_ip));
+      return all;
+    };
+    return http_.emplace_back(network_.io, limits_, network_.admission, network_.log, config().name, names, answer)
         .open({ip, port.number});
   }
   auto datagrams = datagram_port(port.number);
@@ -71,6 +77,7 @@ Result<void> Device::open(const protocol::Port& port) {
     });
     return {};
   }
+  (*datagrams)->tell_of_closed_ports([this](Endpoint receiver) { on_receiver_closed(receiver); });
   const ConnectionId id = ++last_connection_;
   streams_.push_back(std::make_shared<DatagramStream>(*this, (*datagrams)->socket(), id, port.gap));
   perform(sonar_.open_stream(id, port, network_.clock.now()));

@@ -127,11 +127,12 @@ class Device final : public SessionParent {
 
   void on_bytes(ConnectionId from, protocol::BytesView bytes) override;
   Outbox::Message next_message(ConnectionId to) override { return sonar_.next_message(to, network_.clock.now()); }
-  std::vector<Endpoint> receivers(ConnectionId stream) const override { return sonar_.receivers(stream); }
+  std::vector<Endpoint> receivers(ConnectionId stream) override;
   void on_sent(ConnectionId to, std::size_t bytes) override { sonar_.on_sent(to, bytes); }
   void on_written(ConnectionId to, const Outbox::Message& message) override;
   void on_not_sent(ConnectionId stream) override;
   std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const override;
+  void look_for_host(ConnectionId stream) override;
   void on_finish(ConnectionId session) override { sonar_.finish(session); }
   void on_fault(const std::string& what) override;
   void on_send_error(const Endpoint& to, const std::string& why) override;
@@ -157,6 +158,7 @@ class Device final : public SessionParent {
   void on_host_datagram(DatagramPort& at, const protocol::Port& port, const Endpoint& from, protocol::BytesView datagram);
   StreamPointer host_of(const protocol::Port& port) const;
   void on_host_closed(const protocol::Port& port, const Endpoint& host);
+  void on_receiver_closed(const Endpoint& receiver);
   StreamPointer begin_dialogue(DatagramPort& at, const protocol::Port& port, Peer host);
   void on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port);
   asio::awaitable<void> turn_away(tcp::socket socket, Admission::Place place);
@@ -184,6 +186,7 @@ class Device final : public SessionParent {
   DeviceNetwork& network_;
   DeviceParent& parent_;
   const LimitConfig& limits_;
+  const std::vector<std::string>& hosts_;  // names by which HTTP may be called
   Sonar sonar_;
   Preview preview_;
   std::list<TcpPort> tcp_ports_;
@@ -198,6 +201,7 @@ class Device final : public SessionParent {
   std::map<ConnectionId, Arrived> arrived_;  // being decided upon, or waiting for a slot
   std::list<SessionPointer> sessions_;
   std::list<StreamPointer> streams_;
+  std::list<std::pair<Endpoint, std::chrono::steady_clock::time_point>> closed_;  // receivers, and when they are tried again
   int turning_away_ = 0;
   std::optional<Visit> turned_away_, gone_, searched_;  // the last ones
   std::string silenced_by_;

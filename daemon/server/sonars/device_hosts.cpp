@@ -1,8 +1,64 @@
-// Dialogues of a Device by datagrams: ports of kind udp_dialogue.
+// Whom a Device sends datagrams: hosts of dialogues (ports of kind udp_dialogue), receivers of streams (udp_stream).
+#include <algorithm>
+
 #include "daemon/config/addresses.hpp"
 #include "daemon/server/sonars/device.hpp"
 
 namespace sonar {
+namespace {
+
+constexpr std::chrono::seconds closed_for{2};  // then a receiver whose port was closed gets one more ping
+constexpr std::uint16_t discard = 9;           // a port that programs leave closed (RFC 863)
+constexpr std::size_t most_closed = 64;
+
+bool is_multicast(const Ipv4& ip) { return ip[0] >> 4 == 0xE; }
+
+bool is_broadcast(const Ipv4& ip, const SonarConfig& sonar) {
+  constexpr unsigned first_reserved = 240;  // from there on no address is one computer's
+  if (ip[0] >= first_reserved || ip == Ipv4{127, 255, 255, 255}) return true;
+  bool broadcast = sonar.netmask != Ipv4{255, 255, 255, 255};
+  for (std::size_t i = 0; i < ip.size(); ++i)
+    broadcast = broadcast && ip[i] == static_cast<std::uint8_t>(sonar.bind_ip[i] | static_cast<std::uint8_t>(~sonar.netmask[i]));
+  return broadcast;
+}
+
+}  // namespace
+
+/// Of those that clients asked for: no address of many computers that neither the product nor the configuration names, and none
+/// whose port is closed.
+std::vector<Endpoint> Device::receivers(ConnectionId stream) {
+  const Connection* const connection = sonar_.connections().find(stream);
+  std::vector<Endpoint> all = sonar_.receivers(stream);
+  if (connection == nullptr || connection->role != Role::stream) return all;
+  const auto& groups = config().groups;
+  std::erase_if(all, [&](const Endpoint& to) {
+    const bool multicast = is_multicast(to.ip);
+    if (!multicast && !is_broadcast(to.ip, config())) return false;
+    if (to.ip == connection->port->group.ip || (multicast && connection->port->any_group)) return false;
+    if (std::find(groups.begin(), groups.end(), to.ip) != groups.end()) return false;
+    on_send_error(to, "a broadcast or multicast address, which sonars.groups of the configuration does not name");
+    return true;
+  });
+  const auto now = std::chrono::steady_clock::now();
+  closed_.remove_if([now](const auto& c) { return c.second <= now; });
+  std::erase_if(all, [&](const Endpoint& to) {
+    return std::any_of(closed_.begin(), closed_.end(), [&](const auto& c) { return c.first == to; });
+  });
+  return all;
+}
+
+void Device::on_receiver_closed(const Endpoint& receiver) {
+  const bool known = std::any_of(closed_.begin(), closed_.end(), [&](const auto& c) { return c.first == receiver; });
+  if (!known && closed_.size() < most_closed) closed_.emplace_back(receiver, std::chrono::steady_clock::now() + closed_for);
+}
+
+/// A host that says nothing may be there all the same: its computer says so when it refuses what is sent to a closed port.
+void Device::look_for_host(ConnectionId stream) {
+  const Connection* const host = sonar_.connections().find(stream);
+  const StreamPointer dialogue = stream_of(stream);
+  if (host == nullptr || !dialogue || !host->dialogue || !host->dialogue->hosts_fall_silent()) return;
+  dialogue->send_nothing_to({host->peer.ip, discard});
+}
 
 /// The host that sent last has the dialogue: there are no connections that would end it.
 void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, const Endpoint& from, protocol::BytesView datagram) {
@@ -22,8 +78,12 @@ void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, cons
 void Device::on_host_closed(const protocol::Port& port, const Endpoint& host) {
   const StreamPointer dialogue = host_of(port);
   if (!dialogue) return;
-  if (const Peer& last = sonar_.connections().find(dialogue->id())->peer; last.ip == host.ip && last.port == host.port)
+  const Peer& last = sonar_.connections().find(dialogue->id())->peer;
+  if (last.ip != host.ip) return;
+  if (last.port == host.port)
     dialogue->finish("its port is closed");
+  else if (host.port == discard)
+    dialogue->heard();
 }
 
 Device::StreamPointer Device::host_of(const protocol::Port& port) const {

@@ -38,6 +38,10 @@ bool Fleet::gone() const {
          std::all_of(retired_.begin(), retired_.end(), [&](const Retired& r) { return is_gone(r.device.front()); });
 }
 
+bool Fleet::has_clients() const {
+  return std::any_of(devices_.begin(), devices_.end(), [](const Device& d) { return d.sonar().connections().has_audience(); });
+}
+
 std::uint64_t Fleet::served() const {
   std::uint64_t served = served_before_;
   for (const Device& d : devices_) served += d.sonar().served();

@@ -59,6 +59,7 @@ class Fleet final : public DeviceParent {
   void compute_preview(PingRequest request, Simulator::Done done) { simulator_.submit(std::move(request), std::move(done)); }
   bool gone() const;  // after stop(): nothing is left
   std::uint64_t served() const;
+  bool has_clients() const;
   /// Empty when all is well.
   std::string problem() const;
 

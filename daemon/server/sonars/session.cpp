@@ -2,12 +2,12 @@
 
 #include <linux/sockios.h>
 #include <netinet/tcp.h>
-#include <poll.h>
 #include <sys/ioctl.h>
 
 #include <algorithm>
 #include <cassert>
 
+#include "daemon/server/control/http_rules.hpp"
 #include "daemon/server/system/listen.hpp"
 
 namespace sonar {
@@ -16,7 +16,7 @@ namespace {
 // Bytes the kernel may hold that are not yet on the wire. More would only make a slow client's picture older.
 constexpr int unsent_limit_bytes = 256 * 1024;
 constexpr auto idle_watch = std::chrono::seconds(1);
-constexpr auto delivery_watch = std::chrono::milliseconds(1);
+constexpr auto delivery_watch = std::chrono::milliseconds(1), fin_watch = std::chrono::milliseconds(50);
 
 std::string reason(const error_code& ec) {
   if (ec == asio::error::eof) return "closed by the client";
@@ -38,11 +38,6 @@ Peer peer_of(const tcp::socket& socket) {
   const tcp::endpoint at = socket.remote_endpoint(ec);
   return {at.address().to_string() + ":" + std::to_string(at.port()),
           at.address().is_v4() ? at.address().to_v4().to_bytes() : protocol::Ipv4{}};
-}
-
-bool has_left(tcp::socket& socket) {
-  pollfd asked{socket.native_handle(), POLLRDHUP, 0};
-  return ::poll(&asked, 1, 0) > 0;
 }
 
 Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
@@ -88,10 +83,18 @@ asio::awaitable<void> Session::read() {
     while (!reading_ && !finishing_ && !over_) co_await rest(never);
     if (over_) co_return;
     received_at_ = Steady::now();
+    if (speaks_http(n)) co_return over("it speaks HTTP");
     parent_.on_bytes(setup_.id, std::span(received_).first(n));
     const auto pause = input_rate_.pause_after(n, Steady::now());
     if (pause.count() > 0 && !finishing_) co_await rest(Steady::now() + pause);
   }
+}
+
+/// Any web page can make a browser send it: nothing of it may act, and it must not hold a driver's place.
+bool Session::speaks_http(std::size_t received) {
+  for (std::size_t i = 0; i < received && first_bytes_.size() < longest_http_method; ++i)
+    first_bytes_ += static_cast<char>(received_[i]);
+  return begins_http_request(first_bytes_);
 }
 
 /// A client that sends too much waits; its FIN, too, is only read then. finish() and over() end the pause.
@@ -191,9 +194,16 @@ asio::awaitable<bool> Session::deliver() {
 void Session::end_by(Outbox::Shape::End end) {
   if (end == Outbox::Shape::End::reset) return reset("a fault reset the connection");
   finish("a fault ended the stream");
+  send_fin();
+}
+
+/// The reader waits for the client's own FIN, the watch for the deadline.
+void Session::send_fin() {
   error_code ec;
   socket_.shutdown(tcp::socket::shutdown_send, ec);
-  sent_fin_ = true;  // as in write()
+  sent_fin_ = true;
+  fin_at_ = Steady::now();
+  wake_watch_.cancel();
 }
 
 asio::awaitable<void> Session::write() {
@@ -210,9 +220,7 @@ asio::awaitable<void> Session::write() {
       parent_.on_written(setup_.id, message);
       if (message.shape && message.shape->end != Outbox::Shape::End::none) co_return end_by(message.shape->end);
     } else if (finishing_) {
-      socket_.shutdown(tcp::socket::shutdown_send, ec);
-      sent_fin_ = true;  // the reader waits for the client's own FIN, the watch for the deadline
-      co_return;
+      co_return send_fin();
     } else {
       co_await wake_writer_.async_wait(into(ec));
     }
@@ -222,8 +230,11 @@ asio::awaitable<void> Session::write() {
 Session::Steady::time_point Session::watch_until() const {
   auto until = Steady::now() + idle_watch;
   if (finishing_) until = std::min(until, finish_by_);
+  if (sent_fin_) until = std::min(until, std::max(fin_at_ + fin_limit, Steady::now() + fin_watch));
   return until;
 }
+
+bool Session::has_all(Steady::time_point now) { return sent_fin_ && now >= fin_at_ + fin_limit && unconfirmed_bytes() <= 0; }
 
 asio::awaitable<void> Session::watch() {
   const auto self = shared_from_this();
@@ -233,7 +244,7 @@ asio::awaitable<void> Session::watch() {
     co_await wake_watch_.async_wait(into(ec));
     if (over_) co_return;
     const auto now = Steady::now();
-    if (finishing_ && now >= finish_by_) {
+    if (finishing_ && (now >= finish_by_ || has_all(now))) {
       if (!sent_fin_) reset("did not take its last message in time");
       over(why_);
     } else if (writing_ && now - progress_at_ > setup_.limits.stall) {

@@ -28,7 +28,7 @@ class SessionParent {
   /// The next message to write; empty when there is none.
   virtual Outbox::Message next_message(ConnectionId to) = 0;
   /// Of a stream: where its messages go.
-  virtual std::vector<Endpoint> receivers(ConnectionId stream) const = 0;
+  virtual std::vector<Endpoint> receivers(ConnectionId stream) = 0;
   virtual void on_sent(ConnectionId to, std::size_t bytes) = 0;
   /// A message has been handed to the kernel whole.
   virtual void on_written(ConnectionId to, const Outbox::Message& message) = 0;
@@ -36,6 +36,8 @@ class SessionParent {
   virtual void on_not_sent(ConnectionId stream) = 0;
   /// A peer that is silent for longer has gone. Nothing: it may be silent.
   virtual std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const = 0;
+  /// The host of a stream has been silent for half of that: it may be asked for a sign.
+  virtual void look_for_host(ConnectionId stream) = 0;
   /// It ends after the message being written.
   virtual void on_finish(ConnectionId session) = 0;
   /// An exception ended one of its coroutines; on_over follows.
@@ -53,8 +55,9 @@ class Session : public std::enable_shared_from_this<Session> {
     LimitConfig limits;                 // of one client
     std::shared_ptr<const void> place;  // kept as long as the session lives
   };
-  /// Longest time a client may take for its last message after finish(); then it is reset.
-  static constexpr std::chrono::milliseconds finish_limit{1500};
+  /// Longest time a client may take for its last message after finish(); then it is reset. One whose computer has all of it, and
+  /// our FIN, is not waited for longer than `fin_limit`.
+  static constexpr std::chrono::milliseconds finish_limit{1200}, fin_limit{400};
 
   Session(SessionParent& parent, tcp::socket socket, const Setup& setup);
 
@@ -94,9 +97,12 @@ class Session : public std::enable_shared_from_this<Session> {
   asio::awaitable<bool> write_shaped(protocol::BytesView bytes, const Outbox::Shape& shape);
   asio::awaitable<bool> pause_writing(std::chrono::nanoseconds length);
   asio::awaitable<bool> deliver();
+  bool speaks_http(std::size_t received);
   void end_by(Outbox::Shape::End end);
   Steady::time_point watch_until() const;
   bool is_silent(Steady::time_point now) const;
+  bool has_all(Steady::time_point now);
+  void send_fin();
   void over(std::string why);
   void spawn(asio::awaitable<void> (Session::*part)());
 
@@ -107,10 +113,11 @@ class Session : public std::enable_shared_from_this<Session> {
   InputRate input_rate_;
   asio::steady_timer wake_reader_, wake_writer_, wake_watch_, pause_;
   std::array<std::byte, 8192> received_{};
+  std::string first_bytes_;  // enough of them to detect HTTP
   const Steady::time_point connected_at_ = Steady::now();
   Steady::time_point received_at_ = connected_at_;  // a byte came in
   Steady::time_point progress_at_{};                // a byte went out, while writing; in a pause its end
-  Steady::time_point finish_by_{};
+  Steady::time_point finish_by_{}, fin_at_{};
   std::uint32_t ping_ = 0;  // that is written now or was last; 0 = a reply
   bool reading_ = true, writing_ = false, hurries_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
   std::string why_;
@@ -118,7 +125,5 @@ class Session : public std::enable_shared_from_this<Session> {
 
 /// Name and address of the other end, for the log and the status message.
 Peer peer_of(const tcp::socket& socket);
-/// The peer has hung up; what it sent before may still be unread.
-bool has_left(tcp::socket& socket);
 
 }  // namespace sonar

@@ -1,8 +1,10 @@
-// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor. Owned by Device.
+// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor, but for those of web pages, which Host and
+// Origin tell. Owned by Device.
 #pragma once
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "daemon/server/connections/connection_listener.hpp"
 #include "daemon/server/connections/http_connection.hpp"
@@ -14,9 +16,12 @@ class SonarHttp final : public HttpService {
  public:
   using Answer = std::function<protocol::ResourceReply(const protocol::ResourceRequest&)>;
 
+  /// By which names it may be called, beside its own address: of now.
+  using Names = std::function<std::vector<std::string>()>;
+
   /// `limits`, `admission` and `log` outlive it. `sonar`: its name, for the log.
   SonarHttp(asio::io_context& io, const LimitConfig& limits, Admission& admission, Log& log, const std::string& sonar,
-            Answer answer);
+            Names names, Answer answer);
 
   Result<void> open(Endpoint at) { return listener_.open(at); }
   void start() { listener_.start(); }
@@ -30,6 +35,7 @@ class SonarHttp final : public HttpService {
 
  private:
   ConnectionServices services_;
+  Names names_;
   Answer answer_;
   ConnectionListener<HttpConnection> listener_;
 };

@@ -1,6 +1,7 @@
 #include "daemon/server/system/listen.hpp"
 
 #include <netinet/tcp.h>
+#include <poll.h>
 
 #include <algorithm>
 #include <fstream>
@@ -62,6 +63,11 @@ void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit) {
   socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPINTVL>(probe_s), ec);
   socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPCNT>(2), ec);
   socket.set_option(option::integer<IPPROTO_TCP, TCP_USER_TIMEOUT>(3000 * probe_s), ec);
+}
+
+bool has_left(tcp::socket& socket) {
+  pollfd asked{socket.native_handle(), POLLRDHUP, 0};
+  return ::poll(&asked, 1, 0) > 0;
 }
 
 Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast) {

@@ -20,6 +20,9 @@ void send_multicast_from(udp::socket& socket, Ipv4 ip);
 /// asio::error::timed_out. Whole seconds; at least 3.
 void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit);
 
+/// The peer has hung up; what it sent before may still be unread.
+bool has_left(tcp::socket& socket);
+
 /// Whether poses from there are taken. Without ranges only this computer's: the ranges may go by a reload while the listener
 /// stays.
 bool is_admitted(const std::vector<AddressRange>& allow_from, const asio::ip::address& from);

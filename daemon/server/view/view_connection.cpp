@@ -4,14 +4,18 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <utility>
 #include <vector>
 
+#include <boost/beast/core/buffers_range.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <boost/beast/websocket/stream.hpp>
+
+#include "daemon/server/view/frame_work.hpp"
 
 namespace sonar {
 namespace {
@@ -25,30 +29,74 @@ constexpr int most_unsent = 128 << 10;
 
 }  // namespace
 
-/// A socket that says when bytes move. Beast finds the friends by its type.
+/// A socket that says when bytes move out, and is read at the allowed rate. Beast finds the friends by its type.
 struct ViewConnection::Watched {
-  tcp::socket& socket;
+  HttpConnection& from;
   Steady::time_point& moved_at;
+  asio::steady_timer& rest;
+  FrameWork work = {};
 
   using executor_type = tcp::socket::executor_type;
-  executor_type get_executor() { return socket.get_executor(); }
+  executor_type get_executor() { return from.socket().get_executor(); }
   template <class Buffers, class Token>
   auto async_read_some(const Buffers& buffers, Token&& token) {
-    return socket.async_read_some(buffers, std::forward<Token>(token));
+    return asio::async_compose<Token, void(error_code, std::size_t)>(Read<Buffers>{*this, buffers}, token, from.socket());
   }
   template <class Buffers, class Token>
   auto async_write_some(const Buffers& buffers, Token&& token) {
     moved_at = Steady::now();
-    return socket.async_write_some(buffers, std::forward<Token>(token));
+    return from.socket().async_write_some(buffers, std::forward<Token>(token));
   }
-  friend void teardown(beast::role_type role, Watched& watched, error_code& ec) { websocket::teardown(role, watched.socket, ec); }
+  friend void teardown(beast::role_type role, Watched& watched, error_code& ec) {
+    websocket::teardown(role, watched.from.socket(), ec);
+  }
   template <class Handler>
   friend void async_teardown(beast::role_type role, Watched& watched, Handler&& handler) {
-    websocket::async_teardown(role, watched.socket, std::forward<Handler>(handler));
+    websocket::async_teardown(role, watched.from.socket(), std::forward<Handler>(handler));
   }
   friend void beast_close_socket(Watched& watched) {
     error_code ec;
-    watched.socket.close(ec);
+    watched.from.socket().close(ec);
+  }
+
+  /// Reads, then waits for as long as the limit is exceeded before the bytes are looked at.
+  template <class Buffers>
+  struct Read {
+    Watched& watched;
+    Buffers buffers;
+    std::size_t size = 0;
+
+    template <class Self>
+    void operator()(Self& self) {
+      auto& socket = watched.from.socket();
+      const Buffers own = buffers;  // `self` holds the others
+      socket.async_read_some(own, std::move(self));
+    }
+    template <class Self>
+    void operator()(Self& self, const error_code& ec, std::size_t read) {
+      if (ec || read == 0) return self.complete(ec, read);
+      size = read;
+      const auto pause = watched.from.pause_after(watched.work_of(buffers, read));
+      if (pause.count() == 0) return self.complete(ec, read);
+      asio::steady_timer& rest = watched.rest;
+      rest.expires_after(pause);
+      rest.async_wait(std::move(self));
+    }
+    /// The pause is over, or the connection is.
+    template <class Self>
+    void operator()(Self& self, const error_code&) {
+      self.complete(watched.from.over() ? error_code(asio::error::operation_aborted) : error_code(), size);
+    }
+  };
+  template <class Buffers>
+  std::size_t work_of(const Buffers& buffers, std::size_t read) {
+    std::size_t sum = 0;
+    for (const asio::const_buffer piece : beast::buffers_range_ref(buffers)) {
+      const std::size_t count = std::min(read, piece.size());
+      sum += work.of({static_cast<const std::byte*>(piece.data()), count});
+      read -= count;
+    }
+    return sum;
   }
 };
 
@@ -67,9 +115,10 @@ ViewConnection::ViewConnection(ConnectionServices& services, HttpConnection& fro
       playback_(welcome.playback),
       on_open_(std::move(on_open)),
       viewer_(host, {welcome.may_steer, welcome.most_hz}, from.sender().source),
-      socket_(std::make_unique<Socket>(Watched{from.socket(), moved_at_})),
+      socket_(std::make_unique<Socket>(Watched{from, moved_at_, rest_})),
       wake_(services.io, never),
-      stall_(services.io, never) {
+      stall_(services.io, never),
+      rest_(services.io, never) {
   error_code ec;
   if (const auto peer = from.socket().remote_endpoint(ec); !ec) address_ += ":" + std::to_string(peer.port());
 }
@@ -177,6 +226,7 @@ asio::awaitable<void> ViewConnection::say_goodbye(std::uint16_t code, const char
 void ViewConnection::on_closing() {
   wake_.cancel();
   stall_.cancel();
+  rest_.cancel();
   if (!std::exchange(over_, true) && !writing_) {
     const std::array<std::uint8_t, 4> going_away{0x88, 2, 1001 >> 8, 1001 & 0xFF};  // a frame of RFC 6455, 5.5.1
     if (::send(from_.socket().native_handle(), going_away.data(), going_away.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) return;

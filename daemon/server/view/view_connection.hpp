@@ -1,5 +1,6 @@
 // The WebSocket of one viewer: takes an HTTP connection over after the handshake was judged. Moves messages between the socket
-// and a Viewer, which decides everything; closes when the viewer takes no byte for limits.stall_s. I/O thread only.
+// and a Viewer, which decides everything; closes when the viewer takes no byte for limits.stall_s. It is read no faster than
+// HTTP is. I/O thread only.
 #pragma once
 
 #include <functional>
@@ -51,7 +52,7 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   std::function<void(const std::shared_ptr<ViewConnection>&)> on_open_;
   Viewer viewer_;
   std::unique_ptr<Socket> socket_;
-  asio::steady_timer wake_, stall_;
+  asio::steady_timer wake_, stall_, rest_;
   Steady::time_point moved_at_{};  // bytes, to the viewer
   bool over_ = false, writing_ = false;
 };

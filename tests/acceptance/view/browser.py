@@ -13,6 +13,8 @@ import urllib.request
 
 from websocket import TEXT, WebSocket
 
+KEY_NUMBERS = {"Backspace": 8, "Tab": 9, "Enter": 13, "Escape": 27, "ArrowUp": 38, "ArrowDown": 40}
+
 
 def program():
     """The browser, or None."""
@@ -142,9 +144,10 @@ class Page:
 
     def press(self, key):
         code = {" ": "Space", "?": "Slash"}.get(key, key)
-        text = {"text": key} if len(key) == 1 else {}
-        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, **text)
-        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, code=code)
+        text = {"text": key} if len(key) == 1 else {"text": "\r"} if key == "Enter" else {}
+        number = {"windowsVirtualKeyCode": KEY_NUMBERS[key]} if key in KEY_NUMBERS else {}  # without it the browser does nothing
+        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, **text, **number)
+        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, code=code, **number)
 
     def click(self, selector):
         """Waits for the element: a message of the daemon may put it there, or replace it."""

@@ -92,12 +92,12 @@ class FakeSonar {
   explicit FakeSonar(std::function<void(Peer&)> behave) : listener_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
-    ::inet_pton(AF_INET, "127.83.1.17", &address.sin_addr);
+    ::inet_pton(AF_INET, "127.0.0.2", &address.sin_addr);
     EXPECT_EQ(::bind(listener_.fd(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
     ::listen(listener_.fd(), 1);
     socklen_t size = sizeof address;
     ::getsockname(listener_.fd(), reinterpret_cast<sockaddr*>(&address), &size);
-    endpoint_ = "127.83.1.17:" + std::to_string(ntohs(address.sin_port));
+    endpoint_ = "127.0.0.2:" + std::to_string(ntohs(address.sin_port));
     thread_ = std::thread([this, behave = std::move(behave)] {
       if (wait_for(listener_.fd(), POLLIN, std::chrono::steady_clock::now() + 10s) != success) return;
       Peer peer(::accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
@@ -309,9 +309,8 @@ TEST(LinkOpen, LogsWhatFailedWhereAndWhatToDo) {
   SonarDescription sonar;
   const auto opening = [&](const std::string& endpoint) { return logged([&] { Link::open(endpoint, 4, link, sonar); }); };
   using testing::AllOf, testing::HasSubstr;
-  EXPECT_THAT(
-      opening("127.83.1.18:1"),
-      AllOf(HasSubstr("\"127.83.1.18:1\": TCP port 1: Connection refused; check that sonard runs"), HasSubstr("BVE_PORT")));
+  EXPECT_THAT(opening("127.0.0.3:1"),
+              AllOf(HasSubstr("\"127.0.0.3:1\": TCP port 1: Connection refused; check that sonard runs"), HasSubstr("BVE_PORT")));
   EXPECT_THAT(opening("not an address"), AllOf(HasSubstr("\"not an address\""), HasSubstr("check the host's name")));
   EXPECT_THAT(opening("127.0.0.1:port"), AllOf(HasSubstr("\"127.0.0.1:port\""), HasSubstr("HOST:PORT")));
   FakeSonar gone([](Peer&) {});
@@ -336,7 +335,7 @@ TEST(LinkOpen, ReportsWhyNoSonarIsReached) {
   SonarDescription sonar;
   for (const char* endpoint : {"", ":14750", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:65536", "127.0.0.1:port"})
     EXPECT_EQ(Link::open(endpoint, 4, link, sonar), bad_parameter) << endpoint;
-  EXPECT_EQ(Link::open("127.83.1.18:1", 4, link, sonar), connection_timed_out);  // refused
+  EXPECT_EQ(Link::open("127.0.0.3:1", 4, link, sonar), connection_timed_out);  // refused
   EXPECT_EQ(Link::open("not an address", 4, link, sonar), lookup_host);
   EXPECT_EQ(link, nullptr);
 }

@@ -5,7 +5,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tests/acceptance"))
 
-from running_sonard import BUILD, Sonard, free_address, run  # noqa: E402,F401  pylint: disable=wrong-import-position,unused-import
+from running_sonard import BUILD, Sonard, run  # noqa: E402,F401  pylint: disable=wrong-import-position,unused-import
 
 PROGRAMS = BUILD / "tests/clients/bvtsdk/programs"
 

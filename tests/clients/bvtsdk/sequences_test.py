@@ -3,7 +3,7 @@ import pathlib
 import tempfile
 import unittest
 
-from prefixes import PROGRAMS, free_address, l_targets, prefix, run
+from prefixes import PROGRAMS, l_targets, prefix, run
 
 
 class Sequences(unittest.TestCase):
@@ -32,7 +32,7 @@ class Sequences(unittest.TestCase):
         self.program("cpp4_record_colours_playback", self.daemon.address, prefix(4) / "colormaps", self.file("recorded.son"))
 
     def test_c4_rtheta_with_retries(self):
-        self.program("c4_rtheta_with_retries", self.daemon.address, free_address())
+        self.program("c4_rtheta_with_retries", self.daemon.address, "127.0.0.9")
 
     def test_c4_logger_thread(self):
         self.program("c4_logger_thread", self.daemon.address, self.file("log.son"))
@@ -48,7 +48,7 @@ class Sequences(unittest.TestCase):
         self.assertEqual(self.file("found.son.ppm").read_bytes()[:3], b"P6\n")
 
     def test_c3_retry_settings_receive_only(self):
-        self.program("c3_retry_settings_receive_only", self.daemon.address, free_address())
+        self.program("c3_retry_settings_receive_only", self.daemon.address, "127.0.0.9")
 
 
 if __name__ == "__main__":

@@ -75,8 +75,8 @@ TEST_P(BeamTransform, IsTheSumOverColumns) {
 constexpr auto in_sine = BeamSpacing::uniform_in_sine, in_angle = BeamSpacing::uniform_in_angle;
 
 std::string name_of(const testing::TestParamInfo<std::tuple<Case, SimdLevel>>& about) {
-  constexpr const char* names[] = {"automatic", "portable", "avx2", "avx512"};
-  return std::string(std::get<0>(about.param).name) + "_" + names[static_cast<int>(std::get<1>(about.param))];
+  return std::string(std::get<0>(about.param).name) + "_" +
+         std::string(simd_level_names[static_cast<std::size_t>(std::get<1>(about.param))]);
 }
 INSTANTIATE_TEST_SUITE_P(
     Products, BeamTransform,

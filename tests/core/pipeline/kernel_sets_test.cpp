@@ -154,8 +154,10 @@ TEST(KernelSets, AFixedFanOfAnyNumberOfRaysIsTraced) {
 
 // SONARD_SIMD holds everything that does not say otherwise, the tests' engines included.
 TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
-  for (const auto& [name, level] :
-       {std::pair{"portable", SimdLevel::portable}, {"avx2", SimdLevel::avx2}, {"avx512", SimdLevel::avx512}}) {
+  for (const auto& [name, level] : {std::pair{"portable", SimdLevel::portable},
+                                    {"avx2", SimdLevel::avx2},
+                                    {"avx512", SimdLevel::avx512},
+                                    {"neon", SimdLevel::neon}}) {
     const testing::HeldVariable held("SONARD_SIMD", name);
     EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(level)) << name;
     EXPECT_EQ(&simd::kernels_for(SimdLevel::portable), &simd::portable_kernels) << "what was asked for by itself stays";
@@ -164,6 +166,16 @@ TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
   EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(SimdLevel::avx512)) << "the best there is";
   const testing::HeldVariable unknown("SONARD_SIMD", "avx1024");
   EXPECT_THROW(simd::kernels_for(SimdLevel::automatic), std::runtime_error);
+}
+
+// What falls back from one level to the next is of the processor's own family.
+TEST(KernelSets, NeonIsOfArmProcessorsAlone) {
+#if defined(__aarch64__)
+  for (const SimdLevel level : {SimdLevel::neon, SimdLevel::avx2, SimdLevel::avx512})
+    EXPECT_STREQ(simd::kernels_for(level).name, "neon");
+#else
+  EXPECT_EQ(&simd::kernels_for(SimdLevel::neon), &simd::portable_kernels);
+#endif
 }
 
 }  // namespace

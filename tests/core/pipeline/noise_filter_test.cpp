@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/pipeline/arithmetic/waveform.hpp"
+#include "core/pipeline/noise.hpp"
 #include "core/pipeline/pulses/pulse.hpp"
 
 namespace sonar {
@@ -33,6 +34,25 @@ TEST(NoiseFilter, StaysFiniteOnAbsurdlyFineGrids) {
     EXPECT_NEAR(correlation(h, 0), 1.0, 1e-4);
     EXPECT_GT(correlation(h, 1), 0.9);
   }
+}
+
+TEST(NoiseTable, SharesDrawsAndTablesWithOthersOfItsSeed) {
+  const std::vector<float> filter{0.6f, 0.8f}, other_filter{0.8f, 0, 0.6f};
+  NoiseTable first, same, other, other_seed, alone, alone_other_seed;
+  first.prepare(Seed{3}, filter);
+  const std::vector<const NoiseTable*> drawn{&same, &first};
+  same.prepare(Seed{3}, filter, drawn);
+  EXPECT_EQ(&same.shaped(), &first.shaped());
+  other.prepare(Seed{3}, other_filter, drawn);
+  alone.prepare(Seed{3}, other_filter);
+  EXPECT_EQ(other.shaped(), alone.shaped());
+  other_seed.prepare(Seed{4}, filter, drawn);
+  alone_other_seed.prepare(Seed{4}, filter);
+  EXPECT_EQ(other_seed.shaped(), alone_other_seed.shaped());
+  EXPECT_NE(other_seed.shaped(), first.shaped());
+  first.prepare(Seed{4}, filter);  // what others share of it stays
+  EXPECT_EQ(same.shaped().size(), first.shaped().size());
+  EXPECT_NE(same.shaped(), first.shaped());
 }
 
 }  // namespace

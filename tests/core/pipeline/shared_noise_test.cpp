@@ -15,6 +15,7 @@
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
 #include "core/pipeline/check_request.hpp"
+#include "core/pipeline/focused_array.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "tests/core/pipeline/kernel_sets.hpp"
 #include "tests/core/pipeline/scenes.hpp"
@@ -112,6 +113,55 @@ TEST_P(ChannelsShare, IsTheFocusedArraysSumOverItsChannels) {
   }
 }
 INSTANTIATE_TEST_SUITE_P(OfALevel, ChannelsShare, ::testing::Values(60.0f, 3.4f));
+
+// Each part of each beam against the sum over its channels in double precision, from inside the array to far away; sectors of one
+// beam, and up to the array's own line, where the phases are hardest.
+TEST(FocusedArray, IsTheSumOverItsChannels) {
+  struct Case {
+    int beams;
+    double widest;
+    SharedNoise law;
+  };
+  const SharedNoise usual, small{.channels = 40, .group = 8, .sine = 0.3f}, single{.channels = 6, .group = 2};
+  for (const Case& c : {Case{512, 0.5, usual}, Case{256, 0.5, usual}, Case{1, 0, usual}, Case{300, 0.95, usual},
+                        Case{90, 0.7, small}, Case{17, 1, single}}) {
+    std::vector<double> sines;
+    for (int j = 0; j < c.beams; ++j) sines.push_back(c.beams > 1 ? c.widest * (1 - 2.0 * j / (c.beams - 1)) : 0.0);
+    FocusedArray array(sines, c.law);
+    const int half = c.law.group / 2;
+    double off = 0, loudest = 0;
+    for (const double r : {0.7, 3.0, 7.0, 20.0, 57.0, 130.0, 700.0, 2000.0}) {
+      array.focus(r);
+      for (std::size_t j = 0; j < sines.size(); ++j) {
+        std::vector<std::complex<double>> sums(static_cast<std::size_t>(array.parts()));
+        for (int m = 0; m < c.law.channels; ++m) {
+          const double x = (m - 0.5 * (c.law.channels - 1)) / (2 * static_cast<double>(c.law.sine));
+          const double delay = std::sqrt(std::max(r * r - 2 * r * x * sines[j] + x * x, 0.0)) - r;
+          const std::complex<double> e = std::polar(m % 2 == 0 ? 1.0 : -1.0, 2 * pi * delay);
+          const double way = pi / 2 * (m % half + 0.5) / half;
+          sums[static_cast<std::size_t>(m / half)] += std::cos(way) * e;
+          sums[static_cast<std::size_t>(m / half + 1)] += std::sin(way) * e;
+          sums.back() += e;
+        }
+        for (std::size_t part = 0; part < sums.size(); ++part) {
+          const float* of = array.sums().data() + 2 * part * sines.size() + j;
+          off = std::max(off, std::abs(sums[part] - std::complex<double>(of[0], of[sines.size()])));
+          loudest = std::max(loudest, std::abs(sums[part]));
+        }
+      }
+    }
+    record_oracle(no_number,
+                  "focused array, " + std::to_string(c.beams) + " beams: against the sum over channels, re the loudest", 0,
+                  off / loudest, 5e-5, "");
+  }
+}
+
+TEST(SharedNoise, KeepsOnlyWhatIsHeard) {
+  Sounding s = with([](ReceiverModel& law) { law.shared_noise.level_db = 3.4f; });
+  const SharedNoiseTable table = make_plan(s.mode(), s.request.settings, {}).shared_noise;
+  ASSERT_TRUE(table.is_audible());
+  EXPECT_LT(table.bytes(), table.response().size() * sizeof(float) * 7 / 10);
+}
 
 // It ends without a step, in all beams.
 TEST(SharedNoise, FadesAway) {

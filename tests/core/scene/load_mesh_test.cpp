@@ -14,10 +14,6 @@
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/temporary_files.hpp"
 
-// Assimp loses some memory when it refuses a cut GLB or DAE; it is read at load time only, and not ours to mend.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libassimp"; }
-
 namespace sonar::load_mesh_test {
 namespace {
 

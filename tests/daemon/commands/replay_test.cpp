@@ -2,9 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
-#include <unistd.h>
 
-#include <atomic>
 #include <future>
 #include <thread>
 
@@ -33,13 +31,7 @@ using Steady = std::chrono::steady_clock;
 constexpr milliseconds patience{20000};
 constexpr std::size_t everything = ~std::size_t{0};
 
-/// 127.192..127.223, from the process number and a counter: of this test alone.
-Ipv4 own_address() {
-  static std::atomic<unsigned> count{0};
-  const unsigned number = static_cast<unsigned>(::getpid()) * 16 + count++;
-  return {127, static_cast<std::uint8_t>(192 + (number >> 16) % 32), static_cast<std::uint8_t>(number >> 8),
-          static_cast<std::uint8_t>(1 + number % 250)};
-}
+const Ipv4 address{127, 0, 0, 2};
 
 Bytes ping_message(std::uint32_t id) {
   oculus::PingHead head;
@@ -87,7 +79,7 @@ class Replay {
     recording_ = std::move(*opened);
     auto device = find_replay_device(*recording_.reader, "recording", 1042);
     if (!device) throw std::runtime_error(device.error().text);
-    options.at = {own_address(), 0};
+    options.at = {address, 0};
     server_ = std::make_unique<ReplayServer>(io_, *recording_.reader, *device, options, log_);
     if (const auto listening = server_->open(); !listening) throw std::runtime_error(listening.error().text);
     server_->start();
@@ -245,8 +237,7 @@ TEST(Replay, StopsWithAClientThatDoesNotRead) {
 
 TEST(Replay, StatusLeadsDriversHere) {
   asio::io_context io;
-  const Ipv4 ip = own_address();
-  udp::socket listener(io, udp::endpoint(asio::ip::address_v4(ip), 0));
+  udp::socket listener(io, udp::endpoint(asio::ip::address_v4(address), 0));
   std::vector<RecordedMessage> messages = messages_of(2, milliseconds(1));
   oculus::StatusMessage recorded;
   recorded.header.part_number = recorded.part_number = 1032;
@@ -259,7 +250,7 @@ TEST(Replay, StatusLeadsDriversHere) {
   for (const bool with_status : {false, true}) {
     if (with_status) messages.push_back({messages.back().at, Origin::device, Carrier::datagram, wire::bytes_of(recorded)});
     ReplayOptions options;
-    options.status_to = {{ip, listener.local_endpoint().port()}};
+    options.status_to = {{address, listener.local_endpoint().port()}};
     Replay replay(file_of(pcap, messages), options);
     ASSERT_TRUE(readable(listener)) << "no status datagram for " << patience.count() << " ms; one a second is sent";
     Bytes datagram(2000);
@@ -383,10 +374,9 @@ TEST(ReplayOfAris, CountsOnWhenItBeginsAgainAndFromOneForTheNextController) {
 
 TEST(ReplayOfAris, ABeaconLeadsControllersHere) {
   asio::io_context io;
-  const Ipv4 ip = own_address();
-  udp::socket listener(io, udp::endpoint(asio::ip::address_v4(ip), 0));
+  udp::socket listener(io, udp::endpoint(asio::ip::address_v4(address), 0));
   ReplayOptions options;
-  options.status_to = {{ip, listener.local_endpoint().port()}};
+  options.status_to = {{address, listener.local_endpoint().port()}};
   Replay replay(aris_file(2, milliseconds(1)), options);
   std::optional<Controller> controller;
   for (const bool busy : {false, true}) {
@@ -485,6 +475,18 @@ TEST(ReplayOfPingLogs, AFileOfNoKnownSonarIsRefused) {
   const auto device = find_replay_device(*opened->reader, "f", 1042);
   ASSERT_FALSE(device);
   EXPECT_THAT(device.error().text, ::testing::HasSubstr("f holds no message of a sonar: f: bytes 1"));
+}
+
+TEST(Replay, SaysThatAPing360CannotBeReplayed) {
+  Bytes file;
+  const auto writer = recording::write_ping_log(recording::sink_into(file));
+  ASSERT_TRUE(
+      writer->write({{}, Origin::device, Carrier::stream, ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{})}));
+  auto opened = recording::open_recording(recording::source_from("f", file));
+  ASSERT_TRUE(opened);
+  const auto device = find_replay_device(*opened->reader, "f", 1042);
+  ASSERT_FALSE(device);
+  EXPECT_THAT(device.error().text, ::testing::HasSubstr("those of a Ping360 cannot"));
 }
 
 // ---- .sonar files
@@ -594,7 +596,7 @@ TEST(Replay, AnInternalFaultIsTold) {
   asio::io_context io;
   BrokenReader reader;
   ReplayOptions options = as_fast_as_read();
-  options.at = {own_address(), 0};
+  options.at = {address, 0};
   ReplayServer server(io, reader, {}, options, log);
   ASSERT_TRUE(server.open());
   server.start();

@@ -110,6 +110,7 @@ sonars:
     advertise_ip: 192.168.2.43
     netmask: 255.255.0.0
     status_to: [192.168.255.255, '10.1.2.3:52103']
+    groups: [239.1.2.3, 192.168.255.255]
     device_id: 9
     clients: {max: 3, when_full: take_over}
     outbox: {depth: 2, full: drop_newest}
@@ -143,6 +144,8 @@ log: {level: debug, format: json}
   EXPECT_NEAR(rotate(s.mount.orientation, {1, 0, 0}).z, -std::sin(rad_from_deg(15)), 1e-12) << "pitched down";
   EXPECT_EQ(text_of(s.advertise_ip), "192.168.2.43");
   EXPECT_EQ(text_of(s.status_to.at(1)), "10.1.2.3:52103");
+  EXPECT_EQ(text_of(s.groups.at(0)), "239.1.2.3");
+  EXPECT_EQ(text_of(s.groups.at(1)), "192.168.255.255");
   EXPECT_EQ(s.device_id, 9);
   EXPECT_EQ(s.max_clients, 3);
   EXPECT_EQ(s.when_full, WhenClientsFull::take_over);

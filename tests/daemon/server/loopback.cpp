@@ -12,6 +12,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <filesystem>
 #include <fstream>
 
 namespace sonar::testing_daemon {
@@ -63,12 +64,9 @@ std::string yaml_of(const DaemonSetup& s) {
          s.sonar_lines + poses + control + s.more;
 }
 
-std::string own_address() {
+std::string own_path(const std::string& name) {
   static std::atomic<unsigned> count{0};
-  const auto process = static_cast<unsigned>(getpid());
-  const unsigned n = ++count;
-  return "127." + std::to_string(64 + process / 250 % 128) + "." + std::to_string(1 + process % 250) + "." +
-         std::to_string(1 + n % 250);
+  return ::testing::TempDir() + "/" + name + "-" + std::to_string(getpid()) + "-" + std::to_string(++count);
 }
 
 std::uint8_t FakeEngine::sample(std::uint32_t ping, std::size_t row, std::size_t beam) {
@@ -108,7 +106,7 @@ std::vector<Ping> FakeEngine::run(std::span<const PingRequest> requests) {
 Daemon::Daemon(DaemonSetup setup) : address_(setup.address) {
   const std::string directory = ::testing::TempDir();
   std::ofstream(directory + "/scene.yaml") << "name: test\n";
-  config_path_ = directory + "/" + address_ + ".yaml";
+  config_path_ = own_path("config.yaml");
   if (setup.config_file) write_config(yaml_of(setup));
   auto config = setup.config_file ? load_config(config_path_) : parse_config(yaml_of(setup), "test.yaml", directory);
   if (!config) throw std::runtime_error(config.error().text);
@@ -133,7 +131,10 @@ Daemon::Daemon(DaemonSetup setup) : address_(setup.address) {
   thread_ = std::thread([this] { code_ = app_->run(); });
 }
 
-Daemon::~Daemon() { stop(); }
+Daemon::~Daemon() {
+  stop();
+  std::filesystem::remove(config_path_);
+}
 
 int Daemon::stop() {
   app_->request_stop();

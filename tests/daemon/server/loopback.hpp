@@ -1,5 +1,5 @@
 // What the daemon's loopback tests share: a daemon with a fake engine in a thread, and a driver-side client with deadlines.
-// Every test has its own 127.x.y.z address, so that tests can run side by side.
+// Programs that use it link own_network: the ports are those of the products.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,8 +23,8 @@ using Steady = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr milliseconds patience{20000};  // for anything that must happen
 
-/// 127.64..127.191, from the process number and a counter.
-std::string own_address();
+/// A path in the folder for temporary files that no other test uses, in this process or another one.
+std::string own_path(const std::string& name);
 
 /// Pings without physics: sample = a pattern of ping number, row and beam. Remembers what it was asked.
 class FakeEngine final : public PingEngine {
@@ -59,7 +59,7 @@ std::shared_ptr<const Mesh> small_mesh();
 std::shared_ptr<Scene> small_scene(bool moving_object = false);
 
 struct DaemonSetup {
-  std::string address = own_address();
+  std::string address = "127.0.0.2";
   std::string profile = "oculus-m1200d";
   std::string sonar_lines;    // more keys of the sonar, "    key: value\n"
   std::string vehicle_lines;  // vehicles beside rov, "  - {name: boat}\n"

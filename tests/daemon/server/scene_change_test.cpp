@@ -119,6 +119,20 @@ TEST(SceneChange, UnderLoadNoPingIsLostAndEachMeetsItsOwnBodies) {
   EXPECT_EQ(daemon.figures().refused, 0u);
 }
 
+/// Each engine costs pings some time: one client that changes the scene without end must not take the others' rate.
+TEST(SceneChange, WhileADriverIsServedEnginesAreMadeSoOften) {
+  Daemon daemon;
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz40));
+  ASSERT_TRUE(client.next_ping());
+  constexpr int beyond = 4;
+  const auto begin = Steady::now();
+  for (int i = 0; i < SceneChanges::most_at_once + beyond; ++i)
+    EXPECT_EQ(daemon.ask(added("buoy " + std::to_string(i))).code, Code::done);
+  EXPECT_GE(Steady::now() - begin, (beyond - 1) * SceneChanges::between_engines);
+  EXPECT_EQ(objects_in(daemon.status()), 2 + SceneChanges::most_at_once + beyond) << "none is lost";
+}
+
 TEST(SceneChange, ChangesQueueInOrder) {
   auto gate = std::make_shared<Gate>();
   DaemonSetup setup;

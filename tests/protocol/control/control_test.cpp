@@ -57,6 +57,19 @@ Bytes pose_bytes(unsigned frame, const Bytes& position, const Bytes& orientation
 }
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
+TEST(Control, APoseWithoutAnIdIsKnownByItsOutline) {
+  EXPECT_TRUE(is_unasked_pose(encode_request({0, PoseSample{}})));
+  EXPECT_FALSE(is_unasked_pose(encode_request({1, PoseSample{}})));
+  EXPECT_FALSE(is_unasked_pose(encode_request({300, PoseSample{}})));
+  EXPECT_FALSE(is_unasked_pose(encode_request({0, GetStatus{}})));
+  EXPECT_FALSE(is_unasked_pose({}));
+  EXPECT_TRUE(is_unasked_pose(Wire{}.sub(13, {}).out)) << "an object's";
+  EXPECT_FALSE(is_unasked_pose(Wire{}.sub(12, {}).sub(3, {}).out)) << "the last of two counts";
+  EXPECT_FALSE(is_unasked_pose(Wire{}.sub(12, {}).varint(1, 7).out)) << "wherever the id stands";
+  const Bytes whole = encode_request({0, PoseSample{}});
+  for (std::size_t n = 0; n < whole.size(); ++n) EXPECT_FALSE(is_unasked_pose(BytesView(whole).first(n))) << n;
+}
+
 TEST(Control, DecodesHandAssembledNedPose) {
   const double h = std::sqrt(0.5);  // yaw 90 degrees: heading east
   const auto s = decode_pose_datagram(pose_bytes(1, vec(10, 20, 3), quat(h, 0, 0, h)));

@@ -105,6 +105,32 @@ TEST(LineParser, EverySplitGivesTheSameLines) {
   }
 }
 
+TEST(LineParser, AfterAGapTheNextWholeLineIsTaken) {
+  const auto bytes = [](std::string_view text) { return std::as_bytes(std::span(text.data(), text.size())); };
+  for (const bool has_whole_line : {false, true}) {
+    LineParser parser;
+    if (has_whole_line) parser.feed(bytes("{\"a\":1}\n"));
+    parser.feed(bytes("{\"b\":"));
+    parser.skip_gap();
+    if (has_whole_line) {
+      ASSERT_EQ(parser.next().value().text, "{\"a\":1}");
+    }
+    EXPECT_FALSE(parser.next());
+    EXPECT_TRUE(parser.may_become_object()) << "what a line began with is not known";
+    parser.feed(bytes("5,6"));
+    EXPECT_FALSE(parser.next());
+    parser.feed(bytes("]}\n{\"c\":3}\n{\"d"));
+    EXPECT_EQ(parser.next().value().text, "{\"c\":3}");
+    EXPECT_FALSE(parser.next());
+  }
+  LineParser swallows;
+  swallows.feed(bytes(std::string(5000, 'x')));
+  EXPECT_TRUE(swallows.next().value().too_long);
+  swallows.skip_gap();
+  swallows.feed(bytes("x\n{}\n"));
+  EXPECT_EQ(swallows.next().value().text, "{}");
+}
+
 TEST(LineParser, ARequestLineIsKnownBeforeItEnds) {
   LineParser parser;
   EXPECT_TRUE(parser.may_become_object());

@@ -68,6 +68,8 @@ TEST(ControlJson, RefusesWithASentence) {
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":1e999})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"mode":-1})"), HasSubstr("-1"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,"range_m":6})"), HasSubstr("\"range_m\" is given twice"));
+  EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,"rangeM":6})"), HasSubstr("\"rangeM\" is given twice"));
+  EXPECT_THAT(refusal_of("sonar", R"({"rangeM":5,"range_m":6})"), HasSubstr("\"range_m\" is given twice"));
   EXPECT_THAT(refusal_of("sonar", R"({range_m:5})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5,})"), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":5} {"range_m":6})"), HasSubstr("not JSON"));
@@ -76,6 +78,9 @@ TEST(ControlJson, RefusesWithASentence) {
   EXPECT_THAT(refusal_of("sonar", "[]"), HasSubstr("not a JSON object"));
   EXPECT_THAT(refusal_of("sonar", ""), HasSubstr("not JSON"));
   EXPECT_THAT(refusal_of("sonar", std::string(100000, '[')), HasSubstr("nested deeper than 16"));
+  std::string many = "[";
+  for (int i = 0; i < 300000; ++i) many += "{},";
+  EXPECT_THAT(refusal_of("sonar", many + "{}]"), HasSubstr("more than 4096 values"));
   EXPECT_THAT(refusal_of("sonar", std::string(largest_json + 1, ' ')), HasSubstr("1 MiB"));
   EXPECT_THAT(refusal_of("pose", R"({"position":{"x":1},"orientation":{"w":1}})"), HasSubstr("frame is missing"));
   EXPECT_THAT(refusal_of("pose", R"({"frame":"SIDEWAYS","position":{},"orientation":{"w":1}})"), HasSubstr("SIDEWAYS"));

@@ -147,6 +147,49 @@ TEST(Dialogue, DummiesOnlyFillSilence) {
   EXPECT_EQ(talk.dialogue->next_tick(), at(2.9));
 }
 
+struct Asking : Conversation {
+  /// As the device does with what a message changes.
+  std::size_t fire_at(double when_s, PingRate rate, int flags = 0x49) {
+    const auto reaction = say(make_fire(fire(0, 1, rate, flags, 5, 50)), when_s);
+    for (const auto& change : events_of<ChangeSettings>(reaction)) state.settings = change.vendor_settings;
+    return reaction.replies.size();
+  }
+  /// In virtual time, one call after the other.
+  std::size_t dummies(double from_s, double to_s) {
+    std::size_t count = 0;
+    for (double s = from_s; s < to_s; s += 0.1) count += dialogue->on_tick(at(s), false).replies.size();
+    return count;
+  }
+};
+
+// ENS stores standby as its rate when a dummy comes, and asks for it when it connects again.
+TEST(Dialogue, NoDummyComesWhileARateIsAsked) {
+  Asking talk;
+  EXPECT_EQ(talk.dummies(0, 3.05), 3u) << "before the first fire message";
+  EXPECT_EQ(talk.fire_at(3.5, PingRate::hz10), 0u);
+  EXPECT_EQ(talk.dialogue->next_tick(), Time::max());
+  EXPECT_EQ(talk.dummies(3.5, 60), 0u) << "the first ping takes a minute";
+  talk.dialogue->on_ping_queued(at(60));
+  EXPECT_EQ(talk.fire_at(60.1, PingRate::hz40), 0u) << "another rate";
+  EXPECT_EQ(talk.dummies(60.1, 90), 0u);
+  EXPECT_EQ(talk.fire_at(90, PingRate::standby), 1u);
+  EXPECT_EQ(talk.dummies(90, 93.05), 3u);
+  EXPECT_EQ(talk.fire_at(93.1, PingRate::hz2), 0u);
+  EXPECT_EQ(talk.dummies(93.1, 120), 0u);
+  talk.state.settings.reset();  // the sonar is put into its stored state by another hand
+  EXPECT_GE(talk.dummies(120, 121.05), 1u);
+}
+
+TEST(Dialogue, WithNetworkTriggerDummiesFillWhatTheClientLeavesOpen) {
+  Asking talk;
+  EXPECT_EQ(talk.fire_at(0.5, PingRate::hz10, 0xC9), 0u);
+  EXPECT_EQ(talk.dummies(0.5, 20), 0u) << "the ping is under way";
+  talk.dialogue->on_ping_queued(at(20));
+  EXPECT_EQ(talk.dummies(20, 23.05), 3u);
+  EXPECT_EQ(talk.fire_at(23.1, PingRate::hz10, 0xC9), 0u);
+  EXPECT_EQ(talk.dummies(23.1, 40), 0u);
+}
+
 TEST(Dialogue, DummyPeriodIsAnOption) {
   EXPECT_EQ(Conversation("dummy_period_ms", "250").dialogue->next_tick(), at(0.25));
   EXPECT_EQ(Conversation("dummy_period_ms", "1e-9").dialogue->next_tick(), at(0.01)) << "never a busy loop";

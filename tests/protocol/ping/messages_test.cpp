@@ -67,6 +67,26 @@ TEST(PingFrames, AnyBytesSplitAnywhereLeaveTheNextFrameReadable) {
   }
 }
 
+TEST(PingFrames, SaysWhereAFrameIs) {
+  const Bytes good = general(Id::device_information);
+  Framer framer(65535);
+  std::uint64_t at = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Bytes junk(static_cast<std::size_t>(i % 7), std::byte{0x42});
+    framer.append(junk);
+    framer.append(good);
+    at += junk.size() + good.size();
+    const auto frame = framer.next();
+    ASSERT_TRUE(frame && frame->sum_is_right);
+    ASSERT_EQ(framer.passed(), at);
+    ASSERT_TRUE(std::equal(good.begin(), good.end(), framer.bytes().begin(), framer.bytes().end()));
+  }
+  framer.append(hex("42 52 20 00"));
+  framer.drop_rest();
+  EXPECT_EQ(framer.passed(), at + 4);
+  EXPECT_EQ(framer.waiting_bytes(), 0u);
+}
+
 TEST(PingFrames, InADatagramAFalseStartHidesNoFrame) {
   Bytes bytes = hex("42 52 20 00");
   const Bytes good = general(Id::protocol_version);

@@ -107,9 +107,12 @@ TEST(Surveyor, RefusesWhatItCannotDo) {
 TEST(Surveyor, AHostByDatagramsThatAsksForNoPingsIsForgotten) {
   Talk tcp("surveyor-240", 0), udp("surveyor-240", 1);
   EXPECT_FALSE(tcp.dialogue->longest_silence());
-  EXPECT_TRUE(udp.dialogue->longest_silence());
+  EXPECT_EQ(udp.dialogue->longest_silence(), std::chrono::seconds(10));
   udp.say(pings());
-  EXPECT_FALSE(udp.dialogue->longest_silence());
+  tcp.say(pings());
+  EXPECT_EQ(udp.dialogue->longest_silence(), std::chrono::seconds(60)) << "its sender may be forged";
+  EXPECT_FALSE(udp.dialogue->hosts_fall_silent()) << "they answer requests for the time";
+  EXPECT_FALSE(tcp.dialogue->longest_silence());
 }
 
 }  // namespace

@@ -18,7 +18,14 @@ function numberRow(setting, name, steering) {
   const input = make('input', { id, type: 'number', step: setting.step, required: !setting.zero, placeholder: setting.zero ?? '' });
   input.name = name;
   input.onchange = () => (input.value === '' && !setting.zero ? input.dispatchEvent(new Event('blur')) : steering.set(name, Number(input.value)));
-  input.onkeydown = (event) => event.key === 'Escape' && input.blur();
+  let before = '';
+  input.onfocus = () => (before = input.value);
+  // Nothing is returned: false would keep every other key from the field, Tab too.
+  input.onkeydown = (event) => {
+    if (event.key !== 'Escape') return;
+    input.value = before;
+    input.blur();
+  };
   return make('div', { class: 'setting' }, make('label', { htmlFor: id }, setting.label), make('span', {}, input, ' ', make('span', { class: 'unit' }, setting.unit)));
 }
 

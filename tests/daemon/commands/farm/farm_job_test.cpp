@@ -7,9 +7,14 @@
 
 #include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "core/base/confined_reads.hpp"
 #include "core/base/regular_file.hpp"
+#include "core/pipeline/simd/kernels.hpp"
+#include "core/text/printable.hpp"
+#include "daemon/commands/farm/farm_command.hpp"
+#include "daemon/commands/farm/worker.hpp"
 
 namespace sonar::farm {
 namespace {
@@ -27,13 +32,46 @@ class TableInMemory final : public Queue {
     const auto at = all.find(table.name + ("/" + key));
     return at == all.end() ? std::nullopt : std::optional(at->second);
   }
-  Result<std::vector<std::string>> keys(Table) override { return {}; }
+  Result<std::vector<std::string>> keys(Table table) override {
+    std::vector<std::string> found;
+    const std::string begin = table.name + std::string("/");
+    for (const auto& [key, value] : all)
+      if (key.starts_with(begin)) found.push_back(key.substr(begin.size()));
+    return found;
+  }
   Result<void> erase(Table, const std::string&) override { return {}; }
   Result<void> open_job(const std::string&, std::chrono::milliseconds) override { return {}; }
   Result<bool> publish(const std::string&, std::uint64_t) override { return true; }
-  Result<Waiting> waiting(const std::string&) override { return Waiting{}; }
-  Result<std::unique_ptr<Task>> take(const std::string&, std::chrono::milliseconds) override { return std::unique_ptr<Task>(); }
+  Result<Waiting> waiting(const std::string&) override { return Waiting{shards.size(), 0}; }
+  Result<std::unique_ptr<Task>> take(const std::string&, std::chrono::milliseconds) override {
+    if (shards.empty()) return std::unique_ptr<Task>();
+    return std::make_unique<TaskInMemory>(*this, shards.front());
+  }
   std::map<std::string, std::string> all;
+  std::vector<std::uint64_t> shards;
+  std::vector<std::string> ends;  // of tasks
+
+ private:
+  class TaskInMemory final : public Task {
+   public:
+    TaskInMemory(TableInMemory& queue, std::uint64_t shard) : queue_(queue), shard_(shard) {}
+    std::uint64_t shard() const override { return shard_; }
+    int delivery() const override { return 1; }
+    Result<void> in_progress() override { return {}; }
+    Result<void> done() override { return end("done"); }
+    Result<void> again(std::chrono::milliseconds) override { return end("again"); }
+    Result<void> bury(const std::string&) override { return end("bury"); }
+    Result<void> drop() override { return end("drop"); }
+
+   private:
+    Result<void> end(const std::string& how) {
+      queue_.ends.push_back(std::to_string(shard_) + " " + how);
+      std::erase(queue_.shards, shard_);
+      return {};
+    }
+    TableInMemory& queue_;
+    std::uint64_t shard_;
+  };
 };
 
 class FarmJobTest : public testing::Test {
@@ -104,6 +142,79 @@ TEST_F(FarmJobTest, NothingLeadsOutOfTheFolder) {
   std::filesystem::create_directory_symlink(folder_ / "job", folder_ / "linked/meshes");
   std::filesystem::remove(folder_ / "job/meshes/a.stl");
   EXPECT_THAT(receive_files(sent, folder_ / "linked", queue).error().text, HasSubstr("by a link"));
+}
+
+TEST_F(FarmJobTest, CountsThatNoJobHasAreRefused) {
+  const FarmJob is = record();
+  using nlohmann::json;
+  const std::vector<std::pair<const char*, json>> wrong{
+      {"shards", -1},      {"shards", 1e18},  {"shards", 0},         {"shards", 4},       {"shards", "3"},
+      {"shards", 3.0},     {"pings", 0},      {"pings", 1e300},      {"pings", -5},       {"shard_pings", 0},
+      {"shard_pings", -2}, {"shards", false}, {"patience_ms", 1e18}, {"patience_ms", -1}, {"shards", 18446744073709551615u}};
+  for (const auto& [key, value] : wrong) {
+    json words = json::parse(is.to_json());
+    words[key] = value;
+    const auto parsed = parse_farm_job(is.id, words.dump());
+    ASSERT_FALSE(parsed) << key << ' ' << value;
+    EXPECT_THAT(parsed.error().text, HasSubstr(std::string("cannot be: ") + key + " is ")) << value;
+  }
+  json words = json::parse(is.to_json());  // fits itself, but not the job file
+  words["shards"] = 5, words["shard_pings"] = 1;
+  const auto parsed = parse_farm_job(is.id, words.dump());
+  ASSERT_TRUE(parsed) << parsed.error().text;
+  EXPECT_THAT(load_files(*parsed, folder_ / "job/set.yaml").error().text,
+              HasSubstr("has 5 shards, and its file set.yaml makes 3"));
+  EXPECT_TRUE(load_files(is, folder_ / "job/set.yaml"));
+}
+
+/// In a process of its own, whose reads are confined from then on. What was wrong; 0 = nothing.
+int work_on_foreign_shards(const path& folder) {
+  TableInMemory queue;
+  const auto job = dataset::load_job(folder / "job/set.yaml").value();
+  FarmJob sent = describe(job, simd::kernels_for(SimdLevel::automatic).name).value();
+  if (!send_files(job, sent, folder / "shared", queue) || !queue.put(job_table, sent.id, sent.to_json())) return 1;
+  queue.shards = {3, 999999999, 18446744073709551615u};
+  WorkerCommand command;
+  command.out = folder / "out", command.threads = 1, command.until_empty = true;
+  const auto code = work_on(queue, command);
+  if (!code || *code != 0) return 2;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "out"))
+    if (entry.path().filename().string().starts_with("shard-")) return 3;
+  return queue.ends == std::vector<std::string>{"3 drop", "999999999 drop", "18446744073709551615 drop"} ? 0 : 4;
+}
+
+TEST_F(FarmJobTest, AWorkerRemovesWhatIsNoShardOfTheJob) {
+  put("job/set.yaml",
+      "dataset: {pings: 5, shard: 2}\n"
+      "scene: {objects: [{name: bed, type: plane, material: sand, size_m: [20, 20], pose: {xyz_m: [5, 0, -12]}}]}\n"
+      "sonar: {ping: {range_m: 7, beams: 32, rows: 64}}\n"
+      "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10.5], rpy_deg: [0, 10, 0]}}\n");
+  EXPECT_EXIT(std::_Exit(work_on_foreign_shards(folder_)), testing::ExitedWithCode(0),
+              "shard 999999999 is none of the 3 of set-");
+}
+
+TEST_F(FarmJobTest, TheStatusShowsNoRawBytesOfTheQueue) {
+  TableInMemory queue;
+  const FarmJob is = record();
+  ASSERT_TRUE(queue.put(job_table, is.id, is.to_json()));
+  ASSERT_TRUE(queue.put(job_table, "odd", "\xff\x1b[2J"));
+  ASSERT_TRUE(queue.put(job_table, is.id + ".stopped", "why\n\x1b]0;title\x07"));
+  ASSERT_TRUE(queue.put(dead_table, is.id + ".2", "\xff not met"));
+  ASSERT_TRUE(queue.put(dead_table, is.id + ".99", "none of the job's"));
+  ASSERT_TRUE(queue.put(beat_table, "host\x1b[31m.7",
+                        R"({"job":")" + is.id + R"(","shard":"\u001b[1m","shards":-1,"pings_per_s":1e300})"));
+  ASSERT_TRUE(queue.put(beat_table, "other.8", R"({"job":5,"shard":[]})"));
+  ASSERT_TRUE(queue.put(beat_table, "third.9", R"({"job":")" + is.id + R"(","shard":7,"shards":"x","pings_per_s":-3})"));
+  const auto text = describe_farm(queue);
+  ASSERT_TRUE(text) << text.error().text;
+  EXPECT_THAT(*text, HasSubstr(R"(STOPPED: why\x0a\x1b]0;title\x07)"));
+  EXPECT_THAT(*text, HasSubstr(R"(dead: shard 2: \xff not met)"));
+  EXPECT_THAT(*text, HasSubstr("2 done, 0 running, 0 queued, 1 dead"));
+  EXPECT_THAT(*text, HasSubstr("third.9: , 0.0 pings/s, 0 shards made"));
+  EXPECT_THAT(*text, testing::Not(HasSubstr("other.8")));
+  EXPECT_EQ(text::printable(*text).size() - text->size(),
+            3 * static_cast<std::size_t>(std::count(text->begin(), text->end(), '\n')))
+      << *text;  // nothing but the ends of lines is left to escape
 }
 
 TEST_F(FarmJobTest, OthersMakeOtherBytes) {

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
 #include <set>
 
 #include "tests/daemon/emulator/sonar/virtual_time.hpp"
@@ -126,6 +127,9 @@ TEST(FaultRecords, AreRefusedWithWhatIsWrongAndWhatIsPossible) {
   r.lasts.seconds = 601;
   EXPECT_THAT(text(r), HasSubstr("ends after 600 s at the latest"));
   EXPECT_EQ(text(r, false), "accepted");
+  r.lasts.seconds = 1e9;
+  EXPECT_THAT(text(r), HasSubstr("ends after 600 s at the latest"));
+  EXPECT_THAT(text(r, false), HasSubstr("at most 86400"));
   r.lasts.seconds = 0;
   EXPECT_THAT(text(r), HasSubstr("seconds must be above 0"));
   r = record("P01");
@@ -135,6 +139,28 @@ TEST(FaultRecords, AreRefusedWithWhatIsWrongAndWhatIsPossible) {
   r.client = "10.0.0.0/33";
   EXPECT_THAT(text(r), HasSubstr("client must be"));
   r.client = "10.0.0.0/8";
+  EXPECT_EQ(text(r), "accepted");
+}
+
+TEST(FaultRecords, ThatNeverActAreRefused) {
+  const auto text = [](const FaultRecord& r) {
+    const auto faults = check_fault(r, true);
+    return faults ? std::string("accepted") : faults.error().text;
+  };
+  FaultRecord r = record("L05");
+  r.at.every = 1;
+  r.at.phase = 5;
+  EXPECT_THAT(text(r), HasSubstr("phase must be below every, 1: no ping's number leaves 5"));
+  r.at.every = 5;
+  EXPECT_THAT(text(r), HasSubstr("phase must be below every"));
+  r.at.every = 6;
+  EXPECT_EQ(text(r), "accepted");
+  r = record("L05");
+  for (const double never : {1e-300, 9e-10, 0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    r.at.probability = never;
+    EXPECT_THAT(text(r), HasSubstr("probability must be from 1e-9 to 1")) << never;
+  }
+  r.at.probability = 1e-9;
   EXPECT_EQ(text(r), "accepted");
 }
 

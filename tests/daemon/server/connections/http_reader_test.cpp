@@ -56,6 +56,28 @@ TEST(HttpReader, JoinsTheHeadersThatBrowsersChooseAFileBy) {
   EXPECT_EQ(t.requests[0].if_none_match, "\"x\"");
 }
 
+TEST(HttpReader, ABodyInAnotherCodingIsNotTakenAsARequest) {
+  const std::string smuggled = "POST /smuggled HTTP/1.1\r\nHost: a\r\nContent-Length: 2\r\n\r\n{}";
+  for (const std::string coding :
+       {"identity", "gzip", "chunked, identity", "gzip, chunked", "nonsense", "chunked\r\nTransfer-Encoding: x"})
+    for (const std::string length : {"", "Content-Length: 0\r\n"}) {
+      const std::string stream =
+          "POST /x HTTP/1.1\r\nHost: a\r\n" + length + "Transfer-Encoding: " + coding + "\r\n\r\n" + smuggled;
+      for (const std::size_t piece : {std::size_t{1}, stream.size()}) {
+        const Taken t = take(stream, piece);
+        EXPECT_TRUE(t.requests.empty()) << coding;
+        EXPECT_TRUE(t.refused == 501 || t.refused == 400) << coding << ": a refusal is final";
+      }
+    }
+  EXPECT_EQ(take("POST /x HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: Chunked\r\n\r\n0\r\n\r\n").requests.size(), 1u);
+}
+
+TEST(HttpReader, TwoOriginsAreRefused) {
+  const Taken t = take("GET / HTTP/1.1\r\nHost: a\r\nOrigin: http://localhost\r\nOrigin: http://evil.example\r\n\r\n");
+  EXPECT_EQ(t.refused, 400u);
+  EXPECT_THAT(t.why, HasSubstr("more than one Origin"));
+}
+
 TEST(HttpReader, EverySplitGivesTheSameRequests) {
   const std::string stream = get + post + chunked + no_chunk + old;
   for (std::size_t piece = 1; piece <= stream.size(); ++piece) {
@@ -100,6 +122,9 @@ TEST(HttpReader, WhatIsNoHttpIsRefused) {
         "POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n", "GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n"})
     EXPECT_EQ(take(bad).refused, 400u) << bad;
   EXPECT_EQ(take("GET / HTTP/2.0\r\n\r\n").refused, 505u);
+  const Taken bare = take("GET / HTTP/1.1\nHost: a\n\n");
+  EXPECT_EQ(bare.refused, 400u);
+  EXPECT_EQ(bare.why, "lines of a request end in CR LF, and this one ends in LF alone");
 }
 
 TEST(HttpReader, EndlessChunkHeadersAndTrailersAreBounded) {

@@ -152,7 +152,7 @@ TEST(Limits, TheLastDescriptorsAreNotForPosesAndHalfOfThemForControl) {
   rlimit was{};
   ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &was), 0);
   const auto visited = [&](Admission::Purpose purpose) {
-    tcp::acceptor acceptor(io, {asio::ip::make_address(own_address()), 0});
+    tcp::acceptor acceptor(io, {asio::ip::make_address("127.0.0.2"), 0});
     std::vector<tcp::socket> in, visitors;
     asio::co_spawn(io, let_in(admission, acceptor, purpose, in), asio::detached);
     const int next = ::open("/dev/null", O_RDONLY);

@@ -21,6 +21,7 @@ class FakeOperations final : public Operations {
   void perform(const control::Operation& operation, const Sender& sender, Done done) override {
     ++asked;
     last_sender = sender;
+    if (const auto* pose = std::get_if<control::PoseSample>(&operation)) last_pose = pose->pose.position_m;
     if (std::holds_alternative<control::GetStatus>(operation)) {
       const auto status = std::make_shared<v1::DaemonStatus>();
       status->set_version("fake");
@@ -42,6 +43,7 @@ class FakeOperations final : public Operations {
   std::atomic<bool> in_trouble{false};  // likewise
   std::vector<Done> later;
   Sender last_sender;
+  Vec3d last_pose{};
 };
 
 class ControlBench {
@@ -87,7 +89,7 @@ class ControlBench {
   std::uint16_t stream_port() const { return server->stream().port; }
   std::uint16_t http_port() const { return server->http().port; }
 
-  std::string address = own_address();
+  std::string address = "127.0.0.2";
   asio::io_context io{1};
   ControlConfig config;
   LimitConfig limits;
@@ -116,7 +118,7 @@ inline v1::Event ping_event(std::uint32_t number) {
 /// A file with a token, for as long as it lives.
 struct TokenFile {
   static constexpr const char* text = "0123456789abcdef-lab";
-  std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / ("control-token-" + own_address());
+  std::filesystem::path path = own_path("control-token");
   TokenFile() {
     std::ofstream(path) << text << "\n";
     std::filesystem::permissions(path, std::filesystem::perms::owner_read);

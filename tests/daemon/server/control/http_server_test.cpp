@@ -264,6 +264,44 @@ TEST(ControlHttp, TooManyAreToldSoAndTheSilentGiveWay) {
   EXPECT_TRUE(a.tcp.ended);
 }
 
+/// A byte now and then of requests that never end, from as many as there are places.
+TEST(ControlHttp, SlowSendersTakeNobodysPlace) {
+  ControlBench bench;
+  std::list<Client> slow;
+  const std::string request = "GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-Slow: " + std::string(200, 'x');
+  for (int i = 0; i < 32; ++i) {
+    slow.emplace_back(bench.address, bench.http_port());
+    slow.back().send(request.substr(0, 40));
+  }
+  for (std::size_t i = 0; i < 12; ++i) {
+    for (Client& c : slow) c.send(request.substr(40 + i, 1));
+    HttpClient watches(bench);
+    EXPECT_EQ(watches.get("/healthz").body, "ok\n") << i;
+  }
+}
+
+/// Counted in work, with the time that passed: whatever the machine, no more than this may be done.
+TEST(ControlHttp, RequestsCostMoreThanTheirBytes) {
+  LimitConfig limits;
+  limits.input_bytes_per_s = 65536;
+  ControlBench bench({}, limits);
+  const auto begin = Steady::now();
+  const auto most = [&](std::size_t cost) {
+    return 2 + (1 + std::chrono::duration<double>(Steady::now() - begin).count()) * 65536 / static_cast<double>(cost);
+  };
+  HttpClient flood(bench);
+  for (int i = 0; i < 2000; ++i) flood.send("GET", "/api/v1/status");
+  EXPECT_TRUE(eventually([&] { return bench.operations.asked > 20; }));
+  std::this_thread::sleep_for(milliseconds(500));
+  EXPECT_LT(bench.operations.asked, most(512));
+  const int before = bench.operations.asked;
+  for (int i = 0; i < 40; ++i) {  // connecting again gains nothing
+    HttpClient again(bench);
+    EXPECT_EQ(again.get("/api/v1/status").status, 200);
+  }
+  EXPECT_LT(bench.operations.asked, most(512)) << before;
+}
+
 TEST(ControlHttp, UntrustedClientsEvictNoTrustedOne) {
   const TokenFile file;
   ControlConfig config;

@@ -119,6 +119,53 @@ TEST(ControlStream, AFloodOfPosesIsReadSlowlyAndANeighbourIsNot) {
   }
 }
 
+TEST(ControlStream, PosesBeyondTheRateAreSkippedButForTheNewestAndNoneActsLater) {
+  LimitConfig limits;
+  limits.pose_bytes_per_s = 65536;
+  ControlBench bench({}, limits);
+  std::vector<std::byte> poses;
+  const auto add = [&](double x) {
+    control::PoseSample sample;
+    sample.pose.position_m.x = x;
+    const auto one = control::delimited(control::encode_request({0, sample}));
+    poses.insert(poses.end(), one.begin(), one.end());
+  };
+  while (poses.size() < 2000000) add(1);
+  add(2);
+  {
+    StreamClient flood(bench);
+    flood.greet();
+    flood.tcp.send(poses);
+  }  // and gone
+  EXPECT_TRUE(eventually([&] {
+    double x = 0;
+    bench.on_io([&] { x = bench.operations.last_pose.x; });
+    return x == 2;
+  }));
+  const int by_then = bench.operations.asked;
+  EXPECT_LT(by_then, 10000) << "of more than 50,000";
+  std::this_thread::sleep_for(milliseconds(300));
+  EXPECT_EQ(bench.operations.asked, by_then);
+}
+
+TEST(ControlStream, AnswersCostMoreThanTheirRequests) {
+  LimitConfig limits;
+  limits.input_bytes_per_s = 16384;
+  ControlBench bench({}, limits);
+  const auto begin = Steady::now();
+  StreamClient client(bench);
+  client.greet();
+  std::vector<std::byte> requests;
+  for (std::uint64_t id = 2; id < 1002; ++id) {
+    const auto one = control::delimited(control::encode_request({id, control::GetStatus{}}));
+    requests.insert(requests.end(), one.begin(), one.end());
+  }
+  client.tcp.send(requests);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(client.next());
+  const double seconds = std::chrono::duration<double>(Steady::now() - begin).count();
+  EXPECT_LT(bench.operations.asked, (1 + seconds) * 16384 / 128 + 4096. / 6) << "128 bytes each, and the last read";
+}
+
 TEST(ControlStream, WithoutTheTokenNoRequestIsServed) {
   const TokenFile file;
   ControlConfig config;

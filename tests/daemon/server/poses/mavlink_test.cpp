@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <fstream>
 
 #include "protocol/control/answers.hpp"
 #include "protocol/mavlink/frames.hpp"
@@ -129,7 +131,7 @@ TEST_F(Mavlink, AListeningLinkMovesTheSonarAndAnswersWithHeartbeats) {
 }
 
 TEST_F(Mavlink, ADiallingLinkSpeaksFirst) {
-  const std::string here = own_address();
+  const std::string here = "127.0.0.3";
   Vehicle vehicle(here);
   Daemon daemon(with_link("udpout:" + here + ":" + std::to_string(vehicle.port)));
   Client client(daemon.address());
@@ -139,7 +141,7 @@ TEST_F(Mavlink, ADiallingLinkSpeaksFirst) {
   vehicle.send("127.0.0.1", port, framed(odometry_at(12, 1'000'000), vehicle.who));
   EXPECT_TRUE(asked_from(daemon, client, 12));
 
-  Vehicle stranger(own_address());
+  Vehicle stranger("127.0.0.4");
   stranger.send("127.0.0.1", port, framed(odometry_at(500, 2'000'000), stranger.who));
   EXPECT_TRUE(eventually([&] { return daemon.log_text().find("not the one that was dialled") != std::string::npos; }));
   EXPECT_TRUE(asked_from(daemon, client, 12));
@@ -206,6 +208,32 @@ TEST_F(Mavlink, AFailureIsAFaultOfTheSonarsUntilAllIsWell) {
   EXPECT_EQ(inject(mavlink::distance_sensor, ok, 1), accepted) << "also when all is well";
 }
 
+TEST_F(Mavlink, WithATokenNoFailureIsInjected) {
+  const std::string token = ::testing::TempDir() + "mavlink-token-" + std::to_string(::getpid());
+  std::ofstream(token) << "0123456789abcdef-lab\n";
+  DaemonSetup setup = with_link("udpin:HERE:0");
+  setup.edit_config = [token](Config& config) {
+    config.faults.armed = true;
+    config.control.token_file = token;
+  };
+  Daemon daemon(setup);
+  const std::uint16_t port = daemon.app().mavlink().listens_at(0).port;
+  Vehicle vehicle(daemon.address()), ground(daemon.address());
+  vehicle.send(daemon.address(), port, framed(odometry_at(1, 1'000'000), vehicle.who));
+  ASSERT_TRUE(vehicle.next(mavlink::Heartbeat::id));
+  mavlink::CommandLong command;
+  command.param1 = mavlink::distance_sensor, command.param2 = 1;
+  command.command = mavlink::CommandLong::inject_failure, command.target_system = 1, command.target_component = 193;
+  mavlink::Identity station{255, 190, 0};
+  ground.send(daemon.address(), port, framed(command, station));
+  const mavlink::Bytes ack = ground.next_datagram();
+  ASSERT_GT(ack.size(), 12u);
+  EXPECT_EQ(ack[12], static_cast<std::byte>(mavlink::MavResult::denied));
+  EXPECT_EQ(daemon.ask(control::GetFaults{}).faults->faults_size(), 0);
+  EXPECT_THAT(daemon.log_text(), HasSubstr("cannot show the token of control.token_file"));
+  std::remove(token.c_str());
+}
+
 TEST_F(Mavlink, NonsenseIsCountedAndChangesNothing) {
   Daemon daemon(with_link("udpin:HERE:0"));
   const std::uint16_t port = daemon.app().mavlink().listens_at(0).port;
@@ -231,7 +259,7 @@ TEST_F(Mavlink, OnlyThoseWhomTheConfigurationNamesAreHeard) {
 }
 
 TEST_F(Mavlink, AnEndpointThatIsTakenIsOneSentence) {
-  const std::string here = own_address();
+  const std::string here = "127.0.0.3";
   Vehicle first(here);
   try {
     Daemon daemon(with_link("udpin:" + here + ":" + std::to_string(first.port)));

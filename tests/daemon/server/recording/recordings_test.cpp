@@ -183,7 +183,7 @@ struct Queue {
     options.sink = [this](LogLevel, const std::string& line) { lines.push_back(line); };
     log.emplace(options);
     recordings.emplace(
-        io, config, *log, 0, [] {}, most_waiting_bytes);
+        writer, config, *log, [] {}, most_waiting_bytes);
   }
   void run() {
     io.restart();
@@ -192,6 +192,7 @@ struct Queue {
   Folder folder;
   Config config;
   asio::io_context io{1};
+  WriterThread writer{io, 0};
   std::vector<std::string> lines;
   std::optional<Log> log;
   std::optional<Recordings> recordings;
@@ -405,7 +406,7 @@ TEST(RecordedDaemon, ASonarThatAReloadTakesAwayIsRecordedNoMore) {
   const Folder folder;
   DaemonSetup setup = recording_setup(folder);
   setup.config_file = setup.options.handle_signals = true;
-  const std::string other = own_address();
+  const std::string other = "127.0.0.3";
   const auto also = [&other](const char* name) {
     return std::string("  - {name: ") + name + ", profile: oculus-m1200d, bind_ip: " + other + ", status_to: ['" + other +
            ":9'], device_id: 9}\n";
@@ -429,9 +430,11 @@ TEST(RecordedDaemon, AReloadThatFailsLeavesTheRecordingOfWhatGoesOn) {
   DaemonSetup setup = recording_setup(folder);
   setup.config_file = setup.options.handle_signals = true;
   Daemon daemon(setup);
-  const Daemon holds_the_other_address;
+  setup.address = "127.0.0.3";
+  DaemonSetup other;
+  other.address = setup.address;
+  const Daemon holds_the_other_address(other);
   EXPECT_EQ(daemon.ask(control::StartRecording{"front.mcap"}).text, "");
-  setup.address = holds_the_other_address.address();
   daemon.write_config(yaml_of(setup));
   ASSERT_EQ(kill(getpid(), SIGHUP), 0);
   ASSERT_TRUE(eventually([&] { return daemon.log_text().find("front as before") != std::string::npos; })) << daemon.log_text();

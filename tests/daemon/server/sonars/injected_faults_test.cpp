@@ -76,7 +76,7 @@ TEST_F(InjectedFaults, AClosedPortRefusesAndOpensAgain) {
   EXPECT_TRUE(client.read_to_end());
   EXPECT_FALSE(accepts(daemon.address()));
   ASSERT_TRUE(done(daemon.ask(control::EndFaults{})));
-  EXPECT_TRUE(eventually([&] { return accepts(daemon.address()); }, milliseconds(500))) << "within 100 ms, five times that here";
+  EXPECT_TRUE(eventually([&] { return accepts(daemon.address()); }, milliseconds(5000))) << "within 100 ms on a quiet machine";
 }
 
 TEST_F(InjectedFaults, SilenceEndsWhenItIsCleared) {
@@ -85,7 +85,7 @@ TEST_F(InjectedFaults, SilenceEndsWhenItIsCleared) {
   }
   EXPECT_FALSE(client.ended);
   ASSERT_TRUE(done(daemon.ask(control::EndFaults{"L05"})));
-  EXPECT_TRUE(client.next_ping(milliseconds(500)));
+  EXPECT_TRUE(client.next_ping());
   EXPECT_EQ(daemon.ask(control::EndFaults{"L05"}).code, OperationResult::Code::refused);
 }
 
@@ -95,7 +95,7 @@ TEST_F(InjectedFaults, APauseInsideAPingEndsWhenItIsCleared) {
   }
   EXPECT_GT(client.decoder.buffered_bytes(), 0u) << "half a ping has arrived";
   ASSERT_TRUE(done(daemon.ask(control::EndFaults{})));
-  EXPECT_TRUE(client.next_ping(milliseconds(500)));
+  EXPECT_TRUE(client.next_ping());
   EXPECT_EQ(client.decoder.skipped_bytes(), 0u);
 }
 
@@ -143,9 +143,8 @@ TEST(PlannedFaults, BeginWithTheDaemonAndFillTheJournal) {
   std::vector<std::uint32_t> numbers;
   while (numbers.size() < 4) numbers.push_back(client.next_ping()->head.fixed.ping_id);
   EXPECT_THAT(numbers, ::testing::ElementsAre(1, 2, 4, 5));
-  std::ifstream file(journal);
   std::string line;
-  ASSERT_TRUE(std::getline(file, line));
+  ASSERT_TRUE(eventually([&] { return static_cast<bool>(std::getline(std::ifstream(journal), line)); }));
   EXPECT_THAT(line, HasSubstr(R"("event":"began","fault":"plan-1","do":"F16","kind":"F16")"));
   ASSERT_EQ(daemon.status().faults_size(), 2);
   EXPECT_EQ(daemon.status().faults(1).state(), "waiting");

@@ -81,6 +81,8 @@ protocol::Reaction obey(const std::string& line, const DeviceState& device) {
     for (std::string word; words >> word;)
       if (const auto to = endpoint_of(word)) wanted.to.push_back(*to);
     reaction.events.push_back(std::move(wanted));
+  } else if (command == "quiet") {
+    // nothing else
   } else if (command == "ping") {
     reaction.events.push_back(protocol::RequestPing{});
   } else if (command == "quit") {
@@ -104,7 +106,7 @@ class LineDialogue final : public protocol::Dialogue {
         if (line_.size() < 200) line_ += c;
         continue;
       }
-      protocol::Reaction one = obey(std::exchange(line_, {}), device_);
+      protocol::Reaction one = obey(limit_silence(std::exchange(line_, {})), device_);
       std::move(one.events.begin(), one.events.end(), std::back_inserter(all.events));
       std::move(one.replies.begin(), one.replies.end(), std::back_inserter(all.replies));
     }
@@ -113,14 +115,27 @@ class LineDialogue final : public protocol::Dialogue {
   protocol::Reaction on_tick(Time, bool) override { return {}; }
   Time next_tick() const override { return Time::max(); }
   void on_ping_queued(Time) override {}
+  std::optional<std::chrono::milliseconds> longest_silence() const override { return longest_silence_; }
+  bool hosts_fall_silent() const override { return falls_silent_; }
   protocol::Delivery on_ping(const VendorSettings*, std::size_t, Time) override {
     if (!sends_pings_) return {};
     return {{Bytes{}}, {}};
   }
 
  private:
+  std::string limit_silence(const std::string& line) {
+    std::istringstream words(line);
+    std::string command;
+    int seconds = 0;
+    if (!(words >> command >> seconds) || (command != "silence" && command != "listens")) return line;
+    longest_silence_ = std::chrono::seconds(seconds);
+    falls_silent_ = command == "listens";
+    return "quiet";
+  }
+
   const DeviceState& device_;
-  bool sends_pings_;
+  bool sends_pings_, falls_silent_ = false;
+  std::optional<std::chrono::milliseconds> longest_silence_;
   std::string line_;
 };
 

@@ -7,6 +7,8 @@ namespace sonar::testing_daemon {
 
 // Commands are lines of text, answered by "ok" or "no: WHY":
 //   range METRES | receivers [ADDRESS:PORT ...] | ping | quit
+//   silence SECONDS | listens SECONDS     longest silence of this client from now on; with `listens` a sign of its computer will
+//   do
 // and over UDP also who, answered by the sonar's name and range.
 constexpr std::uint16_t command_port = 15000;  // TCP
 constexpr std::uint16_t data_port = 15001;     // TCP: "PING number bytes\n" and the samples; UDP: a dialogue of lines, and parts

@@ -84,7 +84,6 @@ TEST(Observers, HaveSoManyPlacesOrNone) {
     EXPECT_TRUE(second.read_to_end());
     EXPECT_TRUE(first.next()) << "it looks on";
   }
-  setup.address = own_address();
   setup.sonar_lines = "    observers: {max: 0}\n";
   Daemon daemon(setup);
   EXPECT_EQ(daemon.status().sonars().at(0).observers(), "");

@@ -1,6 +1,7 @@
 // One client, one sonar, over loopback: the conversation a driver has with the device.
 #include <gmock/gmock.h>
 
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -45,6 +46,31 @@ TEST(Serving, DummiesFlowUntilTheFirstFire) {
     EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*message));
   }
   EXPECT_THAT(daemon.requests(), IsEmpty());
+}
+
+TEST(Serving, NoDummyWhileAPingTakesLong) {
+  std::promise<void> enough;
+  DaemonSetup setup;
+  setup.sonar_lines = "    options: {dummy_period_ms: 20}\n";
+  setup.engine_before = [until = enough.get_future().share()](std::uint32_t) { until.wait(); };
+  Daemon daemon(setup);
+  Client client(daemon.address());
+  client.fire(fire_at(PingRate::hz10));
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("settings: mode 2") != std::string::npos; }));
+  const auto written = [&] { return daemon.status().sonars().at(0).clients().at(0).bytes_written(); };
+  const auto before = written();
+  for (const auto until = Steady::now() + milliseconds(1200); Steady::now() < until;) {
+    EXPECT_EQ(written(), before) << "a byte between the fire message and its ping";
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  enough.set_value();
+  auto message = client.next();
+  while (message && std::holds_alternative<oculus::DummyMessage>(*message)) message = client.next();  // from before the message
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(message);
+    EXPECT_TRUE(std::holds_alternative<oculus::DecodedPing>(*message));
+    message = client.next();
+  }
 }
 
 TEST(Serving, OptionPingsBeforeTheFirstFire) {

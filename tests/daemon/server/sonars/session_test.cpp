@@ -24,7 +24,8 @@ struct Parent final : SessionParent {
     messages.pop_front();
     return next;
   }
-  std::vector<Endpoint> receivers(ConnectionId) const override { return {}; }
+  std::vector<Endpoint> receivers(ConnectionId) override { return {}; }
+  void look_for_host(ConnectionId) override {}
   void on_sent(ConnectionId, std::size_t) override {}
   void on_not_sent(ConnectionId) override {}
   std::optional<milliseconds> longest_silence(ConnectionId) const override { return std::nullopt; }
@@ -76,7 +77,7 @@ struct SessionShapes : ::testing::Test {
   }
 
   asio::io_context io;
-  tcp::acceptor acceptor{io, {asio::ip::make_address(own_address()), 0}};
+  tcp::acceptor acceptor{io, {asio::ip::make_address("127.0.0.2"), 0}};
   Client client{acceptor.local_endpoint().address().to_string(), acceptor.local_endpoint().port()};
   Parent parent;
   std::shared_ptr<Session> session;
@@ -98,9 +99,10 @@ TEST_F(SessionShapes, PiecesArriveApart) {
   start({shaped("abcdefgh", {{{0, milliseconds(200)}, {3, milliseconds(200)}, {3, {}}, {7, milliseconds(200)}}}),
          shaped("ijk", {})});
   const auto pieces = read_until_end_or(11);
-  ASSERT_THAT(texts_of(pieces).size(), 3u);
+  ASSERT_GE(pieces.size(), 3u) << "the end of the first message and the second arrive together or apart";
   EXPECT_EQ(pieces[0].text, "abc");
   EXPECT_EQ(pieces[1].text, "defg");
+  EXPECT_EQ(pieces[2].text.front(), 'h');
   EXPECT_EQ(joined(pieces), "abcdefghijk");
   EXPECT_GE(pieces[0].at, milliseconds(200));
   EXPECT_GE(pieces[1].at, milliseconds(400));

@@ -91,17 +91,6 @@ class UdpSocket {
   std::uint16_t port_ = 0;
 };
 
-/// The next datagram that this daemon sent: daemons of the tests that run beside this one send to fixed ports and groups too.
-std::string next_of(const Daemon& daemon, UdpSocket& to, milliseconds timeout = patience) {
-  const auto deadline = std::chrono::steady_clock::now() + timeout;
-  std::string datagram;
-  do
-    datagram = to.next(std::chrono::ceil<milliseconds>(
-        std::max(deadline - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration::zero())));
-  while (!datagram.empty() && !to.sender.starts_with(daemon.address() + ":"));
-  return datagram;
-}
-
 struct Part {
   unsigned ping = 0, part = 0, parts = 0;
   std::string samples;
@@ -277,36 +266,34 @@ TEST(Transports, TheBeaconSaysAtOnceThatAClientCameOrWent) {
   UdpSocket host("127.0.0.1", beacon_port);
   auto client = std::make_unique<Client>(daemon.address(), command_port);
   constexpr milliseconds at_once{5000};  // its period is 10 s
-  std::string status = next_of(daemon, host, at_once);
+  std::string status = host.next(at_once);
   for (int waiting = 0; waiting < 3 && status == "front free"; ++waiting)  // from the start
-    status = next_of(daemon, host, at_once);
+    status = host.next(at_once);
   EXPECT_EQ(status, "front busy");
   client.reset();
-  EXPECT_EQ(next_of(daemon, host, at_once), "front free");
+  EXPECT_EQ(host.next(at_once), "front free");
 }
 
 TEST(Transports, AMulticastGroupReceivesWithoutAskingForIt) {
   UdpSocket member("0.0.0.0", group_port);
-  const std::string interface = own_address();
+  const std::string interface = "127.0.0.2";
   if (!member.join(text::format_ipv4(group_ip), interface)) GTEST_SKIP() << "no multicast on the loopback interface here";
   UdpSocket sender(interface);
   if (!sender.sends_multicast_from(interface)) GTEST_SKIP() << "no multicast from the loopback interface here";
   sender.send("heard", text::format_ipv4(group_ip), group_port);
-  std::string own;
-  do own = member.next(milliseconds(1000));
-  while (!own.empty() && own != "heard");
-  if (own.empty()) GTEST_SKIP() << "multicast does not come back from the loopback interface here";
+  if (member.next(milliseconds(1000)) != "heard") GTEST_SKIP() << "multicast does not come back from the loopback interface here";
 
   Daemon daemon(made_up());
-  const std::string first = next_of(daemon, member);
+  const std::string first = member.next();
   ASSERT_FALSE(first.empty());
-  EXPECT_EQ(std::stoul(next_of(daemon, member)), std::stoul(first) + 1);
+  EXPECT_EQ(std::stoul(member.next()), std::stoul(first) + 1);
 }
 
-std::string http(const std::string& address, const std::string& method, const std::string& path, const std::string& body = {}) {
+std::string http(const std::string& address, const std::string& method, const std::string& path, const std::string& body = {},
+                 const std::string& host = {}, const std::string& more = {}) {
   Client client(address, http_port);
-  client.send(method + " " + path + " HTTP/1.1\r\nHost: sonar\r\nConnection: close\r\nContent-Length: " +
-              std::to_string(body.size()) + "\r\n\r\n" + body);
+  client.send(method + " " + path + " HTTP/1.1\r\nHost: " + (host.empty() ? address : host) + "\r\n" + more +
+              "Connection: close\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
   return text_of(client.read_raw(std::size_t{1} << 20));
 }
 std::string body_of(const std::string& answer) { return answer.substr(std::min(answer.find("\r\n\r\n") + 4, answer.size())); }
@@ -333,6 +320,99 @@ TEST(Transports, HttpReadsAndChangesTheDevice) {
   const std::string samples = next_ping(receiver, &ping);
   EXPECT_EQ(samples, pattern(ping));
   EXPECT_TRUE(asked_for_range(daemon, 7));
+}
+
+TEST(Transports, PagesOfTheWebReadAndChangeNothingByHttp) {
+  DaemonSetup setup = made_up();
+  setup.edit_config = [edit = setup.edit_config](Config& config) {
+    edit(config);
+    config.control.hosts = {"sonar.lab"};
+  };
+  Daemon daemon(setup);
+  const std::string& at = daemon.address();
+  EXPECT_THAT(http(at, "GET", "/range", "", "evil.example"), StartsWith("HTTP/1.1 403 ")) << "a name that was rebound";
+  EXPECT_THAT(http(at, "PUT", "/range", "9", "", "Origin: http://evil.example\r\n"), StartsWith("HTTP/1.1 403 "));
+  EXPECT_THAT(http(at, "PUT", "/range", "9", "", "Origin: null\r\n"), StartsWith("HTTP/1.1 403 "));
+  EXPECT_EQ(body_of(http(at, "GET", "/range")), "5") << "unchanged";
+  EXPECT_THAT(daemon.log_text(), HasSubstr("a page of Origin http://evil.example"));
+  for (const std::string& host : {std::string("sonar.lab"), std::string("localhost:15080"), at + ":15080"})
+    EXPECT_EQ(body_of(http(at, "GET", "/range", "", host)), "5") << host;
+}
+
+/// The same in all makes' ports: what a page makes a browser send must neither act nor hold a driver's place.
+TEST(Transports, ARequestOfHttpEndsAClientsConnection) {
+  Daemon daemon(made_up());
+  for (const std::string method : {"GET", "POST", "HEAD", "PUT", "DELETE", "OPTIONS", "CONNECT", "TRACE", "PATCH"})
+    for (const bool in_pieces : {false, true}) {
+      Client page(daemon.address(), command_port);
+      const std::string request = method + " / HTTP/1.1\r\nHost: x\r\n\r\nrange 9\n";
+      page.send(request.substr(0, in_pieces ? 2 : request.size()));
+      if (in_pieces) {
+        std::this_thread::sleep_for(milliseconds(5));
+        page.send(request.substr(2));
+      }
+      page.read_to_end();
+      EXPECT_TRUE(page.ended || page.was_reset) << method;
+      EXPECT_EQ(page.bytes_read, 0u) << method;
+    }
+  EXPECT_THAT(daemon.log_text(), HasSubstr("it speaks HTTP"));
+  Client driver(daemon.address(), command_port);
+  EXPECT_EQ(ask(driver, "who"), "front 5\n") << "no range was set";
+  EXPECT_EQ(ask(driver, "range 6"), "ok\n");
+}
+
+TEST(Transports, AReceiverWhosePortIsClosedGetsNothingUntilItOpens) {
+  Daemon daemon(made_up());
+  std::uint16_t port = 0;
+  {
+    UdpSocket receiver;
+    port = receiver.port();
+    EXPECT_THAT(http(daemon.address(), "PUT", "/receivers", receiver.at()), StartsWith("HTTP/1.1 204 "));
+    next_ping(receiver);
+  }
+  const auto sent = [&] {
+    std::uint64_t bytes = 0;
+    daemon.on_io_thread([&] { bytes = daemon.app().devices().front().figures().bytes_written; });
+    return bytes;
+  };
+  std::this_thread::sleep_for(milliseconds(200));  // the last one is on its way
+  const auto before = sent();
+  std::this_thread::sleep_for(milliseconds(1000));
+  EXPECT_LT(sent() - before, 4u * 4000u) << "20 pings of 3200 bytes while it was open";
+  UdpSocket again("127.0.0.1", port);
+  next_ping(again);
+}
+
+TEST(Transports, NoClientNamesABroadcastOrGroupThatTheConfigurationDoesNot) {
+  Daemon daemon(made_up()), named(made_up("    groups: [127.255.255.255]\n"));
+  for (Daemon* const d : {&daemon, &named}) {
+    UdpSocket everybody("127.255.255.255"), receiver;
+    const auto port = std::to_string(everybody.port());
+    EXPECT_THAT(http(d->address(), "PUT", "/receivers", receiver.at() + " 127.255.255.255:" + port + " 239.1.2.3:9999"),
+                StartsWith("HTTP/1.1 204 "));
+    next_ping(receiver);
+    next_ping(receiver);
+    EXPECT_EQ(next_of(*d, everybody, d == &named ? patience : milliseconds(200)).empty(), d == &daemon);
+    EXPECT_THAT(d->log_text(), HasSubstr("sonars.groups"));
+  }
+}
+
+TEST(Transports, AHostByDatagramsThatIsSilentIsGivenUpUnlessItsComputerAnswersForIt) {
+  Daemon daemon(made_up());
+  UdpSocket host;
+  host.send("silence 1\n", daemon.address(), data_port);
+  EXPECT_EQ(host.next(), "ok\n");
+  next_ping(host);
+  EXPECT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 0; }));
+  EXPECT_THAT(daemon.log_text(), HasSubstr("client gone: silent for 1 s"));
+  UdpSocket listens;  // on this computer, where a closed port is answered for
+  listens.send("listens 1\n", daemon.address(), data_port);
+  EXPECT_EQ(listens.next(), "ok\n");
+  unsigned first = 0, last = 0;
+  next_ping(listens, &first);
+  do next_ping(listens, &last);
+  while (last < first + 50 && last != 0);
+  EXPECT_EQ(daemon.status().sonars(0).clients_size(), 1) << "2.5 s and more later";
 }
 
 TEST(Transports, AStopFreesEveryPort) {

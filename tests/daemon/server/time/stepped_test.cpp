@@ -66,7 +66,7 @@ TEST(Stepped, WaitsForEveryClient) {
   fire.settings.flags |= oculus::flag::beams_512 | oculus::flag::samples_16_bit;
   reader.fire(fire);
   std::uint32_t last = 0;
-  while (const auto ping = reader.next_ping(milliseconds(500))) last = ping->head.fixed.ping_id;
+  for (auto ping = reader.next_ping(); ping; ping = reader.next_ping(milliseconds(500))) last = ping->head.fixed.ping_id;
   ASSERT_GT(last, 0u) << "the kernel's buffers take a few";
   oculus::PingSequence ids;
   for (std::uint32_t i = 1; i <= last + 3; ++i) {

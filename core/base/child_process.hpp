@@ -1,0 +1,37 @@
+// Runs a program of ours on work that may end it: with files in memory as its standard streams, and nothing else of this process.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/base/result.hpp"
+
+namespace sonar {
+
+/// A file without a name, which is gone when the last process closes it.
+class MemoryFile {
+ public:
+  static Result<MemoryFile> make(const char* name);
+  MemoryFile(MemoryFile&& other) noexcept;
+  MemoryFile& operator=(MemoryFile&&) = delete;
+  ~MemoryFile();
+
+  int descriptor() const { return descriptor_; }
+
+ private:
+  explicit MemoryFile(int descriptor) : descriptor_(descriptor) {}
+  int descriptor_;
+};
+
+struct ChildEnd {
+  int signal = 0;     // that ended it; 0 = it exited
+  int exit_code = 0;  // -1: not known, because this process ignores its children
+};
+
+/// Waits for the end of the program. It gets `arguments` after its name, this process's environment and folder, and the three
+/// files as its standard streams; no other descriptor, no blocked or ignored signal, and a process group of its own.
+Result<ChildEnd> run_child(const std::filesystem::path& program, const std::vector<std::string>& arguments,
+                           const MemoryFile& input, const MemoryFile& output, const MemoryFile& errors);
+
+}  // namespace sonar

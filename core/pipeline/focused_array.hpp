@@ -1,0 +1,56 @@
+// What an array of channels of alternating signs makes of a signal that they share, focused at a range: sums over its channels
+// (docs/acoustics.md, eq. 47).
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/sonar/sonar_model.hpp"
+
+namespace sonar {
+
+/// Sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}, d the delay of a channel at x against the array's middle, from a
+/// point at a range and sine u. Parts: groups, which overlap by half and whose w^2 add to 1 in every channel; last, all channels
+/// alike.
+///
+/// A half of a group is short: but for the delay of its middle, its sum hardly changes with the sine. It is summed at few sines
+/// of a segment of beams, Chebyshev's, and interpolated: to 1e-5 of the loudest, as the rounding of the phases.
+class FocusedArray {
+ public:
+  FocusedArray(const std::vector<double>& beam_sines, const SharedNoise& law);
+  int parts() const { return parts_; }
+  std::size_t beams() const { return u_.size(); }
+  void focus(double range_in_wavelengths);
+  /// [parts][2][beams], real and imaginary parts.
+  const std::vector<float>& sums() const { return sums_; }
+  /// How far, in turns, the phase of a channel changes at most between two focal ranges.
+  double turns_between(double range, double other_range) const;
+
+ private:
+  /// Beams side by side, and sines that stand for them: their own if they are few.
+  struct Segment {
+    std::size_t first_beam = 0, beams = 0, first_node = 0, nodes = 0, weights = 0;  // weights: [nodes][beams] from there on
+    bool is_direct() const { return nodes == beams; }
+  };
+  void lay_out_segments(double reach);
+  void sum_at_nodes(int half, float range);
+  void add_to_beams(int half, float range, const Segment& segment);
+  double middle(int half) const;  // in wavelengths
+
+  std::vector<float> u_, node_u_, weights_;
+  std::vector<Segment> segments_;
+  std::vector<float> sums_;     // [parts][2][beams]
+  std::vector<float> at_node_;  // [weightings][2][nodes]
+  std::vector<float> length_;   // scratch: from the middle of a half; then cosines and sines of a channel
+  int channels_, half_, halves_, parts_;
+  double d_;  // spacing of the channels, in wavelengths
+  double widest_ = 0;
+};
+
+/// Chebyshev's points of [from, to], and weights of polynomials through values at them: [points][places].
+std::vector<double> chebyshev_points(double from, double to, int count);
+std::vector<double> chebyshev_weights(const std::vector<double>& points, const std::vector<double>& places);
+/// How many points hold the error below some 5e-6 for what turns by `radians` to either side of the middle.
+int chebyshev_count(double radians);
+
+}  // namespace sonar

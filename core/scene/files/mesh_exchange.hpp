@@ -1,0 +1,32 @@
+// What the daemon and the program that imports meshes hand each other: the request as arguments and standard input, the answer as
+// a file. Neither believes the other's lengths.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/scene/files/load_mesh.hpp"
+
+namespace sonar {
+
+struct ImportRequest {
+  MeshFile mesh;  // `in_memory` is the standard input
+  bool on_disk = true;
+  int parent = 0;                  // the process that waits for the answer
+  std::filesystem::path readable;  // of confine_reads(); empty: all
+  std::filesystem::path memory_root;
+};
+
+std::vector<std::string> arguments_of(const ImportRequest& request);
+/// Nothing when they are of another version.
+std::optional<ImportRequest> request_from(const std::vector<std::string>& arguments);
+
+/// False when the file does not take it all. Nothing reads as an answer before it is whole.
+bool write_answer(int descriptor, const Result<LoadedMesh>& mesh);
+/// The same of an error, from a signal handler: no memory is taken.
+bool write_refusal(int descriptor, ErrorKind kind, std::string_view text);
+/// Nothing when there is no whole answer.
+std::optional<Result<LoadedMesh>> read_answer(int descriptor);
+
+}  // namespace sonar

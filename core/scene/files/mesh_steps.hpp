@@ -1,0 +1,22 @@
+// The steps that the daemon's own readers of meshes and the importer share.
+#pragma once
+
+#include "core/scene/files/load_mesh.hpp"
+
+namespace sonar {
+
+constexpr std::uintmax_t max_mesh_bytes = std::uintmax_t{2} << 30;  // of a file and those it names, together
+
+/// ".obj", in small letters.
+std::string mesh_extension(const std::filesystem::path& file);
+
+tl::unexpected<Error> bad_mesh(const MeshFile& request, const std::string& what);
+
+/// Refused when the memory left does not hold what the importer takes for files of so many bytes.
+Result<void> check_import_memory(const MeshFile& request, std::uintmax_t bytes);
+
+/// `source` gives the corners in units and axes of the file, `triangles` of them at most.
+Result<LoadedMesh> finish_mesh(const MeshFile& request, bool y_up_by_default, std::uint64_t triangles,
+                               std::vector<std::string> names, const TriangleSource& source);
+
+}  // namespace sonar

@@ -1,0 +1,131 @@
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <vector>
+
+#include "core/scene/import/check_mesh.hpp"
+#include "core/scene/import/node_graph.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::size_t deepest_element = 500;
+constexpr std::string_view blanks = " \t\r\n";
+constexpr auto none = std::string_view::npos;
+
+struct Element {
+  std::string_view name, id, label, url, count;
+};
+
+/// Of the text between "<" and ">".
+Element parse_element(std::string_view tag) {
+  std::size_t at = std::min(tag.find_first_of(" \t\r\n/"), tag.size());
+  Element element;
+  element.name = tag.substr(0, at);
+  while ((at = tag.find_first_not_of(blanks, at)) != none) {
+    const std::size_t equals = tag.find('=', at);
+    if (equals == none) break;
+    const std::size_t open = tag.find_first_of("\"'", equals);
+    const std::size_t close = open == none ? none : tag.find(tag[open], open + 1);
+    if (close == none) break;
+    std::string_view name = tag.substr(at, equals - at);
+    name = name.substr(0, name.find_first_of(blanks));
+    const std::string_view value = tag.substr(open + 1, close - open - 1);
+    if (name == "id") element.id = value;
+    if (name == "name") element.label = value;
+    if (name == "url") element.url = value;
+    if (name == "count") element.count = value;
+    at = close + 1;
+  }
+  return element;
+}
+
+/// Where the tag that begins at `at` ends: its ">" outside of quotes.
+std::size_t end_of_tag(std::string_view text, std::size_t at) {
+  for (char quote = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    if (quote != 0 ? c == quote : c == '"' || c == '\'') {
+      quote = quote != 0 ? '\0' : c;
+    } else if (c == '>' && quote == 0) {
+      return at;
+    }
+  }
+  return none;
+}
+
+/// The elements that contain nodes, as the importer finds them: the library by id, else any node by id or name.
+struct Nodes {
+  NodeGraph graph;
+  std::vector<std::size_t> scenes;
+  std::map<std::string_view, std::size_t> library, others;
+  std::vector<std::pair<std::size_t, std::string_view>> instances;  // parent, name of the child
+
+  std::size_t add(const Element& element, bool in_a_node) {
+    const std::size_t node = graph.add(std::string(element.id.empty() ? element.label : element.id));
+    if (!in_a_node && !element.id.empty()) library[element.id] = node;
+    if (!element.id.empty()) others.try_emplace(element.id, node);
+    if (!element.label.empty()) others.try_emplace(element.label, node);
+    return node;
+  }
+  MeshFault fault() {
+    for (const auto& [parent, name] : instances) {
+      auto at = library.find(name);
+      if (at == library.end() && (at = others.find(name)) == others.end()) continue;
+      graph.contains(parent, at->second);
+    }
+    return graph.fault(scenes);
+  }
+};
+
+}  // namespace
+
+MeshFault check_collada(std::string_view file) {
+  constexpr std::size_t no_node = ~std::size_t{0};
+  Nodes nodes;
+  std::vector<std::size_t> inside;  // for each open element, the node that it is in
+  const auto after = [&](std::string_view end, std::size_t at) {
+    const std::size_t found = file.find(end, at);
+    return found == none ? none : found + end.size();
+  };
+  for (std::size_t at = file.find('<'); at != none; at = at == none ? none : file.find('<', at)) {
+    const std::string_view rest = file.substr(at);
+    if (rest.starts_with("<!--")) {
+      at = after("-->", at + 4);
+    } else if (rest.starts_with("<![CDATA[")) {
+      at = after("]]>", at);
+    } else if (rest.starts_with("<?")) {
+      at = after("?>", at);
+    } else {
+      const std::size_t end = end_of_tag(file, at);
+      if (end == none) break;
+      const std::string_view tag = file.substr(at + 1, end - at - 1);
+      at = end + 1;
+      if (tag.starts_with("!")) continue;
+      if (tag.starts_with("/")) {
+        if (!inside.empty()) inside.pop_back();
+        continue;
+      }
+      const Element element = parse_element(tag);
+      std::size_t node = inside.empty() ? no_node : inside.back();
+      if (element.name == "node" || element.name == "visual_scene") {
+        const std::size_t here = nodes.add(element, node != no_node);
+        if (node != no_node) nodes.graph.contains(node, here);
+        if (element.name == "visual_scene") nodes.scenes.push_back(here);
+        node = here;
+      }
+      if (element.name == "instance_node" && node != no_node && element.url.starts_with("#"))
+        nodes.instances.emplace_back(node, element.url.substr(1));
+      std::uint64_t count = 0;
+      const auto [stop, error] = std::from_chars(element.count.begin(), element.count.end(), count);
+      if (error == std::errc::result_out_of_range || count > file.size())
+        return "says that <" + std::string(element.name.substr(0, 32)) + "> has " + std::string(element.count.substr(0, 24)) +
+               " values, which its " + std::to_string(file.size()) + " bytes cannot hold; it is damaged, export it again";
+      if (!tag.ends_with("/")) inside.push_back(node);
+      if (inside.size() > deepest_element)
+        return "nests its elements deeper than " + std::to_string(deepest_element) + " levels; it is damaged, export it again";
+    }
+  }
+  return nodes.fault();
+}
+
+}  // namespace sonar

@@ -1,0 +1,108 @@
+#include <map>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "core/scene/import/check_mesh.hpp"
+#include "core/scene/import/node_graph.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::size_t deepest_nesting = 200;
+using Json = nlohmann::json;
+
+/// Follows the text without holding it. Names of nodes are their numbers, in glTF 1 words.
+class GltfWalk final : public Json::json_sax_t {
+ public:
+  MeshFault fault;
+  std::map<std::string, std::vector<std::string>> children;  // of nodes
+  std::vector<std::vector<std::string>> scenes;              // the nodes of each
+
+  bool null() override { return value({}); }
+  bool boolean(bool) override { return value({}); }
+  bool number_integer(number_integer_t v) override { return value(std::to_string(v)); }
+  bool number_unsigned(number_unsigned_t v) override { return value(std::to_string(v)); }
+  bool number_float(number_float_t, const string_t&) override { return value({}); }
+  bool string(string_t& v) override { return value(v); }
+  bool binary(binary_t&) override { return true; }
+  bool start_object(std::size_t) override { return open(false); }
+  bool start_array(std::size_t) override { return open(true); }
+  bool end_object() override { return close(); }
+  bool end_array() override { return close(); }
+  bool key(string_t& name) override {
+    levels_.back().key = name;
+    return true;
+  }
+  bool parse_error(std::size_t, const std::string&, const Json::exception&) override { return false; }
+
+ private:
+  struct Level {
+    bool array;
+    std::uint64_t index = 0;
+    std::string key;
+    std::string name() const { return array ? std::to_string(index) : key; }
+  };
+
+  bool is_at(std::size_t depth, const char* top, const char* last) const {
+    return levels_.size() == depth && levels_[0].key == top && !levels_[2].array && levels_[2].key == last;
+  }
+  bool value(const std::string& v) {
+    if (is_at(4, "nodes", "children")) children[levels_[1].name()].push_back(v);
+    if (is_at(4, "scenes", "nodes")) scenes.back().push_back(v);
+    if (is_at(3, "buffers", "uri") && (v.starts_with("/") || v.starts_with("\\") || v.substr(1, 1) == ":"))
+      fault = "names the file " + v.substr(0, 200) + ", an absolute path; put the file beside it and name it by its own name";
+    step();
+    return !fault;
+  }
+  bool open(bool array) {
+    if (levels_.size() == 2 && levels_[0].key == "scenes") scenes.emplace_back();
+    if (levels_.size() == 2 && levels_[0].key == "nodes") children[levels_[1].name()];
+    levels_.push_back({array, 0, {}});
+    if (levels_.size() > deepest_nesting)
+      fault = "nests its JSON deeper than " + std::to_string(deepest_nesting) + " levels; it is damaged, export it again";
+    return !fault;
+  }
+  bool close() {
+    levels_.pop_back();
+    step();
+    return true;
+  }
+  void step() {
+    if (!levels_.empty() && levels_.back().array) ++levels_.back().index;
+  }
+
+  std::vector<Level> levels_;
+};
+
+std::string_view json_of(std::string_view file) {
+  constexpr std::size_t head = 20;  // magic, version, length, length of the first part, its kind
+  if (!file.starts_with("glTF") || file.size() < head) return file;
+  std::uint64_t length = 0;
+  for (std::size_t k = 4; k-- > 0;) length = length << 8 | static_cast<unsigned char>(file[12 + k]);
+  return file.substr(head, length);
+}
+
+}  // namespace
+
+MeshFault check_gltf(std::string_view file) {
+  const std::string_view text = json_of(file);
+  GltfWalk walk;
+  Json::sax_parse(text.begin(), text.end(), &walk, Json::input_format_t::json, false);
+  if (walk.fault) return walk.fault;
+  NodeGraph graph;
+  std::map<std::string, std::size_t> number;
+  std::vector<std::size_t> roots;
+  for (const auto& [name, children] : walk.children) number[name] = graph.add(name);
+  const auto link = [&](std::size_t parent, const std::vector<std::string>& children) {
+    for (const std::string& child : children)
+      if (const auto at = number.find(child); at != number.end()) graph.contains(parent, at->second);
+  };
+  for (const auto& [name, children] : walk.children) link(number[name], children);
+  for (const auto& nodes : walk.scenes) {
+    roots.push_back(graph.add("scene"));
+    link(roots.back(), nodes);
+  }
+  return graph.fault(roots);
+}
+
+}  // namespace sonar

@@ -1,0 +1,24 @@
+// Cheap checks of mesh files before an importer reads them: numbers that the file cannot hold, and what contains itself, is
+// nested too deep or multiplies. Each takes a time linear in the text, and the memory of its nodes. They refuse what would cost
+// much; the importer finds the other faults.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace sonar {
+
+/// What is wrong, as a sentence that lacks the file's name.
+using MeshFault = std::optional<std::string>;
+
+/// `head`: the header at least, of a file of `file_bytes`.
+MeshFault check_ply(std::string_view head, std::uint64_t file_bytes);
+/// Text or binary (GLB), version 1 or 2.
+MeshFault check_gltf(std::string_view file);
+MeshFault check_collada(std::string_view file);
+
+constexpr std::size_t ply_head_bytes = 64 << 10;
+
+}  // namespace sonar

@@ -1,0 +1,57 @@
+#include <algorithm>
+#include <charconv>
+#include <sstream>
+
+#include "core/scene/import/check_mesh.hpp"
+
+namespace sonar {
+namespace {
+
+/// In a binary file; 1 of a type that is not known.
+std::uint64_t bytes_of(std::string_view type) {
+  if (type == "short" || type == "ushort" || type == "int16" || type == "uint16") return 2;
+  if (type == "int" || type == "uint" || type == "float" || type == "int32" || type == "uint32" || type == "float32") return 4;
+  if (type == "double" || type == "float64") return 8;
+  return 1;
+}
+
+}  // namespace
+
+MeshFault check_ply(std::string_view head, std::uint64_t file_bytes) {
+  // Assimp 5.2 never comes back from a header that does not end.
+  const std::size_t end = head.find("end_header");
+  if (!head.starts_with("ply") || end == std::string_view::npos || head.find('\n', end) == std::string_view::npos)
+    return "cannot be read: not a PLY file with a whole header";
+  std::istringstream lines{std::string(head.substr(0, end))};
+  bool ascii = false;
+  std::string element;
+  std::uint64_t count = 0, least = 0, all = 0;  // bytes: of one of the element at least, of the elements before it
+  const auto holds = [&] {
+    all = std::min<std::uint64_t>(all + count * std::max<std::uint64_t>(least, 1), std::uint64_t{1} << 62);
+    return all <= file_bytes + 1;  // the last line may lack its end
+  };
+  const auto too_many = [&] {
+    return "says that it has " + std::to_string(count) + " of \"" + element.substr(0, 32) + "\", which its " +
+           std::to_string(file_bytes) + " bytes cannot hold; it is cut short or damaged, export it again";
+  };
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string word, type, number;
+    words >> word >> type;
+    if (word == "format") ascii = type == "ascii";
+    if (word == "property") least += ascii ? 2 : type == "list" ? (words >> type, bytes_of(type)) : bytes_of(type);
+    if (word != "element") continue;
+    if (!holds()) return too_many();
+    element = type, least = 0, count = 0;
+    words >> number;
+    if (std::from_chars(number.data(), number.data() + number.size(), count).ec == std::errc::result_out_of_range ||
+        count > file_bytes) {
+      count = std::max(count, file_bytes + 1);
+      return too_many();
+    }
+  }
+  if (!holds()) return too_many();
+  return std::nullopt;
+}
+
+}  // namespace sonar

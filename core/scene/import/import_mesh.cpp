@@ -1,0 +1,125 @@
+#include "core/scene/import/import_mesh.hpp"
+
+#include <assimp/config.h>
+#include <assimp/material.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <array>
+#include <assimp/Importer.hpp>
+
+#include "core/base/regular_file.hpp"
+#include "core/scene/files/mesh_steps.hpp"
+#include "core/scene/import/check_mesh.hpp"
+#include "core/scene/import/import_files.hpp"
+#include "core/scene/import/node_graph.hpp"
+#include "core/scene/shapes/polygon.hpp"
+
+namespace sonar {
+namespace {
+
+std::string first_line(std::string s) {
+  std::replace(s.begin(), s.end(), '\r', '\n');
+  return s.substr(0, std::min<std::size_t>(s.find('\n'), 200));
+}
+
+/// At most, of every mesh of the file.
+std::vector<std::uint64_t> triangles_of_meshes(const aiScene& scene) {
+  std::vector<std::uint64_t> triangles(scene.mNumMeshes);
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m)
+    for (unsigned f = 0; f < scene.mMeshes[m]->mNumFaces; ++f)
+      triangles[m] += std::max(scene.mMeshes[m]->mFaces[f].mNumIndices, 2u) - 2;
+  return triangles;
+}
+/// Of a node and those below it: many nodes may show the same mesh.
+std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint64_t>& of_meshes, unsigned depth = 0) {
+  if (depth > NodeGraph::deepest) return 0;
+  std::uint64_t triangles = 0;
+  for (unsigned m = 0; m < node.mNumMeshes; ++m) triangles += of_meshes[node.mMeshes[m]];
+  for (unsigned c = 0; c < node.mNumChildren; ++c) triangles += triangles_of_nodes(*node.mChildren[c], of_meshes, depth + 1);
+  return triangles;
+}
+
+// Node transforms in double: far offsets in a node must not cost the vertices their millimetres.
+void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>& parent, unsigned depth,
+                   const TriangleSink& take) {
+  if (depth > NodeGraph::deepest) return;
+  const aiMatrix4x4t<double> here = parent * aiMatrix4x4t<double>(node.mTransformation);
+  std::vector<Vec3d> polygon;
+  for (unsigned m = 0; m < node.mNumMeshes; ++m) {
+    const aiMesh& mesh = *scene.mMeshes[node.mMeshes[m]];
+    const auto material = static_cast<std::uint16_t>(std::min(mesh.mMaterialIndex, 65535u));
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+      const aiFace& face = mesh.mFaces[f];
+      if (face.mNumIndices < 3) continue;  // points and lines
+      polygon.clear();
+      for (unsigned k = 0; k < face.mNumIndices; ++k) {
+        if (face.mIndices[k] >= mesh.mNumVertices) return;
+        const aiVector3D& p = mesh.mVertices[face.mIndices[k]];
+        const aiVector3t<double> v = here * aiVector3t<double>(p.x, p.y, p.z);
+        polygon.push_back({v.x, v.y, v.z});
+      }
+      if (polygon.size() == 3) {
+        take(std::span<const Vec3d, 3>(polygon), material);
+        continue;
+      }
+      for (const auto& triangle : triangulate(polygon))
+        take(std::array{polygon[triangle[0]], polygon[triangle[1]], polygon[triangle[2]]}, material);
+    }
+  }
+  for (unsigned c = 0; c < node.mNumChildren; ++c) each_triangle(scene, *node.mChildren[c], here, depth + 1, take);
+}
+
+Result<MeshFault> check_text(const MeshFile& request, const std::string& extension) {
+  const bool ply = extension == ".ply", collada = extension == ".dae", gltf = extension == ".gltf" || extension == ".glb";
+  if (!ply && !collada && !gltf) return MeshFault();
+  std::string held;
+  std::string_view text = request.in_memory;
+  std::uintmax_t bytes = text.size();
+  if (text.empty()) {
+    auto read = read_regular(request.file, ply ? ply_head_bytes : max_mesh_bytes);
+    if (!read) return tl::make_unexpected(read.error());
+    std::error_code error;
+    bytes = std::filesystem::file_size(request.file, error);
+    text = held = *std::move(read);
+  }
+  return ply ? check_ply(text.substr(0, ply_head_bytes), bytes) : collada ? check_collada(text) : check_gltf(text);
+}
+
+}  // namespace
+
+Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks) {
+  const std::string extension = mesh_extension(request.file);
+  const auto checked = check_text(request, extension);
+  if (!checked) return tl::make_unexpected(checked.error());
+  if (*checked) return bad_mesh(request, **checked);
+
+  std::optional<Error> fault;
+  Assimp::Importer importer;
+  auto* files = new ImportFiles(request, fault, hooks.opened);
+  importer.SetIOHandler(files);  // is the importer's then
+  const bool dae = extension == ".dae";
+  const bool y_up_by_default = extension == ".gltf" || extension == ".glb" || dae;  // Assimp turns a tagged DAE to y up
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());
+  const aiScene* scene =  // without its post-processing, which asserts on odd files
+      request.in_memory.empty()
+          ? importer.ReadFile(files->mesh(), 0)
+          : importer.ReadFileFromMemory(request.in_memory.data(), request.in_memory.size(), 0, extension.c_str() + 1);
+  if (!scene || !scene->mRootNode) {
+    if (fault) return tl::make_unexpected(*std::move(fault));
+    return bad_mesh(request, "cannot be read: " + first_line(importer.GetErrorString()));
+  }
+  hooks.imported();
+  std::vector<std::string> names;
+  for (unsigned i = 0; i < scene->mNumMaterials; ++i) {
+    aiString label;
+    scene->mMaterials[i]->Get(AI_MATKEY_NAME, label);
+    names.emplace_back(label.C_Str());
+  }
+  const std::uint64_t triangles = triangles_of_nodes(*scene->mRootNode, triangles_of_meshes(*scene));
+  return finish_mesh(request, y_up_by_default, triangles, std::move(names), [&](const TriangleSink& take) {
+    each_triangle(*scene, *scene->mRootNode, aiMatrix4x4t<double>(), 0, take);
+  });
+}
+
+}  // namespace sonar

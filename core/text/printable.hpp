@@ -1,0 +1,11 @@
+// Text from outside on a terminal: bytes that would move its cursor, change its state or are no UTF-8 are shown as \xNN.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace sonar::text {
+
+std::string printable(std::string_view text);
+
+}  // namespace sonar::text

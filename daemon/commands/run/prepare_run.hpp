@@ -1,0 +1,29 @@
+// All of a run that comes before its first socket: what `sonard run` starts from and `sonard check` judges, so that both refuse
+// the same with the same sentence.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "core/base/parallel.hpp"
+#include "daemon/commands/command_line.hpp"
+#include "daemon/commands/load_progress.hpp"
+#include "daemon/config/find_config.hpp"
+#include "daemon/server/engine/start_engine.hpp"
+
+namespace sonar {
+
+struct PreparedRun {
+  FoundConfig found;
+  std::shared_ptr<const Scene> scene;
+  std::unique_ptr<Parallel> pool;  // of the engines
+  EngineFactory make_engine;
+  std::unique_ptr<PingEngine> engine;  // of the scene
+};
+
+/// The configuration as the command line changes it, its token, journal, scene and engine. `json`: how errors are to be written
+/// from then on. `say_with` gives the sentences about a long load their place.
+Result<PreparedRun> prepare_run(const RunCommand& command, bool& json,
+                                const std::function<LoadProgress::Say(const Config&)>& say_with);
+
+}  // namespace sonar

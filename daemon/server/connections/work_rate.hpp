@@ -1,0 +1,47 @@
+// What the clients of one address may cost a server: a bucket of work for each address, so that connecting again and again gains
+// nothing and a flood from one address delays no other. Work is counted in bytes: those that come, those of an answer, and a
+// fixed number for what costs time beside its bytes. Pure arithmetic, as InputRate.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "daemon/server/connections/input_rate.hpp"
+
+namespace sonar {
+
+/// In bytes; measured: a byte may cost 50 ns of the I/O thread, which leaves it 95 % of its time at the default rate.
+namespace work {
+inline constexpr std::size_t of_connection = 1024, of_request = 512, of_upgrade = 32768;  // HTTP
+inline constexpr std::size_t of_frame = 64, of_control_frame = 512;                       // WebSocket
+inline constexpr std::size_t of_message = 128;                                            // control stream, with an answer
+}  // namespace work
+
+class WorkRate {
+ public:
+  using Steady = InputRate::Steady;
+  static constexpr std::size_t most_addresses = 256;
+  /// However much an address owes: each of its connections may go on once in that time, and a look at /healthz waits no longer.
+  static constexpr std::chrono::seconds longest_pause{1};
+
+  /// Work was done for, or has come from, the address; 0 = go on. `per_s` as it is now.
+  Steady::duration pause_after(const std::string& address, std::size_t amount, std::size_t per_s, Steady::time_point now) {
+    if (!addresses_.contains(address) && addresses_.size() >= most_addresses) forget_one();
+    auto& [rate, used_at] = addresses_.try_emplace(address, InputRate(per_s), now).first->second;
+    used_at = now;
+    rate.use(per_s);
+    const auto pause = rate.pause_after(amount, now);
+    rate.forgive_beyond(longest_pause);
+    return std::min(pause, Steady::duration(longest_pause));
+  }
+
+ private:
+  void forget_one() {
+    addresses_.erase(std::min_element(addresses_.begin(), addresses_.end(),
+                                      [](const auto& a, const auto& b) { return a.second.second < b.second.second; }));
+  }
+  std::map<std::string, std::pair<InputRate, Steady::time_point>> addresses_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,39 @@
+// The file of the journal of faults: lines are appended whole, or not at all. Opening and writing never wait for a reader.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+
+namespace sonar {
+
+class JournalFile {
+ public:
+  /// A FIFO needs a reader. io.
+  static Result<std::shared_ptr<JournalFile>> open(const std::filesystem::path& file);
+  /// Says what open() would, and makes no file.
+  static Result<void> check(const std::filesystem::path& file);
+  ~JournalFile();
+  JournalFile(const JournalFile&) = delete;
+  JournalFile& operator=(const JournalFile&) = delete;
+
+  struct Written {
+    std::uint64_t lines = 0;
+    std::string why;  // not all; empty = all
+  };
+  /// Stops at the first line that fails; a later call tries again.
+  Written append(std::string_view lines);
+
+ private:
+  explicit JournalFile(int descriptor) : descriptor_(descriptor) {}
+  std::string write_line(std::string_view line);
+
+  int descriptor_;
+  bool cut_ = false;  // the end of the file is part of a line
+};
+
+}  // namespace sonar

@@ -1,0 +1,64 @@
+// The thread that writes files: those of recordings, and the journal of faults. The I/O thread never waits for a disk; what is
+// to be written comes here as jobs, in order. Owned by App.
+#pragma once
+
+#include <unistd.h>
+
+#include <exception>
+#include <functional>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "core/base/result.hpp"
+#include "daemon/server/system/asio.hpp"
+
+namespace sonar {
+
+class WriterThread {
+ public:
+  /// `nice_by` is added to the niceness of the thread; `on_idle` is called after the last job, on the I/O thread.
+  WriterThread(asio::io_context& io, int nice_by, std::function<void()> on_idle = {}) : io_(io), on_idle_(std::move(on_idle)) {
+    asio::post(thread_, [nice_by] {
+      if (nice_by != 0 && ::nice(nice_by) == -1) return;  // costs only smoothness
+    });
+  }
+  /// Waits for what is being written.
+  ~WriterThread() { thread_.join(); }
+  WriterThread(const WriterThread&) = delete;
+  WriterThread& operator=(const WriterThread&) = delete;
+
+  /// `job` runs on the thread and returns a Result<void>; `after` takes that on the I/O thread, whose loop lives until then.
+  template <class Job, class After>
+  void run(Job job, After after) {
+    ++under_way_;
+    asio::post(thread_, [this, guard = asio::make_work_guard(io_), job = std::move(job), after = std::move(after)]() mutable {
+      asio::post(io_, [this, result = attempt(job), after = std::move(after)]() mutable {
+        --under_way_;
+        after(result);
+        if (idle() && on_idle_) on_idle_();
+      });
+    });
+  }
+  /// What `job` returns, or what it throws.
+  template <class Job>
+  static Result<void> attempt(Job&& job) {
+    try {
+      return job();
+    } catch (const std::bad_alloc&) {
+      return failure(ErrorKind::unavailable, "not enough memory to record");
+    } catch (const std::exception& e) {
+      return failure(ErrorKind::bug, std::string("writing it failed: ").append(e.what()));
+    }
+  }
+  /// No job runs or waits.
+  bool idle() const { return under_way_ == 0; }
+
+ private:
+  asio::io_context& io_;
+  std::function<void()> on_idle_;
+  std::size_t under_way_ = 0;
+  asio::thread_pool thread_{1};
+};
+
+}  // namespace sonar

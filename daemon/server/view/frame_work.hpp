@@ -1,0 +1,54 @@
+// What a viewer's bytes cost beside their number: WebSocket frames, which the library reads in silence when they are empty
+// fragments or control frames (RFC 6455, 5.2). Looks at the heads of frames only, at any split of the stream.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "daemon/server/connections/work_rate.hpp"
+
+namespace sonar {
+
+class FrameWork {
+ public:
+  /// The work of all that begins in these bytes, which follow those before.
+  std::size_t of(std::span<const std::byte> received) {
+    std::size_t work = received.size();
+    for (std::size_t i = 0; i < received.size();) {
+      if (payload_left_ > 0) {
+        const auto skipped = std::min<std::uint64_t>(payload_left_, received.size() - i);
+        payload_left_ -= skipped;
+        i += static_cast<std::size_t>(skipped);
+        continue;
+      }
+      work += take(std::to_integer<std::uint8_t>(received[i++]));
+    }
+    return work;
+  }
+
+ private:
+  /// One byte of a head.
+  std::size_t take(std::uint8_t byte) {
+    std::size_t work = 0;
+    if (at_ == 0) {
+      work = (byte & 0x08) != 0 ? work::of_control_frame : work::of_frame;
+    } else if (at_ == 1) {
+      length_ = byte & 0x7F;
+      length_bytes_ = length_ == 126 ? 2 : length_ == 127 ? 8 : 0;
+      mask_bytes_ = (byte & 0x80) != 0 ? 4 : 0;
+      if (length_bytes_ > 0) length_ = 0;
+    } else if (at_ < 2 + length_bytes_) {
+      length_ = length_ << 8 | byte;
+    }
+    if (++at_ < 2 || at_ < 2 + length_bytes_ + mask_bytes_) return work;
+    payload_left_ = length_;
+    at_ = 0;
+    return work;
+  }
+
+  std::size_t at_ = 0, length_bytes_ = 0, mask_bytes_ = 0;  // in the head
+  std::uint64_t length_ = 0, payload_left_ = 0;
+};
+
+}  // namespace sonar

@@ -1,0 +1,58 @@
+"""What configuring says where something is missing or too old: core/requirements.cmake in a project that has nothing else."""
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+REQUIREMENTS = pathlib.Path(__file__).parents[2] / "core/requirements.cmake"
+
+
+def configure(*options, before="", folders=None):
+    """What cmake prints, without its line breaks, and its exit status."""
+    with tempfile.TemporaryDirectory() as made:
+        folder = pathlib.Path(made)
+        (folder / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.22)\nproject(requirements LANGUAGES CXX)\n"
+                                               f"{before}\ninclude({REQUIREMENTS})\nmessage(STATUS \"all is here\")\n")
+        for name, text in (folders or {}).items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(text)
+        options = [option.replace("FOLDER", made) for option in options]
+        run = subprocess.run(["cmake", "-S", made, "-B", folder / "build", *options], capture_output=True, text=True, timeout=300)
+        return " ".join((run.stdout + run.stderr).split()), run.returncode
+
+
+class Requirements(unittest.TestCase):
+    def test_goes_on_where_all_is_here(self):
+        text, status = configure("-DBUILD_TESTING=ON")
+        self.assertIn("all is here", text)
+        self.assertEqual(status, 0)
+
+    def test_names_all_that_is_missing_and_its_packages(self):
+        text, status = configure("-DCMAKE_DISABLE_FIND_PACKAGE_CLI11=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_Protobuf=ON")
+        self.assertNotEqual(status, 0)
+        self.assertIn("CLI11 2.1 or newer (not found) Protobuf 3.12 or newer (not found)", text)
+        self.assertIn("apt-get install libcli11-dev libprotobuf-dev protobuf-compiler)", text)
+
+    def test_names_what_is_too_old(self):
+        text, status = configure("-Dembree_DIR=FOLDER/old", folders={
+            "old/embree-config.cmake": "", "old/embree-config-version.cmake": "set(PACKAGE_VERSION 3.11.0)"})
+        self.assertNotEqual(status, 0)
+        self.assertIn("embree 3.12 or newer (3.11.0 was found)", text)
+        self.assertIn("libembree-dev", text)
+
+    def test_names_a_protobuf_that_is_too_new(self):
+        text, status = configure(before="macro(find_package name)\n  _find_package(${ARGV})\n  if(${name} STREQUAL Protobuf)\n"
+                                        "    set(Protobuf_VERSION 4.25.1)\n  endif()\nendmacro()")
+        self.assertNotEqual(status, 0)
+        self.assertIn("Protobuf before 22 (4.25.1 was found)", text)
+
+    def test_names_a_compiler_that_is_too_old(self):
+        for compiler, version, sentence in (("GNU", "10.2.1", "g++ 11 or newer (this is 10.2.1, another: -DCMAKE_CXX_COMPILER="),
+                                            ("Clang", "13.0.1", "Clang 14 or newer (this is 13.0.1, another: -DCMAKE_CXX_COMPILER=")):
+            text, status = configure(before=f"set(CMAKE_CXX_COMPILER_ID {compiler})\nset(CMAKE_CXX_COMPILER_VERSION {version})")
+            self.assertNotEqual(status, 0)
+            self.assertIn(sentence, text)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,103 @@
+// What clients of an address may cost: counted in virtual time, whatever they send and however often they connect.
+#include "daemon/server/connections/work_rate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "daemon/server/view/frame_work.hpp"
+
+namespace sonar {
+namespace {
+
+using Steady = WorkRate::Steady;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr std::size_t per_s = 1 << 20;
+
+/// How many times something of that cost is done within 5 s by one that always has the next ready.
+std::size_t done_in_5_s(std::size_t cost) {
+  WorkRate rate;
+  const auto begin = Steady::time_point(std::chrono::hours(5));
+  std::size_t done = 0;
+  for (auto now = begin; now < begin + seconds(5); ++done) now += rate.pause_after("a", cost, per_s, now) + Steady::duration(1);
+  return done;
+}
+
+TEST(WorkRate, WhatCostsTimeBesideItsBytesIsCounted) {
+  EXPECT_LT(done_in_5_s(work::of_request + 60 + 300), 7300u) << "small requests: 70,000 without the count";
+  EXPECT_LT(done_in_5_s(work::of_request + 60 + 5000), 1200u) << "status";
+  EXPECT_LT(done_in_5_s(work::of_request + 60 + 177000), 40u) << "the page";
+  EXPECT_LT(done_in_5_s(work::of_connection + work::of_request + work::of_upgrade + 200), 190u) << "handshakes: 3866 without";
+}
+
+TEST(WorkRate, AnAddressPaysForAllItsConnectionsAndForNoOther) {
+  WorkRate rate;
+  const auto now = Steady::time_point(std::chrono::hours(5));
+  for (int i = 0; i < 100; ++i) rate.pause_after("flood", per_s, per_s, now);
+  EXPECT_EQ(std::chrono::round<milliseconds>(rate.pause_after("flood", 0, per_s, now)), seconds(1))
+      << "a new connection of it waits too, but not for ever";
+  EXPECT_EQ(rate.pause_after("flood", 0, per_s, now + seconds(1)).count(), 0);
+  EXPECT_EQ(rate.pause_after("honest", 10000, per_s, now).count(), 0);
+}
+
+TEST(WorkRate, ThoseWhoWaitTakeTurns) {
+  WorkRate rate;
+  const auto now = Steady::time_point(std::chrono::hours(5));
+  rate.pause_after("a", per_s, per_s, now);
+  const auto first = rate.pause_after("a", per_s / 10, per_s, now), second = rate.pause_after("a", per_s / 10, per_s, now);
+  EXPECT_EQ(std::chrono::round<milliseconds>(first), milliseconds(100));
+  EXPECT_EQ(std::chrono::round<milliseconds>(second), milliseconds(200));
+}
+
+TEST(WorkRate, RemembersSoManyAddresses) {
+  WorkRate rate;
+  auto now = Steady::time_point(std::chrono::hours(5));
+  rate.pause_after("flood", 10 * per_s, per_s, now);
+  for (std::size_t i = 0; i < 3 * WorkRate::most_addresses; ++i) {
+    now += Steady::duration(1);
+    rate.pause_after(std::to_string(i), 1, per_s, now);
+    EXPECT_GT(rate.pause_after("flood", 0, per_s, now).count(), 0) << "the one that was used longest ago is forgotten";
+  }
+}
+
+std::vector<std::byte> frame(unsigned first, std::size_t payload) {
+  std::vector<std::byte> bytes{std::byte(first)};
+  if (payload < 126) {
+    bytes.push_back(std::byte(0x80 | payload));
+  } else if (payload < 65536) {
+    bytes.insert(bytes.end(), {std::byte(0x80 | 126), std::byte(payload >> 8), std::byte(payload & 255)});
+  } else {
+    bytes.push_back(std::byte(0x80 | 127));
+    for (int shift = 56; shift >= 0; shift -= 8) bytes.push_back(std::byte(std::uint64_t{payload} >> shift & 255));
+  }
+  bytes.insert(bytes.end(), 4 + payload, std::byte{0x89});  // a mask and a payload that look like heads of pings
+  return bytes;
+}
+
+TEST(FrameWork, CountsFramesAtEverySplit) {
+  constexpr unsigned text = 0x81, begun = 0x01, goes_on = 0x00, ping = 0x89, pong = 0x8A;
+  std::vector<std::byte> all;
+  std::size_t expected = 0;
+  for (const auto& [first, payload] :
+       {std::pair(text, std::size_t{5}), std::pair(begun, std::size_t{0}), std::pair(goes_on, std::size_t{0}),
+        std::pair(ping, std::size_t{0}), std::pair(pong, std::size_t{125}), std::pair(text, std::size_t{126}),
+        std::pair(text, std::size_t{70000})}) {
+    const auto one = frame(first, payload);
+    all.insert(all.end(), one.begin(), one.end());
+    expected += one.size() + (first == ping || first == pong ? work::of_control_frame : work::of_frame);
+  }
+  for (const std::size_t piece :
+       {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{7}, std::size_t{4096}, all.size()}) {
+    FrameWork counted;
+    std::size_t work = 0;
+    for (std::size_t at = 0; at < all.size(); at += piece)
+      work += counted.of(std::span(all).subspan(at, std::min(piece, all.size() - at)));
+    EXPECT_EQ(work, expected) << "in pieces of " << piece;
+  }
+}
+
+}  // namespace
+}  // namespace sonar

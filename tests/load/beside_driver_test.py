@@ -1,0 +1,134 @@
+"""What newer parts of the shipped program cost a driver: viewers of the live view, faults on purpose at a sonar beside it, and
+hosts of the UDP families, whose pings are all accounted for. --quick takes 3 s a case instead of 60."""
+import contextlib
+import json
+import pathlib
+import re
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import urllib.request
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests/acceptance"), str(ROOT / "tests/reliability")]
+from foxglove_viewer import Closed, Viewer  # noqa: E402
+from oculus_reader import Client, fire_message  # noqa: E402
+from ping_link_test import DOWN, OMNISCAN, PING360, SIDE, SURVEYOR, Host, scan, settings, side_scan  # noqa: E402
+from real_pings_test import next_ping  # noqa: E402
+from record import record  # noqa: E402
+from running_sonard import Sonard  # noqa: E402
+
+QUICK = "--quick" in sys.argv
+LASTS_S = 3 if QUICK else 60
+RATE_HZ = 10
+EIGHT_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 8}"  # keys of the sonar, by way of its mount
+COMMAND = "SONARD_BUILD=build/release python3 tests/load/beside_driver_test.py"
+
+
+def keep(item, figure, bound, good):
+    print(f"{item}: {figure}")
+    if not QUICK:
+        record(item, figure, bound, good, COMMAND)
+
+
+def numbers_of(client, seconds):
+    """Of the pings that come in that time."""
+    end, numbers = time.monotonic() + seconds, []
+    while time.monotonic() < end or not numbers:
+        numbers.append(next_ping(client)[0])
+    return numbers
+
+
+def lost_of(numbers):
+    return numbers[-1] - numbers[0] + 1 - len(set(numbers))
+
+
+def ask(daemon, path, body=None):
+    request = urllib.request.Request(f"http://{daemon.address}:8088{path}", None if body is None else json.dumps(body).encode(),
+                                     {"Content-Type": "application/json"})
+    with urllib.request.urlopen(request, timeout=60) as answer:
+        return answer.read().decode()
+
+
+def figures(daemon):
+    """{"NAME{LABELS}": value} of /metrics."""
+    lines = (line for line in ask(daemon, "/metrics").splitlines() if not line.startswith("#"))
+    return {name: float(value) for name, value in (line.rsplit(" ", 1) for line in lines)}
+
+
+def reads(viewer, over):
+    with contextlib.suppress(Closed, OSError, EOFError):
+        while not over.is_set():
+            viewer.receive()
+
+
+class BesideADriver(unittest.TestCase):
+    def test_eight_viewers_of_everything(self):
+        over = threading.Event()
+        with Sonard(trajectory="orbit") as daemon, Client(daemon.address) as client, contextlib.ExitStack() as stack:
+            client.send(fire_message(rate_hz=RATE_HZ))
+            next_ping(client)
+            for _ in range(8):
+                viewer = stack.enter_context(Viewer(daemon.address)).greeted()
+                viewer.subscribe(*sorted({channel["topic"] for channel in viewer.channels.values()}))
+                threading.Thread(target=reads, args=(viewer, over), daemon=True).start()
+            numbers = numbers_of(client, LASTS_S)
+            over.set()
+        lost = lost_of(numbers)
+        keep("viewers", f"{lost} of {len(numbers) + lost}", "0", lost == 0)
+        self.assertEqual(lost, 0)
+
+    def test_faults_that_come_and_go(self):
+        """Of another client's connection; the driver's own stays."""
+        with tempfile.TemporaryDirectory() as folder:
+            journal = pathlib.Path(folder) / "journal.jsonl"
+            with Sonard(trajectory="orbit", mount=EIGHT_CLIENTS, arguments=("--faults", "--fault-journal", str(journal))) as daemon, \
+                    Client(daemon.address) as client:
+                client.send(fire_message(rate_hz=RATE_HZ))
+                numbers, given = [next_ping(client)[0]], 0
+                end = time.monotonic() + LASTS_S
+                while time.monotonic() < end:
+                    with Client(daemon.address) as other:
+                        other.send(fire_message(rate_hz=RATE_HZ))
+                        next_ping(other)
+                        kind = ("F01", "S01", "S06", "L02", "L04")[given % 5]
+                        ask(daemon, "/api/v1/faults", {"do": kind, "name": f"load-{given}", "client": "newest", "for": {"seconds": 0.3}})
+                        given += 1
+                        numbers += numbers_of(client, 0.5)
+                entries = json.loads(ask(daemon, "/api/v1/faults/journal?after=0"))["journal"]
+                lost_entries = figures(daemon)["sonard_fault_entries_lost_total"]
+                self.assertEqual(daemon.stop()[0], 0, daemon.log())
+            written = [json.loads(line)["seq"] for line in journal.read_text(encoding="utf-8").splitlines()]
+        lost = lost_of(numbers)
+        whole = written == [str(i + 1) for i in range(len(written))] and len(written) >= int(entries[-1]["seq"]) and lost_entries == 0
+        keep("faults-beside", f"{lost} of {len(numbers) + lost}; {given} faults", "0", lost == 0)
+        keep("faults-journal", f"{len(written)} entries in the file, {lost_entries:.0f} lost", "every one", whole)
+        self.assertEqual(lost, 0)
+        self.assertTrue(whole, (len(written), entries[-1]["seq"], lost_entries))
+
+    def test_hosts_of_datagrams(self):
+        counted, good = [], True
+        for profile, port, begin, message, mount in (("ping360", PING360, scan(0, 399), 2301, None),
+                                                     ("surveyor-240", SURVEYOR, settings(1), 3011, DOWN),
+                                                     ("omniscan-450", OMNISCAN, side_scan(1), 2198, SIDE)):
+            with Sonard(profile=profile, trajectory="orbit", **({"mount": mount} if mount else {})) as daemon:
+                host = Host(daemon.address, port)
+                host.send(begin)
+                received, until = 0, time.monotonic() + LASTS_S / 3
+                while time.monotonic() < until or received < 3:
+                    host.next(message, patience_s=60)
+                    received += 1
+                self.assertEqual(daemon.stop()[0], 0, daemon.log())
+                said = re.search(r"(\d+) pings, (\d+) served, (\d+) dropped", daemon.log())
+                self.assertIsNotNone(said, daemon.log())
+                pings, served, dropped = (int(n) for n in said.groups())
+            counted.append(f"{profile} {pings} pings, {served} served, {dropped} dropped, {received} received")
+            good = good and served >= received and pings - served - dropped in (0, 1)
+        keep("datagrams", "; ".join(counted), "served + dropped, one under way at the end", good)
+        self.assertTrue(good, counted)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0]])

@@ -1,0 +1,15 @@
+// Linked into a GoogleTest program: its tests run in a network of their own.
+#include <gtest/gtest.h>
+
+#include "tests/own_network/own_network.hpp"
+
+namespace {
+
+class OwnNetwork final : public testing::Environment {
+ public:
+  void SetUp() override { sonar::testing::enter_own_network(); }
+};
+
+[[maybe_unused]] const testing::Environment* const added = testing::AddGlobalTestEnvironment(new OwnNetwork);
+
+}  // namespace

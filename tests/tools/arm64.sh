@@ -1,0 +1,107 @@
+#!/usr/bin/env bash
+# Builds sonard for 64-bit ARM on an amd64 Debian 12 and tests it under qemu-user, which takes about an hour; not part of .ci/run.
+# usage: tests/tools/arm64.sh [--root DIR] [STEP...]
+#   --root DIR  in a Debian 12 system of its own in DIR, made there by mmdebstrap where it is missing, on a clone of the last
+#               commit. Without it the step setup adds the architecture arm64 to dpkg of this system and installs libraries of
+#               arm64, for which apt may remove those of amd64: for a bare system or a container.
+#   STEP        setup, build, test, threads, demo, package; all in this order by default. setup and --root need root.
+# What it makes is in build/arm64 (with --root below DIR/srv/sonard).
+set -u -o pipefail
+cd "$(dirname "$0")/../.." || exit 70
+# shellcheck source=tests/tools/setup.sh
+. tests/tools/setup.sh
+# shellcheck source=tests/tools/bare_root.sh
+. tests/tools/bare_root.sh
+folder=build/arm64
+emulated=$folder/emulated  # the programs as commands of this machine
+
+usage() { sed -n '2,8s/^# //p' "$0"; }
+root=
+case "${1:-}" in
+  -h | --help) usage; exit 0 ;;
+  --root) root=${2:?--root DIR}; shift 2 ;;
+esac
+[ $# -gt 0 ] || set -- setup build test threads demo package
+for step in "$@"; do
+  case $step in setup | build | test | threads | demo | package) ;; *) usage >&2; exit 64 ;; esac
+done
+if [ -n "$root" ]; then
+  make_bare_root bookworm "$root" || exit
+  [[ " $* " != *" setup "* ]] || clone_into "$root" || exit
+  in_root "$root" /srv/sonard/tests/tools/arm64.sh "$@"
+  exit
+fi
+
+# Programs that run here come from amd64, libraries from arm64; packages for all architectures have one form.
+setup() {
+  [ "$(dpkg --print-architecture)" = amd64 ] || { echo "this script cross-builds on amd64; here ./run.sh builds" >&2; return 69; }
+  local name names=(crossbuild-essential-arm64 qemu-user dpkg-dev file)
+  dpkg --add-architecture arm64 && apt-get -q update || return 69
+  for name in "${build_packages[@]}"; do
+    case $name in
+      g++) continue ;;
+      cmake | ninja-build | python3 | protobuf-compiler) ;;
+      *) apt-cache show --no-all-versions "$name" | grep -q '^Architecture: all' || name+=:arm64 ;;
+    esac
+    names+=("$name")
+  done
+  DEBIAN_FRONTEND=noninteractive apt-get -q -y --no-install-recommends install "${names[@]}" "${page_packages[@]}" </dev/null
+}
+
+# Core, protocol and the emulator, but for programs that repeat one stage over thousands of pings to measure a figure.
+tested() {
+  grep -E '^tests/(core|protocol)/|^tests/daemon/daemon_(emulator|rules|config|sonar|viewer)_test$' |
+    grep -vE '/(core_)?(everything|statistics|coverage|statistics_oracles|coverage_oracles|specular_statistics|texture)_test$' | sort -u
+}
+
+build_all() {
+  local tests
+  cmake -S . -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_TOOLCHAIN_FILE=tests/tools/arm64.cmake \
+    -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" -DSONAR_WERROR="${SONAR_WERROR:-OFF}" >/dev/null </dev/null || return
+  mapfile -t tests < <(ninja -C "$folder" -t targets all | sed -n 's/^\(tests\/.*_test\): .*/\1/p' | tested)
+  [ ${#tests[@]} -gt 0 ] || { echo "$folder has no tests to build" >&2; return 66; }
+  NINJA_STATUS="[%f/%t] " cmake --build "$folder" --parallel "$(build_jobs)" --target installed "${tests[@]}" </dev/null |
+    tests/tools/build_progress.py
+  [ "${PIPESTATUS[0]}" = 0 ] || return 1
+  local program
+  for program in daemon/sonard clients/sonarctl; do
+    mkdir -p "$emulated/${program%/*}"
+    printf '#!/bin/sh\nexec qemu-aarch64 "%s/%s" "$@"\n' "$PWD/$folder" "$program" >"$emulated/$program"
+    chmod +x "$emulated/$program"
+  done
+  qemu-aarch64 "$folder/daemon/sonard" --version
+}
+
+# One line a program that passes; the whole output of one that fails.
+run_tests() {
+  local programs
+  mapfile -t programs < <(cd "$folder" && find tests -name '*_test' -type f | tested)
+  [ ${#programs[@]} -gt 0 ] || { echo "no tests in $folder: first the step build" >&2; return 66; }
+  printf '%s\0' "${programs[@]}" | xargs -0 -n 1 -P "${SONARD_TEST_JOBS:-$(nproc)}" bash -c '
+    started=$SECONDS
+    if output=$(timeout 3600 qemu-aarch64 "'"$folder"'/$0" --gtest_brief=1 2>&1 </dev/null); then
+      printf "%s: %s, %d s\n" "${0##*/}" "$(tail -n 1 <<<"$output")" $((SECONDS - started))
+    else
+      printf "%s FAILED\n%s\n" "$0" "$output"
+      exit 1
+    fi'
+}
+
+# A run is the same to the byte on one, two and four threads.
+threads() { SONARD_BUILD=$PWD/$emulated SONARD_PINGS=10 python3 -B tests/acceptance/determinism_test.py; }
+
+demo() { SONARD_DEMO_SLOWNESS=30 tests/tools/check_demo.sh "$emulated" "$folder/demo.png"; }
+
+package() { (cd "$folder" && cpack -G DEB >/dev/null && ls -1 "$PWD"/*_arm64.deb); }
+
+failed=()
+for step in "$@"; do
+  say "arm64: $step"
+  case $step in
+    setup) setup || exit ;;
+    build) build_all || exit ;;
+    test) run_tests || failed+=(test) ;;
+    *) "$step" || failed+=("$step") ;;
+  esac
+done
+[ ${#failed[@]} -eq 0 ] || { printf '\narm64 FAILED: %s\n' "${failed[*]}" >&2; exit 1; }

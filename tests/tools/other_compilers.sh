@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Reads the whole tree, tests too, with compilers other than the usual one; makes no code, so it finds errors and the warnings that
+# need no optimiser. Warnings are errors. usage: tests/tools/other_compilers.sh [COMPILER...]
+#   COMPILER  e.g. g++-11, clang++-14; without one, those installed take turns by the commit. Without any installed, it is skipped.
+# Build folders stay in build/other.
+set -u -o pipefail
+cd "$(dirname "$0")/../.." || exit 70
+case "${1:-}" in
+  -h | --help) sed -n '2,5s/^# //p' "$0"; exit 0 ;;
+esac
+# shellcheck source=tests/tools/setup.sh
+. tests/tools/setup.sh
+
+if [ $# -eq 0 ]; then
+  usual=$(c++ -dumpversion)
+  mapfile -t installed < <(compgen -c | grep -xE '(g|clang)\+\+-[0-9]+' | grep -vxF "g++-${usual%%.*}" | sort -u)
+  [ ${#installed[@]} -gt 0 ] || { echo "skipped: no other compiler is installed, e.g. apt-get install g++-11 clang-14"; exit 0; }
+  commit=$(git rev-parse --short=7 HEAD 2>/dev/null || echo 0)
+  set -- "${installed[$((16#${commit:0:7} % ${#installed[@]}))]}"
+fi
+
+# Prints the compiler's commands of a build folder with -fsyntax-only, each ended by a zero. Generated code is left out.
+commands() {
+  python3 - "$1/compile_commands.json" <<'PYTHON'
+import json, re, sys
+files = {entry["file"]: entry for entry in json.load(open(sys.argv[1]))}  # once each, though tests share some
+for file, entry in files.items():
+    if not re.search(r"cmake_pch\.hxx\.cxx$|\.pb\.cc$|_proto\.dir/", file):
+        command = re.sub(r" -o \S+ -c ", " -fsyntax-only ", entry["command"])
+        print("cd '%s' && %s" % (entry["directory"], command), end="\0")
+PYTHON
+}
+
+# check COMPILER
+check() {
+  local compiler=$1 folder=build/other/$1 made
+  command -v "$compiler" >/dev/null || { echo "$compiler is not installed: apt-get install ${compiler/clang++/clang}" >&2; return 1; }
+  mkdir -p "$folder"
+  # Headers that the build makes and precompiled headers are made as ever.
+  cmake -S . -B "$folder" -G Ninja -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_BUILD_TYPE=Release -DSONAR_WERROR=ON -DSONAR_CUDA=OFF \
+    >"$folder/log" 2>&1 &&
+    made=$(ninja -C "$folder" -t targets all | grep -oE '^(cmake_object_order_depends_target_[^:]*|[^:]*cmake_pch\.hxx\.(gch|pch))') &&
+    xargs ninja -C "$folder" <<<"$made" >"$folder/log" 2>&1 || { cat "$folder/log" >&2; return 1; }
+  commands "$folder" | xargs -0 -n 1 -P "$(build_jobs)" bash -c
+}
+
+failed=0
+for compiler in "$@"; do
+  started=$SECONDS
+  if check "$compiler"; then verdict="no warning"; else verdict="FAILED, see above" failed=1; fi
+  printf '%s: %s in %d s\n' "$compiler" "$verdict" $((SECONDS - started))
+done
+exit $failed
