@@ -384,16 +384,16 @@ TEST(Transports, AReceiverWhosePortIsClosedGetsNothingUntilItOpens) {
 }
 
 TEST(Transports, NoClientNamesABroadcastOrGroupThatTheConfigurationDoesNot) {
-  Daemon daemon(made_up()), named(made_up("    groups: [127.255.255.255]\n"));
-  for (Daemon* const d : {&daemon, &named}) {
+  for (const bool named : {false, true}) {
+    Daemon daemon(made_up(named ? "    groups: [127.255.255.255]\n" : ""));
     UdpSocket everybody("127.255.255.255"), receiver;
     const auto port = std::to_string(everybody.port());
-    EXPECT_THAT(http(d->address(), "PUT", "/receivers", receiver.at() + " 127.255.255.255:" + port + " 239.1.2.3:9999"),
+    EXPECT_THAT(http(daemon.address(), "PUT", "/receivers", receiver.at() + " 127.255.255.255:" + port + " 239.1.2.3:9999"),
                 StartsWith("HTTP/1.1 204 "));
     next_ping(receiver);
     next_ping(receiver);
-    EXPECT_EQ(next_of(*d, everybody, d == &named ? patience : milliseconds(200)).empty(), d == &daemon);
-    EXPECT_THAT(d->log_text(), HasSubstr("sonars.groups"));
+    EXPECT_EQ(everybody.next(named ? patience : milliseconds(200)).empty(), !named);
+    EXPECT_THAT(daemon.log_text(), HasSubstr("sonars.groups"));
   }
 }
 
