@@ -117,8 +117,7 @@ PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, B
   const bool volume = request.switches.volume && scene.water_column.has_volume();
   const bool leak = request.switches.leak && p.plan.mode.receiver.leak_upa > 0;
   if (p.plan.expected_power) return p;
-  // Settings that differ in the range alone have the same filter in samples.
-  std::vector<const NoiseTable*> drawn;
+  std::vector<const NoiseTable*> drawn;  // settings that differ in the range alone have the same filter in samples
   for (const auto& other : w.prepared) drawn.insert(drawn.end(), {&other->noise, &other->grains});
   if (request.switches.noise || ((leak || volume) && p.one_table())) p.noise.prepare(request.seed, p.plan.noise_filter, drawn);
   if ((leak || volume) && !p.one_table()) p.grains.prepare(request.seed, p.plan.pulse_filter, drawn);

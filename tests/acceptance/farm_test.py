@@ -186,7 +186,7 @@ class Farm(unittest.TestCase):
         self.assertIn("0 running, 1 queued", self.status())
 
     def test_numbers_that_are_no_shards_are_removed_from_the_queue(self):
-        with socket.create_connection(("127.0.0.1", self.port), timeout=60) as nats:
+        with socket.create_connection(("127.0.0.1", PORT), timeout=60) as nats:
             lines = nats.makefile("rb")
             nats.sendall(b'CONNECT {"verbose":false}\r\nSUB farm.work.> 1\r\nPING\r\n')
             while not lines.readline().startswith(b"PONG"):

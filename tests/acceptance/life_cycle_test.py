@@ -240,7 +240,7 @@ class Undisturbed(unittest.TestCase):
     def test_a_render_on_a_full_disk_ends_with_a_sentence(self):
         def small_disk():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, resource.RLIM_INFINITY))
         with tempfile.TemporaryDirectory() as folder:
             for kind in ("npy", "png", "raw"):
                 with self.subTest(format=kind):

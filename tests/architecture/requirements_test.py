@@ -34,11 +34,11 @@ class Requirements(unittest.TestCase):
         self.assertIn("apt-get install libcli11-dev libprotobuf-dev protobuf-compiler)", text)
 
     def test_names_what_is_too_old(self):
-        text, status = configure("-Dembree_DIR=FOLDER/old", folders={
-            "old/embree-config.cmake": "", "old/embree-config-version.cmake": "set(PACKAGE_VERSION 3.11.0)"})
+        text, status = configure("-Dspdlog_DIR=FOLDER/old", folders={
+            "old/spdlog-config.cmake": "", "old/spdlog-config-version.cmake": "set(PACKAGE_VERSION 1.8.0)"})
         self.assertNotEqual(status, 0)
-        self.assertIn("embree 3.12 or newer (3.11.0 was found)", text)
-        self.assertIn("libembree-dev", text)
+        self.assertIn("spdlog 1.9 or newer (1.8.0 was found)", text)
+        self.assertIn("libspdlog-dev", text)
 
     def test_names_a_protobuf_that_is_too_new(self):
         text, status = configure(before="macro(find_package name)\n  _find_package(${ARGV})\n  if(${name} STREQUAL Protobuf)\n"
