@@ -48,9 +48,10 @@ tl::unexpected<Error> without_answer(const MeshFile& request, const ChildEnd& en
                    request.file.filename().string() + ": cannot be read: " + program +
                        " was killed, most likely for want of memory; use a smaller mesh, or give it more");
   if (end.signal == SIGXFSZ)
-    return failure(ErrorKind::unavailable, request.file.filename().string() +
-                                               ": cannot be read: the size of files is limited to less than the mesh takes in memory; "
-                                               "raise the limit (ulimit -f, LimitFSIZE=)");
+    return failure(ErrorKind::unavailable,
+                   request.file.filename().string() +
+                       ": cannot be read: the size of files is limited to less than the mesh takes in memory; "
+                       "raise the limit (ulimit -f, LimitFSIZE=)");
   if (end.signal != 0)
     return bad_mesh(request, std::string("cannot be read: the importer crashed on it (") + ::strsignal(end.signal) +
                                  "); it is damaged or nested too deep, export it again" + words);
