@@ -13,8 +13,8 @@ struct Detection {
 };
 
 /// One for each of `directions` even parts of the sector whose strongest sample lies `above_db` over the median of its beam; of
-/// samples on a logarithmic scale. A sample counts only where no echo of another direction, heard by a beam of this width (-3
-/// dB), explains it: an echo is listed in the direction that it comes from alone, and a floor in all. Most to port first.
-std::vector<Detection> detect_points(const Ping& ping, int directions, double above_db, double beam_width_rad);
+/// samples on a logarithmic scale. The azimuth is the peak across beams in the row of that sample, so that one echo heard by
+/// several beams is placed where it comes from; an echo that two directions share is listed once. Most to port first.
+std::vector<Detection> detect_points(const Ping& ping, int directions, double above_db);
 
 }  // namespace sonar
