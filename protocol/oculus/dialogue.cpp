@@ -63,6 +63,7 @@ class OculusDialogue final : public protocol::Dialogue {
   }
   void on_ping_queued(Time now) override {
     is_not_waiting();
+    is_heard_ = is_heard();
     requested_ping_ = false;
     postpone_dummy(now);
   }
@@ -101,9 +102,10 @@ class OculusDialogue final : public protocol::Dialogue {
     const bool repeated = request == last_request_;
     last_request_ = request;
     const bool one_ping = resolved.settings.triggered && !standby;
-    reaction.events.emplace_back(ChangeSettings{resolved.settings, std::make_shared<HeldFire>(*fire), summary(*fire, resolved)});
+    is_heard_ = is_heard();
+    fired_ = std::make_shared<HeldFire>(*fire);
+    reaction.events.emplace_back(ChangeSettings{resolved.settings, fired_, summary(*fire, resolved)});
     if (one_ping) reaction.events.emplace_back(RequestPing{});
-    has_fired_ = true;
     requested_ping_ = one_ping;
     if (standby && !repeated) {  // drivers expect a dummy as the acknowledgement of standby
       reaction.replies.push_back(make_dummy(device_.id));
@@ -112,12 +114,15 @@ class OculusDialogue final : public protocol::Dialogue {
   }
 
   /// A driver may take a dummy as the echo of standby, and stores that as its ping rate: there is none while it waits for pings,
-  /// however long they take. With network trigger the device waits for the client.
+  /// however long they take. With network trigger the device waits for the client. An observer's fire messages change nothing.
   bool expects_pings() const {
     const auto* held = dynamic_cast<const HeldFire*>(device_.settings.get());
-    if (!has_fired_ || held == nullptr || table_rate_hz(held->fire.settings.ping_rate) <= 0) return false;
+    if (!is_heard() || held == nullptr || table_rate_hz(held->fire.settings.ping_rate) <= 0) return false;
     return requested_ping_ || (held->fire.settings.flags & flag::network_trigger) == 0;
   }
+
+  /// The device has taken settings of this client, now or earlier.
+  bool is_heard() const { return is_heard_ || (fired_ != nullptr && device_.settings == fired_); }
 
   static std::string summary(const FireRequest& fire, const ResolvedSettings& resolved) {
     std::string text = describe(fire);
@@ -158,7 +163,8 @@ class OculusDialogue final : public protocol::Dialogue {
   protocol::Bytes last_request_;
   DeviceState::StoredAddress stored_;  // as of this call: a read may follow its write in the same bytes
   Time dummy_at_{};
-  bool has_fired_ = false, requested_ping_ = false;
+  std::shared_ptr<const VendorSettings> fired_;  // by the last fire message
+  bool is_heard_ = false, requested_ping_ = false;
   std::optional<Time> greeting_at_;
   bool greets_silent_ = false;  // only a client that has neither fired nor been sent a ping by then
   std::size_t notices_ = 0;
