@@ -127,7 +127,7 @@ void SonarClients::tick(std::size_t place) {
   if (!clients_[place]) return;
   const Connection* const connection = sonar_.connections().find(clients_[place]->id);
   const auto next = connection->next_tick();
-  if (!next) return;
+  if (!next || *next == Time::max()) return;  // nothing until bytes or a ping come
   require(*next <= now_ + longest_silence);
   now_ = std::max(now_, *next);
   tick_all_due();

@@ -514,9 +514,9 @@ class Host {
   std::string post(const std::string& path, const std::string& body) {
     tcp::socket socket(io_);
     socket.connect(at_);
-    const std::string request = "POST /api/v1/integration" + path +
-                                " HTTP/1.1\r\nHost: sonar\r\nContent-Type: application/json\r\n" +
-                                "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body;
+    const std::string request = "POST /api/v1/integration" + path + " HTTP/1.1\r\nHost: " + at_.address().to_string() +
+                                "\r\nContent-Type: application/json\r\n" + "Content-Length: " + std::to_string(body.size()) +
+                                "\r\n\r\n" + body;
     asio::write(socket, asio::buffer(request));
     std::string answer(12, '\0');
     return readable(socket) ? (asio::read(socket, asio::buffer(answer)), answer) : "no answer";

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "daemon/server/sonars/session.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -33,10 +34,10 @@ TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {
   Daemon daemon(setup);
   Client healthy(daemon.address());
   Client slow(daemon.address(), 52100, 16384);
-  healthy.fire(large_fire(PingRate::hz10));
+  healthy.fire(large_fire(PingRate::hz2));  // slow enough to be read by a sanitized test on a busy machine
   oculus::PingSequence healthy_ids;
   std::uint32_t last = 0;
-  for (int i = 0; i < 25; ++i) {
+  for (int i = 0; i < 16; ++i) {
     const auto ping = healthy.next_ping();
     ASSERT_TRUE(ping);
     EXPECT_THAT(ping->violations, IsEmpty());
@@ -314,7 +315,7 @@ TEST(GracefulStop, ReadingClientsGetAWholeLastMessageAndStalledOnesAReset) {
   reader.join();
   EXPECT_TRUE(whole) << "FIN";
   EXPECT_EQ(healthy.decoder.buffered_bytes(), 0u) << "no message was cut";
-  EXPECT_GE(took, milliseconds(1400)) << "the stalled one had its time";
+  EXPECT_GE(took, Session::finish_limit) << "the stalled one had its time";
   EXPECT_LT(took, milliseconds(8000)) << "the promise is 2 s; this allows for a busy machine";
   EXPECT_THAT(daemon.log_text(), HasSubstr("did not take its last message in time"));
 }
