@@ -13,7 +13,8 @@ using protocol::Reaction;
 constexpr auto port_table = streaming_ports(51200);
 
 class OmniscanDialogue final : public StreamingConversation<Settings, settings_from> {
-  bool hosts_fall_silent() const override { return true; }  // ping-python; those of a Surveyor answer its requests for the time
+  /// ping-python does; hosts of a Surveyor answer its requests for the time.
+  bool hosts_fall_silent() const override { return settings().parameters.enable != 0; }
 
  public:
   using StreamingConversation::StreamingConversation;

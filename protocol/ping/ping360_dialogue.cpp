@@ -55,7 +55,7 @@ class Ping360Dialogue final : public Conversation {
   std::optional<Time> next_ping_request() const override {
     return task_ != Task::none && !fired_ ? std::optional(due_) : std::nullopt;  // stepped time comes to a mere turn too
   }
-  bool hosts_fall_silent() const override { return true; }  // ping-python while it scans
+  bool hosts_fall_silent() const override { return task_ != Task::none; }  // ping-python while it scans
   protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
     if (late_ && made_with == late_.get())
       late_.reset();

@@ -94,7 +94,7 @@ class BesideADriver(unittest.TestCase):
                         other.send(fire_message(rate_hz=RATE_HZ))
                         next_ping(other)
                         kind = ("F01", "S01", "S06", "L02", "L04")[given % 5]
-                        ask(daemon, "/api/v1/faults", {"do": kind, "name": f"load-{given}", "client": "newest", "for": {"seconds": 0.3}})
+                        ask(daemon, "/api/v1/faults", {"do": kind, "name": f"load-{given}", "client": str(given + 2), "for": {"seconds": 0.3}})
                         given += 1
                         numbers += numbers_of(client, 0.5)
                 entries = json.loads(ask(daemon, "/api/v1/faults/journal?after=0"))["journal"]
