@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/base/enum_names.hpp"
+#include "core/pipeline/simd/kernels.hpp"
 #include "core/text/arguments.hpp"
 #include "core/text/nearest.hpp"
 #include "daemon/config/move_addresses.hpp"
@@ -200,7 +201,9 @@ Command parse_command_line(int argc, char** argv) {
     return complain("the benchmark is a program of its own, sonard_bench, which is built with the tests (docs/benchmarks.md)");
 
   CLI::App app{"sonard: emulates imaging sonars on the network, from a 3D scene", "sonard"};
-  app.set_version_flag("--version", std::string("sonard " SONARD_VERSION));
+  app.set_version_flag("--version", [] {  // the best level of this processor, whatever SONARD_SIMD says
+    return std::string("sonard " SONARD_VERSION "\nhot loops: ") + simd::kernels_for(SimdLevel::avx512).name;
+  });
   RunCommand run;
   CheckCommand check;
   RenderCommand render;

@@ -1,13 +1,12 @@
 """In the stepped clock a run is the same to the byte, however many threads compute it."""
 import hashlib
-import os
 import re
 import unittest
 
 from oculus_reader import Client, fire_message
 from running_sonard import Sonard
 
-PINGS = int(os.environ.get("SONARD_PINGS", 200))  # fewer where the processor is emulated
+PINGS = 200
 
 
 def run(threads, seed=1):

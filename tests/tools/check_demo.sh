@@ -8,10 +8,10 @@ picture=${2:-out/demo.png}
 # Sand with nothing on it, 5.5 to 7.8 m, 12 degrees to port. tests/acceptance/picture_test.py judges these figures with 256 beams.
 sand=250:350,150:250
 pings=20 memory_limit_mb=300 first_ping_goal_s=1 first_ping_limit_s=5 stop_goal_ms=2000 stop_limit_ms=10000 wait_s=10
-# An emulated processor takes so many times as long, and its emulator needs memory of its own.
+# An emulated processor takes so many times as long, hence fewer pings, and its emulator needs memory of its own.
 if [ -n "${SONARD_DEMO_SLOWNESS:-}" ]; then
   first_ping_limit_s=$((first_ping_limit_s * SONARD_DEMO_SLOWNESS)) stop_limit_ms=$((stop_limit_ms * SONARD_DEMO_SLOWNESS))
-  wait_s=$((wait_s * SONARD_DEMO_SLOWNESS)) memory_limit_mb=$((2 * memory_limit_mb))
+  wait_s=$((wait_s * SONARD_DEMO_SLOWNESS)) memory_limit_mb=$((2 * memory_limit_mb)) pings=5
 fi
 
 scratch=$(mktemp -d)

@@ -16,7 +16,7 @@ archives=/usr/lib/$(g++ -dumpmachine)
 # archive would miss. An old-style run path also holds for what the libraries beside the programs need of each other.
 # shellcheck disable=SC2016
 cmake -S . -B $folder -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF -DSONAR_FFTW=OFF -DSONAR_FARM=OFF -DSONAR_CUDA=OFF \
-  -DCMAKE_INSTALL_RPATH='$ORIGIN/../lib/sonard' -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
+  -DCMAKE_INSTALL_RPATH='$ORIGIN/../lib/sonard;$ORIGIN/../../lib/sonard' -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
   -DZLIB_LIBRARY="$archives/libz.a" -DPNG_LIBRARY="$archives/libpng.a" -DSNAPPY_LIBRARY="$archives/libsnappy.a" \
   -DProtobuf_LIBRARY="$archives/libprotobuf.a" -DSONAR_WERROR="${SONAR_WERROR:-OFF}" \
   -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" </dev/null >/dev/null || exit
@@ -27,7 +27,7 @@ cmake --install $folder --prefix "$PWD/$stage" --strip >/dev/null || exit
 rm -rf "$stage/lib/systemd"  # the unit is for /usr/bin
 
 of_the_system='^(libc|libm|libdl|libpthread|librt|libstdc\+\+|libgcc_s|ld-linux[^.]*)\.so'
-libraries() { ldd "$stage"/bin/* | sed -n 's/^\t\([^ ]*\) => \([^ ]*\) .*/\1 \2/p' | sort -u | grep -vE "$of_the_system"; }
+libraries() { ldd "$stage"/bin/* "$stage"/libexec/sonard/* | sed -n 's/^\t\([^ ]*\) => \([^ ]*\) .*/\1 \2/p' | sort -u | grep -vE "$of_the_system"; }
 mapfile -t bundled < <(libraries)
 for library in "${bundled[@]}"; do
   install -m 644 "${library#* }" "$stage/lib/sonard/${library% *}" || exit
@@ -37,7 +37,7 @@ done
 # Licences of all that is inside: of libraries, and of what was compiled or linked in, by the packages that it came from.
 packages() {
   local package library
-  for library in "${bundled[@]}"; do dpkg-query -S "$(readlink -f "${library#* }")"; done | sed 's/:.*//'
+  for library in "${bundled[@]}"; do dpkg-query -S "*/$(basename "$(readlink -f "${library#* }")")"; done | sed 's/:.*//'
   for package in "${build_packages[@]}" libjs-three; do
     case $package in *-dev | libjs-*) dpkg-query -W -f '${Package} ${Depends}\n' "$package" | sed 's/([^)]*)//g; s/[,|]/ /g' | tr -s ' ' '\n' ;; esac
   done | grep -E -- '-dev$|^libjs-'
