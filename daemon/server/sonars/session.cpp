@@ -194,6 +194,8 @@ asio::awaitable<bool> Session::deliver() {
 void Session::end_by(Outbox::Shape::End end) {
   if (end == Outbox::Shape::End::reset) return reset("a fault reset the connection");
   finish("a fault ended the stream");
+  finish_by_ = Steady::now() + fault_fin_limit;
+  fin_by_fault_ = true;
   send_fin();
 }
 
@@ -230,11 +232,13 @@ asio::awaitable<void> Session::write() {
 Session::Steady::time_point Session::watch_until() const {
   auto until = Steady::now() + idle_watch;
   if (finishing_) until = std::min(until, finish_by_);
-  if (sent_fin_) until = std::min(until, std::max(fin_at_ + fin_limit, Steady::now() + fin_watch));
+  if (sent_fin_ && !fin_by_fault_) until = std::min(until, std::max(fin_at_ + fin_limit, Steady::now() + fin_watch));
   return until;
 }
 
-bool Session::has_all(Steady::time_point now) { return sent_fin_ && now >= fin_at_ + fin_limit && unconfirmed_bytes() <= 0; }
+bool Session::has_all(Steady::time_point now) {
+  return sent_fin_ && !fin_by_fault_ && now >= fin_at_ + fin_limit && unconfirmed_bytes() <= 0;
+}
 
 asio::awaitable<void> Session::watch() {
   const auto self = shared_from_this();

@@ -58,6 +58,8 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Longest time a client may take for its last message after finish(); then it is reset. One whose computer has all of it, and
   /// our FIN, is not waited for longer than `fin_limit`.
   static constexpr std::chrono::milliseconds finish_limit{1200}, fin_limit{400};
+  /// After an end of the stream by a fault: a client that ignores it has time to show that.
+  static constexpr std::chrono::milliseconds fault_fin_limit{1500};
 
   Session(SessionParent& parent, tcp::socket socket, const Setup& setup);
 
@@ -120,6 +122,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Steady::time_point finish_by_{}, fin_at_{};
   std::uint32_t ping_ = 0;  // that is written now or was last; 0 = a reply
   bool reading_ = true, writing_ = false, hurries_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
+  bool fin_by_fault_ = false;
   std::string why_;
 };
 
