@@ -121,7 +121,9 @@ class Unit(unittest.TestCase):
                           f'poses: {{protobuf: "{address}:14770", json: "{address}:14771"}}\n', encoding="utf-8")
         with subprocess.Popen(["strace", "-f", "-qq", "-o", str(calls), str(SONARD), "run", str(config), "--exit-after-pings", "3"],
                               stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
-            listened = run(SONARCTL, "listen", address, "--pings", "3", "--wait", "60", "--seconds", "60", "--quiet")
+            listened = run(SONARCTL, "listen", address, "--pings", "3", "--wait", "300", "--seconds", "300", "--quiet", patience_s=660)
+            if listened.returncode != 0:  # it waits for pings that are not taken
+                subprocess.run(["pkill", "-P", str(process.pid)], check=False)
             process.stderr.read()
         self.assertEqual((process.returncode, listened.returncode), (0, 0), listened.stderr)
         return calls.read_text(encoding="utf-8", errors="replace")
