@@ -297,15 +297,14 @@ void ReplayServer::end_if_silent() {
 /// What a client says changes nothing; it is read so that the client can go on saying it.
 asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
   std::array<std::byte, 4096> ignored;
-  std::string first_bytes;
+  HttpDetector http;
   bool logged = false;
   while (true) {
     error_code ec;
     const std::size_t n = co_await client->socket.async_read_some(asio::buffer(ignored), into(ec));
     if (ec) break;
     figures_.client_bytes += n;
-    for (std::size_t i = 0; i < n && first_bytes.size() < longest_http_method; ++i) first_bytes += static_cast<char>(ignored[i]);
-    if (begins_http_request(first_bytes)) break;  // any web page can make a browser send it
+    if (http.speaks_http(std::span(ignored).first(n))) break;
     if (client->dialogue) obey(*client, protocol::BytesView(ignored).first(n));
     if (!std::exchange(logged, true)) log_.info("settings of a client have no effect on a recording", {{"client", client->name}});
   }

@@ -93,6 +93,12 @@ bool begins_http_request(std::string_view bytes) {
   return std::any_of(methods.begin(), methods.end(), [bytes](std::string_view method) { return bytes.starts_with(method); });
 }
 
+bool HttpDetector::speaks_http(std::span<const std::byte> received) {
+  for (std::size_t i = 0; i < received.size() && first_bytes_.size() < longest_http_method; ++i)
+    first_bytes_ += static_cast<char>(received[i]);
+  return begins_http_request(first_bytes_);
+}
+
 bool is_json(std::string_view content_type) {
   std::string_view type = cut(content_type, ';');
   while (!type.empty() && (type.back() == ' ' || type.back() == '\t')) type.remove_suffix(1);

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -31,9 +32,19 @@ bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std
 /// "application/json", with any parameters.
 bool is_json(std::string_view content_type);
 
-/// Detects HTTP requests on ports of other protocols. Needs the first longest_http_method bytes.
+/// Needs the first longest_http_method bytes.
 bool begins_http_request(std::string_view bytes);
 inline constexpr std::size_t longest_http_method = 8;  // "OPTIONS "
+
+/// Detects HTTP requests on ports of other protocols: any web page can make a browser send one.
+class HttpDetector {
+ public:
+  /// Whether the stream, up to these bytes, begins as an HTTP request.
+  bool speaks_http(std::span<const std::byte> received);
+
+ private:
+  std::string first_bytes_;
+};
 
 struct Route {
   enum class Kind { unknown, help, health, metrics, status, events, operation, faults, end_fault, ticket };

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "daemon/server/control/http_rules.hpp"
 #include "daemon/server/system/listen.hpp"
 #include "protocol/control/answers.hpp"
 
@@ -89,7 +88,7 @@ asio::awaitable<void> StreamConnection::read() {
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || over()) break;
     received += n;
-    if (speaks_http(std::span(buffer).first(n))) {
+    if (http_.speaks_http(std::span(buffer).first(n))) {
       log_refusal(services_, "HTTP request on the control stream, which is protobuf; use control.http for HTTP", sender_.id);
       break;
     }
@@ -155,14 +154,6 @@ asio::awaitable<void> StreamConnection::limit_rate(const Work& work) {
 }
 
 /// Any web page can make a browser send it; it must have no effect even if it parses as protobuf.
-bool StreamConnection::speaks_http(std::span<const std::byte> received) {
-  for (const std::byte b : received) {
-    if (first_bytes_.size() == longest_http_method) break;
-    first_bytes_ += static_cast<char>(b);
-  }
-  return begins_http_request(first_bytes_);
-}
-
 /// False: close the connection.
 bool StreamConnection::accept(control::BytesView message, Work& work) {
   work.bytes += least_work;

@@ -11,6 +11,7 @@
 #include "daemon/server/connections/connection_services.hpp"
 #include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/control/control_targets.hpp"
+#include "daemon/server/control/http_rules.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 
@@ -40,7 +41,6 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   bool proved = false;                           // it has said Hello
 
  private:
-  bool speaks_http(std::span<const std::byte> received);
   struct Work {
     std::size_t bytes = 0, pose_bytes = 0;  // pose_bytes: of poses without an answer; included in bytes
   };
@@ -71,7 +71,7 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   std::size_t in_progress_ = 0;                // requests whose answer is not in answers_ yet
   EventQueue events_;
   Events::Token subscription_;
-  std::string first_bytes_;                // enough of them to detect HTTP
+  HttpDetector http_;
   std::function<bool()> claim_slot_;       // empty: trusted
   bool greeted_ = false, ending_ = false;  // ending: the last answer is being written
 };

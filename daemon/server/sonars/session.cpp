@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cassert>
 
-#include "daemon/server/control/http_rules.hpp"
 #include "daemon/server/system/listen.hpp"
 
 namespace sonar {
@@ -83,18 +82,12 @@ asio::awaitable<void> Session::read() {
     while (!reading_ && !finishing_ && !over_) co_await rest(never);
     if (over_) co_return;
     received_at_ = Steady::now();
-    if (speaks_http(n)) co_return over("it speaks HTTP");
+    // Nothing of it may act, and it must not hold a driver's place.
+    if (http_.speaks_http(std::span(received_).first(n))) co_return over("it speaks HTTP");
     parent_.on_bytes(setup_.id, std::span(received_).first(n));
     const auto pause = input_rate_.pause_after(n, Steady::now());
     if (pause.count() > 0 && !finishing_) co_await rest(Steady::now() + pause);
   }
-}
-
-/// Any web page can make a browser send it: nothing of it may act, and it must not hold a driver's place.
-bool Session::speaks_http(std::size_t received) {
-  for (std::size_t i = 0; i < received && first_bytes_.size() < longest_http_method; ++i)
-    first_bytes_ += static_cast<char>(received_[i]);
-  return begins_http_request(first_bytes_);
 }
 
 /// A client that sends too much waits; its FIN, too, is only read then. finish() and over() end the pause.

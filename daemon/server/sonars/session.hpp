@@ -15,6 +15,7 @@
 #include "daemon/emulator/sonar/actions.hpp"
 #include "daemon/emulator/sonar/connections.hpp"
 #include "daemon/server/connections/input_rate.hpp"
+#include "daemon/server/control/http_rules.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/sha256.hpp"
 
@@ -99,7 +100,6 @@ class Session : public std::enable_shared_from_this<Session> {
   asio::awaitable<bool> write_shaped(protocol::BytesView bytes, const Outbox::Shape& shape);
   asio::awaitable<bool> pause_writing(std::chrono::nanoseconds length);
   asio::awaitable<bool> deliver();
-  bool speaks_http(std::size_t received);
   void end_by(Outbox::Shape::End end);
   Steady::time_point watch_until() const;
   bool is_silent(Steady::time_point now) const;
@@ -115,7 +115,7 @@ class Session : public std::enable_shared_from_this<Session> {
   InputRate input_rate_;
   asio::steady_timer wake_reader_, wake_writer_, wake_watch_, pause_;
   std::array<std::byte, 8192> received_{};
-  std::string first_bytes_;  // enough of them to detect HTTP
+  HttpDetector http_;
   const Steady::time_point connected_at_ = Steady::now();
   Steady::time_point received_at_ = connected_at_;  // a byte came in
   Steady::time_point progress_at_{};                // a byte went out, while writing; in a pause its end

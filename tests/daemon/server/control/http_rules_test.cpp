@@ -92,6 +92,18 @@ TEST(HttpRules, ARequestIsKnownByItsFirstBytes) {
     EXPECT_FALSE(begins_http_request(other)) << other;
 }
 
+TEST(HttpRules, ARequestIsDetectedHoweverItIsSplit) {
+  const auto detects = [](std::string_view stream, std::size_t first) {
+    HttpDetector detector;
+    const auto bytes = std::as_bytes(std::span(stream));
+    return detector.speaks_http(bytes.first(first)) || detector.speaks_http(bytes.subspan(first));
+  };
+  for (std::size_t first = 0; first <= 12; ++first) {
+    EXPECT_TRUE(detects("DELETE /x HT", first)) << first;
+    EXPECT_FALSE(detects("binary GET /", first)) << "only at the beginning";
+  }
+}
+
 TEST(HttpRules, Subscriptions) {
   const auto of = [](const char* target) { return subscription_of(*parse_target(target)); };
   EXPECT_TRUE(of("/e")->pings && of("/e")->clients && of("/e")->poses && of("/e")->scene) << "nothing said: everything";
