@@ -5,7 +5,6 @@
 #include "daemon/commands/run/prepare_run.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/emulator/world/plausibility.hpp"
-#include "daemon/server/connections/token.hpp"
 
 namespace sonar {
 
@@ -17,11 +16,7 @@ Result<void> run_check(const CheckCommand& command) {
   if (!prepared) return tl::make_unexpected(prepared.error());
   const Config& config = prepared->found.config;
   const Scene& scene = *prepared->scene;
-  if (!config.control.token_file.empty()) {
-    std::string warning;
-    if (const auto token = Token::read(config.control.token_file, warning); !token) return tl::make_unexpected(token.error());
-    if (!warning.empty()) std::fprintf(stderr, "sonard: %s\n", warning.c_str());
-  }
+  if (!prepared->token_warning.empty()) std::fprintf(stderr, "sonard: %s\n", prepared->token_warning.c_str());
   std::printf("%s: ok, %zu sonar%s; scene %s: ok, %zu triangles\n", command.config.c_str(), config.sonars.size(),
               config.sonars.size() == 1 ? "" : "s", config.scene.name().c_str(), scene.triangle_count());
   for (const std::string& note : notes_of_options(config)) std::printf("%s\n", note.c_str());

@@ -31,10 +31,10 @@ Result<FoundConfig> read_config(const RunCommand& command, bool& json) {
 }
 
 /// The server opens them again: this finds what is wrong with them before the scene is loaded.
-Result<void> check_files(const Config& config) {
-  std::string warning;
+Result<void> check_files(const Config& config, std::string& token_warning) {
   if (!config.control.token_file.empty())
-    if (const auto token = Token::read(config.control.token_file, warning); !token) return tl::make_unexpected(token.error());
+    if (const auto token = Token::read(config.control.token_file, token_warning); !token)
+      return tl::make_unexpected(token.error());
   if (!config.faults.journal.empty()) return JournalFile::check(config.faults.journal);
   return {};
 }
@@ -57,7 +57,7 @@ Result<PreparedRun> prepare_run(const RunCommand& command, bool& json,
   PreparedRun run;
   run.found = *std::move(found);
   const Config& config = run.found.config;
-  if (const auto r = check_files(config); !r) return tl::make_unexpected(r.error());
+  if (const auto r = check_files(config, run.token_warning); !r) return tl::make_unexpected(r.error());
   const LoadProgress loading(say_with(config));
   const auto scene = load_scene(config.scene);
   if (!scene) return tl::make_unexpected(scene.error());

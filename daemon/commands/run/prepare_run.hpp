@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "core/base/parallel.hpp"
 #include "daemon/commands/command_line.hpp"
@@ -19,6 +20,7 @@ struct PreparedRun {
   std::unique_ptr<Parallel> pool;  // of the engines
   EngineFactory make_engine;
   std::unique_ptr<PingEngine> engine;  // of the scene
+  std::string token_warning;           // of Token::read(); empty = the file is safe
 };
 
 /// The configuration as the command line changes it, its token, journal, scene and engine. `json`: how errors are to be written
