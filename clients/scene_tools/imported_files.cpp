@@ -7,18 +7,13 @@
 #include <fstream>
 
 #include "core/scene/files/load_mesh.hpp"
+#include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/shapes/terrain.hpp"
 
 namespace sonar::scene_tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string extension_of(const fs::path& file) {
-  std::string e = file.extension().string();
-  for (char& c : e) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
-  return e;
-}
 
 void append(std::string& out, double v) {
   std::array<char, 32> text{};
@@ -80,7 +75,7 @@ bool FileResolver::resolve_mesh(PlacedShape& placed, const fs::path& file) {
 /// The suffix gives the format; the daemon's loader checks the rest.
 std::string FileResolver::why_not(const fs::path& file) {
   static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
-  if (std::find(known.begin(), known.end(), extension_of(file)) == known.end())
+  if (std::find(known.begin(), known.end(), mesh_extension(file)) == known.end())
     return file.filename().string() + ": a scene reads OBJ, STL, PLY, glTF, GLB and DAE";
   if (!try_files_) return {};
   const auto [known_file, is_new] = tried_.try_emplace(file);
@@ -109,7 +104,7 @@ bool FileResolver::convert(PlacedShape& placed, const fs::path& file) {
 
 bool FileResolver::resolve_heightmap(PlacedShape& placed, const fs::path& file) {
   const std::string what = std::string("heightmap ") + plain(placed.shape.uri, 200) + ": ";
-  if (extension_of(file) != ".png")
+  if (mesh_extension(file) != ".png")
     return findings_.leave_out(placed.at, what + "a scene reads grey PNG, or ESRI ASCII grids (gdal_translate -of AAIGrid)"),
            false;
   if (try_files_) {
