@@ -1,5 +1,5 @@
-// What an array of channels of alternating signs makes of a signal that they share, focused at a range: sums over its channels
-// (docs/acoustics.md, eq. 47).
+// Response of an array of channels of alternating signs, focused at a range, to a signal that they share: sums over its
+// channels (docs/acoustics.md, eq. 47).
 #pragma once
 
 #include <cstddef>

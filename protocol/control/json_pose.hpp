@@ -36,7 +36,7 @@ class LineParser {
   };
   void feed(std::span<const std::byte> received);
   std::optional<Line> next();
-  /// Some of the stream is missing here: the line that has begun is dropped, and what comes up to the end of the next one.
+  /// A part of the stream was dropped here: the line that has begun is discarded, and the bytes up to the end of the next one.
   void skip_gap();
   /// The line that has begun can still become a JSON object: only blanks have come of it, or its first sign is a brace. A request
   /// line of HTTP never can.

@@ -79,8 +79,8 @@ class Faults(unittest.TestCase):
         self.refuses(64, ("add", "F01", "--at", "pign=3"), 'did you mean "ping"?')
         self.refuses(64, ("add", "F01", "--at", "ping=x"), "is not a whole number")
         self.refuses(64, ("add",))
-        nobody = run(SONARCTL, "fault", "list", "--control", "127.0.0.9:14770")
-        self.assertEqual(nobody.returncode, 69, nobody.stderr)
+        refused = run(SONARCTL, "fault", "list", "--control", "127.0.0.9:14770")
+        self.assertEqual(refused.returncode, 69, refused.stderr)
 
     def test_the_catalogue_and_the_table(self):
         kinds = self.does("kinds")

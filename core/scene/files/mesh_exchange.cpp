@@ -62,7 +62,7 @@ Result<LoadedMesh> broken() {
   return failure(ErrorKind::bug, "the program that imports meshes gave an answer that is none (this is a bug, please report it)");
 }
 
-/// What every user of a mesh takes for granted.
+/// Every user of a mesh relies on this.
 bool is_sound(const LoadedMesh& mesh) {
   const Mesh& m = mesh.centred.mesh;
   return is_finite(mesh.centred.centre_m) &&

@@ -1,4 +1,4 @@
-// What the daemon and the program that imports meshes hand each other: the request as arguments and standard input, the answer as
+// Messages between the daemon and the program that imports meshes: the request as arguments and standard input, the answer as
 // a file. Neither believes the other's lengths.
 #pragma once
 

@@ -17,7 +17,7 @@ struct Element {
   std::string_view name, id, label, url, count;
 };
 
-/// Of the text between "<" and ">".
+/// `tag` is the text between "<" and ">".
 Element parse_element(std::string_view tag) {
   std::size_t at = std::min(tag.find_first_of(" \t\r\n/"), tag.size());
   Element element;

@@ -10,7 +10,7 @@
 
 namespace sonar {
 
-/// What is wrong, as a sentence that lacks the file's name.
+/// The fault of a file, as a sentence that lacks the file's name; none: nothing was found.
 using MeshFault = std::optional<std::string>;
 
 /// `head`: the header at least, of a file of `file_bytes`.

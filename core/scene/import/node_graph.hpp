@@ -21,8 +21,8 @@ class NodeGraph {
   }
   void contains(std::size_t parent, std::size_t child) { nodes_[parent].children.push_back(child); }
 
-  /// What is wrong, as a sentence that lacks the file's name: nodes within themselves, too deep, or too many of them below the
-  /// roots together. Nothing when all is well. Linear in its edges.
+  /// The fault of the graph, as a sentence that lacks the file's name: nodes within themselves, too deep, or too many of them
+  /// below the roots together. Nothing when all is well. Linear in its edges.
   std::optional<std::string> fault(const std::vector<std::size_t>& roots) const;
 
  private:

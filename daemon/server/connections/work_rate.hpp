@@ -22,7 +22,7 @@ class WorkRate {
  public:
   using Steady = InputRate::Steady;
   static constexpr std::size_t most_addresses = 256;
-  /// However much an address owes: each of its connections may go on once in that time, and a look at /healthz waits no longer.
+  /// Upper limit of a pause, however much work an address has caused: /healthz answers within it.
   static constexpr std::chrono::seconds longest_pause{1};
 
   /// Work was done for, or has come from, the address; 0 = go on. `per_s` as it is now.

@@ -26,7 +26,7 @@ void FaultLog::append(const std::string& json) {
   if (!writing_) write_pending();
 }
 
-/// One batch at a time: what comes meanwhile is the next.
+/// One batch is written at a time; entries that arrive meanwhile form the next.
 void FaultLog::write_pending() {
   writing_ = true;
   const std::uint64_t entries = std::exchange(pending_entries_, 0);

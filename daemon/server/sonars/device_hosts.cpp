@@ -1,4 +1,4 @@
-// Whom a Device sends datagrams: hosts of dialogues (ports of kind udp_dialogue), receivers of streams (udp_stream).
+// The hosts that a Device sends datagrams to: hosts of dialogues (ports of kind udp_dialogue), receivers of streams (udp_stream).
 #include <algorithm>
 
 #include "daemon/config/addresses.hpp"

@@ -33,7 +33,7 @@ constexpr bool sanitized = false;
 class HostileMeshes : public ::testing::Test {
  protected:
   HostileMeshes() {
-    // Whoever takes more than this has failed, and must not take the computer along.
+    // A test that needs more than this has failed, and must not exhaust the memory of the computer.
     const rlimit most{std::uint64_t{4} << 30, RLIM_INFINITY};
     EXPECT_TRUE(sanitized || ::setrlimit(RLIMIT_AS, &most) == 0);
   }
