@@ -41,7 +41,7 @@ setup() {
     case $name in
       g++) continue ;;
       cmake | ninja-build | python3 | protobuf-compiler) ;;
-      *) apt-cache show --no-all-versions "$name" | grep -q '^Architecture: all' || name+=:arm64 ;;
+      *) [[ $(apt-cache show --no-all-versions "$name") == *'Architecture: all'* ]] || name+=:arm64 ;;
     esac
     names+=("$name")
   done

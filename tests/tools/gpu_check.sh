@@ -86,7 +86,7 @@ begin_run() {
   name=$(grep -aoE 'libcufft\.so\.[0-9]+' "$SONARD_CUDA_MODULE" | head -1)
   cufft=$(find /usr/local /opt /usr/lib /root /home -name "${name:-libcufft.so.12}" -print -quit 2>/dev/null)
   libraries=$pack/lib${cufft:+:${cufft%/*}}
-  ldconfig -p 2>/dev/null | grep -q 'libstdc++.so.6' || libraries=$libraries:$pack/lib-if-missing
+  [[ $(ldconfig -p 2>/dev/null) == *libstdc++.so.6* ]] || libraries=$libraries:$pack/lib-if-missing
   # shellcheck disable=SC2012
   sanitizer=$(command -v compute-sanitizer || ls /usr/local/cuda*/bin/compute-sanitizer 2>/dev/null | head -1)
   # shellcheck disable=SC2012
@@ -204,7 +204,7 @@ memory() {
 do_run() {
   local archive=$default_build/gpu_pack.tar.gz
   case ${1:-} in *.tar.gz) archive=$1; shift ;; esac
-  if ! command -v nvidia-smi >/dev/null || ! nvidia-smi -L 2>/dev/null | grep -q GPU; then
+  if ! command -v nvidia-smi >/dev/null || [[ $(nvidia-smi -L 2>/dev/null) != *GPU* ]]; then
     echo "gpu_check: no CUDA device here (nvidia-smi names none): nothing was checked" >&2
     return 77
   fi

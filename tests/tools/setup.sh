@@ -54,7 +54,7 @@ need_packages() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 update </dev/null
   local unknown=() known=()
   for name in "${missing[@]}"; do
-    if LC_ALL=C apt-cache policy "$name" | grep -q 'Candidate: [^(]'; then known+=("$name"); else unknown+=("$name"); fi
+    if [[ $(LC_ALL=C apt-cache policy "$name") =~ Candidate:\ [^\(] ]]; then known+=("$name"); else unknown+=("$name"); fi
   done
   [ ${#known[@]} -eq 0 ] || "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -y --no-install-recommends \
     -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 -o Dpkg::Use-Pty=0 install "${known[@]}" </dev/null || {
