@@ -46,8 +46,8 @@ struct AppOptions {
 
 class App {
  public:
-  /// After stop() run() returns by then, whatever is still under way.
-  static constexpr std::chrono::milliseconds stop_limit{1500};
+  /// After stop() run() returns by then, whatever is still under way: half of the promised 2 s is for a loaded machine.
+  static constexpr std::chrono::milliseconds stop_limit{1100};
 
   /// `make_engine` is kept: later scenes get theirs on another thread. What it refers to must outlive the App.
   App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);

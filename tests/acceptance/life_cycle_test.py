@@ -1,6 +1,7 @@
 """How sonard ends, comes back and bears what its surroundings do to it: signals, kill -9, full disks, closed outputs, being frozen.
 What is measured is kept for docs/reliability.md where SONARD_RELIABILITY names a folder. Times are asserted with room for a busy
 machine; the record says whether the promise itself was kept."""
+import contextlib
 import fcntl
 import os
 import pathlib
@@ -15,7 +16,7 @@ import time
 import unittest
 
 from oculus_reader import Client, fire_message
-from running_sonard import ROOT, SONARCTL, SONARD, Sonard, run
+from running_sonard import ROOT, SONARCTL, SONARD, Sonard, eventually, run
 
 sys.path.insert(0, str(ROOT / "tests/reliability"))
 from record import record  # noqa: E402  the folder above
@@ -127,6 +128,40 @@ class Stop(unittest.TestCase):
                     pass
             deaf.close()
             self.assertIn("did not take its last message in time", daemon.log())
+
+    def test_terminate_with_119_descriptors_open(self):
+        """9 drivers, 8 viewers, 20 event streams, 64 other control and pose connections, a recording."""
+        more = "recording: {folder: .}\nlimits: {control_clients: 64}"
+        with Sonard(mount=FOUR_CLIENTS.replace("4", "9"), more=more) as daemon, contextlib.ExitStack() as stack:
+            readers = [Reader(daemon.address) for _ in range(9)]
+            address = daemon.address
+
+            def connected(port, greeting=b"", answer=b""):
+                client = stack.enter_context(socket.create_connection((address, port), timeout=60))
+                client.sendall(greeting)
+                if answer:
+                    self.assertTrue(client.recv(4096).startswith(answer))
+
+            for _ in range(8):
+                connected(8088, f"GET / HTTP/1.1\r\nHost: {address}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+                          "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\nSec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n".encode(), b"HTTP/1.1 101")
+            for _ in range(20):
+                connected(8088, f"GET /api/v1/events?pings=1 HTTP/1.1\r\nHost: {address}\r\n\r\n".encode(), b"HTTP/1.1 200")
+            for port in [14770, 14771] * 32:
+                connected(port)
+            started = run(SONARCTL, "recording", "start", "run.oculus", "--sonar", "front", "--control", f"{address}:14770")
+            self.assertEqual(started.returncode, 0, started.stderr)
+            eventually(lambda: len(os.listdir(f"/proc/{daemon.process.pid}/fd")) >= 119)
+            for reader in readers:
+                reader.wait_for(3)
+            code, seconds = daemon.stop()
+            for reader in readers:
+                reader.join(20)
+            record("stop-119", f"{seconds:.2f} s", "within 2 s", code == 0 and seconds <= 2, COMMAND)
+            self.assertEqual([reader.ending for reader in readers], ["FIN"] * 9)
+            self.assertEqual(code, 0, daemon.log())
+            self.assertLess(seconds, 2 * ROOM)
+            self.assertIn("run.oculus", daemon.log())
 
     def test_a_second_terminate_ends_at_once(self):
         with Sonard(mount=FOUR_CLIENTS) as daemon:

@@ -40,6 +40,7 @@ ITEMS = {
     "Life cycle": [
         ("stop-reading", "SIGTERM: reading clients get their message whole, then a FIN", "all"),
         ("stop-time", "SIGTERM with a client that does not read: exit 0", "within 2 s"),
+        ("stop-119", "SIGTERM with 119 descriptors open: 9 drivers, 8 viewers, 20 event streams, 64 others, a recording", "within 2 s"),
         ("reload-untouched", "SIGHUP: pings lost by an unchanged sonar", "0"),
         ("reload-error", "SIGHUP with an invalid file", "the old configuration stays"),
         ("kill-restart", "kill -9 and restart: first ping", "within 2.5 s"),

@@ -58,7 +58,7 @@ class Session : public std::enable_shared_from_this<Session> {
   };
   /// Longest time a client may take for its last message after finish(); then it is reset. One whose computer has all of it, and
   /// our FIN, is not waited for longer than `fin_limit`.
-  static constexpr std::chrono::milliseconds finish_limit{1200}, fin_limit{400};
+  static constexpr std::chrono::milliseconds finish_limit{800}, fin_limit{400};
   /// After an end of the stream by a fault: a client that ignores it has time to show that.
   static constexpr std::chrono::milliseconds fault_fin_limit{1500};
 
