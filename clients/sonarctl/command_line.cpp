@@ -37,7 +37,7 @@ int run(int argc, char** argv) {
       {"farm", add_farm(app, words)},    {"judge", add_judge(app, words)}, {"lab", add_lab(app, words)}};
   const bool is_other_program = !words.empty() && (words[0] == "farm" || words[0] == "judge" || words[0] == "lab");
   try {
-    app.parse(is_other_program ? 2 : argc, argv);
+    text::parse(app, is_other_program ? 2 : argc, argv);
   } catch (const CLI::ParseError& error) {
     const std::string complaint = text::complaint_about(app, error, words);
     return complaint.empty() ? app.exit(error) : complain(complaint, ErrorKind::usage);

@@ -101,7 +101,22 @@ std::string with_its_source(std::string sentence, const CLI::App& asked, const s
   return sentence;
 }
 
+void check_environment(CLI::App& app) {
+  for (CLI::Option* option : app.get_options({})) {
+    const char* value = option->get_envname().empty() ? nullptr : std::getenv(option->get_envname().c_str());
+    if (value == nullptr || *value == '\0' || option->count() > 0) continue;
+    option->add_result(value);
+    option->run_callback();
+  }
+  for (CLI::App* command : app.get_subcommands()) check_environment(*command);
+}
+
 }  // namespace
+
+void parse(CLI::App& app, int argc, const char* const* argv) {
+  app.parse(argc, argv);
+  check_environment(app);
+}
 
 CLI::Validator one_of(std::vector<std::string> names) {
   const std::string described = joined(names, "|");

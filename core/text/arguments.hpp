@@ -21,6 +21,10 @@ CLI::Validator number(double low = std::numeric_limits<double>::lowest(), double
 /// For transform(): ENU becomes enu.
 CLI::Validator in_small_letters();
 
+/// As CLI::App::parse. Since 2.4 CLI11 passes over a value from an environment variable that fails its option's check; here it is
+/// an error with every CLI11.
+void parse(CLI::App& app, int argc, const char* const* argv);
+
 /// One line that describes the error of a command line, and ends with where_help_is(): `unknown command "veiw"; did you mean
 /// "view"?` (an option likewise), else the parser's text. A value from an environment variable is reported under the variable's
 /// name. Empty for --help and --version without an unknown word. `words`: as typed, without the program.

@@ -251,7 +251,7 @@ Command parse_command_line(int argc, char** argv) {
   if (const std::string wrong = bare && argc > 1 ? unknown_command(argv[1]) : ""; !wrong.empty())
     return complain(wrong + text::where_help_is(app));
   try {
-    app.parse(argc, argv);
+    text::parse(app, argc, argv);
   } catch (const CLI::ParseError& e) {
     if (const std::string wrong = text::complaint_about(app, e, typed); !wrong.empty()) return complain(wrong);
     app.exit(e);  // --help and --version

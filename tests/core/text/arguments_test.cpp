@@ -35,7 +35,7 @@ std::string complaint(const std::vector<std::string>& words) {
   try {
     std::vector<const char*> line{"tool"};
     for (const std::string& word : words) line.push_back(word.c_str());
-    app.parse(static_cast<int>(line.size()), line.data());
+    parse(app, static_cast<int>(line.size()), line.data());
   } catch (const CLI::ParseError& error) {
     return complaint_about(app, error, words);
   }
