@@ -19,11 +19,16 @@ std::string_view trimmed(const char* text) {
   return view.substr(begin, view.find_last_not_of(blanks) - begin + 1);
 }
 
-std::size_t count_elements(const tinyxml2::XMLElement* first) {
-  std::size_t n = 0;
-  for (const tinyxml2::XMLElement* e = first; e != nullptr; e = e->NextSiblingElement())
-    n += 1 + count_elements(e->FirstChildElement());
-  return n;
+constexpr int deepest = 100;  // as tinyxml2 before version 10 had it; later ones go to 500
+
+/// The first element that lies deeper than `deepest`; null when none does. `count` elements were seen.
+const tinyxml2::XMLElement* count_elements(const tinyxml2::XMLElement* first, int depth, std::size_t& count) {
+  for (const tinyxml2::XMLElement* e = first; e != nullptr; e = e->NextSiblingElement()) {
+    if (depth > deepest) return e;
+    ++count;
+    if (const auto* too_deep = count_elements(e->FirstChildElement(), depth + 1, count)) return too_deep;
+  }
+  return nullptr;
 }
 
 /// Bytes of the UTF-8 character that `text` begins with; 0 when it is none.
@@ -78,8 +83,8 @@ Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const st
   if (text.size() > max_xml_bytes) return bad(1, "is larger than 16 MiB; such files hold meshes elsewhere");
   if (text.find('\0') != std::string_view::npos) return bad(1, "is not a text file");
   auto document = std::make_shared<tinyxml2::XMLDocument>();
-  if (document->Parse(text.data(), text.size()) == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED)
-    return bad(document->ErrorLineNum(), "elements nest more than 100 deep");
+  const auto bad_nesting = [&](int line) { return bad(line, "elements nest more than " + std::to_string(deepest) + " deep"); };
+  if (document->Parse(text.data(), text.size()) == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) return bad_nesting(document->ErrorLineNum());
   if (document->ErrorID() == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) return bad(1, "is empty");
   if (document->Error())
     return bad(document->ErrorLineNum(), std::string("not well-formed XML here (") + document->ErrorName() + ")");
@@ -87,7 +92,7 @@ Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const st
   auto file = std::make_shared<XmlFile>();
   file->path = path;
   file->short_name = std::move(short_name);
-  file->elements = count_elements(document->RootElement());
+  if (const auto* too_deep = count_elements(document->RootElement(), 1, file->elements)) return bad_nesting(too_deep->GetLineNum());
   file->document = std::move(document);
   return file;
 }

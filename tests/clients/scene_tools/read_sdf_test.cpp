@@ -224,9 +224,12 @@ TEST(ReadSdf, CirclesAndDepthsEnd) {
     chain += link(name(i), pose);
   }
   EXPECT_THAT(r.error(sdf(model("m", chain + link("l400")))), HasSubstr("256 deep"));
-  std::string deep(200 * 7, ' ');
-  for (int i = 0; i < 200; ++i) deep.replace(static_cast<std::size_t>(7 * i), 7, "<model>");
-  EXPECT_THAT(r.error(std::string("<sdf>") + deep), HasSubstr("100 deep"));
+  for (const int depth : {101, 200, 2000}) {
+    std::string deep("<sdf>");
+    for (int i = 1; i < depth; ++i) deep += "<model>";
+    for (int i = 1; i < depth; ++i) deep += "</model>";
+    EXPECT_THAT(r.error(deep + "</sdf>"), HasSubstr("100 deep")) << depth;
+  }
 }
 
 }  // namespace
