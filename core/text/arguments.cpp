@@ -93,8 +93,10 @@ std::string error_of_parser(const CLI::App& asked, const CLI::ParseError& error)
 /// CLI11 names the option; for a value from an environment variable the error names the variable.
 std::string with_its_source(std::string sentence, const CLI::App& asked, const std::vector<std::string>& words) {
   for (const CLI::Option* option : asked.get_options()) {
-    const std::string name = option->get_name(), variable = option->get_envname();
-    if (variable.empty() || !sentence.starts_with(name + ":") || std::getenv(variable.c_str()) == nullptr) continue;
+    const std::string variable = option->get_envname();
+    if (variable.empty() || option->get_lnames().empty()) continue;
+    const std::string name = "--" + option->get_lnames().front();  // get_name() is empty for options that help leaves out
+    if (!sentence.starts_with(name + ":") || std::getenv(variable.c_str()) == nullptr) continue;
     const auto is_it = [&name](const std::string& word) { return word == name || word.starts_with(name + "="); };
     if (std::none_of(words.begin(), words.end(), is_it)) sentence.replace(0, name.size(), variable + " (environment)");
   }

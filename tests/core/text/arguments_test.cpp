@@ -19,13 +19,14 @@ std::string complaint(const std::vector<std::string>& words) {
   CLI::App app("", "tool");
   app.require_subcommand(1);
   CLI::App& command = *app.add_subcommand("look", "");
-  int threads = 0;
+  int threads = 0, depth = 0;
   double rate = 0;
   bool quiet = false;
   std::string file, mode, shape, colour;
   std::vector<double> place;
   command.add_option("FILE", file, "what to look at")->required();
   command.add_option("--threads", threads, "how many")->check(whole_number(0, 256))->envname("TOOL_THREADS");
+  command.add_option("--depth", depth, "not in help")->check(whole_number())->envname("TOOL_DEPTH")->group("");
   CLI::Option* given_rate = command.add_option("--rate", rate, "looks a second")->check(number(0.5, 10));
   command.add_option("--mode", mode, "how")->check(one_of({"fast", "careful"}))->excludes(given_rate);
   command.add_option("--shape", shape, "")->check(one_of({"ring"}));
@@ -93,6 +94,9 @@ TEST(Arguments, OfAValueFromTheEnvironmentTheVariableIsNamed) {
   EXPECT_THAT(complaint({"look", "x"}), HasSubstr("TOOL_THREADS (environment): \"many\" is not a whole number"));
   EXPECT_THAT(complaint({"look", "x", "--threads", "few"}), HasSubstr("--threads: \"few\" is not a whole number"));
   ::unsetenv("TOOL_THREADS");
+  ::setenv("TOOL_DEPTH", "-1", 1);
+  EXPECT_THAT(complaint({"look", "x"}), HasSubstr("TOOL_DEPTH (environment): \"-1\" is not a whole number"));
+  ::unsetenv("TOOL_DEPTH");
 }
 
 }  // namespace
