@@ -90,16 +90,17 @@ std::string error_of_parser(const CLI::App& asked, const CLI::ParseError& error)
   return error.what();
 }
 
-/// CLI11 names the option; for a value from an environment variable the error names the variable.
-std::string with_its_source(std::string sentence, const CLI::App& asked, const std::vector<std::string>& words) {
-  for (const CLI::Option* option : asked.get_options()) {
-    const std::string variable = option->get_envname();
-    if (variable.empty() || option->get_lnames().empty()) continue;
-    const std::string name = "--" + option->get_lnames().front();  // get_name() is empty for options that help leaves out
-    if (!sentence.starts_with(name + ":") || std::getenv(variable.c_str()) == nullptr) continue;
+/// CLI11 names the option, or nothing where help leaves it out; for a value from an environment variable the error names the
+/// variable. CLI11 reads the variables of all commands, whichever was asked for.
+std::string with_its_source(const std::string& sentence, const CLI::App& app, const std::vector<std::string>& words) {
+  for (const CLI::Option* option : app.get_options()) {
+    const std::string variable = option->get_envname(), name = option->get_name();
+    if (variable.empty() || !sentence.starts_with(name + ":") || std::getenv(variable.c_str()) == nullptr) continue;
     const auto is_it = [&name](const std::string& word) { return word == name || word.starts_with(name + "="); };
-    if (std::none_of(words.begin(), words.end(), is_it)) sentence.replace(0, name.size(), variable + " (environment)");
+    if (std::none_of(words.begin(), words.end(), is_it)) return variable + " (environment)" + sentence.substr(name.size());
   }
+  for (const CLI::App* command : app.get_subcommands({}))
+    if (std::string named = with_its_source(sentence, *command, words); named != sentence) return named;
   return sentence;
 }
 
@@ -110,7 +111,7 @@ void check_environment(CLI::App& app) {
     option->add_result(value);
     option->run_callback();
   }
-  for (CLI::App* command : app.get_subcommands()) check_environment(*command);
+  for (CLI::App* command : app.get_subcommands({})) check_environment(*command);
 }
 
 }  // namespace
@@ -170,7 +171,7 @@ std::string complaint_about(const CLI::App& app, const CLI::ParseError& error, c
   const bool is_help = error.get_exit_code() == 0;
   if (is_help && unknown.command == nullptr) return {};
   std::string text =
-      unknown.command != nullptr ? error_of_unknown(unknown) : with_its_source(error_of_parser(asked, error), asked, words);
+      unknown.command != nullptr ? error_of_unknown(unknown) : with_its_source(error_of_parser(asked, error), app, words);
   // One line, whatever was typed.
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
