@@ -23,8 +23,9 @@ if [ -n "$long" ]; then  # tests that measure what reliability_table.py shows le
   export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
   rm -f "$SONARD_RELIABILITY"/*.json  # what is not measured now is told as "not run"
 fi
+# Most tests that take long wait: for sockets, pictures or a time to pass. Two a processor use it better than one.
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"
-timed "tests" ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-$(nproc)}" --output-on-failure --no-tests=error \
+timed "tests" ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-$(($(nproc) * 2))}" --output-on-failure --no-tests=error \
   --output-junit "$PWD/build/release/tests.xml" "$@" </dev/null
 status=$?
 # What the oracles of docs/acoustics.md measured. A run of some tests only need not have figures for all of them.

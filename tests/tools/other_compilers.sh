@@ -1,31 +1,41 @@
 #!/usr/bin/env bash
 # Reads the whole tree, tests too, with compilers other than the usual one; makes no code, so it finds errors and the warnings that
-# need no optimiser. Warnings are errors. usage: tests/tools/other_compilers.sh [COMPILER...]
+# need no optimiser. Warnings are errors. usage: tests/tools/other_compilers.sh [--share N] [COMPILER...]
+#   --share N reads one Nth of the files, another one for each commit
 #   COMPILER  e.g. g++-11, clang++-14; without one, those installed take turns by the commit. Without any installed, it is skipped.
 # Build folders stay in build/other.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 case "${1:-}" in
-  -h | --help) sed -n '2,5s/^# //p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,6s/^# //p' "$0"; exit 0 ;;
 esac
 # shellcheck source=tests/tools/setup.sh
 . tests/tools/setup.sh
+
+share=1
+if [ "${1:-}" = --share ]; then
+  [[ "${2:-}" =~ ^[1-9][0-9]*$ ]] || { sed -n '2,6s/^# //p' "$0" >&2; exit 64; }
+  share=$2
+  shift 2
+fi
+commit=$(git rev-parse --short=7 HEAD 2>/dev/null) || commit=0
+commit=$((16#${commit:0:7}))
 
 if [ $# -eq 0 ]; then
   usual=$(c++ -dumpversion)
   mapfile -t installed < <(compgen -c | grep -xE '(g|clang)\+\+-[0-9]+' | grep -vxF "g++-${usual%%.*}" | sort -u)
   [ ${#installed[@]} -gt 0 ] || { echo "skipped: no other compiler is installed, e.g. apt-get install g++-11 clang-14"; exit 0; }
-  commit=$(git rev-parse --short=7 HEAD 2>/dev/null || echo 0)
-  set -- "${installed[$((16#${commit:0:7} % ${#installed[@]}))]}"
+  set -- "${installed[$((commit % ${#installed[@]}))]}"
 fi
 
 # Prints the compiler's commands of a build folder with -fsyntax-only, each ended by a zero. Generated code is left out.
 commands() {
-  python3 - "$1/compile_commands.json" <<'PYTHON'
+  python3 - "$1/compile_commands.json" "$share" "$commit" <<'PYTHON'
 import json, re, sys
 files = {entry["file"]: entry for entry in json.load(open(sys.argv[1]))}  # once each, though tests share some
-for file, entry in files.items():
-    if not re.search(r"cmake_pch\.hxx\.cxx$|\.pb\.cc$|_proto\.dir/", file):
+share, commit = int(sys.argv[2]), int(sys.argv[3])
+for number, (file, entry) in enumerate(sorted(files.items())):
+    if number % share == commit % share and not re.search(r"cmake_pch\.hxx\.cxx$|\.pb\.cc$|_proto\.dir/", file):
         command = re.sub(r" -o \S+ -c ", " -fsyntax-only ", entry["command"])
         print("cd '%s' && %s" % (entry["directory"], command), end="\0")
 PYTHON
