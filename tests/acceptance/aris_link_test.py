@@ -250,7 +250,7 @@ class Tools(unittest.TestCase):
             run(SONARCTL, "fault", "add", "G01", "--pings", "1000", *control)
             start = time.monotonic()
             self.assertNotEqual(daemon.ctl("listen", "--seconds", 3).returncode, 0)
-            self.assertLess(time.monotonic() - start, 12, "frames that lack parts do not prolong it")
+            self.assertLess(time.monotonic() - start, 30, "frames that lack parts do not prolong it")
             refused = run(SONARCTL, "fault", "add", "S01", *control)
             self.assertIn("sends pings by datagrams alone", refused.stderr)
 
