@@ -133,16 +133,24 @@ class Live(PageChecks, unittest.TestCase):
                 if best < 1000:
                     break
             print(f"\n  first picture after {best:.0f} ms", end="", file=sys.stderr)
-            if best >= 1000 and os.getloadavg()[0] > 1.5 * os.cpu_count():
-                self.skipTest(f"other programs keep the processors busy: load {os.getloadavg()[0]:.1f}")
+            if best >= 1000:
+                self.skip_beside_busy_programs()
             self.assertLess(best, 1000)
+
+    def skip_beside_busy_programs(self):
+        if os.getloadavg()[0] > 1.5 * os.cpu_count():
+            self.skipTest(f"other programs keep the processors busy: load {os.getloadavg()[0]:.1f}")
 
     def test_numbers_are_true(self):
         """A driver that reads at 7 Hz is shown with 7 Hz, and with the drops that the status has."""
         with Sonard(scene="tank-rod.yaml", pose="{frame: ENU_FLU, xyz_m: [-0.4, 0, -0.61]}") as daemon, \
                 Driver(daemon.address, reads_hz=7, rate_hz=15, range_m=1, beams=256):
             page = self.open(daemon)
-            page.wait("Number(document.querySelector('#clients td:nth-child(4)').innerText.replace(/\\D/g, '')) > 0", 90)
+            try:
+                page.wait("Number(document.querySelector('#clients td:nth-child(4)').innerText.replace(/\\D/g, '')) > 0", 90)
+            except AssertionError:
+                self.skip_beside_busy_programs()  # which leave it fewer than 7 pings a second: it drops none
+                raise
             cell = "Number(document.querySelector('#clients td:nth-child(%d)').innerText.replace(/[^\\d.]/g, ''))"
             page.wait(f"Math.abs({cell % 2} - 7) <= 0.3", 60)
             # Pings leave in bursts, as the kernel's buffers drain: means over ten seconds.
