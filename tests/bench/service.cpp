@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdio>
@@ -124,6 +125,13 @@ class Service {
   std::thread thread_;
 };
 
+/// As far as settings of the grid differ; a gain that the device chose is echoed otherwise.
+bool answers(const oculus::FireRequest& fire, const oculus::DecodedPing& ping) {
+  const oculus::FireSettings& echo = ping.head.fixed.fire;
+  return echo.mode == fire.settings.mode && echo.range == fire.settings.range && echo.flags == fire.settings.flags &&
+         echo.gamma == fire.settings.gamma;
+}
+
 class Client {
  public:
   Client(asio::io_context& io, const tcp::endpoint& to) : socket_(io) {
@@ -133,11 +141,12 @@ class Client {
     ::setsockopt(socket_.native_handle(), SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
   }
   void fire(const oculus::FireRequest& fire) { asio::write(socket_, asio::buffer(oculus::make_fire(fire))); }
-  /// When the last byte of the next ping was here; 0 = the stream has ended.
-  double next_ping() {
+  /// When the last byte of the next ping, or of the next that echoes `fire`, was here; 0 = the stream has ended.
+  double next_ping(const oculus::FireRequest* fire = nullptr) {
     for (;;) {
       while (auto message = decoder_.next())
         if (const auto* ping = std::get_if<oculus::DecodedPing>(&*message)) {
+          if (fire != nullptr && !answers(*fire, *ping)) continue;
           rows = static_cast<int>(ping->rows());
           return read_at_s_;
         }
@@ -193,6 +202,80 @@ Result<json> find_latency(const ScenePointer& scene, const BenchOptions& options
   std::fflush(stdout);
   return json{
       {"case", "P3a"}, {"rows", client.rows}, {"threads", options.threads.back()}, {"triggers", triggers}, {"latency", times}};
+}
+
+namespace {
+
+/// One of `settings_in_grid` combinations of what a driver may ask for; neighbours differ in most of them.
+constexpr int settings_in_grid = 144;
+oculus::FireRequest grid_setting(int k) {
+  int i = k * 55 % settings_in_grid;
+  const auto one_of = [&i](auto... values) {
+    const std::array all{values...};
+    const auto at = static_cast<std::size_t>(i) % all.size();
+    i /= static_cast<int>(all.size());
+    return all[at];
+  };
+  oculus::FireRequest fire = fire_p3a(false);
+  const bool high = one_of(true, false);
+  fire.settings.mode = high ? 2 : 1;
+  fire.settings.range = one_of(0.5, 1.5, 2.0, 3.0, 5.0, 10.0) * (high ? 1 : 3);
+  fire.settings.ping_rate = one_of(oculus::PingRate::hz40, oculus::PingRate::hz15, oculus::PingRate::hz10);
+  if (!one_of(true, false)) fire.settings.flags = static_cast<std::uint8_t>(fire.settings.flags & ~oculus::flag::beams_512);
+  if (one_of(true, false)) fire.settings.flags |= oculus::flag::gain_assist;
+  fire.settings.salinity_ppt = k % 3 == 0 ? 35 : 0;
+  fire.settings.gain_percent = 20 + k % 5 * 15;
+  fire.settings.gamma = static_cast<std::uint8_t>(k % 2 == 0 ? 127 : 255);
+  return fire;
+}
+
+}  // namespace
+
+Result<json> find_first_pings(const ScenePointer& scene, const BenchOptions& options, bool& holds) {
+  auto service = Service::start(scene, options);
+  if (!service) return tl::make_unexpected(service.error());
+  asio::io_context io;
+  Client client(io, (*service)->data());
+  constexpr double allowed_ratio = 8;
+  constexpr int warm_pings = 3;
+  std::vector<double> first_ms, late_ms, first_cpu_ms, warm_cpu_ms;
+  // The last setting is asked for once before: what a daemon's first ping takes is no matter of settings.
+  for (int k = -1; k < settings_in_grid; ++k) {
+    const oculus::FireRequest fire = grid_setting(k < 0 ? settings_in_grid - 1 : k);
+    const double begin_s = now_s(), used_s = processor_s();
+    client.fire(fire);
+    const double first_s = client.next_ping(&fire), first_used_s = processor_s();
+    for (int i = 0; i < warm_pings; ++i)
+      if (client.next_ping() == 0) return tl::make_unexpected(broken("sent no ping within 20 s"));
+    const double warm_s = (processor_s() - first_used_s) / warm_pings;
+    if (k < 0) continue;
+    const double period_ms = 1e3 / (fire.settings.ping_rate == oculus::PingRate::hz40   ? 40
+                                    : fire.settings.ping_rate == oculus::PingRate::hz15 ? 15
+                                                                                        : 10);
+    first_ms.push_back(1e3 * (first_s - begin_s));
+    late_ms.push_back(first_ms.back() - 2 * period_ms);
+    first_cpu_ms.push_back(1e3 * (first_used_s - used_s));
+    warm_cpu_ms.push_back(1e3 * warm_s);
+  }
+  client.close();
+  const Times first(first_ms), late(late_ms), first_cpu(first_cpu_ms), warm_cpu(warm_cpu_ms);
+  const double ratio = first_cpu.max / warm_cpu.median;
+  holds = ratio <= allowed_ratio;
+  std::printf(
+      "P14  first ping after a change, %d settings, %d threads: median %.1f ms, slowest %.1f ms, at most %.1f ms beyond two "
+      "periods; "
+      "processor ms %.1f, slowest %.1f, a warm ping %.1f: slowest / warm %.1f (at most %g%s)\n",
+      settings_in_grid, options.threads.back(), first.median, first.max, late.max, first_cpu.median, first_cpu.max,
+      warm_cpu.median, ratio, allowed_ratio, holds ? "" : ": MISSED");
+  std::fflush(stdout);
+  return json{{"settings", settings_in_grid},
+              {"threads", options.threads.back()},
+              {"first", first},
+              {"beyond_two_periods_ms", late.max},
+              {"first_cpu", first_cpu},
+              {"warm_cpu", warm_cpu},
+              {"ratio", ratio},
+              {"allowed_ratio", allowed_ratio}};
 }
 
 Result<json> find_cost_of_clients(const ScenePointer& scene, int clients, double seconds, const BenchOptions& options) {
