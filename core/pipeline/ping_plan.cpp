@@ -115,6 +115,13 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
   return {power.begin(), power.end()};
 }
 
+/// To a millionth: settings whose rows differ only by rounding have the same filter, and share the draws of noise.
+std::vector<float> rounded(std::vector<float> filter) {
+  constexpr float steps = 1 << 20;
+  for (float& tap : filter) tap = std::round(tap * steps) / steps;
+  return filter;
+}
+
 /// The sample grid, and the pulse on it.
 void lay_out_samples(PingPlan& p) {
   const PingSettings& s = p.settings;
@@ -235,6 +242,12 @@ Columns make_columns(const FrequencyMode& mode, int beam_count) {
 
 namespace {
 
+std::vector<ReceivePattern> receive_patterns(const FrequencyMode& mode, std::size_t beams) {
+  std::vector<ReceivePattern> patterns(beams, receive_pattern(mode.pattern));
+  for (std::size_t j = 0; j < beams && mode.has_own_widths(); ++j) patterns[j] = receive_pattern(mode, j);
+  return patterns;
+}
+
 /// The smallest band of columns whose dropped energy is below the share.
 struct Band {
   int half = 0;
@@ -262,12 +275,10 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
                               bool squared, const BeamWeightOptions& options) {
   const bool alike = !mode.has_own_widths();
   const ReceivePattern nominal = receive_pattern(mode.pattern);
-  ReceivePattern widest = nominal;
-  std::vector<ReceivePattern> pattern(beam_sines.size(), nominal);
-  for (std::size_t j = 0; j < beam_sines.size() && !alike; ++j) {
-    pattern[j] = receive_pattern(mode, j);
-    if (j == 0 || pattern[j].aperture_wavelengths < widest.aperture_wavelengths) widest = pattern[j];
-  }
+  const std::vector<ReceivePattern> pattern = receive_patterns(mode, beam_sines.size());
+  ReceivePattern widest = pattern.empty() ? nominal : pattern.front();
+  for (const ReceivePattern& p : pattern)
+    if (p.aperture_wavelengths < widest.aperture_wavelengths) widest = p;
   BeamWeights c;
   const Band band = band_of(nominal, columns, options.dropped_energy);
   // Beams with widths of their own share the band that the widest needs.
@@ -341,7 +352,7 @@ double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settin
   return static_cast<double>(settings.device_sound_speed_mps) / static_cast<double>(mode.centre_hz);
 }
 
-PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool) {
   PingPlan p;
   p.mode = mode;
   p.settings = settings;
@@ -351,7 +362,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.columns = make_columns(mode, settings.beam_count);
   p.beam_sine = make_beam_sines(mode, settings.beam_count);
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
-  for (std::size_t j = 0; j < p.beam_sine.size(); ++j) p.beam_pattern.push_back(receive_pattern(mode, j));
+  p.beam_pattern = receive_patterns(mode, p.beam_sine.size());
   p.beam_weights = make_beam_weights(mode, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);
   p.fan = make_fan(mode, settings, p.pulse_width_m, switches.side_lobes);
@@ -362,20 +373,36 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   const double narrowest_rad =
       mode.has_own_widths() ? beam_width_sines(mode).narrowest : static_cast<double>(mode.pattern.azimuth_width_rad);
   p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * narrowest_rad, settings.range_m * 1.1);
-  p.pulse_filter = p.noise_filter = make_noise_filter(p.pulse_shape, p.sample_time_s);
+  p.pulse_filter = p.noise_filter = rounded(make_noise_filter(p.pulse_shape, p.sample_time_s));
   double bandwidth_hz = p.pulse_shape.noise_bandwidth_hz();
   if (const auto width = static_cast<double>(mode.receiver.noise_width); switches.bandwidth && width != 1) {
     const Pulse passed(mode.waveform, width * 2 * p.pulse_width_m / static_cast<double>(settings.device_sound_speed_mps));
-    p.noise_filter = make_noise_filter(passed, p.sample_time_s);
+    p.noise_filter = rounded(make_noise_filter(passed, p.sample_time_s));
     bandwidth_hz = passed.noise_bandwidth_hz();
   }
   // sum_k W_jk^2 column powers make a beam's: NL (eq. 30) at its output.
   p.column_noise_upa = noise_rms_upa(mode, bandwidth_hz) / std::sqrt(p.beam_weights.weight_energy);
   lay_out_noise_profile(p);
-  p.shared_noise = SharedNoiseTable(p);
+  p.shared_noise = SharedNoiseTable(p, pool);
   p.beam_mix = BeamMix(p);
   fill_row_gains(p);
   return p;
+}
+
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
+  Parallel alone;
+  return make_plan(mode, settings, switches, alone);
+}
+
+std::size_t bytes_of(const PingPlan& p) {
+  const auto of = [](const auto&... all) { return (... + (sizeof(all[0]) * all.capacity())); };
+  std::size_t bytes = p.shared_noise.bytes() + p.beam_mix.bytes();
+  if (p.beam_weights.transform) bytes += p.beam_weights.transform->bytes();
+  if (p.spectral) bytes += p.spectral->bytes();
+  return bytes + of(p.fixed_fan_rays, p.columns.transmit, p.fan.tangent, p.fan.elevation_rad, p.beam_weights.panels,
+                    p.beam_weights.weights, p.beam_azimuth_rad, p.beam_sine, p.beam_pattern, p.pulse_rows, p.levels, p.elevation,
+                    p.pulse_filter, p.noise_filter, p.noise_profile.far, p.noise_profile.near_less_far, p.noise_profile.decay,
+                    p.row_power_factor, p.row_gain);
 }
 
 void set_gain(PingPlan& plan, float gain_db) {

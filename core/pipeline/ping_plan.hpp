@@ -129,7 +129,11 @@ struct PingPlan {
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
 };
 
+/// The same for any number of threads.
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool);
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
+/// About, of what a plan keeps.
+std::size_t bytes_of(const PingPlan& plan);
 /// Of the centre frequency, at the sound speed that the device assumes [m].
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
 /// The client's gain alone, which may change with every ping.
