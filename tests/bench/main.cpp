@@ -205,10 +205,10 @@ int parse_and_run(int argc, char** argv) {
   CLI::App cli{
       "Times whole pings, stage by stage, warm: the cells of the scene are made already. The first ping, which makes them, is\n"
       "the figure \"cold\" of every case; P3e jumps. P5, P8, P13 and P14 run a daemon on loopback. P6 compares the hot loops "
-      "with "
-      "the plain\n"
-      "ways of doing the same, P14 the first ping after a change of settings with a warm one: exit code 1 when a ratio is "
-      "missed.",
+      "with\n"
+      "the plain ways of doing the same, P14 the first ping after a change of settings with a warm one: exit code 1 when a "
+      "ratio\n"
+      "is missed.",
       "sonard_bench"};
   cli.footer("examples:\n  sonard_bench --case P1 --case P3d --threads 1 --threads 2 --json out.json\n  sonard_bench --case P6");
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
