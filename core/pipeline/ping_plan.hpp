@@ -132,8 +132,6 @@ struct PingPlan {
 /// The same for any number of threads.
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool);
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
-/// About, of what a plan keeps.
-std::size_t bytes_of(const PingPlan& plan);
 /// Of the centre frequency, at the sound speed that the device assumes [m].
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
 /// The client's gain alone, which may change with every ping.
@@ -143,6 +141,7 @@ bool serves(const PingPlan& plan, const PingRequest& request);
 
 // The parts of a plan, callable alone.
 Columns make_columns(const FrequencyMode& mode, int beam_count);
+std::vector<ReceivePattern> receive_patterns(const FrequencyMode& mode, std::size_t beams);
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count);
 BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines,
                               bool squared, const BeamWeightOptions& options = {});

@@ -4,6 +4,21 @@
 #include <set>
 
 namespace sonar {
+namespace {
+
+/// About, of what a plan keeps.
+std::size_t bytes_of(const PingPlan& p) {
+  const auto of = [](const auto&... all) { return (... + (sizeof(all[0]) * all.capacity())); };
+  std::size_t bytes = p.shared_noise.bytes() + p.beam_mix.bytes();
+  if (p.beam_weights.transform) bytes += p.beam_weights.transform->bytes();
+  if (p.spectral) bytes += p.spectral->bytes();
+  return bytes + of(p.fixed_fan_rays, p.columns.transmit, p.fan.tangent, p.fan.elevation_rad, p.beam_weights.panels,
+                    p.beam_weights.weights, p.beam_azimuth_rad, p.beam_sine, p.beam_pattern, p.pulse_rows, p.levels, p.elevation,
+                    p.pulse_filter, p.noise_filter, p.noise_profile.far, p.noise_profile.near_less_far, p.noise_profile.decay,
+                    p.row_power_factor, p.row_gain);
+}
+
+}  // namespace
 
 PreparedSettings& SettingsCache::prepared_for(const PingRequest& request, const Scene& scene, Parallel& pool) {
   auto it = std::find_if(prepared_.begin(), prepared_.end(),
