@@ -1,5 +1,6 @@
 """The laboratory of two namespaces: requests as text, and with namespaces (skipped where there are none) a pulled cable."""
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -45,8 +46,8 @@ class Namespaces(unittest.TestCase):
         command = [sys.executable, "-m", "sonard_client.lab", "--sonard", str(SONARD), "--", sys.executable, "-u", driver, lab.DEVICE]
         said = []
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                              env={**os.environ, "PYTHONPATH": str(PACKAGE)}) as laboratory:
-            too_long = threading.Timer(120, laboratory.kill)
+                              start_new_session=True, env={**os.environ, "PYTHONPATH": str(PACKAGE)}) as laboratory:
+            too_long = threading.Timer(600, os.killpg, (laboratory.pid, signal.SIGKILL))  # the driver, too
             too_long.start()
 
             def wait_for(text, count=1):
@@ -57,11 +58,11 @@ class Namespaces(unittest.TestCase):
                         return
                 self.fail(f"no {text}: {''.join(said)}")
             try:
-                wait_for('"number"', 10)
+                wait_for('"number"', 3)
                 laboratory.stdin.write("L06 seconds=4\n")
                 laboratory.stdin.flush()
                 wait_for("timed out; reconnecting")
-                wait_for('"number"', 10)
+                wait_for('"number"', 3)
             finally:
                 laboratory.terminate()
                 too_long.cancel()
