@@ -79,23 +79,26 @@ void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
   };
   widest_ = reach_of(sets - 1);
   taps_.assign(2 * static_cast<std::size_t>(sets * (2 * widest_ + 1)), 0.0f);
+  // Sums over one period of what beams of this spacing tell apart; beyond the aperture, where nothing is, the phase stays. The
+  // points lie on either side of the middle, in odd steps of 1 / circle.
+  constexpr int half = aperture_points / 2, circle = 2 * aperture_points;
+  std::vector<double> cosine, place2;
+  for (int i = 0; i < circle; ++i) cosine.push_back(std::cos(2 * pi * i / circle));
+  for (int i = 0; i < half; ++i)
+    place2.push_back(std::pow(std::min(2 * (i + 0.5) / aperture_points / (wavelengths * spacing), 1.0), 2));
+  std::vector<std::complex<double>> phase(half), taps;
   for (int set = 0; set < sets; ++set) {
     reach_.push_back(reach_of(set));
+    taps.assign(static_cast<std::size_t>(reach_.back() + 1), 0);
+    for (std::size_t i = 0; i < half; ++i) phase[i] = std::polar(2.0 / aperture_points, set_rad * set * place2[i]);
     double energy = 0;
-    std::vector<std::complex<double>> taps;
-    for (int d = -reach_.back(); d <= reach_.back(); ++d) {
-      std::complex<double> sum = 0;
-      // One period of what beams of this spacing tell apart; beyond the aperture, where nothing is, the phase stays.
-      for (int i = 0; i < aperture_points; ++i) {
-        const double turns = (i + 0.5) / aperture_points - 0.5;
-        const double place = std::min(2 * std::abs(turns) / (wavelengths * spacing), 1.0);
-        sum += std::polar(1.0 / aperture_points, set_rad * set * place * place - 2 * pi * d * turns);
-      }
-      energy += std::norm(sum);
-      taps.push_back(sum);
+    for (std::size_t d = 0; d < taps.size(); ++d) {
+      for (std::size_t i = 0; i < half; ++i) taps[d] += phase[i] * cosine[d * (2 * i + 1) % circle];
+      energy += std::norm(taps[d]) * (d == 0 ? 1 : 2);
     }
     float* to = taps_.data() + 2 * (set * (2 * widest_ + 1) + widest_ - reach_.back());
-    for (const std::complex<double>& tap : taps) {
+    for (int d = -reach_.back(); d <= reach_.back(); ++d) {
+      const std::complex<double> tap = taps[static_cast<std::size_t>(std::abs(d))];
       // Diffuse power stays as it is.
       const std::complex<double> t = plan.expected_power ? std::norm(tap) / energy : tap / std::sqrt(energy);
       *to++ = static_cast<float>(t.real());
@@ -143,6 +146,11 @@ BeamMixView BeamMix::view() const {
   v.first_range_m = first_range_m_;
   v.sample_m = sample_m_;
   return v;
+}
+
+std::size_t BeamMix::bytes() const {
+  return sizeof(float) * (turn_m_.capacity() + taps_.capacity() + own_.capacity() + share_.capacity()) +
+         sizeof(std::int32_t) * reach_.capacity();
 }
 
 void BeamMix::blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector<float>& scratch) const {

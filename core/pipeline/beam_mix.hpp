@@ -2,6 +2,7 @@
 // fitted share of their neighbours (docs/acoustics.md, section 6). A function of the plan alone.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "core/pipeline/arithmetic/beam_mix.hpp"
@@ -28,6 +29,7 @@ class BeamMix {
   const std::vector<float>& own() const { return own_; }
   const std::vector<float>& share() const { return share_; }
   BeamMixView view() const;
+  std::size_t bytes() const;
   /// In place; `scratch` keeps its memory. Nothing where blurs() or blends() is false.
   void blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector<float>& scratch) const;
   void blend(BeamSignals& beams, std::vector<float>& scratch) const;

@@ -159,6 +159,12 @@ void BeamTransformTables::read_between(double aperture_in_spacings, const Column
   }
 }
 
+std::size_t BeamTransformTables::bytes() const {
+  std::size_t floats = split_.capacity() + response_.capacity() + between_.capacity();
+  for (const auto& turns : turns_) floats += turns.capacity();
+  return sizeof(float) * floats + sizeof(std::int32_t) * first_column_.capacity();
+}
+
 double BeamTransformTables::cost() const {
   // Operations counted from simd/transform.inl: two transforms, the product, and reading the beams.
   const double q = tables_.quarter;

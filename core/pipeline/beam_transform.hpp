@@ -3,6 +3,7 @@
 // response varies no faster than its aperture allows. Used by form_beams() in place of wide bands of weights.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -26,6 +27,7 @@ class BeamTransformTables {
   /// Floats of scratch for the kernel, 64-byte aligned.
   std::size_t work_floats() const { return static_cast<std::size_t>(4 * tables_.quarter) * 32; }
 
+  std::size_t bytes() const;
   /// Vector operations a group of sixteen samples takes, to compare with a band's.
   double cost() const;
 

@@ -62,6 +62,13 @@ void NoiseTable::prepare(Seed seed, const std::vector<float>& filter, std::span<
   shaped_ = std::make_shared<const std::vector<float>>(filtered(*white_, filter));
 }
 
+std::size_t NoiseTable::bytes(std::set<const void*>& counted) const {
+  std::size_t bytes = 0;
+  for (const auto& draws : {white_, shaped_})
+    if (draws && counted.insert(draws.get()).second) bytes += sizeof(float) * draws->capacity();
+  return bytes;
+}
+
 void NoiseTable::add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const {
   read(sonar, ping, column_index, rms, samples, column, [](auto& to, auto noise) { to += noise; });
 }

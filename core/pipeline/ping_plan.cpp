@@ -115,6 +115,13 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
   return {power.begin(), power.end()};
 }
 
+/// To a millionth: settings whose rows differ only by rounding have the same filter, and share the draws of noise.
+std::vector<float> rounded(std::vector<float> filter) {
+  constexpr float steps = 1 << 20;
+  for (float& tap : filter) tap = std::round(tap * steps) / steps;
+  return filter;
+}
+
 /// The sample grid, and the pulse on it.
 void lay_out_samples(PingPlan& p) {
   const PingSettings& s = p.settings;
@@ -233,86 +240,6 @@ Columns make_columns(const FrequencyMode& mode, int beam_count) {
   return c;
 }
 
-namespace {
-
-/// The smallest band of columns whose dropped energy is below the share.
-struct Band {
-  int half = 0;
-  double energy = 0, total = 0;  // sum_k W_jk^2 over the band, and over all columns
-};
-Band band_of(const ReceivePattern& weight, const Columns& columns, double dropped_energy) {
-  // W at whole columns apart; its square is the energy that a column adds to a beam.
-  std::vector<double> energy(static_cast<std::size_t>(columns.count));
-  Band band;
-  for (int h = 0; h < columns.count; ++h) {
-    const double w = weight(h * columns.spacing);
-    band.total += energy[static_cast<std::size_t>(h)] = w * w * (h == 0 ? 1 : 2);
-  }
-  double dropped = 0;
-  band.half = columns.count - 1;
-  while (band.half > 0 && dropped + energy[static_cast<std::size_t>(band.half)] < dropped_energy * band.total)
-    dropped += energy[static_cast<std::size_t>(band.half--)];
-  band.energy = band.total - dropped;
-  return band;
-}
-
-}  // namespace
-
-BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines,
-                              bool squared, const BeamWeightOptions& options) {
-  const bool alike = !mode.has_own_widths();
-  const ReceivePattern nominal = receive_pattern(mode.pattern);
-  ReceivePattern widest = nominal;
-  std::vector<ReceivePattern> pattern(beam_sines.size(), nominal);
-  for (std::size_t j = 0; j < beam_sines.size() && !alike; ++j) {
-    pattern[j] = receive_pattern(mode, j);
-    if (j == 0 || pattern[j].aperture_wavelengths < widest.aperture_wavelengths) widest = pattern[j];
-  }
-  BeamWeights c;
-  const Band band = band_of(nominal, columns, options.dropped_energy);
-  // Beams with widths of their own share the band that the widest needs.
-  c.half_band = alike ? band.half : band_of(widest, columns, options.dropped_energy).half;
-  c.weight_energy = band.energy;
-  // Powers are summed without cancelling: there a transform's rounding, relative to the loudest, would show in the shadows.
-  if (options.transform && !squared && alike && !nominal.unit && beam_sines.size() > 1) {
-    auto tables = std::make_shared<const BeamTransformTables>(nominal, columns, beam_sines);
-    const double band_cost = static_cast<double>(beam_sines.size()) * std::min(2 * c.half_band + 1, columns.count);
-    if (tables->cost() < band_cost) {
-      c.transform = std::move(tables);
-      c.half_band = columns.count - 1;
-      c.weight_energy = band.total;
-    }
-  }
-
-  const int beams = static_cast<int>(beam_sines.size());
-  const auto nearest_column = [&](int beam) {
-    return (columns.first_sine - beam_sines[static_cast<std::size_t>(beam)]) / columns.spacing;
-  };
-  const bool same_for_all = mode.beam_spacing == BeamSpacing::uniform_in_sine && beams > 1;
-  for (int first = 0; first < beams; first += 4) {
-    const int last = std::min(first + 3, beams - 1);
-    const int from = static_cast<int>(std::floor(nearest_column(first) + 0.5)) - c.half_band;
-    const int to = static_cast<int>(std::floor(nearest_column(last) + 0.5)) + c.half_band + 1;
-    const int clipped_from = std::max(from, 0), clipped_to = std::min(to, columns.count);
-    const bool whole = last == first + 3;
-    if (first == 0 || !same_for_all || !whole) {
-      c.panels.push_back({first, clipped_from, clipped_to - clipped_from, c.weights.size()});
-      // The first panel keeps its unclipped weights, because the others share them.
-      const int start = same_for_all && whole ? from : clipped_from, stop = same_for_all && whole ? to : clipped_to;
-      if (start < clipped_from) c.panels.back().weights += 4 * static_cast<std::size_t>(clipped_from - start);
-      for (int k = start; k < stop; ++k)
-        for (int j = first; j < first + 4; ++j) {
-          const auto beam = static_cast<std::size_t>(j);
-          const double w = j <= last ? pattern[beam](columns.sine(k) - beam_sines[beam]) : 0.0;
-          c.weights.push_back(static_cast<float>(squared ? w * w : w));
-        }
-    } else {
-      c.panels.push_back({first, clipped_from, clipped_to - clipped_from, 4 * static_cast<std::size_t>(clipped_from - from)});
-    }
-  }
-  return c;
-}
-
 std::optional<std::size_t> PingPlan::column_of(const ConicalDirection& direction, double half_angle_rad) const {
   const double column = std::floor((columns.first_sine - direction.u) / columns.spacing + 0.5);
   if (std::abs(direction.psi_rad) > half_angle_rad || !(column >= 0) || column >= columns.count) return {};
@@ -341,7 +268,7 @@ double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settin
   return static_cast<double>(settings.device_sound_speed_mps) / static_cast<double>(mode.centre_hz);
 }
 
-PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool) {
   PingPlan p;
   p.mode = mode;
   p.settings = settings;
@@ -351,7 +278,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.columns = make_columns(mode, settings.beam_count);
   p.beam_sine = make_beam_sines(mode, settings.beam_count);
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
-  for (std::size_t j = 0; j < p.beam_sine.size(); ++j) p.beam_pattern.push_back(receive_pattern(mode, j));
+  p.beam_pattern = receive_patterns(mode, p.beam_sine.size());
   p.beam_weights = make_beam_weights(mode, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);
   p.fan = make_fan(mode, settings, p.pulse_width_m, switches.side_lobes);
@@ -362,20 +289,25 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   const double narrowest_rad =
       mode.has_own_widths() ? beam_width_sines(mode).narrowest : static_cast<double>(mode.pattern.azimuth_width_rad);
   p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * narrowest_rad, settings.range_m * 1.1);
-  p.pulse_filter = p.noise_filter = make_noise_filter(p.pulse_shape, p.sample_time_s);
+  p.pulse_filter = p.noise_filter = rounded(make_noise_filter(p.pulse_shape, p.sample_time_s));
   double bandwidth_hz = p.pulse_shape.noise_bandwidth_hz();
   if (const auto width = static_cast<double>(mode.receiver.noise_width); switches.bandwidth && width != 1) {
     const Pulse passed(mode.waveform, width * 2 * p.pulse_width_m / static_cast<double>(settings.device_sound_speed_mps));
-    p.noise_filter = make_noise_filter(passed, p.sample_time_s);
+    p.noise_filter = rounded(make_noise_filter(passed, p.sample_time_s));
     bandwidth_hz = passed.noise_bandwidth_hz();
   }
   // sum_k W_jk^2 column powers make a beam's: NL (eq. 30) at its output.
   p.column_noise_upa = noise_rms_upa(mode, bandwidth_hz) / std::sqrt(p.beam_weights.weight_energy);
   lay_out_noise_profile(p);
-  p.shared_noise = SharedNoiseTable(p);
+  p.shared_noise = SharedNoiseTable(p, pool);
   p.beam_mix = BeamMix(p);
   fill_row_gains(p);
   return p;
+}
+
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
+  Parallel alone;
+  return make_plan(mode, settings, switches, alone);
 }
 
 void set_gain(PingPlan& plan, float gain_db) {

@@ -129,6 +129,8 @@ struct PingPlan {
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
 };
 
+/// The same for any number of threads.
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool);
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
 /// Of the centre frequency, at the sound speed that the device assumes [m].
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
@@ -139,6 +141,7 @@ bool serves(const PingPlan& plan, const PingRequest& request);
 
 // The parts of a plan, callable alone.
 Columns make_columns(const FrequencyMode& mode, int beam_count);
+std::vector<ReceivePattern> receive_patterns(const FrequencyMode& mode, std::size_t beams);
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count);
 BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns, const std::vector<double>& beam_sines,
                               bool squared, const BeamWeightOptions& options = {});

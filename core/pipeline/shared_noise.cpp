@@ -159,60 +159,70 @@ std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& s
          "or in receiver.shared_noise a larger group or a sine outside the sector, or a leak that ends";
 }
 
+/// What is heard of the parts in a block of samples, in order.
+struct SharedNoiseTable::Block {
+  std::vector<std::size_t> at;  // part * beams + beam
+  std::vector<float> heard;     // [at][2][block_samples]
+};
+
 /// Eq. 47.
-SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
+SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
   const SharedNoise& law = plan.mode.receiver.shared_noise;
   const bool noise = has_noise(law);
   const Leak leak = plan.mode.receiver.leak_is_shared ? Leak(plan, plan.switches) : Leak();
   if (!plan.switches.shared_noise || !(noise || leak.is_audible())) return;
   const double wavelength_m = device_wavelength_m(plan.mode, plan.settings);
-  const std::size_t beams = plan.beam_sine.size();
+  beams_ = plan.beam_sine.size();
   double widest = 0;
   for (const double u : plan.beam_sine) widest = std::max(widest, std::abs(u));
   const Reach noise_reach = reach_of(plan.mode, plan.settings, widest);
-  const auto range_m = [&](int n) { return (n + plan.sample_offset) * plan.sample_spacing_m; };
-  const auto leak_samples = static_cast<int>(leak.rms_upa().size());
-  while (samples_ < plan.samples && (range_m(samples_) < noise_reach.end_m || samples_ < leak_samples)) ++samples_;
+  const auto range_m = [&](std::size_t n) { return (static_cast<double>(n) + plan.sample_offset) * plan.sample_spacing_m; };
+  const std::size_t leak_samples = leak.rms_upa().size(), all = static_cast<std::size_t>(plan.samples);
+  std::size_t samples = 0;
+  while (samples < all && (range_m(samples) < noise_reach.end_m || samples < leak_samples)) ++samples;
+  samples_ = static_cast<int>(samples);
   // A channel's own noise, by itself, is (30) at a beam's output.
   const double own_upa = plan.column_noise_upa * std::sqrt(plan.beam_weights.weight_energy / law.channels);
   const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) : 0;
   const auto steady = static_cast<double>(law.steady);
   const double behind_m = focus_m(law, plan.settings);
   const double nearest_m = std::max(static_cast<double>(law.nearest_focus_m), plan.sample_spacing_m / 2);
-  FocusedArray array(plan.beam_sine, law);
-  parts_ = static_cast<std::size_t>(array.parts());
-  beams_ = beams;
-  const auto samples = static_cast<std::size_t>(samples_);
-  blocks_ = (samples + block_samples - 1) / block_samples;
   for (std::size_t n = 0; n < samples; ++n) {
-    const double range = range_m(static_cast<int>(n)), r = std::max(range, plan.sample_spacing_m / 2);
+    const double range = range_m(n), r = std::max(range, plan.sample_spacing_m / 2);
     const double upa = level_upa * std::sqrt(std::min(1.0, r / static_cast<double>(law.full_m)) * noise_reach.share(range));
     noise_upa_.push_back(static_cast<float>(upa * std::sqrt(1 - steady)));
     steady_upa_.push_back(static_cast<float>(upa * std::sqrt(steady)));
   }
-  at_.assign(parts_ * beams_ * blocks_, 0);
-  const double least = faint * law.channels * static_cast<double>(beams);
-  const auto audible = static_cast<float>(silent / array.parts() * own_upa * own_upa * law.channels);
-  Responses responses;
-  std::vector<double> focal;
-  float re[block_samples] = {}, im[block_samples] = {};
-  for (std::size_t from = 0, block = 0; from < samples; from += block_samples, ++block) {
-    const std::size_t to = std::min(from + block_samples, samples);
+  leak_upa_.assign(std::min(leak_samples, samples), 0.0f);
+  struct Worker {
+    FocusedArray array;
+    Responses responses;
+    std::vector<double> focal;
+  };
+  std::vector<Worker> workers(static_cast<std::size_t>(pool.threads()), Worker{{plan.beam_sine, law}, {}, {}});
+  parts_ = static_cast<std::size_t>(workers[0].array.parts());
+  const double least = faint * law.channels * static_cast<double>(beams_);
+  const auto audible = static_cast<float>(silent / static_cast<double>(parts_) * own_upa * own_upa * law.channels);
+  blocks_ = (samples + block_samples - 1) / block_samples;
+  std::vector<Block> blocks(blocks_);
+  pool.for_each(blocks_, [&](std::size_t block, int worker) {
+    auto& [array, responses, focal] = workers[static_cast<std::size_t>(worker)];
+    const std::size_t from = block * block_samples, to = std::min(from + block_samples, samples);
     focal.clear();
-    for (std::size_t n = from; n < to; ++n)
-      focal.push_back(std::max(range_m(static_cast<int>(n)) + behind_m, nearest_m) / wavelength_m);
+    for (std::size_t n = from; n < to; ++n) focal.push_back(std::max(range_m(n) + behind_m, nearest_m) / wavelength_m);
     responses.fill(array, focal);
-    if (from < leak.rms_upa().size()) {
+    float re[block_samples] = {}, im[block_samples] = {};
+    if (from < leak_samples) {
       double power[block_samples] = {};
-      for (std::size_t j = 0; j < beams; ++j) {
+      for (std::size_t j = 0; j < beams_; ++j) {
         responses.of(parts_ - 1, j, re, im);
         for (std::size_t n = 0; n < to - from; ++n) power[n] += static_cast<double>(re[n] * re[n] + im[n] * im[n]);
       }
       // (31) at the beams' outputs, as a mean over them.
-      for (std::size_t n = from; n < std::min(to, leak.rms_upa().size()); ++n) {
+      for (std::size_t n = from; n < std::min(to, leak_samples); ++n) {
         const double per_channel =
-            std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams) / std::max(power[n - from], least));
-        leak_upa_.push_back(static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[n]) * per_channel));
+            std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams_) / std::max(power[n - from], least));
+        leak_upa_[n] = static_cast<float>(Leak::steady_part * static_cast<double>(leak.rms_upa()[n]) * per_channel);
       }
     }
     for (std::size_t part = 0; part < parts_; ++part) {
@@ -221,19 +231,33 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan) {
         upa[n - from] = part + 1 < parts_ ? noise_upa_[n] : steady_upa_[n] + (n < leak_upa_.size() ? leak_upa_[n] : 0);
         most_upa = std::max(most_upa, upa[n - from]);
       }
-      for (std::size_t j = 0; j < beams; ++j) {
+      for (std::size_t j = 0; j < beams_; ++j) {
         if (most_upa * most_upa * responses.most_power(part, j) <= audible) continue;
         responses.of(part, j, re, im);
         float most = 0;
         for (std::size_t n = 0; n < to - from; ++n) most = std::max(most, upa[n] * upa[n] * (re[n] * re[n] + im[n] * im[n]));
         if (most <= audible) continue;
-        heard_.insert(heard_.end(), re, re + block_samples);
-        heard_.insert(heard_.end(), im, im + block_samples);
-        at_[(part * beams_ + j) * blocks_ + block] = static_cast<std::uint32_t>(heard_.size() / (2 * block_samples));
+        blocks[block].at.push_back(part * beams_ + j);
+        blocks[block].heard.insert(blocks[block].heard.end(), re, re + block_samples);
+        blocks[block].heard.insert(blocks[block].heard.end(), im, im + block_samples);
       }
     }
+  });
+  gather(blocks);
+}
+
+/// The table is the same for any number of threads.
+void SharedNoiseTable::gather(std::vector<Block>& blocks) {
+  std::size_t floats = 0;
+  for (const Block& block : blocks) floats += block.heard.size();
+  heard_.reserve(floats);
+  at_.assign(parts_ * beams_ * blocks_, 0);
+  for (std::size_t b = 0; b < blocks_; ++b) {
+    auto count = static_cast<std::uint32_t>(heard_.size() / (2 * block_samples));
+    for (const std::size_t at : blocks[b].at) at_[at * blocks_ + b] = ++count;
+    heard_.insert(heard_.end(), blocks[b].heard.begin(), blocks[b].heard.end());
+    blocks[b] = {};
   }
-  heard_.shrink_to_fit();
 }
 
 const float* SharedNoiseTable::heard(std::size_t part, std::size_t beam, std::size_t block) const {

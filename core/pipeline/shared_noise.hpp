@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/parallel.hpp"
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/signals.hpp"
 #include "core/sonar/ping.hpp"
@@ -25,7 +26,7 @@ class SharedNoiseTable {
   static constexpr std::size_t block_samples = 32;  // kept or left out together
   SharedNoiseTable() = default;
   /// Nothing where the receiver has none. Needs the plan's columns and the level of their noise.
-  explicit SharedNoiseTable(const PingPlan& plan);
+  SharedNoiseTable(const PingPlan& plan, Parallel& pool);
   bool is_audible() const { return samples_ > 0; }
   bool has_leak() const { return !leak_upa_.empty(); }
   int samples() const { return samples_; }  // from the first on; at larger ranges the signal falls outside the sector
@@ -33,7 +34,10 @@ class SharedNoiseTable {
   /// Real and imaginary part, [parts][beams][2][samples]: of a signal of amplitude 1 in the channels of a group; in the last
   /// part, in all channels.
   std::vector<float> response() const;
-  std::size_t bytes() const { return sizeof(float) * heard_.size() + sizeof(std::uint32_t) * at_.size(); }
+  std::size_t bytes() const {
+    return sizeof(float) * (heard_.capacity() + noise_upa_.capacity() + steady_upa_.capacity() + leak_upa_.capacity()) +
+           sizeof(std::uint32_t) * at_.capacity();
+  }
   // In a channel. Of what is new in every ping and by group, rms [samples]; of what is not, amplitude [samples]; of the leak,
   // amplitude [as far as it reaches].
   const std::vector<float>& noise_upa() const { return noise_upa_; }
@@ -48,6 +52,8 @@ class SharedNoiseTable {
  private:
   /// [2][block_samples] of a part in a beam, or null where it is left out.
   const float* heard(std::size_t part, std::size_t beam, std::size_t block) const;
+  struct Block;
+  void gather(std::vector<Block>& blocks);
 
   int samples_ = 0;
   std::size_t parts_ = 0, beams_ = 0, blocks_ = 0;

@@ -11,6 +11,7 @@
 #include "core/pipeline/range_image.hpp"
 #include "core/pipeline/receive.hpp"
 #include "core/pipeline/scatter.hpp"
+#include "core/pipeline/settings_cache.hpp"
 #include "core/pipeline/specular/specular.hpp"
 #include "core/pipeline/synthesize.hpp"
 #include "core/pipeline/trace_fan.hpp"
@@ -19,20 +20,9 @@
 
 namespace sonar {
 
-/// What one model with one set of settings needs from ping to ping.
-struct PreparedSettings {
-  std::shared_ptr<const SonarModel> model;
-  PingPlan plan;
-  NoiseTable noise, grains;  // of the receiver; of the pulse's correlation, where that is another
-  std::uint64_t last_used = 0;
-
-  bool one_table() const { return plan.noise_filter == plan.pulse_filter; }
-};
-
 /// Buffers reused from ping to ping.
 struct Workspace::Buffers {
-  std::vector<std::unique_ptr<PreparedSettings>> prepared;  // several sonars may take turns
-  std::uint64_t pings = 0;
+  SettingsCache prepared;
   SpecularEchoes specular_echoes;
   std::vector<LawTable> laws;  // the tiles point into it
   std::vector<float> turned_away;
@@ -74,7 +64,6 @@ constexpr std::size_t group_bytes =
 constexpr int least_groups_a_worker = 3;  // so that all are done at about the same time
 constexpr int window_samples = 64;        // samples one worker carries from beamforming to codes
 constexpr int echo_room = 16384;
-constexpr std::size_t most_prepared = 8;  // sets of settings kept ready
 
 /// Adds the time since its construction, or the last lap, to a stage.
 class Stopwatch {
@@ -94,36 +83,6 @@ class Stopwatch {
   double since_;
 };
 
-template <class Buffers>
-PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Buffers& w) {
-  // Tables of the settings are kept for several sonars; the least recently used are dropped.
-  ++w.pings;
-  auto it = std::find_if(w.prepared.begin(), w.prepared.end(),
-                         [&](const auto& p) { return p->model == request.model && serves(p->plan, request); });
-  if (it == w.prepared.end()) {
-    if (w.prepared.size() >= most_prepared)
-      w.prepared.erase(std::min_element(w.prepared.begin(), w.prepared.end(),
-                                        [](const auto& a, const auto& b) { return a->last_used < b->last_used; }));
-    auto made = std::make_unique<PreparedSettings>();
-    made->model = request.model;
-    made->plan =
-        make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings, request.switches);
-    it = w.prepared.insert(w.prepared.end(), std::move(made));
-  }
-  PreparedSettings& p = **it;
-  p.last_used = w.pings;
-  set_gain(p.plan, request.settings.gain_db);
-  // Leak and volume have the pulse's correlation. A table is drawn anew for another seed or filter only.
-  const bool volume = request.switches.volume && scene.water_column.has_volume();
-  const bool leak = request.switches.leak && p.plan.mode.receiver.leak_upa > 0;
-  if (p.plan.expected_power) return p;
-  std::vector<const NoiseTable*> drawn;  // settings that differ in the range alone have the same filter in samples
-  for (const auto& other : w.prepared) drawn.insert(drawn.end(), {&other->noise, &other->grains});
-  if (request.switches.noise || ((leak || volume) && p.one_table())) p.noise.prepare(request.seed, p.plan.noise_filter, drawn);
-  if ((leak || volume) && !p.one_table()) p.grains.prepare(request.seed, p.plan.pulse_filter, drawn);
-  return p;
-}
-
 }  // namespace
 
 /// The stages of one ping and what they hand on.
@@ -138,7 +97,7 @@ class PingSimulation {
         w_(*work.buffers_),
         pool_(pool),
         labels_(labels),
-        prepared_(prepared_for(request, scene.scene(), w_)),
+        prepared_(w_.prepared.prepared_for(request, scene.scene(), pool)),
         plan_(prepared_.plan),
         scalars_(make_scalars(plan_, request, scene.origin())),
         volume_(scene.scene().water_column, plan_, scalars_),

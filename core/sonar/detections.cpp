@@ -2,9 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 
 namespace sonar {
 namespace {
+
+/// Less than a row's loudest, what a beam hears may be a side lobe's: those of Hamming's weights lie 42 dB below.
+constexpr double side_lobes_db = 30;
+/// Less than the loudest sample of a direction, a peak may be the tail of a pulse or of another direction's echo.
+constexpr double tail_db = 12;
+/// As much speckle may lie between neighbours on a floor.
+constexpr double fill_db = 20;
 
 /// Levels [dB] of a picture.
 class Levels {
@@ -47,41 +57,168 @@ double top_of(double before, double middle, double after) {
   return curve < 0 ? std::clamp(0.5 * (before - after) / curve, -0.5, 0.5) : 0;
 }
 
+/// The beams of a ping and what the directions are.
+struct Fan {
+  const Ping& ping;
+  int directions;
+  double width_sine;         // of a beam, -3 dB
+  double port_rad, end_rad;  // edges of the sector
+
+  Fan(const Ping& of, int count, double beam_width_rad)
+      : ping(of), directions(count), width_sine(2 * std::sin(beam_width_rad / 2)), port_rad(edge(true)), end_rad(edge(false)) {}
+  double azimuth(int beam) const { return static_cast<double>(ping.beam_azimuth_rad[static_cast<std::size_t>(beam)]); }
+  int beams() const { return static_cast<int>(ping.beam_azimuth_rad.size()); }
+  int first_beam(int direction) const { return direction * beams() / directions; }
+  double middle_rad(int direction) const { return port_rad + (direction + 0.5) / directions * (end_rad - port_rad); }
+  int direction_of(double azimuth_rad) const {
+    return std::clamp(static_cast<int>((azimuth_rad - port_rad) / (end_rad - port_rad) * directions), 0, directions - 1);
+  }
+
+ private:
+  double edge(bool port) const {
+    const int outer = port ? 0 : beams() - 1, inner = port ? 1 : beams() - 2;
+    return azimuth(outer) + (azimuth(outer) - azimuth(inner)) / 2;
+  }
+};
+
+/// An echo whose direction the row's levels across the beams show.
+struct Peak {
+  double level_db;
+  int row, beam;
+  double azimuth_rad;
+};
+
+/// Where the echo lies that is loudest in a beam of its row; none beyond the sector.
+std::optional<double> azimuth_of_peak(const Fan& fan, const Levels& level, int row, int beam) {
+  const double here = level(row, beam);
+  if (beam > 0 && beam + 1 < level.beams) {
+    const double shift = top_of(level(row, beam - 1), here, level(row, beam + 1));
+    return fan.azimuth(beam) + std::abs(shift) * (fan.azimuth(shift < 0 ? beam - 1 : beam + 1) - fan.azimuth(beam));
+  }
+  // At an edge, of which one side is heard: by the fall of the main lobe, 12 dB (offset / width)^2.
+  const int inner = beam == 0 ? 1 : beam - 1;
+  const double u = std::sin(fan.azimuth(beam)), v = std::sin(fan.azimuth(inner));
+  const double sine = (u + v) / 2 + (here - level(row, inner)) * fan.width_sine * fan.width_sine / (24 * (u - v));
+  const double azimuth = std::asin(std::clamp(sine, -1.0, 1.0));
+  if (azimuth > std::max(fan.port_rad, fan.end_rad) || azimuth < std::min(fan.port_rad, fan.end_rad)) return {};
+  return azimuth;
+}
+
+/// Peaks across the beams, the loudest first. Side lobes of a row's loudest are left out.
+std::vector<Peak> peaks_in(const Fan& fan, const Levels& level, const std::vector<double>& least_db) {
+  std::vector<Peak> peaks;
+  for (int row = 0; row < level.rows; ++row) {
+    double loudest = level(row, 0);
+    for (int b = 1; b < level.beams; ++b) loudest = std::max(loudest, level(row, b));
+    for (int b = 0; b < level.beams; ++b) {
+      const double here = level(row, b);
+      if (here < least_db[static_cast<std::size_t>(b)] || here < loudest - side_lobes_db) continue;
+      if ((b > 0 && level(row, b - 1) > here) || (b + 1 < level.beams && level(row, b + 1) >= here)) continue;
+      if (const auto azimuth = azimuth_of_peak(fan, level, row, b)) peaks.push_back({here, row, b, *azimuth});
+    }
+  }
+  std::stable_sort(peaks.begin(), peaks.end(), [](const Peak& a, const Peak& b) { return a.level_db > b.level_db; });
+  return peaks;
+}
+
+struct Found {
+  Detection point;
+  double level_db;
+};
+
+/// The loudest peak of each direction. Not what a louder one may have left beside it, within half a beam and two pulses, nor what
+/// is far weaker than what the direction's beams hear.
+std::vector<std::optional<Found>> loudest_peaks(const Fan& fan, const Levels& level, const std::vector<double>& least_db,
+                                                double reach_m) {
+  const PingSettings& settings = fan.ping.request.settings;
+  std::vector<std::optional<Found>> found(static_cast<std::size_t>(fan.directions));
+  std::vector<double> weakest_db;
+  for (int d = 0; d < fan.directions; ++d) {
+    double most = -1e9;
+    for (int b = fan.first_beam(d); b < fan.first_beam(d + 1); ++b)
+      for (int row = 0; row < level.rows; ++row) most = std::max(most, level(row, b));
+    weakest_db.push_back(most - tail_db);
+  }
+  for (const Peak& peak : peaks_in(fan, level, least_db)) {
+    const auto d = static_cast<std::size_t>(fan.direction_of(peak.azimuth_rad));
+    if (found[d] || peak.level_db < weakest_db[d]) continue;
+    const double range = settings.range_of_row(peak.row);
+    const bool is_beside = std::any_of(found.begin(), found.end(), [&](const auto& other) {
+      return other && std::abs(other->point.range_m - range) <= reach_m &&
+             std::abs(std::sin(other->point.azimuth_rad) - std::sin(peak.azimuth_rad)) < fan.width_sine / 2;
+    });
+    if (is_beside) continue;
+    found[d] = Found{{peak.azimuth_rad, range}, peak.level_db};
+    if (peak.row > 0 && peak.row + 1 < level.rows) {
+      const double before = level(peak.row - 1, peak.beam), after = level(peak.row + 1, peak.beam);
+      if (peak.level_db >= std::max(before, after))
+        found[d]->point.range_m = settings.range_of_row(peak.row + top_of(before, peak.level_db, after));
+    }
+  }
+  return found;
+}
+
+/// The range at which the line through two points meets a direction between them.
+std::optional<double> range_between(const Detection& a, const Detection& b, double azimuth_rad) {
+  const double y = a.range_m * std::sin(a.azimuth_rad), x = a.range_m * std::cos(a.azimuth_rad);
+  const double dy = b.range_m * std::sin(b.azimuth_rad) - y, dx = b.range_m * std::cos(b.azimuth_rad) - x;
+  const double t = std::tan(azimuth_rad), along = (t * x - y) / (dy - t * dx);
+  if (!(along >= 0 && along <= 1)) return {};
+  return std::hypot(y + along * dy, x + along * dx);
+}
+
+/// Under the sonar a floor's echo comes to several directions in one pulse, and a row shows one peak for them: where neighbours
+/// on both sides are on a floor, the amplitude's centroid about the range between them.
+std::optional<Found> by_amplitude(const Fan& fan, const Levels& level, const std::vector<double>& least_db, int direction,
+                                  const Found& before, const Found& after, double reach_m) {
+  const PingSettings& settings = fan.ping.request.settings;
+  const double azimuth = fan.middle_rad(direction);
+  const auto near = range_between(before.point, after.point, azimuth);
+  if (!near) return {};
+  double most = 0, sum = 0, moment = 0, least = 0;
+  const int first = fan.first_beam(direction), end = fan.first_beam(direction + 1);
+  for (int row = 0; row < level.rows; ++row) {
+    const double range = settings.range_of_row(row);
+    if (std::abs(range - *near) > reach_m) continue;
+    double power = 0;
+    for (int b = first; b < end; ++b) power += std::pow(10, level(row, b) / 10) / (end - first);
+    most = std::max(most, power);
+    sum += std::sqrt(power);
+    moment += std::sqrt(power) * range;
+  }
+  for (int b = first; b < end; ++b)
+    least = b == first ? least_db[static_cast<std::size_t>(b)] : std::max(least, least_db[static_cast<std::size_t>(b)]);
+  const double level_db = most > 0 ? 10 * std::log10(most) : -1e9;
+  if (level_db < std::max(least, std::min(before.level_db, after.level_db) - fill_db)) return {};
+  return Found{{azimuth, moment / sum}, level_db};
+}
+
 }  // namespace
 
-std::vector<Detection> detect_points(const Ping& ping, int directions, double above_db) {
+std::vector<Detection> detect_points(const Ping& ping, int directions, double above_db, double beam_width_rad) {
   const Levels level(ping);
-  std::vector<Detection> points;
-  int last_row = -1, last_beam = -1;
-  for (int d = 0; d < directions; ++d) {
-    const int first = d * level.beams / directions, end = (d + 1) * level.beams / directions;
-    int row = 0, beam = first;
-    for (int r = 0; r < level.rows; ++r)
-      for (int b = first; b < end; ++b)
-        if (level(r, b) > level(row, beam)) row = r, beam = b;
-    if (first == end || level(row, beam) < level.median_of(beam) + above_db) continue;
-    // Up the slope of the pattern, to the beam that looks at the echo.
-    const int reach = end - first;
-    for (int steps = 0; steps < reach; ++steps) {
-      const int best = beam > 0 && level(row, beam - 1) > level(row, beam) ? beam - 1 : beam;
-      const int next = beam + 1 < level.beams && level(row, beam + 1) > level(row, best) ? beam + 1 : best;
-      if (next == beam) break;
-      beam = next;
-    }
-    if (row == last_row && beam == last_beam) continue;
-    last_row = row, last_beam = beam;
-    Detection point{static_cast<double>(ping.beam_azimuth_rad[static_cast<std::size_t>(beam)]),
-                    ping.request.settings.range_of_row(row)};
-    if (beam > 0 && beam + 1 < level.beams) {
-      const double shift = top_of(level(row, beam - 1), level(row, beam), level(row, beam + 1));
-      const std::size_t neighbour = static_cast<std::size_t>(shift < 0 ? beam - 1 : beam + 1);
-      point.azimuth_rad += std::abs(shift) * (static_cast<double>(ping.beam_azimuth_rad[neighbour]) - point.azimuth_rad);
-    }
-    if (row > 0 && row + 1 < level.rows)
-      point.range_m =
-          ping.request.settings.range_of_row(row + top_of(level(row - 1, beam), level(row, beam), level(row + 1, beam)));
-    points.push_back(point);
+  if (level.beams < std::max(2, directions)) return {};
+  const Fan fan(ping, directions, beam_width_rad);
+  const PingSettings& settings = ping.request.settings;
+  std::vector<double> least_db;
+  for (int b = 0; b < level.beams; ++b) least_db.push_back(level.median_of(b) + above_db);
+  const double reach_m = 2 * std::max(static_cast<double>(settings.pulse_width_m), settings.range_bin_m);
+  std::vector<std::optional<Found>> found = loudest_peaks(fan, level, least_db, reach_m);
+  // A floor has no holes: what lies between two points is filled whole, or is not a floor.
+  for (int d = 1; d < directions; ++d) {
+    int end = d;
+    while (end < directions && !found[static_cast<std::size_t>(end)]) ++end;
+    const auto& before = found[static_cast<std::size_t>(d - 1)];
+    std::vector<std::optional<Found>> between;
+    for (int k = d; k < end && end < directions && before; ++k)
+      between.push_back(by_amplitude(fan, level, least_db, k, *before, *found[static_cast<std::size_t>(end)], reach_m));
+    if (std::all_of(between.begin(), between.end(), [](const auto& point) { return point.has_value(); }))
+      std::copy(between.begin(), between.end(), found.begin() + d);
+    d = end;
   }
+  std::vector<Detection> points;
+  for (const auto& each : found)
+    if (each) points.push_back(each->point);
   return points;
 }
 

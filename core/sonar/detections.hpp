@@ -12,9 +12,10 @@ struct Detection {
   double range_m = 0;      // in the device's metres
 };
 
-/// One for each of `directions` even parts of the sector whose strongest sample lies `above_db` over the median of its beam; of
-/// samples on a logarithmic scale. The azimuth is the peak across beams in the row of that sample, so that one echo heard by
-/// several beams is placed where it comes from; an echo that two directions share is listed once. Most to port first.
-std::vector<Detection> detect_points(const Ping& ping, int directions, double above_db);
+/// At most one for each of `directions` even parts of the sector, of samples on a logarithmic scale, `above_db` over the median
+/// of their beam. In each row the peaks across beams of that width (-3 dB) show where echoes come from: the loudest of each
+/// direction counts. Directions without one, between two that have one, take the centroid of what their own beams hear, if all of
+/// them hear something. A small target is one point, a floor one in each direction. Most to port first.
+std::vector<Detection> detect_points(const Ping& ping, int directions, double above_db, double beam_width_rad);
 
 }  // namespace sonar

@@ -26,13 +26,13 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       world_(pose_rules(config_), vehicles_of(config_), bodies_of(*scene, config_), clock_.now()),
       stepped_time_(config_.clock, clock_, world_),
       simulator_(io_, make_engine(scene), compute_niceness),
-      writer_(io_, compute_niceness,
+      writer_(io_, background_niceness,
               [this] {
                 if (stopping_) on_change();
               }),
       recordings_(writer_, config_, log_, [this] { on_change(); }),
       changes_(
-          io_, simulator_, std::move(scene), make_engine, compute_niceness,
+          io_, simulator_, std::move(scene), make_engine, background_niceness,
           [this](const ScenePointer& now) {
             world_.use_objects(bodies_of(*now, config_), clock_.now());
             recordings_.use_scene(*now);

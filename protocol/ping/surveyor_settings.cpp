@@ -14,6 +14,7 @@ namespace {
 
 constexpr int beams = 64, directions = 16;  // directions: as many as receive elements
 constexpr double swath_deg = 80;            // recalled, like the width along the track and the number of elements
+constexpr double beam_width_deg = 7;        // of 16 elements half a wavelength apart
 constexpr double above_db = 15;             // unknown: chosen
 constexpr double usual_end_m = 20;          // chosen: of end 0, which the device sets by the bottom itself
 constexpr double db_per_gain = 0.4;         // unknown: chosen
@@ -30,7 +31,7 @@ SonarModel make_model() {
   mode.max_range_m = 100;
   mode.source_level_db = 200;
   mode.beam_spacing = BeamSpacing::uniform_in_angle;
-  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(7));  // 16 elements half a wavelength apart
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(beam_width_deg));
   mode.pattern.azimuth_taper = Taper::hamming;
   mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(4));
   mode.receiver.tvg_slope_db = 20;
@@ -157,7 +158,7 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
   const WaterStats water = water_stats(device);
 
   std::vector<Bytes> atof, yz;
-  for (const Detection& found : detect_points(ping, directions, above_db)) {
+  for (const Detection& found : detect_points(ping, directions, above_db, rad_from_deg(beam_width_deg))) {
     atof.push_back(
         wire::bytes_of(AtofPoint{static_cast<float>(found.azimuth_rad), static_cast<float>(2 * found.range_m / speed), {}}));
     Bytes& pair = yz.emplace_back();

@@ -30,6 +30,9 @@ nlohmann::json find_curves(const ScenePointer& scene, const BenchScene& where, c
 
 /// P5: from a pose and a trigger sent to the last byte received, of a whole daemon on loopback.
 Result<nlohmann::json> find_latency(const ScenePointer& scene, const BenchOptions& options);
+/// P14: from a changed setting sent to the first ping made with it, over a grid of settings. `holds`: no setting takes the
+/// processor much longer than a warm ping does.
+Result<nlohmann::json> find_first_pings(const ScenePointer& scene, const BenchOptions& options, bool& holds);
 /// P8: clients that take every ping of a whole daemon; dropped pings, and what sending takes of one processor.
 Result<nlohmann::json> find_cost_of_clients(const ScenePointer& scene, int clients, double seconds, const BenchOptions& options);
 /// P13: rates of P1, P3a and P3d with 1, 2 and 4 threads.

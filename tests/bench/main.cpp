@@ -23,7 +23,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* other_cases[] = {"P3e", "P5", "P6", "P7", "P8", "P9", "P10", "P12", "P13"};  // beside bench_cases()
+constexpr const char* other_cases[] = {"P3e", "P5", "P6", "P7", "P8", "P9", "P10", "P12", "P13", "P14"};  // beside bench_cases()
 constexpr int ratios_missed = 1;
 
 template <class Items>
@@ -142,6 +142,13 @@ Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, c
       report["sonars"].push_back(*std::move(rates));
     }
   }
+  if (asked("P14")) {
+    bool holds = true;
+    auto first = find_first_pings(scene, options, holds);
+    if (!first) return tl::make_unexpected(first.error());
+    report["first_pings"] = *std::move(first);
+    all_hold &= holds;
+  }
   if (options.curves) report["curves"] = find_curves(scene, where, options);
   return all_hold;
 }
@@ -197,9 +204,11 @@ int parse_and_run(int argc, char** argv) {
   EngineOptionsGiven model;
   CLI::App cli{
       "Times whole pings, stage by stage, warm: the cells of the scene are made already. The first ping, which makes them, is\n"
-      "the figure \"cold\" of every case; P3e jumps. P5, P8 and P13 run a daemon on loopback, P6 compares the hot loops with the "
-      "plain\n"
-      "ways of doing the same and exits with 1 when a ratio is missed.",
+      "the figure \"cold\" of every case; P3e jumps. P5, P8, P13 and P14 run a daemon on loopback. P6 compares the hot loops "
+      "with\n"
+      "the plain ways of doing the same, P14 the first ping after a change of settings with a warm one: exit code 1 when a "
+      "ratio\n"
+      "is missed.",
       "sonard_bench"};
   cli.footer("examples:\n  sonard_bench --case P1 --case P3d --threads 1 --threads 2 --json out.json\n  sonard_bench --case P6");
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));

@@ -103,6 +103,13 @@ def service(report):
         rows.append(["P5", f"latency from a pose and a network trigger to the ping's last byte at a client on loopback: {t['rows']} rows, "
                      f"{t['threads']} threads, {t['triggers']} triggers", f"median {t['latency']['median_ms']:.2f} ms, p99 {p99:.2f} ms, "
                      f"worst {t['latency']['max_ms']:.2f} ms", "25 ms", "10 ms", verdict(p99, 25, 10, True)])
+    if "first_pings" in report:
+        f = report["first_pings"]
+        late = max(f["beyond_two_periods_ms"], 0)
+        rows.append(["P14", f"first ping after a change of settings, {f['settings']} settings in turn, {f['threads']} threads",
+                     f"median {f['first']['median_ms']:.0f} ms, slowest {f['first']['max_ms']:.0f} ms; at most {late:.0f} ms beyond two "
+                     f"periods ({f['slowest']}); processor time {f['median_ratio']:.1f} times a warm ping's",
+                     "50 ms beyond two periods", "", "holds" if late <= 50 and f["holds"] else "**missed**"])
     for c in report.get("cold", []):
         ms = c["cold"]["median_ms"]
         rows.append(["P3e", f"jump to a new place, {c['case']}, {c['threads']} thread{'s' if c['threads'] > 1 else ''}, "

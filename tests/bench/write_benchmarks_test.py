@@ -30,6 +30,15 @@ class Page(unittest.TestCase):
         self.assertIn("50 %", tables, "1.9 ms of the prototype against 3.8")
         self.assertIn("| P1, 1 thread: P1 described | 100.0 | 333 times the paper's |", tables)
 
+    def test_first_pings_hold_by_time_and_by_ratio(self):
+        for late, holds, verdict in ((-20.0, True, "| holds |"), (60.0, True, "**missed**"), (10.0, False, "**missed**")):
+            report = {"processor": "test", "results": [result("P1", 2, 80)],
+                      "first_pings": {"settings": 144, "threads": 2, "first": TIMES, "beyond_two_periods_ms": late, "slowest": "30 m",
+                                      "median_ratio": 1.5, "holds": holds}}
+            row = next(line for line in write_benchmarks.page(report).splitlines() if line.startswith("| P14"))
+            self.assertIn(f"at most {max(late, 0):.0f} ms beyond two periods (30 m)", row)
+            self.assertIn(verdict, row)
+
     def test_everything_found_is_told(self):
         report = {"processor": "test", "load_average": 5.5, "results": [result("P1", 2, 80)],
                   "latency": {"rows": 437, "threads": 2, "triggers": 200, "latency": TIMES},

@@ -78,8 +78,8 @@ class Threads(unittest.TestCase):
             next_ping(client)
             first, *others = scheduling(daemon.process)
         self.assertGreaterEqual(len(others), 4, "pool and simulation")
-        # The live view's thread is less nice: it makes pictures that a person waits for.
-        self.assertEqual(set(others), {(min(first[0] + nice_by, 19), 0) for nice_by in (5, 10)})
+        # Pings come first, then the live view, whose pictures a person waits for, then recordings and scenes.
+        self.assertEqual(set(others), {(min(first[0] + nice_by, 19), 0) for nice_by in (1, 5, 10)})
 
     def test_real_time_by_wish(self):
         with Sonard(more="engine: {io_priority: 5}") as daemon, Client(daemon.address) as client:

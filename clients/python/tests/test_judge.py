@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 import unittest
+import unittest.mock as mock
 import xml.etree.ElementTree
 import zlib
 from html.parser import HTMLParser
@@ -18,6 +19,8 @@ from common import ROOT, made_ping
 
 from sonard_client.judge import __main__ as judge_main
 from sonard_client.judge import cases, driver, report, wire
+from sonard_client.judge.cases import CASES
+from sonard_client.judge.scene import Scene
 from sonard_client.judge.truth import TruePing, TruthReader
 from sonard_client.judge.verdicts import Observation, back_at, colour, judge, sort_published
 from sonard_client.judge.wire import Seen
@@ -434,6 +437,28 @@ class Reports(unittest.TestCase):
         self.assertFalse(report.passed(column_of(rows)))
         self.assertTrue(report.passed(column_of(rows[:2] + rows[4:])))
 
+    def test_cases_that_fail_alike_are_one_cause(self):
+        def dead(ending, *more):
+            run = run_of("FALSE", "CRASH", must=False, should=False, shade="worst")
+            run["wall_clock"]["must"][0]["value"] = ending
+            run["wall_clock"]["must"].extend(more)
+            return run
+        false = {"what": "publishes nothing false", "holds": False, "value": "5 false"}
+        rows = [row_of("L05.1", GOOD), row_of("L05.2", SLOW), row_of("L05.3", dead("exit code 7")),
+                row_of("L05.4", dead("exit code 7", false)), row_of("L06.1", NOT_RUN), row_of("L07.1", dead("exit code 12")),
+                row_of("M02.1", DEAD, expectation="INFO")]
+        self.assertEqual([(c["must"], c["cases"]) for c in report.causes(rows)],
+                         [(True, ["L05.3", "L07.1"]), (True, ["L05.4"]), (False, ["L05.2"])])
+        text = report.causes_text(column_of(rows))
+        self.assertIn("2  MUST: survives", text)
+        self.assertIn("L05.3 L07.1", text)
+        self.assertEqual(report.causes_text(column_of(rows[:1])), "")
+        page = (self.written(rows) / "index.html").read_text()
+        Page(page)
+        for number in re.findall(r'href="#([^"]+)"', page):
+            self.assertIn(f'id="{number}"', page)
+        self.assertIn('href="#L07.1"', page)
+
     def test_junit(self):
         rows = [row_of("L05.1", GOOD), row_of("L05.2", SLOW), row_of("L05.3", DEAD), row_of("L06.1", NOT_RUN)]
         suite = xml.etree.ElementTree.fromstring(report.junit([column_of(rows)], False)).find("testsuite")
@@ -488,6 +513,54 @@ class Reports(unittest.TestCase):
         for place in (self.folder, self.folder / "none"):
             with self.assertRaisesRegex(ValueError, "judge"):
                 report.read(place)
+
+
+class TimeLeft(unittest.TestCase):
+    def test_is_what_the_rest_is_expected_to_take_at_the_speed_so_far(self):
+        three = [case for case in CASES if case.family == "L" and case.until() == {"count": 1} and not case.tail_s][:3]
+        usual = judge_main.TimeLeft.expected_s(three[0])
+        left = judge_main.TimeLeft(three, 1)
+        self.assertEqual(left.after(three[0], 10 * usual), f", {round(20 * usual / 60):.0f} min left")
+        self.assertEqual(left.after(three[1], 0), f", {round(5 * usual, -1):.0f} s left")
+        self.assertEqual(left.after(three[2], 10), "")
+        fast = judge_main.TimeLeft(three, 2)
+        self.assertEqual(fast.after(three[0], usual), ", 10 s left")
+
+    def test_cases_that_do_not_run_take_none(self):
+        self.assertEqual(judge_main.TimeLeft([], 4).after(CASES[0], 0.0), "")
+
+
+class Waiting(unittest.TestCase):
+    """A busy computer is slow; a driver that does nothing is stuck."""
+
+    def waited(self, steps, timeout_s):
+        scene = mock.Mock()
+        scene.driver.poll.return_value = None
+        scene.driver.samples = []
+        began, counts = time.monotonic(), iter(steps)
+        last = [0]
+
+        def moves():
+            last[0] = next(counts, last[0])
+            return last[0]
+        done = Scene.wait(scene, lambda: last[0] >= 8, timeout_s, moves)
+        return done, time.monotonic() - began
+
+    def test_goes_on_while_something_happens(self):
+        done, seconds = self.waited([n // 2 for n in range(20)], 0.3)  # 0.1 s between two events, 0.8 s in all
+        self.assertTrue(done)
+        self.assertGreater(seconds, 0.3)
+
+    def test_ends_when_nothing_happens(self):
+        done, seconds = self.waited([0, 1, 2, 3], 0.3)
+        self.assertFalse(done)
+        self.assertGreaterEqual(seconds, 0.3)
+
+    def test_ends_at_last(self):
+        scene = mock.Mock()
+        scene.driver.poll.return_value = None
+        scene.driver.samples = []
+        self.assertFalse(Scene.wait(scene, lambda: False, 0.1, time.monotonic))
 
 
 class CommandLine(unittest.TestCase):

@@ -70,4 +70,10 @@ void SpectralColumns::finish(int first, int last, SpectralScratch& scratch, Colu
   }
 }
 
+std::size_t SpectralColumns::bytes() const {
+  // A transform has about as many factors as values.
+  const auto values = response_.capacity() + static_cast<std::size_t>(sums_.grid_points() + period_);
+  return sizeof(spectral::Complex) * values + sizeof(double) * sums_.tables().correction.size();
+}
+
 }  // namespace sonar

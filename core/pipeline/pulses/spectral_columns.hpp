@@ -28,6 +28,7 @@ class SpectralColumns {
   const spectral::FrequencySums& sums() const { return sums_; }
   /// What every sum is multiplied with: the pulse's spectrum over the period.
   std::span<const spectral::Complex> response() const { return response_; }
+  std::size_t bytes() const;  // about
 
   void begin(int columns, SpectralScratch& scratch) const;
   /// Takes the echoes in; their columns must lie in [first_column, first_column + columns of begin).

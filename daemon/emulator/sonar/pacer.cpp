@@ -5,17 +5,25 @@
 
 namespace sonar {
 
+namespace {
+
+double travel_s(const PingSettings& s) {
+  const double sound_speed_mps = s.device_sound_speed_mps > 0 ? static_cast<double>(s.device_sound_speed_mps) : 1500.0;
+  return 2.0 * s.range_m / sound_speed_mps + 0.002;
+}
+
+}  // namespace
+
 std::chrono::nanoseconds ping_period(const PingSettings& s) {
   if (!(s.rate_hz > 0)) return std::chrono::nanoseconds(0);
-  const double sound_speed_mps = s.device_sound_speed_mps > 0 ? static_cast<double>(s.device_sound_speed_mps) : 1500.0;
-  const double travel_s = 2.0 * s.range_m / sound_speed_mps + 0.002;
-  return nanoseconds_from(std::max(1.0 / static_cast<double>(s.rate_hz), travel_s));
+  return nanoseconds_from(std::max(1.0 / static_cast<double>(s.rate_hz), travel_s(s)));
 }
 
 void Pacer::configure(const PingSettings& settings, Time now) {
   const auto period = ping_period(settings);
+  travel_ = nanoseconds_from(travel_s(settings));
   if (running_ && period == period_ && settings.triggered == triggered_) return;
-  const Time quiet_until = has_fired_ ? last_tick_ + period_ : now;
+  const Time quiet_until = has_fired_ ? std::max(home_at_, last_tick_ + std::min(period_, period)) : now;
   running_ = period.count() > 0;
   if (!(running_ && triggered_ && settings.triggered)) forget_trigger();
   triggered_ = settings.triggered;
@@ -31,6 +39,7 @@ void Pacer::skip(std::chrono::nanoseconds by) {
   start_ += by;
   trigger_at_ += by;
   last_tick_ += by;
+  home_at_ += by;
 }
 
 void Pacer::stop() {
@@ -61,6 +70,12 @@ std::optional<Time> Pacer::next_tick() const {
   return start_ + index_ * period_;
 }
 
+void Pacer::note_ping(Time at) {
+  last_tick_ = at;
+  home_at_ = at + travel_;
+  has_fired_ = true;
+}
+
 bool Pacer::fire(Time now, bool busy) {
   const auto due = next_tick();
   if (!due || now < *due) return false;
@@ -70,8 +85,7 @@ bool Pacer::fire(Time now, bool busy) {
       return false;
     }
     trigger_waits_ = false;
-    last_tick_ = now;
-    has_fired_ = true;
+    note_ping(now);
     return true;
   }
   const std::int64_t reached = (now - start_) / period_;  // index of the newest tick that has passed
@@ -83,8 +97,7 @@ bool Pacer::fire(Time now, bool busy) {
     ++skipped_.busy;
     return false;
   }
-  last_tick_ = start_ + reached * period_;
-  has_fired_ = true;
+  note_ping(start_ + reached * period_);
   return true;
 }
 

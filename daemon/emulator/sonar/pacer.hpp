@@ -25,7 +25,8 @@ struct SkippedTicks {
 class Pacer {
  public:
   /// New settings. The grid goes on when period and trigger mode stay the same; otherwise it restarts at `now`, but not before
-  /// the sound of the last ping has come back. A pending trigger is kept as long as pings are triggered.
+  /// the sound of the last ping has come back, and not sooner after it than the shorter of both periods. A pending trigger is
+  /// kept as long as pings are triggered.
   void configure(const PingSettings& settings, Time now);
   /// The clock jumps ahead by `by`: everything is due as long from now as it was.
   void skip(std::chrono::nanoseconds by);
@@ -50,13 +51,14 @@ class Pacer {
 
  private:
   void forget_trigger();
+  void note_ping(Time at);
 
   bool running_ = false, triggered_ = false, trigger_waits_ = false, has_fired_ = false;
-  std::chrono::nanoseconds period_{0};
-  Time start_{};            // of the grid
-  std::int64_t index_ = 0;  // of the next tick on it
+  std::chrono::nanoseconds period_{0}, travel_{0};  // travel: of sound to the range and back
+  Time start_{};                                    // of the grid
+  std::int64_t index_ = 0;                          // of the next tick on it
   Time trigger_at_{};
-  Time last_tick_{};
+  Time last_tick_{}, home_at_{};  // of the last ping, and when its sound is back
   std::uint64_t ticks_ = 0;
   SkippedTicks skipped_;
 };

@@ -23,7 +23,7 @@ std::string schedule_in_real_time(int priority) {
 void compute_apart(const std::function<void()>& work) {
   std::exception_ptr fault;
   std::thread([&] {
-    if (::nice(compute_niceness) == -1) {
+    if (::nice(background_niceness) == -1) {
       // On Linux niceness belongs to the thread; a refusal costs only smoothness.
     }
     try {

@@ -6,14 +6,17 @@
 
 namespace sonar {
 
-/// Niceness of every thread that computes: pool, simulation, building a scene.
-inline constexpr int compute_niceness = 10;
+/// Niceness of the threads that compute pings: of equals the I/O thread goes first. More would leave pings little beside programs
+/// that never sleep, which at +10 take nine tenths of their core.
+inline constexpr int compute_niceness = 1;
+/// Of those that no ping waits for: building a scene, recording.
+inline constexpr int background_niceness = 10;
 
 /// The calling thread runs before all others of the computer that are not scheduled so (SCHED_FIFO); threads it starts do not.
 /// `priority` 1 to 99. Empty, or a sentence: why not, and what to do.
 std::string schedule_in_real_time(int priority);
 
-/// Runs `work` on a thread of its own that computes, and waits for it. Threads that `work` starts are as nice as that one:
+/// Runs `work` on a thread of its own in the background, and waits for it. Threads that `work` starts are as nice as that one:
 /// Embree's builders, which live on. Exceptions pass through.
 void compute_apart(const std::function<void()>& work);
 

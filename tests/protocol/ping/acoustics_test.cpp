@@ -160,9 +160,9 @@ TEST(OmniscanAcoustics, TheBedBeginsUnderTheSonar) {
 // ---- Surveyor
 
 struct Sounder {
-  explicit Sounder(std::shared_ptr<const Scene> scene) {
+  explicit Sounder(std::shared_ptr<const Scene> scene, int end_mm = 10000) {
     surveyor::Settings settings;
-    settings.parameters = {.end_mm = 10000, .enable = 1};
+    settings.parameters = {.end_mm = end_mm, .enable = 1};
     sounding = std::make_unique<Sounding>(scene, state.model->modes[0], surveyor::ping_settings(settings));
     sounding->request.switches.noise = true;
     sounding->request.vendor_settings = std::make_shared<surveyor::HeldSettings>(settings);
@@ -199,18 +199,49 @@ double slope_of(const Points& p) {
   for (std::size_t i = 0; i < p.y.size(); ++i) ++n, y += p.y[i], z += p.z[i], yy += p.y[i] * p.y[i], yz += p.y[i] * p.z[i];
   return (n * yz - y * z) / (n * yy - y * y);
 }
-std::shared_ptr<const Scene> bed(double slope) {
-  return SceneMaker().add(height_field(-8, 8, -16, 16, 0.5, [=](double, double y) { return -5 + slope * y; }), -25).make();
+std::shared_ptr<const Scene> bed(double slope, double altitude_m = 5, double strength_db = -25) {
+  const double half_m = 3.2 * altitude_m;
+  const auto height_m = [=](double, double y) { return -altitude_m + slope * y; };
+  return SceneMaker()
+      .add(height_field(-half_m / 2, half_m / 2, -half_m, half_m, altitude_m / 10, height_m), static_cast<float>(strength_db))
+      .make();
 }
 
 TEST(SurveyorAcoustics, AFlatBottomIsFlat) {
   Sounder sounder(bed(0));
   for (std::uint32_t number = 1; number <= 20; ++number) {
     const Points points = points_in(sounder.ping(number)[2]);
-    EXPECT_GE(points.y.size(), 10u);
+    EXPECT_EQ(points.y.size(), 16u);
     EXPECT_GT(points.y.front(), 2.5) << "to port first";
     EXPECT_LT(points.y.back(), -2.5);
     for (std::size_t i = 0; i < points.z.size(); ++i) EXPECT_NEAR(points.z[i], -5, 0.05) << number << " y " << points.y[i];
+  }
+}
+
+// Within some pulses: 1.5 steps of 400 to twice the altitude.
+TEST(SurveyorAcoustics, BedsHaveAPointInEachDirection) {
+  for (const double altitude_m : {2.0, 12.0})
+    for (const double slope_deg : {0.0, 10.0, -20.0})
+      for (const double strength_db : {-15.0, -35.0}) {
+        const double slope = std::tan(rad_from_deg(slope_deg));
+        Sounder sounder(bed(slope, altitude_m, strength_db), static_cast<int>(2000 * altitude_m));
+        for (std::uint32_t number = 1; number <= 4; ++number) {
+          const Points points = points_in(sounder.ping(number, 0, 0.3 * number)[2]);
+          EXPECT_EQ(points.y.size(), 16u) << altitude_m << " m, " << slope_deg << ", " << strength_db << " dB";
+          for (std::size_t i = 0; i < points.z.size(); ++i)
+            EXPECT_NEAR(points.z[i], -altitude_m + slope * points.y[i], 0.02 * altitude_m) << points.y[i];
+        }
+      }
+}
+
+TEST(SurveyorAcoustics, ASmallTargetIsOnePoint) {
+  for (double azimuth = -39; azimuth < 39.5; azimuth += 2.6) {
+    const double a = rad_from_deg(azimuth);
+    Sounder sounder(SceneMaker().add_point({0, 5 * std::sin(a), -5 * std::cos(a)}, -30).make());
+    const Points points = points_in(sounder.ping(1)[2]);
+    ASSERT_EQ(points.y.size(), 1u) << azimuth;
+    EXPECT_NEAR(points.y[0], 5 * std::sin(a), 0.03) << azimuth;
+    EXPECT_NEAR(points.z[0], -5 * std::cos(a), 0.03) << azimuth;
   }
 }
 

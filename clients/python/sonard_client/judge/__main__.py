@@ -108,6 +108,31 @@ def _check(options: argparse.Namespace) -> None:
         raise NotJudged("--tap ros1 needs rospy, which this Python does not have: source ROS's setup.bash first")
 
 
+class TimeLeft:
+    """How long the cases that are left will take: as long as those before, by what each is expected to take."""
+
+    def __init__(self, cases: Sequence[Case], jobs: int) -> None:
+        self._waiting = {case.number: case for case in cases}
+        self._jobs = jobs
+        self._expected_s = self._took_s = 0.0  # of those that are done
+
+    @staticmethod
+    def expected_s(case: Case) -> float:
+        """Start, fault, recovery and end, on an idle computer."""
+        return 6 + case.until().get("seconds", 1) + case.tail_s
+
+    def after(self, case: Case, took_s: float, repeat: int = 1) -> str:
+        """Words for the time that is left once that case is done: "", ", 40 s left", ", 5 min left"."""
+        if self._waiting.pop(case.number, None) is not None:
+            self._expected_s += self.expected_s(case) * repeat
+            self._took_s += took_s
+        if not self._waiting or self._expected_s == 0:
+            return ""
+        expected_s = sum(self.expected_s(one) for one in self._waiting.values()) * repeat
+        left_s = expected_s * self._took_s / self._expected_s / min(self._jobs, len(self._waiting))
+        return f", {max(10, round(left_s, -1)):.0f} s left" if left_s < 95 else f", {left_s / 60:.0f} min left"
+
+
 class Judge:
     """One run over the chosen cases."""
 
@@ -128,6 +153,7 @@ class Judge:
             self.command = shlex.join(adapter) + " " + options.driver
         self._running: "set[subprocess.Popen[str]]" = set()
         self._stopping = False
+        self._left = TimeLeft([], options.jobs)
         self._print, self._done, self._slots = threading.Lock(), 0, list(range(options.jobs, 0, -1))
         # Several judges on one computer: their loopback addresses and ports must differ.
         self._first_offset = 1 + os.getpid() % 9 * 10
@@ -158,7 +184,7 @@ class Judge:
             (folder / "spec.json").write_text(json.dumps(self.spec(case, slot), indent=1) + "\n", encoding="utf-8")
             path = os.pathsep.join(filter(None, (_PACKAGE, os.environ.get("PYTHONPATH", ""))))
             command = [sys.executable, "-m", "sonard_client.judge.run_case", str(folder.resolve())]
-            limit_s = 90 + (case.limit + case.until().get("seconds", 20) if case else 30)
+            limit_s = 240 + (case.limit + case.until().get("seconds", 20) if case else 30)
             if not self.lacking:
                 command = [*lab.unshare_prefix(), *command]
             with subprocess.Popen(command, env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.DEVNULL,
@@ -225,7 +251,7 @@ class Judge:
         return f"{case.kind} of this sonard has no parameter {', '.join(unknown)}" if unknown else ""
 
     def row(self, case: Case, total: int) -> Dict[str, Any]:
-        folder = self.out / "cases" / case.number
+        folder, began = self.out / "cases" / case.number, time.monotonic()
         why = "stopped" if self._stopping else self.not_run(case)
         runs: List[Dict[str, Any]] = []
         if why:
@@ -245,12 +271,14 @@ class Judge:
             self._done += 1
             words = ", ".join(w for w in report.pages.verdict_words(found) if w)
             reasons = "" if found["result"].startswith("PASS") and found["should_holds"] else "; ".join(report.reasons(found))
-            print(f"[{self._done:>3}/{total}] {case.number:<8} {found['result']:<11} {words:<22} {reasons}".rstrip(), flush=True)
+            left = self._left.after(case, 0.0 if why else time.monotonic() - began, self.options.repeat)
+            print(f"[{self._done:>3}/{total}{left}] {case.number:<8} {found['result']:<11} {words:<22} {reasons}".rstrip(), flush=True)
         return found
 
     def column(self, cases: Sequence[Case]) -> Dict[str, Any]:
         o, began = self.options, time.monotonic()
         date = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
+        self._left = TimeLeft([case for case in cases if not self.not_run(case)], o.jobs)
         with ThreadPoolExecutor(o.jobs) as pool:
             try:
                 rows = list(pool.map(lambda case: self.row(case, len(cases)), cases))
@@ -281,6 +309,8 @@ def _judge(options: argparse.Namespace) -> int:
     judge.nominal()
     column = judge.column(cases)
     report.write(out, [column], options.strict)
+    if text := report.causes_text(column):
+        print(text)
     print(report.summary(column))
     print(f"report: {out / 'index.html'}")
     if all(row["result"] == "NOT RUN" for row in column["cases"]):

@@ -67,6 +67,7 @@ td.cell a,td.cell span.box{display:block;border-radius:7px;padding:.25rem .6rem;
 font-size:.88rem;line-height:1.35}
 td.cell a:hover{text-decoration:underline}
 td.cell b{margin-right:.4rem}
+ul.causes{list-style:none;margin:0;padding:0}ul.causes li{margin:.35rem 0}
 .why{font-size:.84rem;color:var(--soft);max-width:26rem}
 .good{background:var(--good);color:var(--good-ink)}.fair{background:var(--fair);color:var(--fair-ink)}
 .flaky{background:var(--flaky);color:var(--flaky-ink)}.bad{background:var(--bad);color:var(--bad-ink)}
@@ -142,7 +143,17 @@ def _cell(column: Json, row: "Json | None") -> str:
             f'<b aria-hidden="true">{mark}</b>{_e(word)}<br><small>{_e(recovery)}</small></a></td>')
 
 
-def matrix(columns: Sequence[Json], summary: Callable[[Json], str]) -> str:
+def _causes(column: Json, causes: Callable[[Sequence[Json]], List[Json]]) -> str:
+    found = causes(column["cases"])
+    if not found:
+        return ""
+    items = "".join(f'<li><span class="swatch {"bad" if c["must"] else "fair"}">{len(c["cases"])}</span>{_e(c["why"])}<br>'
+                    f'<small>{" ".join(f"""<a href="#{_e(n)}">{_e(n)}</a>""" for n in c["cases"])}</small></li>' for c in found)
+    return (f'<section class="card" aria-label="{_e(column["name"])}: causes"><h2>{_e(column["name"])}: cases that fail alike</h2>'
+            f'<ul class="causes">{items}</ul></section>')
+
+
+def matrix(columns: Sequence[Json], summary: Callable[[Json], str], causes: Callable[[Sequence[Json]], List[Json]]) -> str:
     """The table of cases by drivers."""
     numbers: Dict[str, Json] = {}
     for column in columns:
@@ -162,7 +173,7 @@ def matrix(columns: Sequence[Json], summary: Callable[[Json], str]) -> str:
         worst = max((r["colour"] for r in rows if r), key=COLOURS.index)
         why = "<br>".join(_e(w) for w in _reasons(rows[0])) if single and rows[0] else ""
         text = _e(f"{case['number']} {case['name']} {case['sentence']}".lower())
-        body.append(f'<tr data-text="{text}" data-worst="{worst}"><th scope="row"><code>{_e(case["number"])}</code>'
+        body.append(f'<tr id="{_e(case["number"])}" data-text="{text}" data-worst="{worst}"><th scope="row"><code>{_e(case["number"])}</code>'
                     f'{_e(case["sentence"])}</th>{"".join(_cell(c, r) for c, r in zip(columns, rows))}'
                     f'{f"<td class=why>{why}</td>" if single else ""}</tr>')
     heads = "".join(f'<th scope="col">{_e(c["name"])}</th>' for c in columns)
@@ -174,6 +185,7 @@ def matrix(columns: Sequence[Json], summary: Callable[[Json], str]) -> str:
     return _page(f"Driver judge: {title}", f"""
 <a class="skip" href="#cases">To the cases</a><main><p class="soft">sonard · driver judge</p><h1>{_e(title)}</h1>{said}
 <div class="cards">{"".join(_card(c) for c in columns)}</div>
+{"".join(_causes(c, causes) for c in columns)}
 <div class="tools" id="tools" hidden><label>Find <input type="search" id="find" placeholder="L05, silent, garbage"></label>
 <label><input type="checkbox" id="only"> only cases that are not perfect</label>
 <span class="soft" id="said" role="status"></span></div>

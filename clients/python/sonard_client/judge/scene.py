@@ -138,10 +138,21 @@ class Scene:
             return [s.mono for s in self.capture.delivered()]
         return list(self.status.ping_times)
 
-    def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        """Waits for a condition; ends early when the driver ends or takes too much memory."""
-        deadline = time.monotonic() + timeout_s
+    def moves(self) -> Tuple[int, ...]:
+        """Counts that grow as long as anything happens between sonar and driver."""
+        wire = self.capture
+        return (len(self.status.ping_times), len(self.driver.published), len(self.driver.line_times),
+                len(wire.seen()) if wire else 0, len(wire.connections) if wire else len(self.status.connections),
+                sum(len(c.fires) for c in wire.connections) if wire else 0)
+
+    def wait(self, until: Callable[[], bool], timeout_s: float, moves: Optional[Callable[[], object]] = None) -> bool:
+        """Waits for a condition; ends early when the driver ends or takes too much memory. With `moves` the time counts anew, up
+        to six times it, whenever their value changes: a busy computer is slow, and a driver that does nothing is stuck."""
+        began = time.monotonic()
+        deadline, before = began + timeout_s, moves() if moves else None
         while time.monotonic() < deadline:
+            if moves and (now := moves()) != before:
+                before, deadline = now, min(began + 6 * timeout_s, time.monotonic() + timeout_s)
             self.journal.read()
             if until():
                 return True

@@ -93,6 +93,30 @@ TEST(Pacer, ANewRhythmStartsAtOnceButNotBeforeTheLastPingIsHome) {
   EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(5000));
 }
 
+TEST(Pacer, AFasterRhythmStartsWithItsOwnPeriod) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  ASSERT_TRUE(pacer.fire(t0, false));
+  pacer.configure(settings(40), t0 + milliseconds(3));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(25));
+  ASSERT_TRUE(pacer.fire(t0 + milliseconds(25), false));
+  // Sound travels 60 m and back in 82 ms, with 2 ms to spare.
+  pacer.configure(settings(10, 60), t0 + milliseconds(50));
+  ASSERT_TRUE(pacer.fire(t0 + milliseconds(50), false));
+  pacer.configure(settings(40, 1), t0 + milliseconds(60));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(50 + 82));
+}
+
+TEST(Pacer, ChangesOfTheRhythmMakeNoMorePingsThanTheFastestOfThem) {
+  Pacer pacer;
+  int pings = 0;
+  for (int ms = 0; ms < 1000; ++ms) {
+    pacer.configure(settings(ms % 2 == 0 ? 10 : 40, 1), t0 + milliseconds(ms));
+    pings += pacer.fire(t0 + milliseconds(ms), false);
+  }
+  EXPECT_LE(pings, 41);
+}
+
 TEST(Pacer, StandbyStopsAndAnyOtherRateResumesAtOnce) {
   Pacer pacer;
   pacer.configure(settings(10), t0);

@@ -189,7 +189,7 @@ TEST(Threads, ThatComputeAreNiceAndSoAreThoseTheyStart) {
     own = niceness();
     std::thread([&] { started = niceness(); }).join();
   });
-  EXPECT_EQ(own, std::min(here + compute_niceness, 19));
+  EXPECT_EQ(own, std::min(here + background_niceness, 19));
   EXPECT_EQ(started, own);
   EXPECT_EQ(niceness(), here);
   EXPECT_THROW(compute_apart([] { throw std::runtime_error("no"); }), std::runtime_error);

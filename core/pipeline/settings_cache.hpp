@@ -1,0 +1,47 @@
+// Tables of settings, kept from ping to ping: several sonars take turns, and clients come back to settings they had before.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/base/parallel.hpp"
+#include "core/pipeline/noise.hpp"
+#include "core/pipeline/ping_plan.hpp"
+#include "core/scene/scene.hpp"
+#include "core/sonar/ping.hpp"
+
+namespace sonar {
+
+/// What one model with one set of settings needs from ping to ping.
+struct PreparedSettings {
+  std::shared_ptr<const SonarModel> model;
+  PingPlan plan;
+  NoiseTable noise, grains;  // of the receiver; of the pulse's correlation, where that is another
+  std::uint64_t last_used = 0;
+
+  bool one_table() const { return plan.noise_filter == plan.pulse_filter; }
+};
+
+class SettingsCache {
+ public:
+  /// Some eight of the largest tables of an M1200d with 512 beams, or hundreds of small ones.
+  static constexpr std::size_t usual_bytes = std::size_t{64} << 20;
+  explicit SettingsCache(std::size_t most_bytes = usual_bytes) : most_bytes_(most_bytes) {}
+
+  /// Makes what is missing, and forgets what was used least recently until all fit, but for these. Valid until the next call.
+  PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Parallel& pool);
+  /// About, of all that are kept.
+  std::size_t bytes() const;
+  std::size_t count() const { return prepared_.size(); }
+
+ private:
+  void forget_others(const PreparedSettings& in_use);
+
+  std::size_t most_bytes_;
+  std::vector<std::unique_ptr<PreparedSettings>> prepared_;
+  std::uint64_t uses_ = 0;
+};
+
+}  // namespace sonar
