@@ -86,8 +86,8 @@ Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double si
     for (std::size_t i = 0; i < n; ++i) at.push_back(size * (static_cast<double>(i) / static_cast<double>(n - 1) - 0.5));
     return at;
   };
-  grid.x_m = axis(picture.columns, size_x_m);
-  grid.y_m = axis(picture.rows, size_y_m);
+  grid.x = axis(picture.columns, size_x_m);
+  grid.y = axis(picture.rows, size_y_m);
   grid.z_m.resize(picture.grey.size());
   for (std::size_t j = 0; j < picture.rows; ++j) {
     for (std::size_t i = 0; i < picture.columns; ++i) {

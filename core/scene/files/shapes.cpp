@@ -36,6 +36,11 @@ Shape from_grid(const Result<HeightGrid>& grid, std::uint16_t material, const No
   return shape;
 }
 
+Geodetic origin_from(Map keys) {
+  const double latitude_deg = keys.required("lat").number(Range::between(-90, 90));
+  return {rad_from_deg(latitude_deg), rad_from_deg(keys.required("lon").number(Range::between(-180, 360))), 0};
+}
+
 double in_rad(const Node& node, double fallback_deg) {
   return rad_from_deg(node.number_or(fallback_deg, Range::between(-360, 360)));
 }
@@ -162,9 +167,17 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
     return from_grid(read_png_heights(path, size[0], size[1], height[0], height[1]), material, file, false);
   }
   if (extension == ".asc") {
-    const double z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000));
+    HeightOptions options{.z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000))};
     const bool centred = keys.optional("centred").boolean_or(false);
-    return from_grid(read_esri_heights(path, z_scale), material, file, centred);
+    if (const Node geographic = keys.optional("geographic")) options.geographic = geographic.boolean_or(false);
+    if (const Node origin = keys.optional("origin")) {
+      options.origin = origin_from(origin.map());
+      if (centred) origin.fail("give origin or centred, not both");
+    }
+    auto grid = read_esri_heights(path, options);
+    if (grid)
+      for (const std::string& note : grid->notes) scene.notes.push_back(path.filename().string() + ": " + note);
+    return from_grid(grid, material, file, centred);
   }
   if (file.present() && !path.filename().empty())
     file.fail("unknown height format; use a grey .png or an ESRI ASCII grid (.asc)");

@@ -43,10 +43,10 @@ TEST(Seabed, HasTheSizeSpacingAndReliefAskedFor) {
   SeabedShape shape{.size_x_m = 30, .size_y_m = 20, .fine_x_m = 30, .fine_y_m = 20, .spacing_x_m = 0.25, .spacing_y_m = 0.5};
   shape.relief_m = 0.2;
   const HeightGrid grid = make_seabed(shape);
-  EXPECT_EQ(grid.x_m.size(), 121u);
-  EXPECT_EQ(grid.y_m.size(), 41u);
-  EXPECT_DOUBLE_EQ(grid.x_m.front(), -15);
-  EXPECT_DOUBLE_EQ(grid.x_m.back(), 15);
+  EXPECT_EQ(grid.x.size(), 121u);
+  EXPECT_EQ(grid.y.size(), 41u);
+  EXPECT_DOUBLE_EQ(grid.x.front(), -15);
+  EXPECT_DOUBLE_EQ(grid.x.back(), 15);
   const auto [low, high] = std::minmax_element(grid.z_m.begin(), grid.z_m.end());
   EXPECT_GT(*high - *low, 0.2f);
   EXPECT_LT(*high - *low, 0.8f);
@@ -64,7 +64,7 @@ TEST(Seabed, RipplesHaveTheirWavelengthAndHeight) {
   shape.relief_m = 0;
   shape.ripples = {.wavelength_m = 0.5, .height_m = 0.06, .direction_rad = 0, .bend = 0};
   const HeightGrid grid = make_seabed(shape);
-  const std::size_t n = grid.x_m.size();
+  const std::size_t n = grid.x.size();
   int crossings = 0;
   float low = 1, high = -1;
   for (std::size_t i = 0; i + 1 < n; ++i) {
@@ -79,16 +79,16 @@ TEST(Seabed, RipplesHaveTheirWavelengthAndHeight) {
 TEST(Seabed, WidensOutsideItsFinePartAndKeepsItsEstimate) {
   const SeabedShape shape{.size_x_m = 60, .size_y_m = 60, .fine_x_m = 10, .fine_y_m = 10, .spacing_x_m = 0.1, .spacing_y_m = 0.1};
   const HeightGrid grid = make_seabed(shape);
-  EXPECT_DOUBLE_EQ(grid.x_m.back(), 30);
+  EXPECT_DOUBLE_EQ(grid.x.back(), 30);
   double widest = 0;
-  for (std::size_t i = 1; i < grid.x_m.size(); ++i) {
-    const double step = grid.x_m[i] - grid.x_m[i - 1];
+  for (std::size_t i = 1; i < grid.x.size(); ++i) {
+    const double step = grid.x[i] - grid.x[i - 1];
     EXPECT_GT(step, 0.05);
     widest = std::max(widest, step);
   }
   EXPECT_GT(widest, 0.9);
   EXPECT_LT(widest, 1.6);
-  EXPECT_EQ(seabed_triangles(shape), 2 * (grid.x_m.size() - 1) * (grid.y_m.size() - 1));
+  EXPECT_EQ(seabed_triangles(shape), 2 * (grid.x.size() - 1) * (grid.y.size() - 1));
 }
 
 const char* const small_grid =
@@ -97,7 +97,7 @@ const char* const small_grid =
 
 TEST(EsriGrid, KeepsFarCoordinatesInTheCentre) {
   TemporaryFiles files;
-  const auto grid = read_esri_heights(files.write("g.asc", small_grid), 1);
+  const auto grid = read_esri_heights(files.write("g.asc", small_grid), {});
   ASSERT_TRUE(grid) << grid.error().text;
   auto mesh = mesh_from_grid(*grid);
   ASSERT_TRUE(mesh);
@@ -109,13 +109,13 @@ TEST(EsriGrid, KeepsFarCoordinatesInTheCentre) {
   // First row of the file is north: the height at the north-west is 1.
   EXPECT_FLOAT_EQ(grid->z_m[6], 1);
   EXPECT_TRUE(std::isnan(grid->z_m[2]));
-  EXPECT_FLOAT_EQ(read_esri_heights(files.write("g.asc", small_grid), -1)->z_m[6], -1);
+  EXPECT_FLOAT_EQ(read_esri_heights(files.write("g.asc", small_grid), {.z_scale = -1})->z_m[6], -1);
 }
 
 TEST(EsriGrid, WrongFilesAreRefusedWithTheirLine) {
   TemporaryFiles files;
   const auto refusal = [&](const std::string& text) {
-    const auto grid = read_esri_heights(files.write("bad.asc", text), 1);
+    const auto grid = read_esri_heights(files.write("bad.asc", text), {});
     return grid ? std::string("accepted") : grid.error().text;
   };
   EXPECT_THAT(refusal(""), HasSubstr("ncols is missing in the header"));
@@ -126,15 +126,141 @@ TEST(EsriGrid, WrongFilesAreRefusedWithTheirLine) {
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 0\n1 2 3 4"), HasSubstr("cellsize must be"));
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2 3"), HasSubstr("ends after 3 of 4 heights"));
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2 3 4 5"), HasSubstr("more heights than"));
-  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 nan"), HasSubstr("line 5: \"nan\" is not a height"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 x"), HasSubstr("line 5: \"x\" is not a height"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ndx 1\n1 2 3 4"), HasSubstr("cellsize is missing"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ndy 1\n1 2 3 4"), HasSubstr("dx is missing"));
+  EXPECT_THAT(refusal("ncols nan\nnrows 2\ncellsize 1\n1 2 3 4"), HasSubstr("ncols needs a number"));
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 1e9"), HasSubstr("beyond 1e7 m"));
-  const auto missing = read_esri_heights("no/grid.asc", 1);
+  const auto missing = read_esri_heights("no/grid.asc", {});
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().kind, ErrorKind::missing_file);
-  const auto empty = read_esri_heights(files.write("e.asc", "ncols 2\nnrows 2\ncellsize 1\nNODATA_value 0\n0 0 0 0"), 1);
+  const auto empty = read_esri_heights(files.write("e.asc", "ncols 2\nnrows 2\ncellsize 1\nNODATA_value 0\n0 0 0 0"), {});
   ASSERT_TRUE(empty);
   EXPECT_THAT(mesh_from_grid(*empty).error().text, HasSubstr("no cell of the grid has a height"));
   for (std::size_t n = 0; n < std::string(small_grid).size(); ++n) refusal(std::string(small_grid).substr(0, n));
+}
+
+std::string grid_of(const std::string& header, const std::string& odd, int edge = 10) {
+  std::string text = "ncols " + std::to_string(edge) + "\nnrows " + std::to_string(edge) + "\n" + header + "\n";
+  for (int i = 0; i < edge * edge; ++i) text += (i == 45 ? odd : i == 99 ? "-9.5" : "-10") + (i % edge == edge - 1 ? "\n" : " ");
+  return text;
+}
+
+TEST(EsriGrid, KnowsNoDataInEveryForm) {
+  TemporaryFiles files;
+  const std::string at = "xllcorner 0\nyllcorner 0\n", metre = at + "cellsize 1";
+  const auto holes_in = [&](const std::string& text, bool with_note) {
+    const auto grid = read_esri_heights(files.write("g.asc", text), {});
+    if (!grid) return grid.error().text;
+    int holes = 0;
+    for (std::size_t k = 0; k < grid->z_m.size(); ++k)
+      if (std::isnan(grid->z_m[k])) {
+        ++holes;
+        EXPECT_EQ(k, 55u) << text;
+      }
+    std::string notes;
+    for (const std::string& note : grid->notes) notes += note + ". ";
+    EXPECT_THAT(notes, HasSubstr(" of its 100 heights (1 %) are no data"));
+    EXPECT_EQ(grid->notes.size(), with_note ? 2u : 1u) << notes;
+    return std::to_string(holes);
+  };
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value nan", "nan"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre, "NaN"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(at + "dx 1\ndy 2", "-9999"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.40282e+38", "-3.4028234663852886e+38"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.4E+38", "-3.4028234663852886e+38"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -99999.99", "-99999.9921875"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value 0", "0"), false), "1");
+  for (const char* fill : {"-32768", "-99999", "-3.4028234663852886e+38", "9.96921e+36"})
+    EXPECT_EQ(holes_in(grid_of(metre, fill), true), "1") << fill;
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -32768", "-9999"), true), "1");
+  // Ground deeper than 9999 m is none.
+  const auto trench = read_esri_heights(
+      files.write("g.asc", "ncols 2\nnrows 2\ncellsize 100\nNODATA_value -32768\n-9999 -9998 -9950 -10010\n"), {});
+  ASSERT_TRUE(trench);
+  EXPECT_TRUE(trench->notes.empty()) << trench->notes[0];
+  EXPECT_FLOAT_EQ(trench->z_m[2], -9999);
+}
+
+TEST(EsriGrid, OblongCells) {
+  TemporaryFiles files;
+  const auto grid =
+      read_esri_heights(files.write("g.asc", "ncols 3\nnrows 2\nxllcorner 10\nyllcorner 20\ndx 2\ndy 4\n1 2 3 4 5 6"), {});
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->x, (std::vector<double>{11, 13, 15}));
+  EXPECT_EQ(grid->y, (std::vector<double>{22, 26}));
+}
+
+std::string degrees_of(const std::string& corner, const std::string& cell, int edge = 40, bool flat = false) {
+  std::string text =
+      "ncols " + std::to_string(edge) + "\nnrows " + std::to_string(edge) + "\n" + corner + "\ncellsize " + cell + "\n";
+  for (int i = 0; i < edge * edge; ++i) text += std::to_string(flat ? -20.0 : -20 + 3 * std::sin(0.3 * i)) + " ";
+  return text;
+}
+
+TEST(EsriGrid, DegreesBecomeMetresAboutAnOrigin) {
+  TemporaryFiles files;
+  // Lengths of a degree at 60 degrees north: 111 412.4 m along the meridian, 55 799.8 m along the parallel (WGS84: the
+  // meridian's radius, and N cos(latitude)), here of 39 arc seconds.
+  const std::string text = degrees_of("xllcorner 5.0\nyllcorner 60.0", "0.000277777778");
+  const auto grid = read_esri_heights(files.write("g.asc", text), {});
+  ASSERT_TRUE(grid) << grid.error().text;
+  ASSERT_EQ(grid->notes.size(), 2u);
+  EXPECT_THAT(grid->notes[0], HasSubstr("taken as degrees"));
+  EXPECT_THAT(grid->notes[1], HasSubstr("about its middle, latitude 60.005556, longitude 5.005556"));
+  const auto mesh = mesh_from_grid(*grid);
+  ASSERT_TRUE(mesh);
+  expect_sound(mesh->mesh);
+  Vec3 low = mesh->mesh.vertices[0], high = low;
+  for (const Vec3& v : mesh->mesh.vertices)
+    low = {std::min(low.x, v.x), std::min(low.y, v.y), 0}, high = {std::max(high.x, v.x), std::max(high.y, v.y), 0};
+  EXPECT_NEAR(high.y - low.y, 39 * 111412.4 / 3600, 0.1);
+  EXPECT_NEAR(high.x - low.x, 39 * 55799.8 / 3600, 0.2);  // the widest row is 19 arc seconds farther south
+  EXPECT_NEAR(mesh->centre_m.x, 0, 0.1);
+  EXPECT_NEAR(mesh->centre_m.y, 0, 0.1);
+
+  // Every vertex where the geodesy of poses puts the same place, its height apart.
+  const Geodetic origin{rad_from_deg(60.1), rad_from_deg(4.9), 0};
+  const auto placed = read_esri_heights(files.write("g.asc", text), {.geographic = true, .origin = origin});
+  ASSERT_TRUE(placed) << placed.error().text;
+  EXPECT_TRUE(placed->notes.empty());
+  const auto there = mesh_from_grid(*placed);
+  ASSERT_TRUE(there);
+  for (const std::size_t k : {std::size_t{0}, std::size_t{39}, std::size_t{777}, std::size_t{1599}}) {
+    const Vec3d expected =
+        enu_in_enu_of(origin, {rad_from_deg(placed->y[k / 40]), rad_from_deg(placed->x[k % 40]), 0}).position_m;
+    const Vec3d p = to_double(there->mesh.vertices[k]) + there->centre_m;
+    EXPECT_NEAR(p.x, expected.x, 1e-3) << k;
+    EXPECT_NEAR(p.y, expected.y, 1e-3) << k;
+    EXPECT_NEAR(p.z, static_cast<double>(placed->z_m[k]), 1e-5) << k;
+  }
+}
+
+TEST(EsriGrid, SaysWhatItTakesForDegrees) {
+  TemporaryFiles files;
+  const auto is_geographic = [&](const std::string& text, const HeightOptions& options = {}) -> std::string {
+    const auto grid = read_esri_heights(files.write("g.asc", text), options);
+    return !grid ? grid.error().text : grid->origin ? "degrees" : "metres";
+  };
+  const std::string near_zero = "xllcorner 0\nyllcorner 0", far = "xllcorner 500000\nyllcorner 6600000";
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.004166667")), "degrees");
+  EXPECT_EQ(is_geographic(degrees_of("xllcorner -122.5\nyllcorner -47", "0.000833333", 12, true)), "degrees");
+  EXPECT_EQ(is_geographic(degrees_of("xllcorner 237.5\nyllcorner 47", "0.016666667", 12)), "degrees");
+  EXPECT_EQ(is_geographic(degrees_of(far, "0.004166667")), "metres");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "30")), "metres");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.05", 12, true)), "metres");  // a tank
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.004166667"), {.geographic = false}), "metres");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.05", 12, true), {.geographic = true}), "degrees");
+  const std::string seattle = degrees_of("xllcorner 237.5\nyllcorner 47", "0.016666667", 12);
+  EXPECT_EQ(is_geographic(seattle, {.origin = Geodetic{rad_from_deg(47), rad_from_deg(-122.5), 0}}), "degrees");
+  EXPECT_THAT(is_geographic(degrees_of(far, "1"), {.geographic = true}), HasSubstr("no longitudes and latitudes"));
+  EXPECT_THAT(is_geographic(degrees_of(near_zero, "1", 40, true), {.geographic = true}), HasSubstr("at most 5"));
+  EXPECT_THAT(is_geographic(degrees_of("xllcorner 3\nyllcorner 89.5", "0.0002"), {}), HasSubstr("of a pole"));
+  EXPECT_THAT(is_geographic(degrees_of(far, "1"), {.origin = Geodetic{}}), HasSubstr("origin is for a grid in degrees"));
+  files.write("g.prj", "GEOGCS[\"WGS 84\"]");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.05", 12, true)), "degrees");
+  files.write("g.prj", "PROJCS[\"UTM\"]");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.004166667")), "metres");
 }
 
 // A grey image written with libpng's simple interface.
@@ -155,8 +281,8 @@ TEST(PngHeights, SixteenBitsKeepTheirSteps) {
   const std::uint16_t pixels[6] = {0, 1, 65535, 256, 512, 32768};
   const auto grid = read_png_heights(write_png(files, 3, 2, PNG_FORMAT_LINEAR_Y, pixels), 20, 10, -6.5535, 0);
   ASSERT_TRUE(grid) << grid.error().text;
-  EXPECT_DOUBLE_EQ(grid->x_m.front(), -10);
-  EXPECT_DOUBLE_EQ(grid->y_m.back(), 5);
+  EXPECT_DOUBLE_EQ(grid->x.front(), -10);
+  EXPECT_DOUBLE_EQ(grid->y.back(), 5);
   EXPECT_NEAR(grid->z_m[3], -6.5535, 1e-6);  // first row of the image is the last row of the grid
   EXPECT_NEAR(grid->z_m[4], -6.5534, 1e-6);
   EXPECT_NEAR(grid->z_m[5], 0, 1e-6);
@@ -189,8 +315,8 @@ TEST(PngHeights, WrongFilesAreRefused) {
 
 TEST(HeightGrid, TooManyTrianglesAreRefused) {
   HeightGrid grid;
-  grid.x_m.resize(5000);
-  grid.y_m.resize(5000);
+  grid.x.resize(5000);
+  grid.y.resize(5000);
   EXPECT_THAT(mesh_from_grid(grid).error().text, HasSubstr("more than 20 million triangles"));
 }
 
