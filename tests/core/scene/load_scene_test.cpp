@@ -181,6 +181,13 @@ objects:
               HasSubstr("unknown height format"));
 }
 
+TEST(LoadScene, LostTrianglesOfAMeshAreANote) {
+  TemporaryFiles files;
+  files.write("m.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\n f 1 3 4\n");
+  EXPECT_THAT(parsed(object("type: mesh, file: m.obj, material: ice"), files.folder())->notes,
+              ::testing::ElementsAre(HasSubstr("m.obj: 1 of the triangles that it lists cannot be read and are missing here")));
+}
+
 TEST(LoadScene, HeightmapsInDegreesStandAboutAnOrigin) {
   TemporaryFiles files;
   files.write("g.asc", "ncols 3\nnrows 3\nxllcenter 5\nyllcenter 60\ncellsize 0.01\n-1 -2 -3\n-4 -5 -6\n-7 -8 -9999\n");
