@@ -1,4 +1,4 @@
-// Ground as a height over a rectangular grid: read from files (PNG, ESRI ASCII) or made from a seed.
+// Ground as a height over a rectangular grid: read from files (PNG, ESRI ASCII, XYZ, GeoTIFF) or made from a seed.
 // All become meshes about their own middle, so that far coordinates stay in the double precision of a pose.
 #pragma once
 
@@ -36,8 +36,8 @@ struct CentredMesh {
 /// Fails when no four neighbouring heights exist, or when it would exceed max_mesh_triangles.
 Result<CentredMesh> mesh_from_grid(const HeightGrid& grid);
 
-/// Grey PNG of 8 or 16 bits over size_x by size_y metres about the origin; first row of the image = largest y.
-/// Black is low_m, white is high_m.
+/// Grey PNG of 8 or 16 bits, also stored as colours, over size_x by size_y metres about the origin; first row of the image =
+/// largest y. Black is low_m, white is high_m.
 Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double size_x_m, double size_y_m, double low_m,
                                     double high_m);
 
@@ -49,6 +49,10 @@ struct HeightOptions {
 };
 /// ESRI ASCII grid (.asc).
 Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const HeightOptions& options);
+/// Lines "x y z" of an even grid (.xyz).
+Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const HeightOptions& options);
+/// GeoTIFF (.tif): one band of numbers, not turned. Unavailable where sonard was built without libtiff.
+Result<HeightGrid> read_geo_tiff_heights(const std::filesystem::path& file, const HeightOptions& options);
 
 struct Ripples {
   double wavelength_m = 0;   // 0 = none

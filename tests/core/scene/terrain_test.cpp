@@ -5,8 +5,12 @@
 #include <gtest/gtest.h>
 #include <png.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
+#include <type_traits>
 
 #include "core/scene/shapes/relief_noise.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
@@ -310,6 +314,282 @@ TEST(PngHeights, WrongFilesAreRefused) {
     std::string bent = bytes;
     bent[n] = static_cast<char>(bent[n] ^ 0x55);
     refusal(files.write("bent.png", bent));
+  }
+}
+
+// Drawing programs store grey so.
+TEST(PngHeights, GreyStoredAsColoursIsRead) {
+  TemporaryFiles files;
+  const std::uint8_t levels[6] = {0, 1, 255, 16, 32, 128};
+  std::vector<std::uint8_t> rgb, rgba;
+  for (const std::uint8_t v : levels) {
+    rgb.insert(rgb.end(), {v, v, v});
+    rgba.insert(rgba.end(), {v, v, v, 255});
+  }
+  const auto expect_levels = [&](const std::filesystem::path& file, const char* what) {
+    const auto grid = read_png_heights(file, 20, 10, -255, 0);
+    ASSERT_TRUE(grid) << what << grid.error().text;
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(grid->z_m[3 + i], levels[i] - 255, 1e-3) << what;
+  };
+  expect_levels(write_png(files, 3, 2, PNG_FORMAT_RGB, rgb.data()), "RGB");
+  expect_levels(write_png(files, 3, 2, PNG_FORMAT_RGBA, rgba.data()), "RGBA");
+  std::vector<std::uint16_t> wide;
+  for (const std::uint8_t v : levels) wide.insert(wide.end(), 3, static_cast<std::uint16_t>(v * 257));
+  const auto linear = read_png_heights(write_png(files, 3, 2, PNG_FORMAT_LINEAR_RGB, wide.data()), 20, 10, -255, 0);
+  ASSERT_TRUE(linear) << linear.error().text;
+  EXPECT_NEAR(linear->z_m[4], -254, 1e-3);
+
+  const auto file = files.path("palette.png");  // indices into equal colours
+  const std::uint8_t indices[6] = {0, 1, 2, 3, 4, 5};
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = 3, image.height = 2, image.format = PNG_FORMAT_RGB_COLORMAP, image.colormap_entries = 6;
+  ASSERT_TRUE(png_image_write_to_file(&image, file.c_str(), 0, indices, 0, rgb.data()));
+  expect_levels(file, "palette");
+  rgb[17] = 129;
+  EXPECT_THAT(read_png_heights(write_png(files, 3, 2, PNG_FORMAT_RGB, rgb.data()), 1, 1, 0, 1).error().text,
+              HasSubstr("not a grey image: it has colours"));
+}
+
+TEST(XyzGrid, PointsOfAnEvenGridInAnyOrder) {
+  TemporaryFiles files;
+  const auto read = [&](const std::string& text) { return read_xyz_heights(files.write("g.xyz", text), {}); };
+  const auto grid = read(
+      "x y z\n500010 100 -1\n500020,100,-2\n500010;110;-3\n\n# missing: 500020 110\n500010 130 -5\n500020 130 nan\n500020 100 "
+      "-7\n");
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->x, (std::vector<double>{500010, 500020}));
+  EXPECT_EQ(grid->y, (std::vector<double>{100, 110, 120, 130}));  // a row that is missing is a row of holes
+  EXPECT_FLOAT_EQ(grid->z_m[0], -1);
+  EXPECT_FLOAT_EQ(grid->z_m[1], -7);
+  EXPECT_FLOAT_EQ(grid->z_m[2], -3);
+  EXPECT_TRUE(std::isnan(grid->z_m[3]) && std::isnan(grid->z_m[4]) && std::isnan(grid->z_m[7]));
+  EXPECT_THAT(grid->notes,
+              ::testing::ElementsAre(HasSubstr("4 of its 8 heights"), HasSubstr("1 points lie where another one was")));
+
+  std::string degrees;  // rounded to five digits, as tools write them
+  for (int j = 0; j < 30; ++j)
+    for (int i = 0; i < 400; ++i) {
+      char line[80];
+      std::snprintf(line, sizeof line, "%.5f %.5f %.2f\n", 5 + i / 3600.0, 60 + j / 3600.0, -20 + 3 * std::sin(0.3 * i + j));
+      degrees += line;
+    }
+  const auto rounded = read(degrees);
+  ASSERT_TRUE(rounded) << rounded.error().text;
+  EXPECT_EQ(rounded->x.size(), 400u);
+  EXPECT_EQ(rounded->y.size(), 30u);
+  EXPECT_TRUE(rounded->origin);
+}
+
+TEST(XyzGrid, FineStepsFarAwayStayInTheirCells) {
+  TemporaryFiles files;
+  std::string text;
+  for (int i = 0; i < 2000; ++i)
+    for (int j = 0; j < 2; ++j) {
+      char line[80];
+      std::snprintf(line, sizeof line, "%.7f %d %d\n", 99'999'000 + 1e-6 * i, j, -1 - i);
+      text += line;
+    }
+  const auto grid = read_xyz_heights(files.write("g.xyz", text), {});
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_FLOAT_EQ(grid->z_m.front(), -1);
+  EXPECT_FLOAT_EQ(grid->z_m.back(), -2000);
+}
+
+TEST(XyzGrid, WrongFilesAreRefused) {
+  TemporaryFiles files;
+  const auto refusal = [&](const std::string& text) {
+    const auto grid = read_xyz_heights(files.write("bad.xyz", text), {});
+    return grid ? std::string("accepted") : grid.error().text;
+  };
+  EXPECT_THAT(refusal(""), HasSubstr("its 0 points are no even grid"));
+  EXPECT_THAT(refusal("1 2\n"), HasSubstr("line 1: three numbers are needed"));
+  EXPECT_THAT(refusal("1 2 3\nx y z\n"), HasSubstr("line 2: three numbers"));
+  EXPECT_THAT(refusal("1 2 3\n1e9 2 3\n"), HasSubstr("line 2: the point is farther"));
+  EXPECT_THAT(refusal("1 2 3\nnan 2 3\n"), HasSubstr("line 2: the point is farther"));
+  EXPECT_THAT(refusal("1 2 3\n2 2 1e9\n"), HasSubstr("line 2: the height 1e9 is beyond"));
+  EXPECT_THAT(refusal("0 0 1\n1 0.3 1\n2.5 1 1\n3.1 2.7 2\n"), HasSubstr("no even grid; make one of them: gdal_grid"));
+  EXPECT_THAT(refusal("0 0 1\n1 1 1\n99999 99999 1\n"), HasSubstr("more than 10 million"));
+}
+
+/// A little-endian TIFF of one strip, from the format's description: field by field.
+struct TiffFile {
+  struct Field {
+    std::uint16_t tag, type;
+    std::uint32_t count;
+    std::string value;  // little-endian
+  };
+  template <class T>
+  static std::string bytes_of(const std::vector<T>& values) {
+    return {reinterpret_cast<const char*>(values.data()), sizeof(T) * values.size()};
+  }
+  std::vector<Field> fields;
+  std::string heights;
+
+  void shorts(std::uint16_t tag, const std::vector<std::uint16_t>& v) {
+    fields.push_back({tag, 3, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+  }
+  void longs(std::uint16_t tag, const std::vector<std::uint32_t>& v) {
+    fields.push_back({tag, 4, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+  }
+  void doubles(std::uint16_t tag, const std::vector<double>& v) {
+    fields.push_back({tag, 12, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+  }
+  void text(std::uint16_t tag, const std::string& v) {
+    fields.push_back({tag, 2, static_cast<std::uint32_t>(v.size() + 1), v + '\0'});
+  }
+
+  template <class T>
+  static TiffFile of(std::uint16_t columns, std::uint16_t rows, const std::vector<T>& heights) {
+    TiffFile f;
+    f.heights = bytes_of(heights);
+    f.shorts(256, {columns}), f.shorts(257, {rows}), f.shorts(258, {8 * sizeof(T)}), f.shorts(259, {1}), f.shorts(262, {1});
+    f.longs(273, {8}), f.shorts(277, {1}), f.shorts(278, {rows}), f.longs(279, {static_cast<std::uint32_t>(f.heights.size())});
+    f.shorts(339, {std::is_floating_point_v<T> ? std::uint16_t{3} : std::is_signed_v<T> ? std::uint16_t{2} : std::uint16_t{1}});
+    return f;
+  }
+  TiffFile& at(double west, double north, double cell_x, double cell_y) {
+    doubles(33550, {cell_x, cell_y, 0});
+    doubles(33922, {0, 0, 0, west, north, 0});
+    return *this;
+  }
+  TiffFile& keys(const std::vector<std::array<std::uint16_t, 2>>& keys) {
+    std::vector<std::uint16_t> words{1, 1, 0, static_cast<std::uint16_t>(keys.size())};
+    for (const auto& [key, value] : keys) words.insert(words.end(), {key, 0, 1, value});
+    shorts(34735, words);
+    return *this;
+  }
+  TiffFile& without(std::uint16_t tag) {
+    std::erase_if(fields, [&](const Field& f) { return f.tag == tag; });
+    return *this;
+  }
+
+  std::string bytes() const {
+    std::vector<Field> sorted = fields;
+    std::sort(sorted.begin(), sorted.end(), [](const Field& a, const Field& b) { return a.tag < b.tag; });
+    const auto word = [](std::uint32_t v) { return bytes_of(std::vector<std::uint32_t>{v}); };
+    const auto half = [](std::uint16_t v) { return bytes_of(std::vector<std::uint16_t>{v}); };
+    const std::size_t directory = 8 + heights.size() + heights.size() % 2;
+    std::string out = "II*" + std::string(1, '\0') + word(static_cast<std::uint32_t>(directory)) + heights, more;
+    out.resize(directory);
+    out += half(static_cast<std::uint16_t>(sorted.size()));
+    const std::size_t behind = directory + 2 + 12 * sorted.size() + 4;
+    for (const Field& f : sorted) {
+      out += half(f.tag) + half(f.type) + word(f.count);
+      std::string value = f.value;
+      if (value.size() > 4) {
+        out += word(static_cast<std::uint32_t>(behind + more.size()));
+        more += value + std::string(value.size() % 2, '\0');
+      } else {
+        value.resize(4);
+        out += value;
+      }
+    }
+    return out + word(0) + more;
+  }
+};
+
+struct GeoTiff : ::testing::Test {
+  TemporaryFiles files;
+  Result<HeightGrid> read(const TiffFile& tiff, const HeightOptions& options = {}) {
+    return read_geo_tiff_heights(files.write("g.tif", tiff.bytes()), options);
+  }
+  void SetUp() override {
+    const auto grid = read_geo_tiff_heights(files.write("g.tif", "?"), {});
+    if (grid.error().kind != ErrorKind::unavailable) return;
+    EXPECT_THAT(grid.error().text, HasSubstr("gdal_translate -of AAIGrid g.tif g.asc"));
+    GTEST_SKIP() << "built without libtiff";
+  }
+};
+const std::vector<float> six{-1, -2, -3, -4, -9999, -6};
+
+TEST_F(GeoTiff, MetresByCornerAndByPoint) {
+  TiffFile area = TiffFile::of(3, 2, six).at(500000, 6600020, 10, 5).keys({{{1024, 1}, {1025, 1}}});
+  area.text(42113, "-9999");
+  const auto grid = read(area);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->x, (std::vector<double>{500005, 500015, 500025}));
+  EXPECT_EQ(grid->y, (std::vector<double>{6600012.5, 6600017.5}));
+  EXPECT_FLOAT_EQ(grid->z_m[3], -1);  // the first row is north
+  EXPECT_TRUE(std::isnan(grid->z_m[1]));
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 of its 6 heights")));
+  const auto points = read(TiffFile::of(3, 2, six).at(500000, 6600020, 10, 5).keys({{{1024, 1}, {1025, 2}}}));
+  ASSERT_TRUE(points);
+  EXPECT_EQ(points->x.front(), 500000);
+  EXPECT_EQ(points->y.back(), 6600020);
+  const auto feet =
+      read(TiffFile::of(3, 2, six).at(1000, 2000, 10, 10).keys({{{1024, 1}, {1025, 2}, {3076, 9002}, {4099, 9002}}}));
+  ASSERT_TRUE(feet) << feet.error().text;
+  EXPECT_NEAR(feet->x.back(), 1020 * 0.3048, 1e-9);
+  EXPECT_NEAR(feet->z_m[3], -0.3048, 1e-6);
+}
+
+TEST_F(GeoTiff, DegreesStandAboutAnOrigin) {
+  const auto grid = read(TiffFile::of(3, 2, std::vector<std::int16_t>{-10, -20, -30, -40, -32768, -60})
+                             .at(5, 60, 0.01, 0.01)
+                             .keys({{{1024, 2}, {1025, 1}, {2054, 9102}}}),
+                         {.origin = Geodetic{rad_from_deg(60), rad_from_deg(5), 0}});
+  ASSERT_TRUE(grid) << grid.error().text;
+  ASSERT_TRUE(grid->origin);
+  EXPECT_NEAR(grid->x[0], 5.005, 1e-12);
+  EXPECT_NEAR(grid->y[1], 59.995, 1e-12);
+  EXPECT_TRUE(std::isnan(grid->z_m[1]));
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 cells of -32768"), HasSubstr("are no data")));
+  EXPECT_FALSE(read(TiffFile::of(3, 2, six).at(5, 60, 0.01, 0.01).keys({{{1024, 1}}}))->origin) << "metres, says the file";
+}
+
+TEST_F(GeoTiff, EveryKindOfNumber) {
+  const auto first = [&](const TiffFile& tiff) {
+    const auto grid = read(TiffFile(tiff).at(0, 100, 10, 10));
+    return grid ? static_cast<double>(grid->z_m[2]) : -1;
+  };
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::uint8_t>{7, 1, 2, 3})), 7);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::int8_t>{-7, 1, 2, 3})), -7);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::uint16_t>{40000, 1, 2, 3})), 40000);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::int32_t>{-70000, 1, 2, 3})), -70000);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<double>{-7.25, 1, 2, 3})), -7.25);
+  TiffFile turned = TiffFile::of(2, 2, six);
+  turned.doubles(34264, {10, 0, 0, 100, 0, 10, 0, 200, 0, 0, 0, 0, 0, 0, 0, 1});  // south first
+  const auto grid = read(turned);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->y, (std::vector<double>{205, 215}));
+  EXPECT_FLOAT_EQ(grid->z_m[0], -1);
+}
+
+TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
+  const auto refusal = [&](const TiffFile& tiff) {
+    const auto grid = read(tiff);
+    return grid ? std::string("accepted") : grid.error().text;
+  };
+  const auto good = [] { return TiffFile::of(3, 2, six).at(0, 100, 10, 10); };
+  EXPECT_EQ(refusal(good()), "accepted");
+  EXPECT_THAT(refusal(TiffFile::of(3, 2, six)), HasSubstr("gdal_translate -a_ullr"));
+  TiffFile picture = good().without(262).without(277);
+  picture.shorts(262, {2}), picture.shorts(277, {3});
+  EXPECT_THAT(refusal(picture), HasSubstr("not one band of heights but a picture"));
+  TiffFile huge = good().without(256).without(257);
+  huge.longs(256, {100000}), huge.longs(257, {100000});
+  EXPECT_THAT(refusal(huge), HasSubstr("more than 10 million"));
+  TiffFile jpeg = good().without(259);
+  jpeg.shorts(259, {7});
+  EXPECT_THAT(refusal(jpeg), HasSubstr("COMPRESS=DEFLATE"));
+  TiffFile turned = TiffFile::of(3, 2, six);
+  turned.doubles(34264, {10, 1, 0, 0, 1, -10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1});
+  EXPECT_THAT(refusal(turned), HasSubstr("gdalwarp"));
+  EXPECT_THAT(refusal(TiffFile::of(3, 2, six).at(0, 0, 0, 10)), HasSubstr("cells that are no lengths"));
+  EXPECT_THAT(refusal(TiffFile::of(2, 2, std::vector<float>{1e9f, 1, 2, 3}).at(0, 0, 1, 1)),
+              HasSubstr("row 1, column 1 is beyond 1e7 m"));
+  EXPECT_EQ(read_geo_tiff_heights("no/such.tif", {}).error().kind, ErrorKind::missing_file);
+  const std::string whole = good().bytes();
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    const auto cut = read_geo_tiff_heights(files.write("cut.tif", whole.substr(0, n)), {});
+    EXPECT_FALSE(cut) << n;
+    if (!cut) {
+      EXPECT_THAT(cut.error().text, HasSubstr("cut.tif: ")) << n;
+    }
+    std::string bent = whole;
+    bent[n] = static_cast<char>(bent[n] ^ 0x55);
+    (void)read_geo_tiff_heights(files.write("bent.tif", bent), {});
   }
 }
 
