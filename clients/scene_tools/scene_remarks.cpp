@@ -55,7 +55,7 @@ void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
 
 void remark_on_places(const SceneDescription& scene, Remarks& out) {
   const auto far =
-      names_where(scene, [](const DescribedObject& o) { return !o.in_world.empty() && length(o.in_world.centre_m()) > far_m; });
+      names_where(scene, [](const DescribedObject& o) { return !o.in_world.empty() && o.in_world.distance_m({}) > far_m; });
   if (!far.empty())
     out.warnings.push_back(std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far));
   const auto above = names_where(
