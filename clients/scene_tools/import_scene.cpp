@@ -120,7 +120,16 @@ Result<Imported> import_scene(const ImportOptions& options) {
   if (!materials) return tl::make_unexpected(materials.error());
   FileResolver files(library, options.out, options.read.skip_missing, options.check, findings);
   std::erase_if(world->shapes, [&](PlacedShape& shape) { return !files.resolve(shape); });
+  files.report_missing();
   if (findings.failed()) return tl::make_unexpected(*findings.error());
+  if (world->shapes.empty()) {
+    std::string why = options.file.string() + ": nothing in it has a shape that a scene can hold";
+    constexpr std::size_t most = 20;
+    const std::vector<std::string> left_out = findings.left_out();
+    for (std::size_t i = 0; i < std::min(most, left_out.size()); ++i)
+      why += (i == 0 ? "; left out: " : "; ") + plain(left_out[i], 400);
+    return failure(ErrorKind::bad_data, why);
+  }
   for (PlacedShape& shape : world->shapes) shape.material = materials->choose(shape, world->models[shape.model].path);
 
   const WriteOptions writing{.moving = options.moving, .offset_m = options.offset_m, .command = options.file.filename().string()};

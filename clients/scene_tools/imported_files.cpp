@@ -54,11 +54,18 @@ bool FileResolver::resolve(PlacedShape& placed) {
   const std::string what = std::string(mesh ? "mesh " : "heightmap ") + plain(placed.shape.uri, 200);
   if (skip_missing_)
     findings_.leave_out(placed.at, what + ": not found");
-  else
-    findings_.fail(placed.at, what +
-                                  ": no such file here; give the folder that holds it with --model-path, or go on without it "
-                                  "with --skip-missing");
+  else if (std::none_of(missing_.begin(), missing_.end(), [&](const auto& known) { return known.second == what; }))
+    missing_.emplace_back(placed.at, what);
   return false;
+}
+
+void FileResolver::report_missing() {
+  if (missing_.empty()) return;
+  std::string text = missing_.front().second +
+                     ": no such file here; give the folder that holds it with --model-path, or go on without it with "
+                     "--skip-missing";
+  for (std::size_t i = 1; i < missing_.size(); ++i) text += (i == 1 ? "; neither are there: " : ", ") + missing_[i].second;
+  findings_.fail(missing_.front().first, text);
 }
 
 bool FileResolver::resolve_mesh(PlacedShape& placed, const fs::path& file) {

@@ -6,6 +6,8 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "clients/scene_tools/imported_world.hpp"
 
@@ -14,8 +16,10 @@ namespace sonar::scene_tools {
 class FileResolver {
  public:
   FileResolver(const Library& library, std::filesystem::path scene, bool skip_missing, bool try_files, Findings& findings);
-  /// Sets the scene entry of a shape from a file. False: omitted and listed.
+  /// Sets the scene entry of a shape from a file. False: omitted and listed, or missing.
   bool resolve(PlacedShape& placed);
+  /// Fails when files were not found and are not to be skipped: each is named once.
+  void report_missing();
   /// Writes the meshes that had to be converted into a folder beside the scene.
   Result<void> write_converted();
   std::size_t converted() const { return converted_.size(); }
@@ -31,6 +35,7 @@ class FileResolver {
   std::filesystem::path scene_;
   bool skip_missing_, try_files_;
   Findings& findings_;
+  std::vector<std::pair<Place, std::string>> missing_;
   std::map<std::filesystem::path, std::string> tried_;      // why a mesh cannot be used; empty: it can
   std::map<std::string, std::string> known_conversions_;    // by file and scale: the path to write
   std::map<std::filesystem::path, std::string> converted_;  // file to write, its text

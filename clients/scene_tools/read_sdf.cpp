@@ -45,6 +45,10 @@ class SdfReader {
       const std::string_view kind = element.name();
       if (model.is_world) {
         if (is_one_of(kind, quiet_in_world) || kind == "model" || kind == "world") continue;
+        if (kind == "light") {
+          findings_.leave_out_of_no_echo("light");
+          continue;
+        }
       } else if (kind == "joint") {
         if (element.attribute("type") != "fixed")
           findings_.leave_out(element.place(),
@@ -61,7 +65,10 @@ class SdfReader {
     const char* wanted = options_.collisions ? "collision" : "visual";
     const char* other = options_.collisions ? "visual" : "collision";
     for (const Element& element : link.children())
-      if (!is_one_of(element.name(), quiet_in_link)) findings_.leave_out(element.place(), called(element));
+      if (element.name() == "light")
+        findings_.leave_out_of_no_echo("light");
+      else if (!is_one_of(element.name(), quiet_in_link))
+        findings_.leave_out(element.place(), called(element));
     const std::vector<Element> parts = link.children(wanted);
     if (parts.empty() && link.child(other))
       findings_.leave_out(link.place(), called(link) + ": has " + other + " shapes only; --" + other + " takes those");

@@ -1,9 +1,11 @@
 #include "clients/scene_tools/resource_paths.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <optional>
 
 namespace sonar::scene_tools {
 namespace {
@@ -17,6 +19,49 @@ bool is_file(const fs::path& path) {
 bool is_folder(const fs::path& path) {
   std::error_code error;
   return fs::is_directory(path, error);
+}
+
+/// -1: no number, so no version.
+int version_of(const fs::path& folder) {
+  const std::string name = folder.filename().string();
+  const bool digits =
+      !name.empty() && name.size() < 9 && std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
+  return digits ? std::atoi(name.c_str()) : -1;
+}
+
+constexpr int most_looked_at = 20'000;  // entries of a folder
+
+/// Folders of a model that Gazebo downloaded are called by its versions; the newest first.
+std::vector<fs::path> versions_in(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code error;
+  int seen = 0;
+  for (const auto& entry : fs::directory_iterator(folder, error))
+    if (++seen > most_looked_at)
+      break;
+    else if (version_of(entry.path()) >= 0)
+      found.push_back(entry.path());
+  std::sort(found.begin(), found.end(), [](const fs::path& a, const fs::path& b) { return version_of(a) > version_of(b); });
+  return found;
+}
+
+std::string lower(std::string_view text) {
+  std::string out(text);
+  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
+  return out;
+}
+
+/// As it is called, or else in other capitals: Gazebo stores what it downloads in small letters.
+fs::path child_of(const fs::path& folder, const std::string& name) {
+  std::error_code error;
+  if (name.empty() || name == "." || name == "..") return {};
+  if (fs::exists(folder / name, error)) return folder / name;
+  int seen = 0;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (++seen > most_looked_at) break;
+    if (lower(entry.path().filename().string()) == lower(name)) return entry.path();
+  }
+  return {};
 }
 
 /// The SDF that a model's folder holds: the newest that model.config names.
@@ -36,10 +81,13 @@ fs::path model_in(const fs::path& folder) {
   return best;
 }
 
-/// The file itself, or the model that a folder holds.
+/// The file itself, or the model that a folder or the newest version in it holds.
 fs::path file_at(const fs::path& place) {
-  if (is_folder(place)) return model_in(place);
-  return is_file(place) ? place : fs::path();
+  if (!is_folder(place)) return is_file(place) ? place : fs::path();
+  if (fs::path model = model_in(place); !model.empty()) return model;
+  for (const fs::path& version : versions_in(place))
+    if (fs::path model = model_in(version); !model.empty()) return model;
+  return {};
 }
 
 /// Decodes "%20" and similar escapes of addresses.
@@ -69,10 +117,61 @@ fs::path look_around(const fs::path& wanted, const fs::path& from_file, const st
   for (int up = 0; up < 8 && !above.empty(); ++up, above = above.parent_path()) {
     for (const fs::path& place : {above / wanted, above / "models" / wanted})
       if (const fs::path found = file_at(place); !found.empty()) return found;
-    if (!first.empty() && above.filename() == first)
+    if (!first.empty() && (above.filename() == first || (up < 4 && !model_in(above).empty())))
       if (const fs::path found = file_at(above / wanted.lexically_relative(first)); !found.empty()) return found;
     if (above == above.parent_path()) break;
   }
+  return {};
+}
+
+/// A model's address on a Fuel server: HOST/1.0/OWNER/models/NAME, then perhaps VERSION or tip, and files/ with a path in it.
+struct FuelAddress {
+  std::string host, owner, name, version;
+  std::vector<std::string> inside;
+};
+std::optional<FuelAddress> fuel_address(const fs::path& address) {
+  std::vector<std::string> parts;
+  for (const fs::path& part : address) parts.push_back(part.string());
+  std::erase_if(parts, [](const std::string& part) { return part.empty() || part == "/"; });
+  const auto is_api = [](const std::string& part) { return part.find_first_not_of("0123456789.") == std::string::npos; };
+  if (parts.size() > 1 && is_api(parts[1])) parts.erase(parts.begin() + 1);
+  if (parts.size() < 4 || lower(parts[2]) != "models") return std::nullopt;
+  FuelAddress out{parts[0], parts[1], parts[3], "", {}};
+  std::size_t next = 4;
+  if (parts.size() > next && (version_of(parts[next]) >= 0 || parts[next] == "tip")) out.version = parts[next++];
+  if (parts.size() > next && parts[next] == "files") ++next;
+  out.inside.assign(parts.begin() + static_cast<std::ptrdiff_t>(next), parts.end());
+  return out;
+}
+
+/// Where Gazebo keeps what it downloaded, both generations.
+std::vector<fs::path> fuel_caches() {
+  std::vector<fs::path> caches;
+  for (const char* variable : {"GZ_FUEL_CACHE_PATH", "IGN_FUEL_CACHE_PATH"})
+    if (const char* value = std::getenv(variable); value && *value) caches.emplace_back(value);
+  if (const char* home = std::getenv("HOME"); home && *home)
+    for (const char* folder : {".gz/fuel", ".ignition/fuel"}) caches.push_back(fs::path(home) / folder);
+  return caches;
+}
+
+fs::path find_in_fuel_caches(const FuelAddress& address) {
+  std::vector<std::string> hosts{address.host, "fuel.gazebosim.org", "fuel.ignitionrobotics.org"};  // two names of one server
+  if (address.host != hosts[1] && address.host != hosts[2]) hosts.resize(1);
+  for (const fs::path& cache : fuel_caches())
+    for (const std::string& host : hosts) {
+      fs::path model = cache;
+      for (const std::string& part : {host, address.owner, std::string("models"), address.name})
+        if (!model.empty()) model = child_of(model, part);
+      if (model.empty()) continue;
+      std::vector<fs::path> places = versions_in(model);
+      places.push_back(model);
+      for (fs::path place : places) {
+        if (version_of(address.version) >= 0 && place != model && version_of(place) != version_of(address.version)) continue;
+        for (const std::string& part : address.inside)
+          if (!place.empty()) place = child_of(place, part);
+        if (fs::path found = place.empty() ? place : file_at(place); !found.empty()) return found;
+      }
+    }
   return {};
 }
 
@@ -89,6 +188,7 @@ std::vector<fs::path> resource_folders(const std::vector<fs::path>& given) {
       if (!one.empty()) folders.emplace_back(one);
     }
   }
+  if (const char* home = std::getenv("HOME"); home && *home) folders.push_back(fs::path(home) / ".gazebo/models");
   return folders;
 }
 
@@ -98,9 +198,16 @@ fs::path find_resource(std::string_view uri, const fs::path& from_file, const st
   if (uri.empty() || uri.size() > 4000 || uri.find('\0') != std::string_view::npos) return {};
   std::string path = std::string(scheme.empty() ? uri : uri.substr(colon + 3));
   if (!scheme.empty()) path = without_escapes(path);
-  if (scheme == "http" || scheme == "https") {  // never fetched, but a copy of the model may lie here under its name
-    const std::string name = fs::path(path).filename().string();
-    return name.empty() ? fs::path() : look_around(name, from_file, folders);
+  if (scheme == "http" || scheme == "https" || scheme == "fuel") {  // never fetched, but a copy may lie here
+    const auto address = fuel_address(fs::path(path).lexically_normal());
+    if (address)
+      if (fs::path found = find_in_fuel_caches(*address); !found.empty()) return found;
+    const std::string name = address && address->inside.empty() ? address->name : fs::path(path).filename().string();
+    if (name.empty()) return {};
+    for (const fs::path& folder : folders)
+      if (const fs::path there = child_of(folder, name); !there.empty())
+        if (const fs::path found = file_at(there); !found.empty()) return found;
+    return look_around(name, from_file, folders);
   }
   const fs::path wanted = fs::path(path).lexically_normal();
   if (scheme == "model" || scheme == "package")

@@ -1,4 +1,5 @@
-// Finds files referenced by Gazebo and URDF files on this disk: model://, package://, file:// and plain paths.
+// Finds files referenced by Gazebo and URDF files on this disk: model://, package://, file://, plain paths, and addresses of a
+// Fuel server in the caches of both generations of Gazebo.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +11,12 @@
 namespace sonar::scene_tools {
 
 /// Folders to look in, best first: `given`, then those of GZ_SIM_RESOURCE_PATH, GAZEBO_MODEL_PATH, IGN_GAZEBO_RESOURCE_PATH and,
-/// for packages, ROS_PACKAGE_PATH.
+/// for packages, ROS_PACKAGE_PATH; last ~/.gazebo/models.
 std::vector<std::filesystem::path> resource_folders(const std::vector<std::filesystem::path>& given);
 
 /// The file that `uri` names in `from_file`, else an empty path. For a folder, the SDF in it that model.config names, or
-/// model.sdf. Beside the folders: next to `from_file`, and up to eight folders above it.
+/// model.sdf, or that of its newest version. Of a Fuel address first in GZ_FUEL_CACHE_PATH, IGN_FUEL_CACHE_PATH, ~/.gz/fuel and
+/// ~/.ignition/fuel. Beside the folders: next to `from_file`, and up to eight folders above it.
 std::filesystem::path find_resource(std::string_view uri, const std::filesystem::path& from_file,
                                     const std::vector<std::filesystem::path>& folders);
 

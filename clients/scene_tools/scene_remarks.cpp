@@ -9,6 +9,7 @@ namespace sonar::scene_tools {
 namespace {
 
 constexpr double far_m = 1000, tiny_m = 0.005, wide_m = 5;
+constexpr double tiny_ground_m = 1, steepest_ground = 10;  // its width; its height over that
 constexpr std::size_t many_triangles = 2'000'000;
 
 std::string list_of(const std::vector<std::string>& names) {
@@ -41,6 +42,11 @@ void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
     out.warnings.push_back((o.name + ": " + o.file + " is " + length_text(o.own.longest_m()) + " long; ").append(guess));
   };
   for (const DescribedObject& o : scene.objects) {
+    const Vec3d size = o.own.size_m();
+    const double width_m = std::max(size.x, size.y);
+    if (o.kind == "heightmap" && (width_m < tiny_ground_m || size.z > steepest_ground * width_m))
+      out.warnings.push_back(o.name + ": " + o.file + " is " + size_text(size) +
+                             " m; are its coordinates degrees (geographic: true), or kilometres?");
     if (o.kind != "mesh") continue;
     if (o.own.longest_m() > huge_mesh_m) warn(o, huge_mesh_cure);
     if (o.own.longest_m() < tiny_m) warn(o, "lengths are metres after scale: is scale too small?");
@@ -49,12 +55,17 @@ void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
 
 void remark_on_places(const SceneDescription& scene, Remarks& out) {
   const auto far =
-      names_where(scene, [](const DescribedObject& o) { return !o.in_world.empty() && length(o.in_world.centre_m()) > far_m; });
+      names_where(scene, [](const DescribedObject& o) { return !o.in_world.empty() && o.in_world.distance_m({}) > far_m; });
   if (!far.empty())
     out.warnings.push_back(std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far));
   const auto above = names_where(
       scene, [](const DescribedObject& o) { return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > 0; });
-  if (!above.empty()) out.warnings.push_back(std::string("wholly above z = 0, the water's surface: ") + list_of(above));
+  const auto grid = std::find_if(scene.objects.begin(), scene.objects.end(), [](const DescribedObject& o) {
+    return o.kind == "heightmap" && !o.in_world.empty() && o.in_world.low_m.z > 0;
+  });
+  if (!above.empty())
+    out.warnings.push_back("wholly above z = 0, the water's surface: " + list_of(above) +
+                           (grid == scene.objects.end() ? "" : "; if " + grid->file + " has depths, set z_scale: -1"));
   if (std::none_of(scene.objects.begin(), scene.objects.end(), [&](const DescribedObject& o) { return is_ground(o, scene); }))
     out.warnings.push_back(
         "no seabed: no object is ground or 5 m wide in both directions, so beams that miss the objects stay black");

@@ -1,5 +1,7 @@
 #include "clients/scene_tools/sdf_models.hpp"
 
+#include <algorithm>
+
 #include "clients/scene_tools/read_parts.hpp"
 #include "core/text/nearest.hpp"
 
@@ -10,6 +12,21 @@ constexpr int most_includes_deep = 16, most_frames_deep = 256;
 constexpr std::size_t most_models = 4096, most_elements = 5'000'000;
 
 bool is_true(std::string_view text) { return text == "true" || text == "1"; }
+
+/// What an included model is that has no echo, or none of its own: by the last part of its address. Empty for all others.
+std::string kind_without_echo(std::string_view uri) {
+  std::string name(uri.substr(uri.find_last_of('/') + 1));
+  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c == '_' ? ' ' : c;
+  for (std::size_t at = 0; (at = name.find("%20")) != std::string::npos;) name.replace(at, 3, " ");
+  if (name == "sun") return "light";
+  if (name == "sky" || name == "skybox") return "sky";
+  if (name == "axes" || name.ends_with(" frame")) return "coordinate frame";
+  if (name == "waves" || name == "coast water" || name == "ocean waves" || name == "ocean" || name == "ocean surface")
+    return "drawn water surface";
+  return {};
+}
+
+bool is_fuel(std::string_view uri) { return uri.starts_with("https://") || uri.starts_with("http://"); }
 
 std::string text_or(std::string_view text, const char* otherwise) { return std::string(text.empty() ? otherwise : text); }
 
@@ -42,7 +59,27 @@ std::unique_ptr<SdfModel> SdfTree::build(const Element& world) {
   root->is_world = true;
   elements_ = world.file()->elements;
   fill(*root, 0);
+  report_missing();
   return root;
+}
+
+/// Each once, with the command that fetches it.
+void SdfTree::report_missing() {
+  if (missing_.empty()) return;
+  std::string list;
+  for (const Missing& m : missing_) {
+    const std::string uri = plain(m.uri, 200);
+    const std::string fetch = is_fuel(m.uri) ? "gz fuel download --url \"" + uri + "\"" : "";
+    const std::string times = m.includes > 1 ? " (" + std::to_string(m.includes) + " includes)" : "";
+    if (options_.skip_missing)
+      findings_.leave_out(m.at, "include of " + uri + times + ": not found" + (fetch.empty() ? "" : "; fetch it: " + fetch));
+    list += (list.empty() ? " " : "; ") + (fetch.empty() ? uri : fetch) + times;
+  }
+  if (options_.skip_missing) return;
+  findings_.fail(missing_.front().at,
+                 "include: models that are not here; fetch them, give the folder that holds them with --model-path, or go on "
+                 "without them with --skip-missing:" +
+                     list);
 }
 
 std::vector<std::shared_ptr<const XmlFile>> SdfTree::included_files() const {
@@ -128,13 +165,15 @@ void SdfTree::add_include(SdfModel& parent, const Element& include, int include_
   if (include_depth >= most_includes_deep)
     return findings_.fail(include.place(),
                           std::string("include: ") + shown + " is more than 16 includes deep; does it include itself?");
+  if (const std::string kind = kind_without_echo(uri); !kind.empty()) return findings_.leave_out_of_no_echo(kind);
   const std::filesystem::path path = library_.find(uri, include.file()->path);
   if (path.empty()) {
-    if (uri == "model://sun") return findings_.leave_out(include.place(), std::string("light: include of ") + shown);
-    if (options_.skip_missing) return findings_.leave_out(include.place(), std::string("include of ") + shown + ": not found");
-    return findings_.fail(include.place(), std::string("include: no model ") + shown +
-                                               " here; give the folder that holds it with --model-path, or go "
-                                               "on without it with --skip-missing");
+    const auto known = std::find_if(missing_.begin(), missing_.end(), [&](const Missing& m) { return m.uri == uri; });
+    if (known != missing_.end())
+      ++known->includes;
+    else
+      missing_.push_back({uri, include.place(), 1});
+    return;
   }
   const auto file = read(path, include);
   if (!file) return;
@@ -145,6 +184,7 @@ void SdfTree::add_include(SdfModel& parent, const Element& include, int include_
     return findings_.fail(root.place(), std::string("<") + plain(root.name()) + "> where an included model needs <sdf>" +
                                             (root.name() == "robot" ? "; import a URDF by itself" : ""));
   if (const Element model = root.child("model")) return add_model(parent, model, include, include_depth + 1);
+  if (root.child("light")) return findings_.leave_out_of_no_echo("light");
   findings_.leave_out(include.place(), std::string("include of ") + shown + ": holds no model");
 }
 

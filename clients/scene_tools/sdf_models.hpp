@@ -50,6 +50,7 @@ class SdfTree {
   std::vector<std::shared_ptr<const XmlFile>> included_files() const;
 
  private:
+  void report_missing();
   void fill(SdfModel& model, int include_depth);
   void add_model(SdfModel& parent, const Element& element, const Element& include, int include_depth);
   void add_include(SdfModel& parent, const Element& include, int include_depth);
@@ -60,6 +61,12 @@ class SdfTree {
   const ReadOptions& options_;
   Findings& findings_;
   std::map<std::filesystem::path, std::shared_ptr<const XmlFile>> files_;
+  struct Missing {
+    std::string uri;
+    Place at;
+    std::size_t includes = 0;
+  };
+  std::vector<Missing> missing_;
   std::size_t models_ = 0, elements_ = 0;
 };
 

@@ -100,6 +100,16 @@ Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const st
 void Findings::fail(const Place& at, const std::string& what) {
   if (!error_) error_ = Error{ErrorKind::bad_data, at.text() + ": " + what};
 }
+std::vector<std::string> Findings::left_out() const {
+  std::string counts;
+  for (const auto& [kind, n] : of_no_echo_)
+    counts += (counts.empty() ? "" : ", ") + std::to_string(n) + " " + kind + (n == 1 ? "" : "s");
+  std::vector<std::string> all;
+  if (!counts.empty()) all.push_back(counts + ": without an echo");
+  all.insert(all.end(), left_out_.begin(), left_out_.end());
+  return all;
+}
+
 void Findings::leave_out(const Place& at, const std::string& what) {
   std::string line = at.short_text() + ": " + what;
   constexpr std::size_t most = 1000;

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -68,14 +69,17 @@ Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const st
 class Findings {
  public:
   void fail(const Place& at, const std::string& what);
-  void leave_out(const Place& at, const std::string& what);  // each place and sentence once
+  void leave_out(const Place& at, const std::string& what);                    // each place and sentence once
+  void leave_out_of_no_echo(const std::string& kind) { ++of_no_echo_[kind]; }  // "light": counted, not listed
   bool failed() const { return error_.has_value(); }
   const std::optional<Error>& error() const { return error_; }
-  const std::vector<std::string>& left_out() const { return left_out_; }
+  /// First, in one line, how many of what has no echo.
+  std::vector<std::string> left_out() const;
 
  private:
   std::optional<Error> error_;
   std::vector<std::string> left_out_;
+  std::map<std::string, std::size_t> of_no_echo_;
   std::unordered_set<std::string> seen_;
 };
 

@@ -176,9 +176,14 @@ class Reader {
     Track* const track = track_of(row.body);
     if (track == nullptr) return complain("more than " + std::to_string(most_bodies) + " bodies");
     Points& p = track->points;
-    // Strictly, for each body: intervals have a length.
-    if (!p.times.empty() && Ns(row.stamp_ns) <= p.times.back())
-      return complain("the time does not rise" + (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
+    if (!p.times.empty() && Ns(row.stamp_ns) < p.times.back())
+      return complain("the time falls" + (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
+    if (!p.times.empty() && Ns(row.stamp_ns) == p.times.back()) {  // as with live poses; intervals have a length
+      ++replaced_;
+      p.times.pop_back(), p.poses.pop_back();
+      if (columns_->has_velocity()) p.velocities_mps.pop_back();
+      if (columns_->has_angular_velocity()) p.angular_velocities_radps.pop_back();
+    }
     p.times.emplace_back(row.stamp_ns);
     p.poses.push_back(row.pose);
     if (columns_->has_velocity()) p.velocities_mps.push_back(row.velocity_mps);
@@ -216,6 +221,7 @@ class Reader {
     }
     file.begins_at = first;
     file.duration = last - first;
+    file.replaced = replaced_;
     for (Track& t : tracks_) {
       for (Ns& at : t.points.times) at -= first;
       // The file's frame ends here: inside, all is ENU and FLU (docs/glossary.md).
@@ -238,7 +244,7 @@ class Reader {
   std::optional<Columns> columns_;
   bool commas_ = false;
   Words words_;
-  std::size_t line_ = 0, rows_ = 0, last_ = 0;
+  std::size_t line_ = 0, rows_ = 0, last_ = 0, replaced_ = 0;
   std::vector<Track> tracks_;
   std::string wrong_;
 };

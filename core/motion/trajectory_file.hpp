@@ -34,8 +34,9 @@ struct TrajectoryFile {
   std::vector<Body> bodies;  // as they appear; at least one
   Format format = Format::csv;
   Frame frame = Frame::enu_flu;
-  Ns begins_at{0};  // the earliest stamp: what the trajectories call 0
-  Ns duration{0};   // to the latest
+  Ns begins_at{0};           // the earliest stamp: what the trajectories call 0
+  Ns duration{0};            // to the latest
+  std::size_t replaced = 0;  // poses that a later line of the same stamp took the place of
 };
 
 /// A comment of the file says its frame: `# frame: NED_FRD`. Errors: name:line: what.

@@ -19,6 +19,7 @@ Result<void> run_check(const CheckCommand& command) {
   if (!prepared->token_warning.empty()) std::fprintf(stderr, "sonard: %s\n", prepared->token_warning.c_str());
   std::printf("%s: ok, %zu sonar%s; scene %s: ok, %zu triangles\n", command.config.c_str(), config.sonars.size(),
               config.sonars.size() == 1 ? "" : "s", config.scene.name().c_str(), scene.triangle_count());
+  for (const std::string& note : scene.notes) std::printf("note: %s\n", note.c_str());
   for (const std::string& note : notes_of_options(config)) std::printf("%s\n", note.c_str());
   for (const VehicleConfig& v : config.vehicles)
     if (v.plan) std::printf("vehicle %s follows %s\n", v.name.c_str(), v.plan.about.c_str());

@@ -25,10 +25,13 @@ constexpr MessageInfo info_of() {
   return {M::id, M::name, M::crc_extra, wire::wire_size<M>(), full_size<M>()};
 }
 constexpr std::array messages_read{
-    info_of<Heartbeat>(),          info_of<SystemTime>(),       info_of<Attitude>(),
-    info_of<AttitudeQuaternion>(), info_of<LocalPositionNed>(), info_of<GlobalPositionInt>(),
-    info_of<GpsGlobalOrigin>(),    info_of<CommandLong>(),      info_of<VisionPositionEstimate>(),
-    info_of<SimState>(),           info_of<AttPosMocap>(),      info_of<Odometry>(),
+    info_of<Heartbeat>(),        info_of<SystemTime>(),
+    info_of<Attitude>(),         info_of<AttitudeQuaternion>(),
+    info_of<LocalPositionNed>(), info_of<GlobalPositionInt>(),
+    info_of<GpsGlobalOrigin>(),  info_of<VfrHud>(),
+    info_of<CommandLong>(),      info_of<VisionPositionEstimate>(),
+    info_of<SimState>(),         info_of<AttPosMocap>(),
+    info_of<Odometry>(),
 };
 
 }  // namespace

@@ -15,6 +15,8 @@ constexpr std::int64_t late_ms = 1000;  // a clock that goes back further than t
 constexpr std::int64_t late_ns = late_ms * 1'000'000;
 constexpr double farthest_m = 100e3;  // from the origin; beyond, the tangent plane is not valid
 constexpr double moved_origin_m = 0.01;
+constexpr double highest_hud_m = 1e5;              // keeps the results finite
+constexpr std::int64_t longest_sinking_ms = 1000;  // at the last vertical speed
 
 std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
@@ -41,7 +43,8 @@ std::string_view name_of(Source source) {
                                                              "ATT_POS_MOCAP",
                                                              "VISION_POSITION_ESTIMATE",
                                                              "LOCAL_POSITION_NED and attitude",
-                                                             "GLOBAL_POSITION_INT and attitude"};
+                                                             "GLOBAL_POSITION_INT and attitude",
+                                                             "depth and attitude"};
   return names[index_of(source)];
 }
 
@@ -56,7 +59,7 @@ void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
   system_ = self_.system = system;
   found_at_ = now;
   next_request_ = now;
-  has_autopilot_ = sim_state_is_coarse_ = global_has_fix_ = sim_state_has_fix_ = false;
+  has_autopilot_ = is_submarine_ = sim_state_is_coarse_ = global_has_fix_ = sim_state_has_fix_ = false;
   reported_.reset();
   autopilot_component_ = 1;
   received_.clear();
@@ -73,6 +76,7 @@ void MavlinkPoses::clear_histories() {
   attitudes_.clear();
   local_.clear();
   global_.clear();
+  depth_.reset();
   newest_boot_ms_ = 0;
   ++resets_;
 }
@@ -182,6 +186,8 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
       return handle(message_in<GlobalPositionInt>(frame), at);
     case GpsGlobalOrigin::id:
       return handle(message_in<GpsGlobalOrigin>(frame), at);
+    case VfrHud::id:
+      return handle(message_in<VfrHud>(frame), at);
     case VisionPositionEstimate::id:
       return handle(message_in<VisionPositionEstimate>(frame), at);
     case SimState::id:
@@ -198,6 +204,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
 void MavlinkPoses::handle(const Heartbeat& m, const Frame& frame) {
   if (m.autopilot == Heartbeat::no_autopilot) return;
   has_autopilot_ = true;
+  is_submarine_ = m.type == Heartbeat::submarine;
   autopilot_ = m.autopilot;
   autopilot_component_ = frame.component;
 }
@@ -206,6 +213,7 @@ void MavlinkPoses::handle(const AttitudeReading& reading, Moment at) {
   note_boot_time(reading.at_ms);
   attitudes_.put(reading);
   join_pairs(at);
+  add_pose_of_depth(reading, at);
 }
 
 void MavlinkPoses::handle(const LocalPositionNed& m, Moment at) {
@@ -216,8 +224,14 @@ void MavlinkPoses::handle(const LocalPositionNed& m, Moment at) {
 
 void MavlinkPoses::handle(const GlobalPositionInt& m, Moment at) {
   note_boot_time(m.boot_ms);
-  const auto place = placed(GlobalPositionInt::name, geodetic_of(m), at);
-  global_has_fix_ = place.has_value();
+  const auto fix = geodetic_of(m);
+  global_has_fix_ = fix && fix->has_value();
+  const auto place = placed(GlobalPositionInt::name, fix, at);
+  const bool is_depth = fix && !place && (!global_has_fix_ || (is_submarine_ && !settings_.origin));
+  if (is_depth)
+    depth_ = Depth{m.boot_ms, -1e-3 * m.height_mm, 0.01 * m.down_cmps, at.now, GlobalPositionInt::id};
+  else
+    depth_.reset();
   if (!place) return;
   global_.put({m.boot_ms, *place, {0.01 * m.north_cmps, 0.01 * m.east_cmps, 0.01 * m.down_cmps}});
   join_pairs(at);
@@ -229,6 +243,14 @@ void MavlinkPoses::handle(const GpsGlobalOrigin& m, Moment at) {
   const Vec3d before = local_in_world_.value_or(Pose{}).position_m;
   if (length(place->position_m - before) > moved_origin_m) ++resets_;
   local_in_world_ = *place;
+}
+
+/// ArduSub's altitude there is above the surface; others send that above the sea or the home. It has no stamp.
+void MavlinkPoses::handle(const VfrHud& m, Moment at) {
+  const double altitude_m = static_cast<double>(m.altitude_m);
+  if (!is_submarine_ || receives(GlobalPositionInt::id, at.now) || !(std::abs(altitude_m) <= highest_hud_m)) return;
+  const bool climbs = std::isfinite(m.climb_mps);
+  depth_ = Depth{newest_boot_ms_, -altitude_m, climbs ? -static_cast<double>(m.climb_mps) : 0, at.now, VfrHud::id};
 }
 
 void MavlinkPoses::handle(const SimState& m, Moment at) {
@@ -263,6 +285,17 @@ void MavlinkPoses::join_pairs(Moment at) {
   while (const auto pair = global_.next(attitudes_))
     add_pose(Source::global, raw_pose(pair->attitude, {pair->place.at_ms, {}, pair->place.ned_mps}),
              boot_stamp(pair->place.at_ms), pair->place.enu_in_world, at);
+}
+
+/// A pose of each attitude, with the newest depth: attitudes come more often, and depth changes slowly.
+void MavlinkPoses::add_pose_of_depth(const AttitudeReading& reading, Moment at) {
+  if (!depth_ || at.now - depth_->received > system_silence || received_within(LocalPositionNed::id, at.now, source_silence))
+    return;
+  const std::int64_t since_ms = std::clamp(reading.at_ms - depth_->at_ms, std::int64_t{0}, longest_sinking_ms);
+  PlaceReading place{reading.at_ms, {0, 0, depth_->down_m + 1e-3 * static_cast<double>(since_ms) * depth_->down_mps}, {}};
+  RawPose raw = raw_pose(reading, place);
+  raw.velocity_mps.reset();
+  add_pose(Source::depth, raw, boot_stamp(reading.at_ms), Pose{{settings_.held_m.x, settings_.held_m.y, 0}, {}}, at);
 }
 
 /// The local ENU frame in the world; nullopt without an origin or a fix, or for an implausible position.

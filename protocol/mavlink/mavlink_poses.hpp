@@ -18,8 +18,8 @@
 namespace sonar::mavlink {
 
 /// Sources of poses, best first (docs/poses.md).
-enum class Source { odometry, sim_state, mocap, vision, local, global };
-inline constexpr std::size_t source_count = 6;
+enum class Source { odometry, sim_state, mocap, vision, local, global, depth };
+inline constexpr std::size_t source_count = 7;
 std::string_view name_of(Source source);
 
 struct Settings {
@@ -29,6 +29,7 @@ struct Settings {
   double rate_hz = 50;
   std::optional<Geodetic> origin;  // of the world; needed for latitudes and longitudes
   bool needs_time = false;         // messages without a time stamp are not used
+  Vec3d held_m = {};               // x and y in the world, ENU, of a vehicle that sends its depth and no place
 };
 
 /// FAILURE_TYPE of common.xml.
@@ -91,6 +92,13 @@ class MavlinkPoses {
     Pose enu_in_world;  // at the vehicle
     Vec3d ned_mps;
   };
+  /// Of a vehicle without a place, such as a BlueROV2 without DVL.
+  struct Depth {
+    std::int64_t at_ms = 0;
+    double down_m = 0, down_mps = 0;
+    Time received{};
+    std::uint32_t message = 0;
+  };
   struct Moment {  // context of a message
     Time now;
     Reaction& out;
@@ -107,12 +115,14 @@ class MavlinkPoses {
   void handle(const LocalPositionNed& m, Moment at);
   void handle(const GlobalPositionInt& m, Moment at);
   void handle(const GpsGlobalOrigin& m, Moment at);
+  void handle(const VfrHud& m, Moment at);
   void handle(const VisionPositionEstimate& m, Moment at);
   void handle(const SimState& m, Moment at);
   void handle(const AttPosMocap& m, Moment at);
   void handle(const Odometry& m, Moment at);
 
   void join_pairs(Moment at);
+  void add_pose_of_depth(const AttitudeReading& reading, Moment at);
   void add_pose(Source source, const control::RawPose& raw, control::Stamp stamp, const Pose& enu_in_world, Moment at);
   std::optional<Pose> placed(std::string_view message, const Result<std::optional<Geodetic>>& place, Moment at);
   control::Stamp stamp_of(Source source, std::uint64_t time_us);
@@ -122,6 +132,7 @@ class MavlinkPoses {
   void add_counts(const FrameCounts& counts, Reaction& out);
   void report_changes(Time now, Reaction& out);
   std::string report(Time now) const;
+  std::string held_text() const;
   std::string missing_inputs(Time now) const;
   bool receives(std::uint32_t message, Time now) const { return received_within(message, now, system_silence); }
   bool received_within(std::uint32_t message, Time now, std::chrono::nanoseconds within) const;
@@ -137,7 +148,7 @@ class MavlinkPoses {
   FrameCounts counts_;
   std::optional<std::uint8_t> system_;
   std::uint8_t autopilot_ = 0, autopilot_component_ = 1;
-  bool has_autopilot_ = false, sim_state_is_coarse_ = false;
+  bool has_autopilot_ = false, is_submarine_ = false, sim_state_is_coarse_ = false;
   bool global_has_fix_ = false, sim_state_has_fix_ = false;
   Time found_at_{}, last_received_{}, next_heartbeat_{}, next_request_{}, next_reminder_{};
   std::optional<Time> first_tick_;  // first tick
@@ -149,6 +160,7 @@ class MavlinkPoses {
   Attitudes attitudes_;
   PairedPlaces<PlaceReading> local_;
   PairedPlaces<GlobalPlace> global_;
+  std::optional<Depth> depth_;
   std::optional<Pose> local_in_world_;  // origin of the autopilot's local axes; absent: that of the world
   std::int64_t newest_boot_ms_ = 0;
   std::array<std::int64_t, source_count> newest_ns_{};

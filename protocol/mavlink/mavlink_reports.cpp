@@ -1,6 +1,8 @@
 // Output of MavlinkPoses: heartbeats and requests to the autopilot, reports on the system found and on missing parts of poses.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "protocol/mavlink/mavlink_poses.hpp"
 
@@ -77,9 +79,22 @@ void MavlinkPoses::request_messages(Reaction& out) {
   };
   for (const std::uint32_t message : {Odometry::id, AttitudeQuaternion::id, LocalPositionNed::id})
     ask(message, settings_.rate_hz);
+  ask(GlobalPositionInt::id, settings_.rate_hz);  // with a place, or with the depth alone
   if (!settings_.origin) return;
-  for (const std::uint32_t message : {SimState::id, GlobalPositionInt::id}) ask(message, settings_.rate_hz);
+  ask(SimState::id, settings_.rate_hz);
   ask(GpsGlobalOrigin::id, 1);
+}
+
+/// Why x and y do not change, and what would make them.
+std::string MavlinkPoses::held_text() const {
+  std::string why = " has no fix, and there is no LOCAL_POSITION_NED: no DVL or the like";
+  if (depth_ && depth_->message == VfrHud::id)
+    why = " and LOCAL_POSITION_NED are missing";
+  else if (global_has_fix_)
+    why = " needs world.origin";
+  std::array<char, 64> held{};
+  std::snprintf(held.data(), held.size(), "; x and y are held at %.6g, %.6g: ", settings_.held_m.x, settings_.held_m.y);
+  return held.data() + std::string(GlobalPositionInt::name) + why;
 }
 
 /// "system 1 (ArduPilot) sends HEARTBEAT, ATTITUDE; no poses yet: ..."
@@ -108,6 +123,7 @@ std::string MavlinkPoses::report(Time now) const {
     text += std::string("; poses from ").append(name_of(static_cast<Source>(s)));
     const bool coarse = static_cast<Source>(s) == Source::sim_state && sim_state_is_coarse_;
     if (coarse) text += ", in steps of up to 0.4 m: lat_int and lon_int need MAVLink 2";
+    if (static_cast<Source>(s) == Source::depth) text += held_text();
     return text;
   }
   const bool had_poses = std::any_of(last_pose_.begin(), last_pose_.end(), [](const auto& at) { return at.has_value(); });
@@ -138,7 +154,7 @@ std::string MavlinkPoses::missing_inputs(Time now) const {
     if (!attitude) missing.emplace_back("an attitude is missing (ATTITUDE_QUATERNION or ATTITUDE)");
     if (!local && !global)
       missing.push_back(std::string("a position is missing (LOCAL_POSITION_NED, or GLOBAL_POSITION_INT") +
-                        (settings_.origin ? ")" : " with world.origin)"));
+                        (settings_.origin ? ")" : " with world.origin or depth alone)"));
     missing.emplace_back(settings_.request_rates ? "requested (request_rates) but not received"
                                                  : "set its stream rates, or request_rates: true");
   }

@@ -19,6 +19,7 @@ struct Heartbeat {
   static constexpr std::uint32_t id = 0;
   static constexpr std::uint8_t crc_extra = 50;
   static constexpr std::string_view name = "HEARTBEAT";
+  static constexpr std::uint8_t submarine = 12;    // MAV_TYPE_SUBMARINE
   static constexpr std::uint8_t no_autopilot = 8;  // MAV_AUTOPILOT_INVALID: ground stations, cameras, ourselves
   std::uint32_t custom_mode = 0;
   std::uint8_t type = 0, autopilot = 0, base_mode = 0, system_status = 0, mavlink_version = 3;
@@ -123,6 +124,21 @@ constexpr void fields(V& visit, M& m) {
 template <class V, wire::Like<GpsGlobalOrigin> M>
 constexpr void extensions(V& visit, M& m) {
   visit("time_usec", m.time_us);
+}
+
+/// What a pilot's display shows.
+struct VfrHud {
+  static constexpr std::uint32_t id = 74;
+  static constexpr std::uint8_t crc_extra = 20;
+  static constexpr std::string_view name = "VFR_HUD";
+  float airspeed_mps = 0, groundspeed_mps = 0, altitude_m = 0, climb_mps = 0;
+  std::int16_t heading_deg = 0;
+  std::uint16_t throttle_percent = 0;
+};
+template <class V, wire::Like<VfrHud> M>
+constexpr void fields(V& visit, M& m) {
+  visit("airspeed", m.airspeed_mps), visit("groundspeed", m.groundspeed_mps), visit("alt", m.altitude_m);
+  visit("climb", m.climb_mps), visit("heading", m.heading_deg), visit("throttle", m.throttle_percent);
 }
 
 struct CommandLong {

@@ -28,6 +28,7 @@ MESSAGES = {
     "ODOMETRY": (331, "uint64_t time_usec, uint8_t frame_id, uint8_t child_frame_id, float x, float y, float z, float[4] q, float vx, "
                       "float vy, float vz, float rollspeed, float pitchspeed, float yawspeed, float[21] pose_covariance, "
                       "float[21] velocity_covariance", "uint8_t reset_counter, uint8_t estimator_type, int8_t quality"),
+    "VFR_HUD": (74, "float airspeed, float groundspeed, int16_t heading, uint16_t throttle, float alt, float climb", ""),
 }
 CODES = {"uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i", "uint64_t": "Q", "float": "f"}
 

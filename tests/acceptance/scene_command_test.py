@@ -36,7 +36,7 @@ class SceneCommand(unittest.TestCase):
 
     def test_an_imported_box_is_heard_where_its_poses_put_it(self):
         said = self.import_quay("--material", "left_rig=concrete")
-        for words in ["2 shapes of 3 models", 'light "sun"', 'sensor "eye"', 'plugin "winch"', "rig/rig.sdf:16", ": ok: 2 objects"]:
+        for words in ["2 shapes of 3 models", '2 lights: without an echo', 'sensor "eye"', 'plugin "winch"', "rig/rig.sdf:16", ": ok: 2 objects"]:
             self.assertIn(words, said)
         written = self.scene.read_text(encoding="utf-8")
         self.assertIn('#   rig/rig.sdf:16: sensor "eye"', written)
@@ -90,9 +90,11 @@ class SceneCommand(unittest.TestCase):
         self.assertIn("--overwrite", self.ctl("import", WORLDS / "quay.world", "--out", self.scene, code=64))
         world = self.path / "w.sdf"
         world.write_text('<sdf version="1.9"><world name="w">\n<include><uri>model://gone</uri></include></world></sdf>', encoding="utf-8")
-        self.assertIn("w.sdf:2: include: no model model://gone", self.ctl("import", world, "--out", self.path / "o.yaml", code=65))
+        self.assertIn("w.sdf:2: include: models that are not here", self.ctl("import", world, "--out", self.path / "o.yaml", code=65))
+        self.assertIn("nothing in it has a shape that a scene can hold; left out: w.sdf:2: include of model://gone: not found",
+                      self.ctl("import", world, "--out", self.path / "o.yaml", "--skip-missing", code=65))
         self.assertFalse((self.path / "o.yaml").exists())
-        self.ctl("import", world, "--out", self.path / "o.yaml", "--skip-missing")
+        (self.path / "o.yaml").write_text("objects: []\n", encoding="utf-8")
         self.assertIn("and --strict", self.ctl("check", self.path / "o.yaml", "--strict", code=65))
 
 

@@ -6,7 +6,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace sonar;
   static const fuzz::MemoryFile file;
   file.fill({data, size});
-  const auto grid = read_esri_heights(file.path(), size % 2 == 0 ? 1 : -1);
+  const auto grid = read_esri_heights(file.path(), {.z_scale = size % 2 == 0 ? 1.0 : -1.0});
   if (grid) {
     fuzz::check(*grid);
   } else {

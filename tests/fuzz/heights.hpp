@@ -20,9 +20,9 @@ inline void check(const Mesh& mesh) {
 
 /// Grids of a few thousand heights are made into meshes too.
 inline void check(const HeightGrid& grid) {
-  require(grid.x_m.size() >= 2 && grid.y_m.size() >= 2 && grid.z_m.size() == grid.x_m.size() * grid.y_m.size());
+  require(grid.x.size() >= 2 && grid.y.size() >= 2 && grid.z_m.size() == grid.x.size() * grid.y.size());
   require(2 * grid.z_m.size() <= max_mesh_triangles);
-  for (const auto* axis : {&grid.x_m, &grid.y_m})
+  for (const auto* axis : {&grid.x, &grid.y})
     for (std::size_t i = 0; i < axis->size(); ++i) require(std::isfinite((*axis)[i]) && (i == 0 || (*axis)[i] > (*axis)[i - 1]));
   if (grid.z_m.size() > 4096) return;
   for (const float z : grid.z_m) require(std::isnan(z) || std::abs(z) <= 1e7f);

@@ -4,7 +4,7 @@
 # What the programs need on Debian 12, 13 and Ubuntu 22.04, 24.04, and what the tests need besides to be built; all of it from
 # their main archives.
 product_packages=(
-  g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libtinyxml2-dev libpng-dev zlib1g-dev
+  g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libtinyxml2-dev libpng-dev libtiff-dev zlib1g-dev
   libexpected-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libfftw3-dev libsnappy-dev libnats-dev
 )
 build_packages=("${product_packages[@]}" libeigen3-dev libgtest-dev libgmock-dev)

@@ -13,9 +13,9 @@ folder=build/tarball stage=build/tarball/$name
 archives=/usr/lib/$(g++ -dumpmachine)
 
 # FFTW is left out: its licence, the GPL, would be that of the programs. So is the farm, which needs OpenSSL, whose updates this
-# archive would miss. An old-style run path also holds for what the libraries beside the programs need of each other.
+# archive would miss, and GeoTIFF, whose libtiff needs the GPL's libjbig. An old-style run path also holds for what the libraries beside the programs need of each other.
 # shellcheck disable=SC2016
-cmake -S . -B $folder -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF -DSONAR_FFTW=OFF -DSONAR_FARM=OFF -DSONAR_CUDA=OFF \
+cmake -S . -B $folder -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF -DSONAR_FFTW=OFF -DSONAR_FARM=OFF -DSONAR_GEOTIFF=OFF -DSONAR_CUDA=OFF \
   -DCMAKE_INSTALL_RPATH='$ORIGIN/../lib/sonard;$ORIGIN/../../lib/sonard' -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
   -DZLIB_LIBRARY="$archives/libz.a" -DPNG_LIBRARY="$archives/libpng.a" -DSNAPPY_LIBRARY="$archives/libsnappy.a" \
   -DProtobuf_LIBRARY="$archives/libprotobuf.a" -DSONAR_WERROR="${SONAR_WERROR:-OFF}" \
@@ -45,7 +45,7 @@ packages() {
 licences=$stage/share/doc/sonard/licences
 mkdir -p "$licences/common" || exit
 while read -r package; do
-  case $package in libfftw3* | libnats* | libgtest* | libgmock* | libeigen3* | libc6* | libssl*) continue ;; esac
+  case $package in libfftw3* | libnats* | libtiff* | libgtest* | libgmock* | libeigen3* | libc6* | libssl*) continue ;; esac
   [ ! -e "/usr/share/doc/$package/copyright" ] || cp "/usr/share/doc/$package/copyright" "$licences/$package"
 done < <(packages | sort -u)
 grep -rhoE '/usr/share/common-licenses/[A-Za-z0-9.-]*[A-Za-z0-9]' "$licences" "$stage/share/doc" | sort -u | while read -r text; do
@@ -55,7 +55,7 @@ cat >"$stage/README" <<TEXT
 sonard $version for Linux on $(uname -m): bin/sonard and bin/sonarctl run from here, wherever this folder is.
 
 It needs glibc 2.35 and libstdc++ of GCC 12, or newer: Debian 12, Ubuntu 22.04. Built without FFTW: measured and exact pulses and
-the paper mode are refused; without the farm. Packages for Debian have both.
+the paper mode are refused; without the farm and GeoTIFF. Packages for Debian have all three.
 
 Documents: share/doc/sonard. Licence: share/doc/sonard/copyright; of the libraries inside: share/doc/sonard/licences, where
 "common" has the texts that Debian keeps in /usr/share/common-licenses.

@@ -1,6 +1,8 @@
 """Synthetic logs of autopilots, robots and instruments for the tests: a vehicle that moves north-east and turns."""
+import contextlib
 import functools
 import math
+import sqlite3
 import struct
 import zlib
 
@@ -89,7 +91,8 @@ def dataflash_log(kinds=("ATT", "POS"), steps=50):
 MAVLINK = {
     "HEARTBEAT": (0, 50, "IBBBBB", ""), "ATTITUDE": (30, 39, "Iffffff", ""), "ATTITUDE_QUATERNION": (31, 246, "Ifffffff", "ffff"),
     "LOCAL_POSITION_NED": (32, 185, "Iffffff", ""), "GLOBAL_POSITION_INT": (33, 104, "IiiiihhhH", ""),
-    "GPS_GLOBAL_ORIGIN": (49, 39, "iii", "Q"), "VISION_POSITION_ESTIMATE": (102, 158, "Qffffff", "21fB"),
+    "GPS_GLOBAL_ORIGIN": (49, 39, "iii", "Q"), "VFR_HUD": (74, 20, "ffffhH", ""),
+    "VISION_POSITION_ESTIMATE": (102, 158, "Qffffff", "21fB"),
     "SIM_STATE": (108, 32, "21f", "ii"), "ATT_POS_MOCAP": (138, 109, "Qfffffff", "21f"),
     "ODOMETRY": (331, 91, "Q3f4f3f3f168xBB", "BBb"),
 }
@@ -294,4 +297,51 @@ def nmea_log(steps=20, began_s=43200, kinds=("HDT", "PHTRO", "GGA", "DBT")):
             out += sentence(f"GPGGA,{clock},{place},4,10,0.8,33.1,M,-17.0,M,,")
         if "RMC" in kinds:
             out += sentence(f"GPRMC,{clock},A,{place},1.1,26.6,211126,,")
+    return out
+
+
+# --- recordings of ROS 2 in SQLite ---
+
+def db3(path, topics):
+    """Writes [(topic, type, [(log time [s], message)])] as rosbag2's sqlite3 storage does."""
+    with contextlib.closing(sqlite3.connect(path)) as base, base:
+        base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
+                     "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)")
+        base.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, "
+                     "data BLOB NOT NULL)")
+        for number, (topic, kind, messages) in enumerate(topics, 1):
+            base.execute("INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')", (number, topic, kind))
+            base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)",
+                             [(number, round(1e9 * t), data) for t, data in messages])
+    return path
+
+
+# --- logs of PX4 ---
+
+def ulog_message(kind, content):
+    return struct.pack("<HB", len(content), ord(kind)) + content
+
+
+def ulog(truth=False, steps=50):
+    formats = ["vehicle_attitude:uint64_t timestamp;uint64_t timestamp_sample;float[4] q;float[4] delta_q_reset;uint8_t n;"
+               "uint8_t[7] _padding0",
+               "vehicle_local_position:uint64_t timestamp;float x;float y;float z;double ref_lat;double ref_lon;float ref_alt;"
+               "bool xy_valid;bool z_valid;bool xy_global;bool z_global;uint8_t[4] _padding0",
+               "vehicle_attitude_groundtruth:uint64_t timestamp;float[4] q",
+               "vehicle_local_position_groundtruth:uint64_t timestamp;float[3] a;float x;float y;float z"]
+    out = b"ULog\x01\x12\x35\x01" + bytes(8) + ulog_message("B", bytes(40))
+    out += b"".join(ulog_message("F", text.encode()) for text in formats)
+    out += ulog_message("F", b"other:uint64_t timestamp;nested[2] n")
+    names = [text.split(":")[0] for text in formats]
+    out += b"".join(ulog_message("A", bytes([0]) + struct.pack("<H", n) + name.encode()) for n, name in enumerate(names))
+    out += ulog_message("A", bytes([1]) + struct.pack("<H", 9) + b"vehicle_attitude")  # a second instance
+    for step in range(steps):
+        t, north, east, down, *angles = moment(step)
+        stamp = round(1e6 * t)
+        out += ulog_message("D", struct.pack("<HQ4f", 9, stamp, *quaternion(1, 1, 1)))
+        out += ulog_message("D", struct.pack("<HQQ4f4fB", 0, stamp + 2000, stamp, *quaternion(*angles), 0, 0, 0, 0, 1))
+        out += ulog_message("D", struct.pack("<HQ3f2df4?", 1, stamp, north, east, down, *ORIGIN, True, step > 0, True, True))
+        if truth:
+            out += ulog_message("D", struct.pack("<HQ4f", 2, stamp, *quaternion(*angles)))
+            out += ulog_message("D", struct.pack("<HQ6f", 3, stamp, 0, 0, 0, north, east, down + 100))
     return out

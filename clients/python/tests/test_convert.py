@@ -3,13 +3,15 @@ import contextlib
 import io
 import math
 import random
+import shutil
+import sqlite3
 import unittest
 from unittest import mock
 
 import made_logs as made
 from converted import WithFolder
 
-from sonard_client.convert import ConvertError, Geodetic, format_of
+from sonard_client.convert import ConvertError, Geodetic, convert, format_of
 from sonard_client.convert.__main__ import main
 from sonard_client.convert.mavlink import crc
 from sonard_client.geodesy import LocalPlane, ecef, parse_origin
@@ -245,6 +247,158 @@ class Telemetry(WithFolder):
                 self.assertIn(frame_ids, self.warned[0])
 
 
+class WithoutHorizontalPosition(WithFolder):
+    """Logs of a BlueROV2 without DVL: depth and attitude make a track at one place."""
+
+    def assert_held(self, track, steps, at=(0, 0), t0=0.0):
+        self.assertEqual(len(track.rows), len(steps))
+        for row, step in zip(track.rows, steps):
+            t, _, _, down, *angles = made.moment(step)
+            self.assertAlmostEqual(row.t_s, t0 + t, delta=0.0051)
+            self.assertEqual(row.position_m[:2], at)
+            self.assertAlmostEqual(row.position_m[2], down, delta=0.006)
+            cosine = abs(sum(a * b for a, b in zip(row.orientation, made.quaternion(*angles))))
+            self.assertLess(2 * math.acos(min(1.0, cosine)), 2e-4)
+        self.assertEqual(len(self.warned), 1, self.warned)
+        self.assertIn(f"no horizontal position (no DVL, UGPS or the like): north and east are held at {at[0]:g}, {at[1]:g}",
+                      self.warned[0])
+
+    @staticmethod
+    def telemetry(kinds, submarine=True, steps=20):
+        log = bytearray()
+        for step in range(steps):
+            t, _, _, down, *angles = made.moment(step)
+            ms = round(1000 * t) + 25000
+            values = {"HEARTBEAT": (0, 12 if submarine else 2, 3, 0, 0, 3), "ATTITUDE": (ms, *angles, 0, 0, 0),
+                      "GLOBAL_POSITION_INT": (ms, 0, 0, 0, round(-1000 * down), 0, 0, 0, 0), "VFR_HUD": (0, 0, -down, 0, 0, 0)}
+            for kind in kinds:
+                log += round(1e6 * (1_700_000_000 + t)).to_bytes(8, "big") + made.mavlink_frame(kind, values[kind])
+        return bytes(log)
+
+    def test_telemetry(self):
+        for kinds in (("HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT", "VFR_HUD"), ("ATTITUDE", "GLOBAL_POSITION_INT"),
+                      ("HEARTBEAT", "ATTITUDE", "VFR_HUD")):
+            with self.subTest(kinds):
+                track = self.convert(self.telemetry(kinds))
+                self.assertEqual(track.source, "ATTITUDE+depth")
+                self.assert_held(track, range(20), t0=25)
+                self.assert_held(self.convert(self.telemetry(kinds), at=(5, -2.5)), range(20), (5, -2.5), t0=25)
+        with self.assertRaisesRegex(ConvertError, "lacks positions and depths"):
+            self.convert(self.telemetry(("HEARTBEAT", "ATTITUDE", "VFR_HUD"), submarine=False))  # above the sea
+        with self.assertRaisesRegex(ConvertError, "lacks attitudes"):
+            self.convert(self.telemetry(("GLOBAL_POSITION_INT",)))
+
+    def test_a_position_is_preferred(self):
+        both = made.telemetry_log() + self.telemetry(("GLOBAL_POSITION_INT", "VFR_HUD"))
+        self.assertEqual(self.convert(both).source, "ATTITUDE+LOCAL_POSITION_NED")
+        with self.assertRaisesRegex(ValueError, "--at is for logs without horizontal position"):
+            self.convert(both, at=(1, 2))
+
+    @staticmethod
+    def dataflash(name, values):
+        log = made.dataflash_format(name) + made.dataflash_format("ATT")
+        for step in range(20):
+            t, _, _, down, roll, pitch, yaw = made.moment(step)
+            angles = [round(100 * math.degrees(angle)) for angle in (roll, pitch, yaw)]
+            log += made.dataflash_message("ATT", round(1e6 * t), 0, angles[0], 0, angles[1], 0, angles[2], 0, 0, 3)
+            log += b"".join(made.dataflash_message(name, round(1e6 * t), *v) for v in values(down, angles))
+        return log
+
+    def test_dataflash(self):
+        layouts = {"CTUN": (40, "Qff", "TimeUS,ThI,Alt", "Qff"), "BARO": (41, "QBf", "TimeUS,I,Alt", "QBf")}
+        cases = {"CTUN": lambda down, _: [(0, -down)],
+                 "BARO": lambda down, _: [(0, 99), (1, -down)],
+                 "POS": lambda down, _: [(0, 0, 17, -down, 17)]}
+        for name, values in cases.items():
+            with self.subTest(name), mock.patch.dict(made.DATAFLASH, layouts):
+                track = self.convert(self.dataflash(name, values))
+                self.assertEqual(track.source, "ATT+depth")
+                self.assert_held(track, range(20))
+
+    def test_a_filter_whose_position_does_not_change_is_reported(self):
+        log = self.dataflash("XKF1", lambda down, angles: [(0, *angles, 0, 0, 0, 0, 0.5, 0.25, down, 0, 0, 0, 0)])
+        track = self.convert(log)
+        self.assertEqual(track.source, "XKF1")
+        self.assert_held(track, range(20), (0.5, 0.25))
+        self.assert_held(self.convert(log, at=(3, 4)), range(20), (3, 4))
+
+
+class RecordingsOfRos2(WithFolder):
+    TOPICS = [("/odom", "nav_msgs/msg/Odometry", [(100 + i, made.odometry(i)) for i in range(5)]),
+              ("/image", "sensor_msgs/msg/Image", [(100, b"not read")])]
+
+    def test_a_file(self):
+        path = made.db3(self.folder / "odom #1 50%.db3", self.TOPICS)
+        self.assertEqual(format_of(path), "db3")
+        track = convert(path, warn=self.warned.append)
+        self.assertEqual((track.source, track.frame, self.warned), ("/odom", "ENU_FLU", []))
+        self.assert_track(track, range(5), t0=100, metres=1e-9, radians=1e-6)
+        with self.assertRaisesRegex(ConvertError, r"no poses on topic '/pose'; topics with poses: '/odom' \(5 poses\)"):
+            convert(path, topic="/pose")
+
+    def folder_of(self, *names):
+        folder = self.folder / "recording"
+        folder.mkdir()
+        (folder / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n" +
+                                              "".join(f"    - {name}\n" for name in names))
+        return folder
+
+    def test_a_folder_of_several_files(self):
+        for kind in ("db3", "mcap"):
+            with self.subTest(kind):
+                folder = self.folder_of(f"r_10.{kind}", f"r_9.{kind}")  # in this order, whatever their names
+                parts = [(f"r_10.{kind}", range(3)), (f"r_9.{kind}", range(3, 6))]
+                for name, steps in parts:
+                    messages = [(100 + i, made.odometry(i)) for i in steps]
+                    if kind == "db3":
+                        made.db3(folder / name, [("/odom", "nav_msgs/msg/Odometry", messages)])
+                    else:
+                        (folder / name).write_bytes(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", messages)]))
+                self.assertEqual(format_of(folder), kind)
+                track = convert(folder, warn=self.warned.append)
+                self.assertEqual(self.warned, [])
+                self.assert_track(track, range(6), t0=100, metres=1e-9, radians=1e-6)
+                shutil.rmtree(folder)
+
+    def test_folders_without_files(self):
+        folder = self.folder_of()
+        with self.assertRaisesRegex(ConvertError, "a folder without .db3 and .mcap files"):
+            format_of(folder)
+        (folder / "r_0.db3.zstd").write_bytes(b"x")
+        with self.assertRaisesRegex(ConvertError, "r_0.db3.zstd is compressed; unpack it first: zstd -d "):
+            format_of(folder)
+
+    def test_messages_compressed_one_by_one(self):
+        path = made.db3(self.folder / "log", [("/odom", "nav_msgs/msg/Odometry", [(1, b"\x28\xb5\x2f\xfd...")])])
+        with self.assertRaisesRegex(ConvertError, "compressed one by one; .*ros2 bag convert"):
+            convert(path)
+
+    def test_another_database(self):
+        path = self.folder / "log"
+        with contextlib.closing(sqlite3.connect(path)) as base, base:
+            base.execute("CREATE TABLE notes(a)")
+        with self.assertRaisesRegex(ConvertError, "not a recording of ROS 2, or damaged: no such table: topics"):
+            convert(path)
+
+
+class Px4(WithFolder):
+    def test_estimates(self):
+        track = self.convert(made.ulog())
+        self.assertEqual((track.source, track.frame, self.warned), ("vehicle_attitude+vehicle_local_position", "NED_FRD", []))
+        self.assert_track(track, range(1, 50), metres=1e-5, radians=1e-5)  # the first position is not valid
+        self.assertIn("origin: 47.60000000,-122.33000000,10.000", track.comments)
+
+    def test_truth_of_the_simulator_is_preferred(self):
+        track = self.convert(made.ulog(truth=True))
+        self.assertEqual(track.source, "vehicle_attitude_groundtruth+vehicle_local_position_groundtruth")
+        self.assertAlmostEqual(track.rows[0].position_m[2], 102)
+
+    def test_truncated(self):
+        log = made.ulog()
+        self.assertEqual(len(self.convert(log[:-10]).rows), 48)
+        self.assertRegex(self.warned[0], "ends within a message, at byte [0-9]+")
+
+
 class Nmea(WithFolder):
     def test_a_pose_at_every_fix(self):
         track = self.convert(made.nmea_log(), origin=HERE, assumed=self.assumed(bottom_m=20))
@@ -277,6 +431,7 @@ class Corrupted(WithFolder):
             "mcap": made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", [(i, made.odometry(i)) for i in range(4)]),
                                ("/tf", "cdr", "tf2_msgs/msg/TFMessage", [(1, made.transforms(1))])], 2),
             "rosbag": made.bag([("/odom", "nav_msgs/Odometry", [(i, made.odometry(i, ros1=True)) for i in range(3)])]),
+            "ulog": made.ulog(True, 3),
             "nmea": made.nmea_log(3, kinds=("HDT", "PRDID", "GGA", "RMC")).encode()}
 
     def outcome(self, kind, data):
@@ -303,12 +458,33 @@ class Corrupted(WithFolder):
                     self.outcome(kind, bytes(data))
 
     def test_other_files(self):
-        for data in (b"", b"\x7fELF" + bytes(100), b"time,x,y\n1,2,3\n"):
-            with self.subTest(data[:8]), self.assertRaises(ConvertError):
+        for data, said in ((b"", "is empty"), (b"\x7fELF" + bytes(100), "none of dataflash"),
+                           (b"time,x,y\n1,2,3\n", "name the file in `traj"),
+                           (b"# frame: ENU_FLU\n1.5 0 0 0 0 0 0 1\n", "sonard plays CSV"), (b"\x1f\x8b\x08", "gunzip -k .*log"),
+                           (b"\x28\xb5\x2f\xfd", "zstd -d"), (b"#ROSBAG V1.2\n", "rosbag migrate .*log NEW.bag"),
+                           (b"FMT, 128, 89, FMT, BBnNZ, Type\n", "as text; give the .bin"), (b"PK\x03\x04..", "unzip")):
+            with self.subTest(data[:8]), self.assertRaisesRegex(ConvertError, said):
                 format_of(self.file(data))
+
+    def test_a_database_changed_anywhere(self):
+        whole = made.db3(self.folder / "whole", RecordingsOfRos2.TOPICS).read_bytes()
+        draw = random.Random(2)
+        for number in range(60):
+            data = bytearray(whole)
+            for _ in range(draw.choice((1, 20, 300))):
+                data[draw.randrange(16, len(data))] = draw.randrange(256)
+            with self.subTest(number=number):
+                self.outcome("db3", bytes(data[:draw.choice((len(data), draw.randrange(len(data))))]))
 
 
 class Command(WithFolder):
+    def test_place_of_a_log_without_one(self):
+        log = self.file(WithoutHorizontalPosition.telemetry(("ATTITUDE", "GLOBAL_POSITION_INT")), "rov.tlog")
+        code, text, said = self.run_main(log, "-o", "-", "--at=-1.5,2")
+        self.assertEqual(code, 0, said)
+        self.assertIn("north and east are held at -1.5, 2", said)
+        self.assertEqual(text.splitlines()[-1].split(",")[1:3], ["-1.500000", "2.000000"])
+
     def run_main(self, *words):
         out, error = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
@@ -349,6 +525,8 @@ class Command(WithFolder):
         self.assertEqual(self.run_main(log, "-o", self.folder / "no" / "folder.csv")[0], 66)
         self.assertEqual(self.run_main(log, "-o", "-", "--origin", "x")[0], 64)
         self.assertEqual(self.run_main(log, "-o", "-", "--component", "256")[0], 64)
+        for place in ("1", "1,2,3", "a,b", "nan,0", "1,2"):  # the last: the log has positions
+            self.assertEqual(self.run_main(log, "-o", "-", "--at", place)[0], 64, place)
         self.assertEqual(self.run_main(log, "-o", "-", "--body", "a b")[0], 64)
         self.assertEqual(self.run_main(self.file(b"\x7fELF"), "-o", "-")[0], 65)
 

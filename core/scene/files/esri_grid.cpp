@@ -1,15 +1,12 @@
-// ESRI ASCII grids: six header lines, then rows of heights from north to south.
+// ESRI ASCII grids: some header lines, then rows of heights from north to south.
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
-#include <optional>
 #include <string>
 
 #include "core/base/regular_file.hpp"
-#include "core/scene/shapes/terrain.hpp"
-#include "core/text/decimal.hpp"
+#include "core/scene/files/height_values.hpp"
 
 namespace sonar {
 namespace {
@@ -41,22 +38,16 @@ std::string lower(std::string_view s) {
   return out;
 }
 
-// Grids written by programs carry forms like "-9999.0", "1e-3", "007"; only the last is odd, and it is harmless here.
-std::optional<double> height_number(std::string_view s) {
-  if (const auto v = text::parse_decimal(s)) return v;
-  std::size_t sign = s.starts_with('-') || s.starts_with('+') ? 1 : 0, zeros = sign;
-  while (zeros + 1 < s.size() && s[zeros] == '0' && s[zeros + 1] >= '0' && s[zeros + 1] <= '9') ++zeros;
-  if (zeros == sign) return std::nullopt;
-  return text::parse_decimal(std::string(s.substr(0, sign)) + std::string(s.substr(zeros)));
-}
-
 struct Header {
-  double columns = 0, rows = 0, x = 0, y = 0, cell = 0, no_data = -9999;
+  std::size_t columns = 0, rows = 0;
+  double x = 0, y = 0, cell_x = 0, cell_y = 0;
   bool centred = false;  // xllcenter rather than xllcorner
+  std::string no_data = "-9999";
 };
 
 Result<Header> read_header(Words& words) {
   std::map<std::string, double> found;
+  Header h;
   const auto bad = [&](std::string what) {
     return failure(ErrorKind::bad_data, "line " + std::to_string(words.line()) + ": " + std::move(what));
   };
@@ -67,36 +58,41 @@ Result<Header> read_header(Words& words) {
       break;
     }
     const std::string key = lower(word.substr(0, 20));
-    static constexpr std::array<const char*, 8> keys{"ncols",     "nrows",     "xllcorner", "yllcorner",
-                                                     "xllcenter", "yllcenter", "cellsize",  "nodata_value"};
+    static constexpr std::array<const char*, 10> keys{"ncols",     "nrows",    "xllcorner", "yllcorner", "xllcenter",
+                                                      "yllcenter", "cellsize", "dx",        "dy",        "nodata_value"};
     if (std::none_of(keys.begin(), keys.end(), [&](const char* k) { return key == k; })) {
       return bad("\"" + key + "\" is not a header word of an ESRI ASCII grid");
     }
     const std::string_view value = words.next();
     const auto number = height_number(value);
-    if (!number) return bad(key + " needs a number");
+    if (!number || (std::isnan(*number) && key != "nodata_value")) return bad(key + " needs a number");
+    if (key == "nodata_value") h.no_data = value;
     found[key] = *number;
   }
-  for (const char* key : {"ncols", "nrows", "cellsize"}) {
+  if (found.contains("cellsize")) found.insert({{"dx", found["cellsize"]}, {"dy", found["cellsize"]}});
+  const char* const cell_x = found.contains("dy") ? "dx" : "cellsize";
+  for (const char* key : {"ncols", "nrows", cell_x, "dy"}) {
     if (!found.contains(key)) return bad(std::string(key) + " is missing in the header");
   }
-  Header h{.columns = found["ncols"], .rows = found["nrows"], .x = 0, .y = 0, .cell = found["cellsize"]};
   h.centred = found.contains("xllcenter") || found.contains("yllcenter");
   h.x = h.centred ? found["xllcenter"] : found["xllcorner"];
   h.y = h.centred ? found["yllcenter"] : found["yllcorner"];
-  if (found.contains("nodata_value")) h.no_data = found["nodata_value"];
-  const bool whole = h.columns == std::floor(h.columns) && h.rows == std::floor(h.rows);
-  if (!whole || h.columns < 2 || h.rows < 2 || h.columns * h.rows > static_cast<double>(max_mesh_triangles) / 2) {
+  h.cell_x = found["dx"], h.cell_y = found["dy"];
+  const double columns = found["ncols"], rows = found["nrows"];
+  const bool whole = columns == std::floor(columns) && rows == std::floor(rows);
+  if (!whole || columns < 2 || rows < 2 || columns * rows > static_cast<double>(max_mesh_triangles) / 2) {
     return bad("ncols and nrows must be whole numbers from 2, at most 10 million cells together");
   }
-  if (!(h.cell > 1e-6 && h.cell < 1e5)) return bad("cellsize must be between 1e-6 and 1e5 m");
+  h.columns = static_cast<std::size_t>(columns), h.rows = static_cast<std::size_t>(rows);
+  for (const double cell : {h.cell_x, h.cell_y})
+    if (!(cell > 1e-6 && cell < 1e5)) return bad("cellsize must be between 1e-6 and 1e5 m");
   if (std::abs(h.x) > 1e8 || std::abs(h.y) > 1e8) return bad("the corner is farther than 1e8 m away");
   return h;
 }
 
 }  // namespace
 
-Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, double z_scale) {
+Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const HeightOptions& options) {
   const auto bad = [&](std::string what) { return failure(ErrorKind::bad_data, file.string() + ": " + std::move(what)); };
   auto text = read_regular(file, most_bytes);
   if (!text) return tl::make_unexpected(text.error());
@@ -104,28 +100,32 @@ Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, double z
   Words words(*std::move(text));
   const auto header = read_header(words);
   if (!header) return bad(header.error().text);
-  const auto columns = static_cast<std::size_t>(header->columns), rows = static_cast<std::size_t>(header->rows);
-  HeightGrid grid;  // grows with what is there, not with what the header promises
+  const std::size_t columns = header->columns, rows = header->rows;
+  RawHeights raw{.geographic = geographic_by_prj(file)};  // grows with what is there, not with what the header promises
+  HeightValues values(header->no_data);
   for (std::size_t i = 0; i < rows * columns; ++i) {
     const std::string_view word = words.next();
     const std::string where = "line " + std::to_string(words.line()) + ": ";
     if (word.empty()) {
       return bad(where + "the grid ends after " + std::to_string(i) + " of " + std::to_string(rows * columns) + " heights");
     }
-    const auto z = height_number(word);
-    if (!z) return bad(where + "\"" + std::string(word.substr(0, 40)) + "\" is not a height");
-    const bool no_data = *z == header->no_data;
-    if (!no_data && std::abs(*z) > 1e7) return bad(where + "the height " + std::string(word.substr(0, 40)) + " is beyond 1e7 m");
-    grid.z_m.push_back(no_data ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(*z * z_scale));
+    const auto number = height_number(word);
+    if (!number) return bad(where + "\"" + std::string(word.substr(0, 40)) + "\" is not a height");
+    const auto z = values.height_of(*number);
+    if (!z) return bad(where + "the height " + std::string(word.substr(0, 40)) + " is beyond 1e7 m");
+    raw.z.push_back(*z);
   }
   if (!words.next().empty()) return bad("more heights than ncols x nrows");
 
-  const auto row_at = [&](std::size_t row) { return grid.z_m.begin() + static_cast<std::ptrdiff_t>(row * columns); };
+  const auto row_at = [&](std::size_t row) { return raw.z.begin() + static_cast<std::ptrdiff_t>(row * columns); };
   for (std::size_t row = 0; row < rows / 2; ++row)  // the file starts in the north, the grid in the south
     std::swap_ranges(row_at(row), row_at(row + 1), row_at(rows - 1 - row));
   const double first = header->centred ? 0 : 0.5;  // a corner is half a cell from the first height
-  for (std::size_t i = 0; i < columns; ++i) grid.x_m.push_back(header->x + (static_cast<double>(i) + first) * header->cell);
-  for (std::size_t j = 0; j < rows; ++j) grid.y_m.push_back(header->y + (static_cast<double>(j) + first) * header->cell);
+  for (std::size_t i = 0; i < columns; ++i) raw.x.push_back(header->x + (static_cast<double>(i) + first) * header->cell_x);
+  for (std::size_t j = 0; j < rows; ++j) raw.y.push_back(header->y + (static_cast<double>(j) + first) * header->cell_y);
+  raw.fill_values = values.fill_values();
+  auto grid = finish_heights(std::move(raw), options);
+  if (!grid) return bad(grid.error().text);
   return grid;
 }
 

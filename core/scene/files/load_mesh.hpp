@@ -1,6 +1,7 @@
 // Reads mesh files (OBJ, STL, PLY, glTF/GLB, DAE) into checked triangles about their own middle. Used by the scene loader only.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -26,6 +27,7 @@ struct MeshFile {
 struct LoadedMesh {
   CentredMesh centred;                      // Mesh::material indexes material_names
   std::vector<std::string> material_names;  // as the file calls them; may be empty strings
+  std::uint64_t lost = 0;                   // triangles of faces that the file lists and the importer does not read
 };
 
 /// Refused with one sentence: missing, unknown format, unreadable, empty, not finite, beyond 1e7 m, more than 20 million

@@ -70,6 +70,10 @@ Shape ShapeReader::read_mesh_file(Map& keys) {
     if (loaded->centred.left_out > 0) {
       scene.notes.push_back(name + ": " + std::to_string(loaded->centred.left_out) + " triangles without area left out");
     }
+    if (loaded->lost > 0)
+      scene.notes.push_back(name + ": " + std::to_string(loaded->lost) +
+                            " of the triangles that it lists cannot be read and are "
+                            "missing here; do their faces name vertices that are not there? Export it again");
     meshes.emplace(key, std::move(*loaded));
   }
   const LoadedMesh& loaded = meshes.at(key);

@@ -1,8 +1,9 @@
-// Grey PNG images as heights; the only file of the scene that includes libpng.
+// Grey PNG images, also stored as colours, as heights; the only file of the scene that includes libpng.
 #include <png.h>
 
 #include <csetjmp>
 #include <cstdio>
+#include <cstring>
 #include <string>
 
 #include "core/base/regular_file.hpp"
@@ -27,14 +28,15 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
   png_read_info(png, info);
   const std::size_t columns = png_get_image_width(png, info), rows = png_get_image_height(png, info);
   const bool grey = (png_get_color_type(png, info) & ~PNG_COLOR_MASK_ALPHA) == PNG_COLOR_TYPE_GRAY;
-  if (!grey) png_error(png, "not a grey image; heights need one channel of 8 or 16 bits");
   if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) png_error(png, "interlaced; save it without interlacing");
   if (columns < 2 || rows < 2) png_error(png, "smaller than 2 x 2 pixels");
   if (columns * rows > max_mesh_triangles / 2) png_error(png, "more than 10 million pixels; use a coarser image");
-  if (png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
+  if (grey && png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
+  if (!grey) png_set_palette_to_rgb(png);  // of palettes only
   png_set_strip_alpha(png);
   png_read_update_info(png, info);
   const bool wide = png_get_bit_depth(png, info) == 16;
+  const std::size_t sample = wide ? 2 : 1, pixel = grey ? sample : 3 * sample;
   row.resize(png_get_rowbytes(png, info));
   picture.columns = columns;
   picture.rows = rows;
@@ -42,7 +44,10 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
   for (std::size_t j = 0; j < rows; ++j) {
     png_read_row(png, row.data(), nullptr);
     for (std::size_t i = 0; i < columns; ++i) {
-      const unsigned v = wide ? (unsigned{row[2 * i]} << 8 | row[2 * i + 1]) : row[i] * 257u;
+      const png_byte* at = row.data() + pixel * i;
+      if (!grey && (std::memcmp(at, at + sample, sample) != 0 || std::memcmp(at, at + 2 * sample, sample) != 0))
+        png_error(png, "not a grey image: it has colours, where red, green and blue differ; heights need one channel");
+      const unsigned v = wide ? (unsigned{at[0]} << 8 | at[1]) : at[0] * 257u;
       picture.grey[j * columns + i] = static_cast<std::uint16_t>(v);
     }
   }
@@ -86,8 +91,8 @@ Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double si
     for (std::size_t i = 0; i < n; ++i) at.push_back(size * (static_cast<double>(i) / static_cast<double>(n - 1) - 0.5));
     return at;
   };
-  grid.x_m = axis(picture.columns, size_x_m);
-  grid.y_m = axis(picture.rows, size_y_m);
+  grid.x = axis(picture.columns, size_x_m);
+  grid.y = axis(picture.rows, size_y_m);
   grid.z_m.resize(picture.grey.size());
   for (std::size_t j = 0; j < picture.rows; ++j) {
     for (std::size_t i = 0; i < picture.columns; ++i) {

@@ -6,6 +6,7 @@
 
 #include "core/base/load_step.hpp"
 #include "core/base/memory_left.hpp"
+#include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/shapes/primitives.hpp"
 
 namespace sonar {
@@ -34,6 +35,11 @@ Shape from_grid(const Result<HeightGrid>& grid, std::uint16_t material, const No
   shape.centre_m = made->centre_m;
   if (centred) shape.centre_m.x = shape.centre_m.y = 0;
   return shape;
+}
+
+Geodetic origin_from(Map keys) {
+  const double latitude_deg = keys.required("lat").number(Range::between(-90, 90));
+  return {rad_from_deg(latitude_deg), rad_from_deg(keys.required("lon").number(Range::between(-180, 360))), 0};
 }
 
 double in_rad(const Node& node, double fallback_deg) {
@@ -151,7 +157,7 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   }
   const Node file = keys.required("file");
   const std::filesystem::path path = folder / file.text(1024);
-  const std::string extension = path.extension().string();
+  const std::string extension = mesh_extension(path);
   std::error_code no_size;
   const std::uintmax_t bytes = std::filesystem::file_size(path, no_size);
   begin_load_step("reading " + path.filename().string(), no_size ? 0 : bytes / 4);
@@ -161,13 +167,27 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
     if (size[0] <= 0 || size[1] <= 0) return {};
     return from_grid(read_png_heights(path, size[0], size[1], height[0], height[1]), material, file, false);
   }
-  if (extension == ".asc") {
-    const double z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000));
+  using Read = Result<HeightGrid> (*)(const std::filesystem::path&, const HeightOptions&);
+  static const std::map<std::string, Read> readers{
+      {".asc", read_esri_heights}, {".xyz", read_xyz_heights}, {".tif", read_geo_tiff_heights}, {".tiff", read_geo_tiff_heights}};
+  if (const auto reader = readers.find(extension); reader != readers.end()) {
+    HeightOptions options{.z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000))};
     const bool centred = keys.optional("centred").boolean_or(false);
-    return from_grid(read_esri_heights(path, z_scale), material, file, centred);
+    if (const Node geographic = keys.optional("geographic")) options.geographic = geographic.boolean_or(false);
+    if (const Node origin = keys.optional("origin")) {
+      options.origin = origin_from(origin.map());
+      if (centred) origin.fail("give origin or centred, not both");
+    }
+    auto grid = reader->second(path, options);
+    if (grid)
+      for (const std::string& note : grid->notes) scene.notes.push_back(path.filename().string() + ": " + note);
+    return from_grid(grid, material, file, centred);
   }
   if (file.present() && !path.filename().empty())
-    file.fail("unknown height format; use a grey .png or an ESRI ASCII grid (.asc)");
+    file.fail(
+        "unknown height format; use a grey .png, an ESRI ASCII grid (.asc), .xyz or GeoTIFF (.tif); others, such as NetCDF "
+        "and BAG: gdal_translate -of GTiff " +
+        path.filename().string() + " " + path.stem().string() + ".tif");
   return {};
 }
 

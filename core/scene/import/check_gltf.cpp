@@ -105,4 +105,36 @@ MeshFault check_gltf(std::string_view file) {
   return graph.fault(roots);
 }
 
+MeshFault glb_fault(std::string_view file) {
+  constexpr std::size_t head = 12, chunk_head = 8;
+  const auto number = [&](std::size_t at) {
+    std::uint64_t v = 0;
+    for (std::size_t k = 4; k-- > 0;) v = v << 8 | static_cast<unsigned char>(file[at + k]);
+    return v;
+  };
+  const auto bytes = [](std::uint64_t n) { return std::to_string(n) + " bytes"; };
+  if (!file.starts_with("glTF"))
+    return "not a GLB file: it does not begin with glTF; is it a .gltf, or a link to the file (Git LFS)?";
+  if (file.size() < head + chunk_head) return "ends within its head, after " + bytes(file.size()) + "; fetch or export it again";
+  const std::uint64_t version = number(4), length = number(8);
+  if (version == 1) return std::nullopt;
+  if (version != 2) return "is GLB of version " + std::to_string(version) + "; export it as glTF 2.0";
+  if (length > file.size())
+    return "is cut short: it says that it has " + bytes(length) + " and has " + bytes(file.size()) + "; fetch or export it again";
+  int chunk = 0;
+  for (std::size_t at = head; at + chunk_head <= file.size(); ++chunk) {
+    const std::uint64_t size = number(at);
+    const char* name = chunk == 0 ? "JSON" : "binary";
+    if (chunk == 0 && file.substr(at + 4, 4) != "JSON") return "its first chunk is not JSON; export it again";
+    if (size > file.size() - at - chunk_head)
+      return std::string("its ") + name + " chunk of " + bytes(size) +
+             " goes beyond the end of the file; fetch or export it again";
+    if (size % 4 != 0)
+      return std::string("its ") + name + " chunk has " + bytes(size) +
+             ", and GLB wants a multiple of 4, filled up with blanks or zeros; export it again";
+    at += chunk_head + static_cast<std::size_t>(size);
+  }
+  return std::nullopt;
+}
+
 }  // namespace sonar

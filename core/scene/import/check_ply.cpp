@@ -54,4 +54,26 @@ MeshFault check_ply(std::string_view head, std::uint64_t file_bytes) {
   return std::nullopt;
 }
 
+std::uint64_t faces_of_ply(std::string_view head) {
+  std::istringstream lines{std::string(head.substr(0, head.find("end_header")))};
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string word, type;
+    std::uint64_t count = 0;
+    if (words >> word >> type >> count && word == "element" && type == "face") return count;
+  }
+  return 0;
+}
+
+std::uint64_t facets_of_stl(std::string_view file) {
+  std::uint64_t facets = 0;
+  for (std::size_t at = 0; at < file.size();) {
+    const std::size_t end = std::min(file.find('\n', at), file.size());
+    const std::size_t word = std::min(file.find_first_not_of(" \t", at), end);
+    facets += file.substr(word, 6) == "facet " || file.substr(word, 6) == "FACET ";
+    at = end + 1;
+  }
+  return facets;
+}
+
 }  // namespace sonar

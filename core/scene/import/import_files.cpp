@@ -18,40 +18,99 @@ constexpr std::uint64_t most_objects = 10'000;
 
 bool begins_object(char c) { return c == 'o' || c == 'g'; }  // no other statement of an OBJ file does
 
-/// Lines of an OBJ file that begin an object or a group.
-bool has_many_objects(std::FILE* file) {
+/// Follows the text of an OBJ file: which lines are faces, and what of them is a vertex. Numbers of texture coordinates and
+/// normals become blanks, so that a face is read whatever they name; a sonar has no use for them.
+class ObjText {
+ public:
+  struct Step {
+    char c;  // as the importer gets it
+    bool begins_object = false, begins_face = false, begins_corner = false;
+  };
+
+  Step next(char c) {
+    Step step{c};
+    const bool goes_on = in_face_ && before_ == '\\' && (c == '\n' || c == '\r');  // on the next line: made one of it
+    if (goes_on) {
+      step.c = ' ';
+      in_word_ = false;
+    } else if (c == '\n') {
+      line_begins_ = true;
+      in_face_ = in_word_ = in_comment_ = false;
+    } else if (line_begins_) {
+      step.begins_object = begins_object(c) && before_ == '\n';
+      if (!is_blank(c))
+        line_begins_ = false, in_face_ = step.begins_face = c == 'f', in_word_ = true, in_vertex_ = slashed_ = false;
+    } else if (is_blank(c)) {
+      in_word_ = false;
+    } else if (in_face_ && (in_comment_ || c == '\\' || c == '#')) {
+      in_comment_ = in_comment_ || c == '#';
+      step.c = ' ';
+    } else if (in_face_) {
+      if (!in_word_) step.begins_corner = in_vertex_ = true;
+      in_word_ = true;
+      if (c == '/') in_vertex_ = false, slashed_ = true;
+      if (!in_vertex_ && slashed_) step.c = ' ';
+      if (in_vertex_) slashed_ = false;
+    }
+    if (c != '\r') before_ = goes_on ? ' ' : c;
+    return step;
+  }
+
+ private:
+  static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+  char before_ = '\n';
+  bool line_begins_ = true, in_face_ = false, in_word_ = false, in_vertex_ = false, slashed_ = false, in_comment_ = false;
+};
+
+struct ObjCounts {
+  std::uint64_t objects = 0, triangles = 0;
+};
+ObjCounts counts_of(std::FILE* file) {
   std::array<char, std::size_t{1} << 16> part;
-  std::uint64_t objects = 0;
-  char before = '\n';
+  ObjCounts counts;
+  ObjText text;
+  std::uint64_t corners = 0;
+  const auto end_face = [&] { counts.triangles += std::max<std::uint64_t>(corners, 2) - 2, corners = 0; };
   while (const std::size_t n = std::fread(part.data(), 1, part.size(), file))
-    for (std::size_t i = 0; i < n; before = part[i++])
-      if (before == '\n' && begins_object(part[i]) && ++objects > most_objects) return true;
-  return false;
+    for (std::size_t i = 0; i < n; ++i) {
+      const ObjText::Step step = text.next(part[i]);
+      counts.objects += step.begins_object;
+      if (step.begins_face) end_face();
+      corners += step.begins_corner;
+    }
+  end_face();
+  return counts;
 }
 
-/// Turns those lines into comments: the surface and its materials are the same without them.
-class WithoutObjects final : public Assimp::IOStream {
+/// An OBJ file with faces of vertices alone and, if asked, with the lines that begin objects as comments: the surface and its
+/// materials are the same without them.
+class ObjStream final : public Assimp::IOStream {
  public:
-  explicit WithoutObjects(OpenFile file, std::size_t size) : file_(std::move(file)), size_(size) {}
+  ObjStream(OpenFile file, std::size_t size, bool without_objects)
+      : file_(std::move(file)), size_(size), without_objects_(without_objects) {}
 
   std::size_t Read(void* to, std::size_t size, std::size_t count) override {
     char* bytes = static_cast<char*>(to);
     const std::size_t n = size == 0 ? 0 : std::fread(bytes, 1, size * count, file_.get());
     for (std::size_t i = 0; i < n; ++i) {
-      const char c = bytes[i];
-      if (before_ == '\n' && begins_object(c)) bytes[i] = '#';
-      before_ = c;
+      const ObjText::Step step = text_.next(bytes[i]);
+      bytes[i] = step.begins_object && without_objects_ ? '#' : step.c;
     }
     return size == 0 ? 0 : n / size;
   }
+  /// From there on, after following the text to there: the importer goes back to the beginning only.
   aiReturn Seek(std::size_t offset, aiOrigin origin) override {
-    const int whence = origin == aiOrigin_SET ? SEEK_SET : origin == aiOrigin_CUR ? SEEK_CUR : SEEK_END;
-    if (std::fseek(file_.get(), static_cast<long>(offset), whence) != 0) return aiReturn_FAILURE;
-    const long now = std::ftell(file_.get());
-    before_ = '\n';
-    if (now == 0) return aiReturn_SUCCESS;
-    if (std::fseek(file_.get(), now - 1, SEEK_SET) != 0) return aiReturn_FAILURE;
-    before_ = static_cast<char>(std::fgetc(file_.get()));
+    if (origin == aiOrigin_CUR) offset += Tell();
+    if (origin == aiOrigin_END) offset = size_ - std::min(offset, size_);
+    if (std::fseek(file_.get(), 0, SEEK_SET) != 0) return aiReturn_FAILURE;
+    text_ = {};
+    std::array<char, 4096> part;
+    for (std::size_t left = offset; left > 0;) {
+      const std::size_t n = std::fread(part.data(), 1, std::min(left, part.size()), file_.get());
+      if (n == 0) return aiReturn_FAILURE;
+      for (std::size_t i = 0; i < n; ++i) text_.next(part[i]);
+      left -= n;
+    }
     return aiReturn_SUCCESS;
   }
   std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
@@ -62,7 +121,8 @@ class WithoutObjects final : public Assimp::IOStream {
  private:
   OpenFile file_;
   std::size_t size_;
-  char before_ = '\n';
+  bool without_objects_;
+  ObjText text_;
 };
 
 }  // namespace
@@ -77,8 +137,13 @@ ImportFiles::ImportFiles(const MeshFile& request, std::optional<Error>& fault, s
   add(request.file.parent_path());
   if (request.folder) add(*request.folder);
   mesh_ = (folders_[0] / request.file.filename()).string();
-  if (const auto file = open_regular(mesh_); file && mesh_extension(mesh_) == ".obj")
-    without_objects_ = has_many_objects(file->get());
+  if (mesh_extension(mesh_) != ".obj") return;
+  is_obj_ = true;
+  if (const auto file = open_regular(mesh_)) {
+    const ObjCounts counts = counts_of(file->get());
+    without_objects_ = counts.objects > most_objects;
+    obj_triangles_ = counts.triangles;
+  }
 }
 
 bool ImportFiles::is_ours(const std::filesystem::path& file) const {
@@ -117,7 +182,7 @@ Assimp::IOStream* ImportFiles::Open(const char* file, const char* mode) {
     }
     opened_(bytes_);
   }
-  if (is_mesh && without_objects_) return new WithoutObjects(std::move(*opened), bytes);
+  if (is_mesh && is_obj_) return new ObjStream(std::move(*opened), bytes, without_objects_);
   return DefaultIOSystem::Open(place.c_str(), mode);
 }
 

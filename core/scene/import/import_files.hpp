@@ -4,6 +4,7 @@
 #include <assimp/DefaultIOSystem.h>
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ class ImportFiles final : public Assimp::DefaultIOSystem {
   /// The mesh, where its folder has no links or dots left.
   const std::string& mesh() const { return mesh_; }
 
+  /// Of the faces that an OBJ file lists; nothing of other formats.
+  std::optional<std::uint64_t> obj_triangles() const { return obj_triangles_; }
+
   bool Exists(const char* file) const override;
   Assimp::IOStream* Open(const char* file, const char* mode) override;
 
@@ -31,7 +35,8 @@ class ImportFiles final : public Assimp::DefaultIOSystem {
   std::optional<Error>& fault_;
   std::function<void(std::uintmax_t)> opened_;
   std::uintmax_t bytes_ = 0;
-  bool without_objects_ = false;
+  bool is_obj_ = false, without_objects_ = false;
+  std::optional<std::uint64_t> obj_triangles_;
 };
 
 }  // namespace sonar

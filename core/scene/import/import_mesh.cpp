@@ -41,6 +41,7 @@ std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint
 }
 
 // Node transforms in double: far offsets in a node must not cost the vertices their millimetres.
+// A face whose vertices are not there is left out.
 void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>& parent, unsigned depth,
                    const TriangleSink& take) {
   if (depth > NodeGraph::deepest) return;
@@ -53,12 +54,14 @@ void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<
       const aiFace& face = mesh.mFaces[f];
       if (face.mNumIndices < 3) continue;  // points and lines
       polygon.clear();
-      for (unsigned k = 0; k < face.mNumIndices; ++k) {
-        if (face.mIndices[k] >= mesh.mNumVertices) return;
+      const bool whole =
+          std::all_of(face.mIndices, face.mIndices + face.mNumIndices, [&](unsigned index) { return index < mesh.mNumVertices; });
+      for (unsigned k = 0; whole && k < face.mNumIndices; ++k) {
         const aiVector3D& p = mesh.mVertices[face.mIndices[k]];
         const aiVector3t<double> v = here * aiVector3t<double>(p.x, p.y, p.z);
         polygon.push_back({v.x, v.y, v.z});
       }
+      if (!whole) continue;
       if (polygon.size() == 3) {
         take(std::span<const Vec3d, 3>(polygon), material);
         continue;
@@ -68,6 +71,35 @@ void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<
     }
   }
   for (unsigned c = 0; c < node.mNumChildren; ++c) each_triangle(scene, *node.mChildren[c], here, depth + 1, take);
+}
+
+/// The text of a mesh, or its first `most` bytes.
+Result<std::string> text_of(const MeshFile& request, std::size_t most) {
+  if (!request.in_memory.empty()) return std::string(request.in_memory.substr(0, most));
+  return read_regular(request.file, most);
+}
+
+/// Why the importer cannot read it, if that can be said better than by the importer.
+std::string better_reason(const MeshFile& request, const std::string& extension, std::string reason) {
+  if (extension != ".glb") return reason;
+  const auto text = text_of(request, max_mesh_bytes);
+  const MeshFault fault = text ? glb_fault(*text) : MeshFault();
+  return fault ? *fault : reason;
+}
+
+/// Triangles that the file lists, where that is not a matter of what the importer makes of it.
+std::uint64_t triangles_listed(const MeshFile& request, const std::string& extension, const ImportFiles& files,
+                               const aiScene& scene, std::uint64_t imported) {
+  if (files.obj_triangles()) return *files.obj_triangles();
+  const auto text = extension == ".stl" || extension == ".ply"
+                        ? text_of(request, extension == ".ply" ? ply_head_bytes : max_mesh_bytes)
+                        : Result<std::string>();
+  if (!text || text->empty()) return imported;
+  if (extension == ".stl") return std::max(imported, facets_of_stl(*text));
+  std::uint64_t faces = 0;
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m) faces += scene.mMeshes[m]->mNumFaces;
+  const std::uint64_t listed = faces_of_ply(*text);
+  return imported + (listed > faces ? listed - faces : 0);  // at least one triangle each
 }
 
 Result<MeshFault> check_text(const MeshFile& request, const std::string& extension) {
@@ -107,7 +139,7 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
           : importer.ReadFileFromMemory(request.in_memory.data(), request.in_memory.size(), 0, extension.c_str() + 1);
   if (!scene || !scene->mRootNode) {
     if (fault) return tl::make_unexpected(*std::move(fault));
-    return bad_mesh(request, "cannot be read: " + first_line(importer.GetErrorString()));
+    return bad_mesh(request, "cannot be read: " + better_reason(request, extension, first_line(importer.GetErrorString())));
   }
   hooks.imported();
   std::vector<std::string> names;
@@ -117,9 +149,17 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
     names.emplace_back(label.C_Str());
   }
   const std::uint64_t triangles = triangles_of_nodes(*scene->mRootNode, triangles_of_meshes(*scene));
-  return finish_mesh(request, y_up_by_default, triangles, std::move(names), [&](const TriangleSink& take) {
-    each_triangle(*scene, *scene->mRootNode, aiMatrix4x4t<double>(), 0, take);
+  const std::uint64_t listed = triangles_listed(request, extension, *files, *scene, triangles);
+  std::uint64_t taken = 0;
+  auto mesh = finish_mesh(request, y_up_by_default, triangles, std::move(names), [&](const TriangleSink& take) {
+    taken = 0;
+    each_triangle(*scene, *scene->mRootNode, aiMatrix4x4t<double>(), 0, [&](std::span<const Vec3d, 3> p, std::uint16_t material) {
+      ++taken;
+      take(p, material);
+    });
   });
+  if (mesh && listed > taken) mesh->lost = listed - taken;
+  return mesh;
 }
 
 }  // namespace sonar

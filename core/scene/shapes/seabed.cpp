@@ -69,7 +69,7 @@ std::size_t seabed_triangles(const SeabedShape& s) {
 
 HeightGrid make_seabed(const SeabedShape& s) {
   const Axis x = make_axis(s.size_x_m, s.fine_x_m, s.spacing_x_m), y = make_axis(s.size_y_m, s.fine_y_m, s.spacing_y_m);
-  HeightGrid grid{.x_m = x.at_m, .y_m = y.at_m, .z_m = std::vector<float>(x.at_m.size() * y.at_m.size())};
+  HeightGrid grid{.x = x.at_m, .y = y.at_m, .z_m = std::vector<float>(x.at_m.size() * y.at_m.size())};
   std::vector<double> z(grid.z_m.size());
   const auto each = [&](auto&& body) {
     for (std::size_t j = 0, k = 0; j < y.at_m.size(); ++j) {

@@ -4,9 +4,50 @@
 #include <limits>
 
 namespace sonar {
+namespace {
+
+/// East and north of every vertex of a grid. In degrees: of the point of the ellipsoid, in the plane that touches it at the
+/// origin, whatever the height. Seen from there, a length along the ground d away is too short by the part (d / R)^2 / 2.
+class PlaneOf {
+ public:
+  explicit PlaneOf(const HeightGrid& grid) : grid_(grid) {
+    if (!grid.origin) return;
+    const Geodetic& o = *grid.origin;
+    const auto ring_at = [](double latitude_rad) {
+      const Vec3d p = ecef_from({latitude_rad, 0, 0});
+      return Ring{p.x, p.z};
+    };
+    const Ring at_origin = ring_at(o.latitude_rad);
+    const double s = std::sin(o.latitude_rad), c = std::cos(o.latitude_rad);
+    for (const double longitude_deg : grid.x) {
+      const double turn = rad_from_deg(longitude_deg) - o.longitude_rad;
+      sin_.push_back(std::sin(turn)), cos_.push_back(std::cos(turn));
+    }
+    for (const double latitude_deg : grid.y) {
+      const Ring ring = ring_at(rad_from_deg(latitude_deg));
+      radius_m_.push_back(ring.radius_m);
+      north_m_.push_back(s * at_origin.radius_m + c * (ring.z_m - at_origin.z_m));
+    }
+    sin_latitude_ = s;
+  }
+  Vec3d operator()(std::size_t i, std::size_t j, double z_m) const {
+    if (!grid_.origin) return {grid_.x[i], grid_.y[j], z_m};
+    return {radius_m_[j] * sin_[i], north_m_[j] - sin_latitude_ * radius_m_[j] * cos_[i], z_m};
+  }
+
+ private:
+  struct Ring {
+    double radius_m, z_m;  // about the earth's axis
+  };
+  const HeightGrid& grid_;
+  std::vector<double> sin_, cos_, radius_m_, north_m_;
+  double sin_latitude_ = 0;
+};
+
+}  // namespace
 
 Result<CentredMesh> mesh_from_grid(const HeightGrid& grid) {
-  const std::size_t columns = grid.x_m.size(), rows = grid.y_m.size();
+  const std::size_t columns = grid.x.size(), rows = grid.y.size();
   if (columns < 2 || rows < 2) return failure(ErrorKind::bad_data, "a height grid needs at least 2 x 2 heights");
   if (2 * (columns - 1) * (rows - 1) > max_mesh_triangles) {
     return failure(ErrorKind::bad_data, "the grid of " + std::to_string(columns) + " x " + std::to_string(rows) +
@@ -20,7 +61,8 @@ Result<CentredMesh> mesh_from_grid(const HeightGrid& grid) {
   }
   if (low > high) return failure(ErrorKind::bad_data, "no cell of the grid has a height");
   CentredMesh out;
-  out.centre_m = {0.5 * (grid.x_m.front() + grid.x_m.back()), 0.5 * (grid.y_m.front() + grid.y_m.back()), 0.5 * (low + high)};
+  const PlaneOf place(grid);
+  out.centre_m = 0.5 * (place(0, 0, low) + place(columns - 1, rows - 1, high));
   constexpr std::uint32_t none = 0xFFFFFFFFu;
   std::vector<std::uint32_t> index(grid.z_m.size(), none);
   out.mesh.vertices.reserve(grid.z_m.size());
@@ -28,8 +70,7 @@ Result<CentredMesh> mesh_from_grid(const HeightGrid& grid) {
     for (std::size_t i = 0; i < columns; ++i, ++k) {
       if (std::isnan(grid.z_m[k])) continue;
       index[k] = static_cast<std::uint32_t>(out.mesh.vertices.size());
-      const Vec3d p{grid.x_m[i], grid.y_m[j], static_cast<double>(grid.z_m[k])};
-      out.mesh.vertices.push_back(to_float(p - out.centre_m));
+      out.mesh.vertices.push_back(to_float(place(i, j, static_cast<double>(grid.z_m[k])) - out.centre_m));
     }
   }
   out.mesh.triangles.reserve(2 * (columns - 1) * (rows - 1));

@@ -1,12 +1,15 @@
-// Ground as a height over a rectangular grid: read from files (PNG, ESRI ASCII) or made from a seed.
+// Ground as a height over a rectangular grid: read from files (PNG, ESRI ASCII, XYZ, GeoTIFF) or made from a seed.
 // All become meshes about their own middle, so that far coordinates stay in the double precision of a pose.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "core/base/geodesy.hpp"
 #include "core/base/result.hpp"
 #include "core/scene/scene.hpp"
 
@@ -16,8 +19,11 @@ inline constexpr std::size_t max_mesh_triangles = 20'000'000;
 
 /// Heights over the product of two rising coordinate lists; NaN = no ground there.
 struct HeightGrid {
-  std::vector<double> x_m, y_m;  // rising, at least two each
-  std::vector<float> z_m;        // [y][x]
+  std::vector<double> x, y;  // rising, at least two each; metres, or with an origin degrees of longitude and latitude
+  std::vector<float> z_m;    // [y][x]
+  /// Set: the ground lies in the plane that touches the ellipsoid here. A height stays what it is, above a flat sea.
+  std::optional<Geodetic> origin = {};
+  std::vector<std::string> notes = {};  // what the reader did that the scene's author should know
 };
 
 /// A mesh about its own middle, and where that middle lies in the coordinates it was described in.
@@ -30,12 +36,23 @@ struct CentredMesh {
 /// Fails when no four neighbouring heights exist, or when it would exceed max_mesh_triangles.
 Result<CentredMesh> mesh_from_grid(const HeightGrid& grid);
 
-/// Grey PNG of 8 or 16 bits over size_x by size_y metres about the origin; first row of the image = largest y.
-/// Black is low_m, white is high_m.
+/// Grey PNG of 8 or 16 bits, also stored as colours, over size_x by size_y metres about the origin; first row of the image =
+/// largest y. Black is low_m, white is high_m.
 Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double size_x_m, double size_y_m, double low_m,
                                     double high_m);
-/// ESRI ASCII grid (.asc) in its own coordinates; heights are multiplied by z_scale (-1 for depths).
-Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, double z_scale);
+
+/// How a file of heights with coordinates of its own is read.
+struct HeightOptions {
+  double z_scale = 1;                   // -1 for depths
+  std::optional<bool> geographic = {};  // coordinates in degrees; unset: as the file says or shows
+  std::optional<Geodetic> origin = {};  // of geographic ones; unset: the middle of the grid
+};
+/// ESRI ASCII grid (.asc).
+Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const HeightOptions& options);
+/// Lines "x y z" of an even grid (.xyz).
+Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const HeightOptions& options);
+/// GeoTIFF (.tif): one band of numbers, not turned. Unavailable where sonard was built without libtiff.
+Result<HeightGrid> read_geo_tiff_heights(const std::filesystem::path& file, const HeightOptions& options);
 
 struct Ripples {
   double wavelength_m = 0;   // 0 = none

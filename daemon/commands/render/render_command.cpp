@@ -147,7 +147,10 @@ Result<int> check(const RenderInput& input) {
 /// A line each, however many steps a sweep has.
 void print_notes(const RenderInput& input) {
   std::set<std::string> notes{note_of_parts_left_out(input.jobs.front().config.engine.switches)};
-  for (const RenderJob& job : input.jobs) notes.insert(note_of_range(job));
+  for (const RenderJob& job : input.jobs) {
+    notes.insert(note_of_range(job));
+    notes.insert(job.scene->notes.begin(), job.scene->notes.end());
+  }
   for (const std::string& note : notes)
     if (!note.empty()) std::fprintf(stderr, "sonard: %s\n", note.c_str());
 }

@@ -9,6 +9,7 @@
 #include "core/motion/trajectory_file.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "core/text/format.hpp"
+#include "daemon/emulator/world/body_axes.hpp"
 
 namespace sonar {
 namespace {
@@ -16,7 +17,6 @@ namespace {
 using text::format;
 
 constexpr double turned_over = -0.5;           // the z axis points down, by more than 30 deg below the horizon
-constexpr double tilted = 0.5;                 // it is further than 60 deg from upright
 constexpr std::size_t most_looked_at = 10000;  // poses of a trajectory, triangles of a mesh
 constexpr double ground_flatness = 0.05;       // height over width: what is flatter is ground, which may be long
 constexpr double least_ground_m = 2;           // its width: a plate is no ground
@@ -33,7 +33,7 @@ constexpr const char* far_cure =
     "positions are metres from the world's 0, 0, 0: see the unit and the origin that they are sent in";
 constexpr const char* turned_cure =
     "see the order of the quaternion (JSON and EuRoC: w first; TUM and ROS: w last), the unit of angles (JSON: radians), and the "
-    "body's axes (FLU: z up; FRD: z down)";
+    "body's axes (FLU: z up; FRD: z down; a camera's: z ahead)";
 constexpr const char* order_cure =
     "write w where the format has it: last in a TUM line (t x y z qx qy qz qw), first in one of EuRoC";
 constexpr const char* angle_cure = "angles are radians there: were degrees sent? Multiply them by 0.0174533";
@@ -41,9 +41,6 @@ constexpr const char* mount_cure =
     "rpy_deg is [roll, pitch, yaw]: a roll near 180, or a pitch beyond 90, turns it over and swaps port and starboard; to look "
     "aft, set yaw 180";
 constexpr const char* lift_cure = "move the scene down: sonarctl scene import --offset 0,0,-10, or the poses of its objects";
-
-/// How far up the body's z axis points, -1 to 1.
-double upright(Quatd q) { return 1 - 2 * (q.x * q.x + q.y * q.y); }
 
 struct Doubt {
   std::string text;
@@ -303,7 +300,10 @@ std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan
   std::vector<Note> notes;
   add(notes, carrier.vehicle,
       doubt_of_all(poses, plan, is_misplaced, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
-  if (has_nameless_quaternions(plan) && is_out_of_order(poses))
+  if (const OtherAxes* axes = axes_of(poses)) {
+    if (!are_upright(carrier.mounts, *axes))
+      add(notes, carrier.vehicle, Doubt{"the poses of " + plan.file + " " + axes->text, axes->cure});
+  } else if (has_nameless_quaternions(plan) && is_out_of_order(poses))
     add(notes, carrier.vehicle,
         Doubt{"the quaternions of " + plan.file + " turn " + carrier.vehicle + " over, and would not with w at the other end",
               order_cure});

@@ -11,13 +11,17 @@ constexpr auto tick_period = std::chrono::milliseconds(250);
 Time wire_time() { return Time(std::chrono::steady_clock::now().time_since_epoch()); }
 
 mavlink::Settings settings_of(const MavlinkConfig& link, const Config& config) {
+  Vec3d held_m;
+  for (const VehicleConfig& v : config.vehicles)
+    if (v.name == link.vehicle) held_m = v.initial_pose.position_m;
   return {link.vehicle,
           link.system_id,
           link.component_id,
           link.request_rates,
           link.rate_hz,
           config.origin,
-          config.clock == ClockMode::follow};
+          config.clock == ClockMode::follow,
+          held_m};
 }
 std::string text_of(const MavlinkConfig& link) { return (link.dials ? "udpout:" : "udpin:") + sonar::text_of(link.at); }
 std::string text_of(const udp::endpoint& e) { return e.address().to_string() + ":" + std::to_string(e.port()); }

@@ -21,8 +21,9 @@ class DatagramPort {
 
   explicit DatagramPort(asio::io_context& io) : io_(io) {}
 
-  /// On the sonar's own address; port 0: any. Errors name the address and the next step.
-  Result<void> open(const SonarConfig& sonar, std::uint16_t port);
+  /// On the sonar's own address; port 0: any. `shared`: hosts on this computer may have the same port at all its addresses, as
+  /// they may when the device is elsewhere. Errors name the address and the next step.
+  Result<void> open(const SonarConfig& sonar, std::uint16_t port, bool shared);
   /// From start() on, what arrives is answered.
   void answer_with(Answer answer) { answer_ = std::move(answer); }
   /// A host whose port is closed is named when its computer says so, to what was sent there. Before start().

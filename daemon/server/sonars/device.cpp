@@ -89,7 +89,12 @@ Result<DatagramPort*> Device::datagram_port(std::uint16_t number) {
   for (DatagramPort& port : datagram_ports_)
     if (number != 0 && port.number() == number) return &port;
   DatagramPort& port = datagram_ports_.emplace_back(network_.io);
-  if (auto r = port.open(config(), number); !r) return tl::make_unexpected(r.error());
+  // Where devices are searched for, hosts bind that port too. That a sonar is started twice shows at its other ports.
+  const auto ports = sonar_.vendor().ports();
+  const bool shared = std::any_of(ports.begin(), ports.end(), [&](const protocol::Port& p) {
+    return p.kind == protocol::Port::Kind::udp_answer && p.number == number;
+  });
+  if (auto r = port.open(config(), number, shared); !r) return tl::make_unexpected(r.error());
   return &port;
 }
 

@@ -70,9 +70,10 @@ bool has_left(tcp::socket& socket) {
   return ::poll(&asked, 1, 0) > 0;
 }
 
-Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast) {
+Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast, bool shared) {
   error_code ec;
   socket.open(udp::v4(), ec);
+  if (!ec && shared) socket.set_option(asio::socket_base::reuse_address(true), ec);
   if (!ec && broadcast) socket.set_option(asio::socket_base::broadcast(true), ec);
   if (!ec) socket.bind({address_of(at.ip), at.port}, ec);
   if (ec) return tl::make_unexpected(explain(ec, at));

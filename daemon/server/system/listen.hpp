@@ -10,8 +10,9 @@
 namespace sonar {
 
 Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at);
-/// `broadcast`: may send to broadcast addresses.
-Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast);
+/// `broadcast`: may send to broadcast addresses. `shared`: programs of this computer that share too may have the same port at all
+/// addresses.
+Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast, bool shared = false);
 
 /// Multicast leaves by the network interface of that address; 0.0.0.0: by the system's choice.
 void send_multicast_from(udp::socket& socket, Ipv4 ip);

@@ -96,6 +96,24 @@ TEST_F(DescribeScene, WarnsOfWhatLooksWrong) {
   EXPECT_THAT(remarks("objects: []").warnings, ElementsAre(HasSubstr("the scene is empty")));
 }
 
+TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
+  // A grid of one arc second whose header the loader is made to take for metres, and depths for heights.
+  files.write("g.asc", "ncols 2\nnrows 2\nxllcorner 5\nyllcorner 60\ncellsize 0.000277777778\n20 21 22 23\n");
+  const Remarks tiny =
+      remarks("objects: [{name: bed, type: heightmap, file: g.asc, material: sand, geographic: false, centred: true}]\n");
+  EXPECT_THAT(tiny.warnings,
+              ElementsAre(HasSubstr("bed: g.asc is 0.0003 x 0.0003 x 3 m; are its coordinates degrees"),
+                          HasSubstr("wholly above z = 0, the water's surface: bed; if g.asc has depths, set z_scale: -1")));
+  const Remarks right = remarks("objects: [{name: bed, type: heightmap, file: g.asc, material: sand, z_scale: -1}]\n");
+  EXPECT_THAT(right.warnings, IsEmpty());
+  EXPECT_THAT(right.notes,
+              ElementsAre(HasSubstr("g.asc: its coordinates (5.00014, 60.0001, cells of 0.000277778) are taken as degrees"),
+                          HasSubstr("g.asc: x and y are about its middle, latitude 60.000278, longitude 5.000278")));
+  files.write("km.asc", "ncols 2\nnrows 2\ncellsize 0.5\n-20 -40 -22 -23\n");
+  EXPECT_THAT(remarks("objects: [{name: bed, type: heightmap, file: km.asc, material: sand, geographic: false}]\n").warnings,
+              ElementsAre(HasSubstr("degrees (geographic: true), or kilometres?")));
+}
+
 TEST_F(DescribeScene, ErrorsAreTheLoadersOwn) {
   const auto wrong = files.write("s.yaml", "objects: [{type: bix}]");
   EXPECT_EQ(describe_scene(wrong).error().text, load_scene(wrong).error().text);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cstdlib>
+#include <optional>
 
 #include "clients/scene_tools/describe_scene.hpp"
 #include "clients/scene_tools/resource_paths.hpp"
@@ -80,6 +81,71 @@ TEST_F(ImportScene, ModelsAreFoundBesideTheFileInGivenFoldersAndInTheEnvironment
   EXPECT_THAT(text(), HasSubstr("# near (near/model.sdf:1)"));
 }
 
+struct Environment {
+  Environment(const char* variable, const std::string& value) : variable_(variable) {
+    if (const char* old = std::getenv(variable)) before_ = old;
+    setenv(variable, value.c_str(), 1);
+  }
+  ~Environment() { before_ ? setenv(variable_, before_->c_str(), 1) : unsetenv(variable_); }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  const char* variable_;
+  std::optional<std::string> before_;
+};
+
+/// Both generations of Gazebo store HOST/OWNER/models/NAME/VERSION in small letters.
+TEST_F(ImportScene, FuelModelsAreFoundInTheCachesOfGazebo) {
+  const Environment home("HOME", files.path("home").string()), none("GZ_FUEL_CACHE_PATH", ""), nor("IGN_FUEL_CACHE_PATH", "");
+  const auto box = [](const char* name, const char* size) {
+    return std::string("<sdf version='1.9'><model name='") + name + "'><link name='l'><visual name='v'><geometry><box><size>" +
+           size + "</size></box></geometry></visual></link></model></sdf>";
+  };
+  const std::string gz = "home/.gz/fuel/fuel.gazebosim.org/hmoyen/models/";
+  write(gz + "sand bed/2/model.sdf", box("old", "1 1 1"));
+  write(gz + "sand bed/10/model.config", "<model><sdf version='1.9'>bed.sdf</sdf></model>");
+  write(gz + "sand bed/10/bed.sdf", box("bed", "20 20 1"));
+  write("home/.ignition/fuel/fuel.ignitionrobotics.org/cole/models/coral01/1/model.sdf",
+        "<sdf version='1.9'><model name='coral'>" +
+            mesh("https://fuel.ignitionrobotics.org/1.0/Cole/models/Coral01/1/files/meshes/c.STL") + "</model></sdf>");
+  write("home/.ignition/fuel/fuel.ignitionrobotics.org/cole/models/coral01/1/meshes/c.stl", triangle);
+  write(gz + "vase/3/model.sdf", "<sdf version='1.9'><model name='vase'>" + mesh("model://Vase/meshes/v.stl") + "</model></sdf>");
+  write(gz + "vase/3/meshes/v.stl", triangle);
+  const std::string fuel = "<include><uri>https://fuel.gazebosim.org/1.0/";
+  const auto done = run(sdf(fuel + "OpenRobotics/models/Sun</uri></include>" + fuel +
+                            "hmoyen/models/Sand Bed</uri><pose>0 0 -5 0 0 0</pose></include>" + fuel +
+                            "hmoyen/models/Sand%20Bed/2</uri></include>" + fuel + "Cole/models/Coral01/tip</uri></include>" +
+                            fuel + "hmoyen/models/Vase</uri></include>"));
+  ASSERT_TRUE(done) << done.error().text;
+  EXPECT_THAT(done->left_out, ElementsAre("1 light: without an echo"));
+  const auto described = describe_scene(options.out);
+  ASSERT_TRUE(described) << described.error().text;
+  ASSERT_EQ(described->objects.size(), 4u) << text();
+  EXPECT_EQ(described->objects[0].name, "bed");
+  EXPECT_NEAR(described->objects[0].in_world.size_m().x, 20, 1e-5);
+  EXPECT_NEAR(described->objects[0].in_world.centre_m().z, -5, 1e-5);
+  EXPECT_NEAR(described->objects[1].in_world.size_m().x, 1, 1e-5);
+  // Given as a folder of models, without the cache.
+  const Environment elsewhere("HOME", "/nonexistent");
+  options.model_folders = {files.path("home/.gz/fuel/fuel.gazebosim.org/hmoyen/models")};
+  const auto given = run(sdf(fuel + "hmoyen/models/Sand Bed</uri></include>"));
+  ASSERT_TRUE(given) << given.error().text;
+  EXPECT_THAT(text(), HasSubstr("size_m: [20, 20, 1]"));
+}
+
+TEST_F(ImportScene, AnEmptySceneIsAnErrorThatSaysWhatIsMissing) {
+  const Environment home("HOME", files.path("home").string());
+  options.read.skip_missing = true;
+  const std::string world =
+      sdf("<light name='l'/><include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/Sand Heightmap</uri></include>");
+  EXPECT_THAT(error(world),
+              ::testing::AllOf(HasSubstr("w.sdf: nothing in it has a shape"), HasSubstr("left out: 1 light"),
+                               HasSubstr("gz fuel download --url \"https://fuel.gazebosim.org/1.0/hmoyen/models/Sand "
+                                         "Heightmap\"")));
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+}
+
 TEST_F(ImportScene, MeshesAreNamedByRelativePathsAndUnevenOnesConverted) {
   write("pkg/meshes/a.stl", triangle);
   write("pkg/urdf/r.urdf", "");
@@ -119,8 +185,10 @@ TEST_F(ImportScene, FilesThatASceneCannotReadAreLeftOut) {
                                           HasSubstr("no.png: ")));
   EXPECT_THAT(text(), HasSubstr("#   w.sdf:3: mesh a.fbx: a scene reads OBJ, STL, PLY, glTF, GLB and DAE\n"));
   EXPECT_THAT(error(sdf(model("a", mesh("gone.stl")))), HasSubstr("w.sdf:3: mesh gone.stl: no such file here"));
+  EXPECT_THAT(error(sdf(model("a", mesh("gone.stl")) + model("b", mesh("lost.stl")) + model("c", mesh("gone.stl")))),
+              ::testing::EndsWith("with --skip-missing; neither are there: mesh lost.stl"));
   options.read.skip_missing = true;
-  EXPECT_EQ(error(sdf(model("a", mesh("gone.stl")))), "no error");
+  EXPECT_EQ(error(sdf(model("a", mesh("gone.stl")) + model("d", link("l")))), "no error");
 }
 
 TEST_F(ImportScene, ColladaFilesBringTheirUnit) {

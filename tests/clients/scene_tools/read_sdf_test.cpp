@@ -168,11 +168,12 @@ TEST(ReadSdf, WhatASceneCannotHoldIsNamedOnceWithItsLine) {
                 "<plugin name='p' filename='x.so'/><joint name='j' type='prismatic'/><joint type='fixed'/>"
                 "<link name='l'><inertial/><visual name='v'><geometry><polyline/></geometry></visual></link>") +
           "\n<include><uri>model://cam</uri></include><include><uri>model://cam</uri><name>b</name></include>"
-          "<include><uri>model://sun</uri></include>"));
+          "<include><uri>model://sun</uri></include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Sun</uri>"
+          "</include><include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/North East Down frame</uri></include>"));
   ASSERT_TRUE(world) << world.error().text;
   EXPECT_THAT(r.findings.left_out(),
-              ElementsAre("w.sdf:6: light: include of model://sun", "w.sdf:3: light \"sun\"", "w.sdf:4: actor \"walker\"",
-                          "w.sdf:5: plugin \"p\"", "w.sdf:5: joint \"j\" (prismatic): stays as it is drawn",
+              ElementsAre("1 coordinate frame, 3 lights: without an echo", "w.sdf:4: actor \"walker\"", "w.sdf:5: plugin \"p\"",
+                          "w.sdf:5: joint \"j\" (prismatic): stays as it is drawn",
                           "w.sdf:5: geometry polyline: not a shape that a scene has", "model:/cam:2: sensor \"eye\""));
 }
 
@@ -195,6 +196,24 @@ TEST(ReadSdf, MistakesAreToldWithFileAndLine) {
   r.options.skip_missing = true;
   EXPECT_TRUE(r.read(sdf("<include><uri>model://gone</uri></include>")));
   EXPECT_THAT(r.findings.left_out(), Contains("w.sdf:3: include of model://gone: not found"));
+}
+
+TEST(ReadSdf, MissingModelsAreNamedOnceEachWithTheCommandThatFetchesThem) {
+  Reading r;
+  const std::string rock = "https://fuel.gazebosim.org/1.0/Cole/models/Ocean Rock 03";
+  const std::string world = sdf("<include><uri> " + rock + " </uri></include>\n<include><uri>" + rock + "</uri></include>\n" +
+                                "<include><uri>model://gone</uri></include>" + model("m", link("l")));
+  EXPECT_EQ(r.error(world),
+            "w.sdf:3: include: models that are not here; fetch them, give the folder that holds them with --model-path, or go on "
+            "without them with --skip-missing: gz fuel download --url \"" +
+                rock + "\" (2 includes); model://gone");
+  r.options.skip_missing = true;
+  ASSERT_TRUE(r.read(world));
+  EXPECT_THAT(r.findings.left_out(), ElementsAre("w.sdf:3: include of " + rock +
+                                                     " (2 includes): not found; fetch it: gz fuel "
+                                                     "download --url \"" +
+                                                     rock + "\"",
+                                                 "w.sdf:5: include of model://gone: not found"));
 }
 
 TEST(ReadSdf, CirclesAndDepthsEnd) {

@@ -175,12 +175,13 @@ TEST(MeshExchange, DamagedAnswersAreRefused) {
   ASSERT_TRUE(good);
   auto file = MemoryFile::make("answer");
   ASSERT_TRUE(file);
-  ASSERT_TRUE(write_answer(file->descriptor(), LoadedMesh{*good, {"a"}}));
+  ASSERT_TRUE(write_answer(file->descriptor(), LoadedMesh{*good, {"a"}, 7}));
   std::string bytes(4096, '\0');
   bytes.resize(static_cast<std::size_t>(::pread(file->descriptor(), bytes.data(), bytes.size(), 0)));
   const auto whole = read_answer(file->descriptor());
   ASSERT_TRUE(whole && *whole);
   EXPECT_EQ((*whole)->centred.mesh, good->mesh);
+  EXPECT_EQ((*whole)->lost, 7u);
   for (std::size_t at = 0; at < bytes.size(); ++at)
     for (const char flip : {'\x01', '\x40', '\x80', '\xff'}) {
       std::string damaged = bytes;

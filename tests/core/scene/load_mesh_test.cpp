@@ -238,6 +238,58 @@ TEST_F(LoadMesh, TrianglesWithoutAreaAreLeftOutAndCounted) {
   EXPECT_GE(mesh.centred.left_out, 1u);
 }
 
+// What a sonar needs of a face are its vertices: texture coordinates and normals may be missing, or stripped by a tool.
+TEST_F(LoadMesh, ObjFacesThatNameMissingTextureCoordinatesAreRead) {
+  const std::string left = "vn 0 0 1\no left\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n",
+                    right = "v 2 0 0\nv 3 0 0\nv 3 1 0\nv 2 1 0\n";
+  for (const char* face :
+       {"5/1/1 6/2/1 7/3/1 8/4/1", "5/9 6/9 7/9 8/9", "5//7 6//8 7//9 8//9", "-4/-9/-9 -3/1/1 -2/1/1 -1/1/1",
+        "5/1/1\t6/2/1 \\\n 7/3/1  8/4/1 ", "5/1/1 6/2/1 7/3/1 8/4/1\r", "5/1/1 6/2/1 7/3/1 8/4/1 # the right 1/2 of it"}) {
+    const LoadedMesh mesh = good("partly.obj", left + "f 1//1 2//1 3//1 4//1\no right\n" + right + "f " + face + "\n");
+    EXPECT_EQ(mesh.centred.mesh.triangles.size(), 4u) << face;
+    EXPECT_EQ(mesh.lost, 0u) << face;
+    EXPECT_NEAR(extent(mesh.centred).high.x, 3, 1e-6) << face;
+  }
+  const LoadedMesh whole = good("whole.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n");
+  EXPECT_EQ(whole.centred.mesh.triangles.size(), 1u);
+}
+
+TEST_F(LoadMesh, TrianglesThatAFileListsAndTheMeshHasNotAreCounted) {
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+  EXPECT_EQ(good("whole.obj", corners + "f 1 2 3 4\n").lost, 0u);
+  EXPECT_EQ(good("indented.obj", corners + "f 1 2 3\n f 1 3 4 2\n").lost, 2u) << "which the importer passes over";
+  std::string beyond = ply;
+  beyond.replace(beyond.rfind("3 1 2 3"), 7, "3 1 2 9");
+  const LoadedMesh three = good("beyond.ply", beyond);
+  EXPECT_EQ(three.centred.mesh.triangles.size(), 3u);
+  EXPECT_EQ(three.lost, 1u);
+  EXPECT_THAT(refusal("beyond.obj", corners + "f 1 2 3\nf 1 2 9\n"), HasSubstr("vertex index out of range"));
+  EXPECT_EQ(good("d.obj", corners + "f 1 2 3\nf 1 1 2\n").lost, 0u) << "without area is another count";
+  EXPECT_EQ(good("whole.stl", stl).lost, 0u);
+  EXPECT_EQ(good("whole.ply", ply).lost, 0u);
+  EXPECT_EQ(good("whole.glb", glb(3)).lost, 0u);
+}
+
+TEST_F(LoadMesh, FaultsOfAGlbAreNamed) {
+  const std::string whole = glb();
+  const auto with = [&](std::size_t at, char c) {
+    std::string bent = whole;
+    bent[at] = c;
+    return bent;
+  };
+  std::string unpadded = whole;  // as older exporters wrote it
+  const std::size_t json = static_cast<unsigned char>(whole[12]) + 256u * static_cast<unsigned char>(whole[13]);
+  unpadded.insert(20 + json, " ");
+  unpadded[12] = static_cast<char>(unpadded[12] + 1), unpadded[8] = static_cast<char>(unpadded[8] + 1);
+  EXPECT_THAT(refusal("u.glb", unpadded), HasSubstr("u.glb: cannot be read: its JSON chunk has " + std::to_string(json + 1) +
+                                                    " bytes, and GLB wants a multiple of 4"));
+  EXPECT_THAT(refusal("l.glb", "version https://git-lfs.github.com/spec/v1\n"),
+              HasSubstr("l.glb: cannot be read: not a GLB file"));
+  EXPECT_THAT(refusal("c.glb", whole.substr(0, whole.size() - 30)), HasSubstr("c.glb: cannot be read: is cut short"));
+  EXPECT_THAT(refusal("v.glb", with(4, 3)), HasSubstr("v.glb: cannot be read: is GLB of version 3"));
+  EXPECT_THAT(refusal("h.glb", whole.substr(0, 15)), HasSubstr("ends within its head"));
+}
+
 TEST_F(LoadMesh, WrongFilesAreRefusedWithOneSentence) {
   EXPECT_THAT(refusal("n.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n"), HasSubstr("n.obj: has vertices that are not finite"));
   EXPECT_THAT(refusal("h.obj", "v 0 0 0\nv 2e7 0 0\nv 0 1 0\nf 1 2 3\n"),

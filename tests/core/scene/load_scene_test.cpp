@@ -181,6 +181,27 @@ objects:
               HasSubstr("unknown height format"));
 }
 
+TEST(LoadScene, LostTrianglesOfAMeshAreANote) {
+  TemporaryFiles files;
+  files.write("m.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\n f 1 3 4\n");
+  EXPECT_THAT(parsed(object("type: mesh, file: m.obj, material: ice"), files.folder())->notes,
+              ::testing::ElementsAre(HasSubstr("m.obj: 1 of the triangles that it lists cannot be read and are missing here")));
+}
+
+TEST(LoadScene, HeightmapsInDegreesStandAboutAnOrigin) {
+  TemporaryFiles files;
+  files.write("g.asc", "ncols 3\nnrows 3\nxllcenter 5\nyllcenter 60\ncellsize 0.01\n-1 -2 -3\n-4 -5 -6\n-7 -8 -9999\n");
+  const std::string bed = "type: heightmap, file: g.asc, material: sand, ";
+  const auto scene = parsed(object(bed + "geographic: true, origin: {lat: 60, lon: 5}"), files.folder());
+  EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 557.9, 0.5);  // 0.01 degrees, a little less in the north
+  EXPECT_NEAR(scene->objects[0].in_world.position_m.y, 1114.2, 0.5);
+  EXPECT_THAT(scene->notes, ::testing::ElementsAre("g.asc: 1 of its 9 heights (11 %) are no data: holes in the ground"));
+  EXPECT_THAT(refusal(object(bed + "origin: {lat: 60, lon: 5}, centred: true"), files.folder()),
+              HasSubstr("origin: give origin or centred, not both"));
+  EXPECT_THAT(refusal(object(bed + "origin: {lat: 91, lon: 5}"), files.folder()), HasSubstr("origin.lat"));
+  EXPECT_THAT(refusal(object(bed + "geographic: true, origin: {lat: 40, lon: 5}"), files.folder()), HasSubstr("at most 5"));
+}
+
 TEST(LoadScene, MaterialLibrariesOfOnesOwn) {
   TemporaryFiles files;
   files.write("lib.yaml", "kelp: {lambert_db: -40}\n");

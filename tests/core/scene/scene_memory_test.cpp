@@ -74,8 +74,8 @@ TEST_F(SceneMemory, OfAMillionTrianglesInBinaryStl) {
 TEST_F(SceneMemory, OfTwoMillionTrianglesBehindTheRays) {
   constexpr std::size_t edge = 1001;
   HeightGrid grid;
-  for (std::size_t i = 0; i < edge; ++i) grid.x_m.push_back(0.1 * static_cast<double>(i));
-  grid.y_m = grid.x_m;
+  for (std::size_t i = 0; i < edge; ++i) grid.x.push_back(0.1 * static_cast<double>(i));
+  grid.y = grid.x;
   for (std::size_t j = 0; j < edge; ++j)
     for (std::size_t i = 0; i < edge; ++i) grid.z_m.push_back(wave(i, j));
   auto scene = std::make_shared<Scene>();

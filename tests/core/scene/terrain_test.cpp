@@ -5,8 +5,12 @@
 #include <gtest/gtest.h>
 #include <png.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
+#include <type_traits>
 
 #include "core/scene/shapes/relief_noise.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
@@ -43,10 +47,10 @@ TEST(Seabed, HasTheSizeSpacingAndReliefAskedFor) {
   SeabedShape shape{.size_x_m = 30, .size_y_m = 20, .fine_x_m = 30, .fine_y_m = 20, .spacing_x_m = 0.25, .spacing_y_m = 0.5};
   shape.relief_m = 0.2;
   const HeightGrid grid = make_seabed(shape);
-  EXPECT_EQ(grid.x_m.size(), 121u);
-  EXPECT_EQ(grid.y_m.size(), 41u);
-  EXPECT_DOUBLE_EQ(grid.x_m.front(), -15);
-  EXPECT_DOUBLE_EQ(grid.x_m.back(), 15);
+  EXPECT_EQ(grid.x.size(), 121u);
+  EXPECT_EQ(grid.y.size(), 41u);
+  EXPECT_DOUBLE_EQ(grid.x.front(), -15);
+  EXPECT_DOUBLE_EQ(grid.x.back(), 15);
   const auto [low, high] = std::minmax_element(grid.z_m.begin(), grid.z_m.end());
   EXPECT_GT(*high - *low, 0.2f);
   EXPECT_LT(*high - *low, 0.8f);
@@ -64,7 +68,7 @@ TEST(Seabed, RipplesHaveTheirWavelengthAndHeight) {
   shape.relief_m = 0;
   shape.ripples = {.wavelength_m = 0.5, .height_m = 0.06, .direction_rad = 0, .bend = 0};
   const HeightGrid grid = make_seabed(shape);
-  const std::size_t n = grid.x_m.size();
+  const std::size_t n = grid.x.size();
   int crossings = 0;
   float low = 1, high = -1;
   for (std::size_t i = 0; i + 1 < n; ++i) {
@@ -79,16 +83,16 @@ TEST(Seabed, RipplesHaveTheirWavelengthAndHeight) {
 TEST(Seabed, WidensOutsideItsFinePartAndKeepsItsEstimate) {
   const SeabedShape shape{.size_x_m = 60, .size_y_m = 60, .fine_x_m = 10, .fine_y_m = 10, .spacing_x_m = 0.1, .spacing_y_m = 0.1};
   const HeightGrid grid = make_seabed(shape);
-  EXPECT_DOUBLE_EQ(grid.x_m.back(), 30);
+  EXPECT_DOUBLE_EQ(grid.x.back(), 30);
   double widest = 0;
-  for (std::size_t i = 1; i < grid.x_m.size(); ++i) {
-    const double step = grid.x_m[i] - grid.x_m[i - 1];
+  for (std::size_t i = 1; i < grid.x.size(); ++i) {
+    const double step = grid.x[i] - grid.x[i - 1];
     EXPECT_GT(step, 0.05);
     widest = std::max(widest, step);
   }
   EXPECT_GT(widest, 0.9);
   EXPECT_LT(widest, 1.6);
-  EXPECT_EQ(seabed_triangles(shape), 2 * (grid.x_m.size() - 1) * (grid.y_m.size() - 1));
+  EXPECT_EQ(seabed_triangles(shape), 2 * (grid.x.size() - 1) * (grid.y.size() - 1));
 }
 
 const char* const small_grid =
@@ -97,7 +101,7 @@ const char* const small_grid =
 
 TEST(EsriGrid, KeepsFarCoordinatesInTheCentre) {
   TemporaryFiles files;
-  const auto grid = read_esri_heights(files.write("g.asc", small_grid), 1);
+  const auto grid = read_esri_heights(files.write("g.asc", small_grid), {});
   ASSERT_TRUE(grid) << grid.error().text;
   auto mesh = mesh_from_grid(*grid);
   ASSERT_TRUE(mesh);
@@ -109,13 +113,13 @@ TEST(EsriGrid, KeepsFarCoordinatesInTheCentre) {
   // First row of the file is north: the height at the north-west is 1.
   EXPECT_FLOAT_EQ(grid->z_m[6], 1);
   EXPECT_TRUE(std::isnan(grid->z_m[2]));
-  EXPECT_FLOAT_EQ(read_esri_heights(files.write("g.asc", small_grid), -1)->z_m[6], -1);
+  EXPECT_FLOAT_EQ(read_esri_heights(files.write("g.asc", small_grid), {.z_scale = -1})->z_m[6], -1);
 }
 
 TEST(EsriGrid, WrongFilesAreRefusedWithTheirLine) {
   TemporaryFiles files;
   const auto refusal = [&](const std::string& text) {
-    const auto grid = read_esri_heights(files.write("bad.asc", text), 1);
+    const auto grid = read_esri_heights(files.write("bad.asc", text), {});
     return grid ? std::string("accepted") : grid.error().text;
   };
   EXPECT_THAT(refusal(""), HasSubstr("ncols is missing in the header"));
@@ -126,15 +130,141 @@ TEST(EsriGrid, WrongFilesAreRefusedWithTheirLine) {
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 0\n1 2 3 4"), HasSubstr("cellsize must be"));
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2 3"), HasSubstr("ends after 3 of 4 heights"));
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2 3 4 5"), HasSubstr("more heights than"));
-  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 nan"), HasSubstr("line 5: \"nan\" is not a height"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 x"), HasSubstr("line 5: \"x\" is not a height"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ndx 1\n1 2 3 4"), HasSubstr("cellsize is missing"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ndy 1\n1 2 3 4"), HasSubstr("dx is missing"));
+  EXPECT_THAT(refusal("ncols nan\nnrows 2\ncellsize 1\n1 2 3 4"), HasSubstr("ncols needs a number"));
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 1e9"), HasSubstr("beyond 1e7 m"));
-  const auto missing = read_esri_heights("no/grid.asc", 1);
+  const auto missing = read_esri_heights("no/grid.asc", {});
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().kind, ErrorKind::missing_file);
-  const auto empty = read_esri_heights(files.write("e.asc", "ncols 2\nnrows 2\ncellsize 1\nNODATA_value 0\n0 0 0 0"), 1);
+  const auto empty = read_esri_heights(files.write("e.asc", "ncols 2\nnrows 2\ncellsize 1\nNODATA_value 0\n0 0 0 0"), {});
   ASSERT_TRUE(empty);
   EXPECT_THAT(mesh_from_grid(*empty).error().text, HasSubstr("no cell of the grid has a height"));
   for (std::size_t n = 0; n < std::string(small_grid).size(); ++n) refusal(std::string(small_grid).substr(0, n));
+}
+
+std::string grid_of(const std::string& header, const std::string& odd, int edge = 10) {
+  std::string text = "ncols " + std::to_string(edge) + "\nnrows " + std::to_string(edge) + "\n" + header + "\n";
+  for (int i = 0; i < edge * edge; ++i) text += (i == 45 ? odd : i == 99 ? "-9.5" : "-10") + (i % edge == edge - 1 ? "\n" : " ");
+  return text;
+}
+
+TEST(EsriGrid, KnowsNoDataInEveryForm) {
+  TemporaryFiles files;
+  const std::string at = "xllcorner 0\nyllcorner 0\n", metre = at + "cellsize 1";
+  const auto holes_in = [&](const std::string& text, bool with_note) {
+    const auto grid = read_esri_heights(files.write("g.asc", text), {});
+    if (!grid) return grid.error().text;
+    int holes = 0;
+    for (std::size_t k = 0; k < grid->z_m.size(); ++k)
+      if (std::isnan(grid->z_m[k])) {
+        ++holes;
+        EXPECT_EQ(k, 55u) << text;
+      }
+    std::string notes;
+    for (const std::string& note : grid->notes) notes += note + ". ";
+    EXPECT_THAT(notes, HasSubstr(" of its 100 heights (1 %) are no data"));
+    EXPECT_EQ(grid->notes.size(), with_note ? 2u : 1u) << notes;
+    return std::to_string(holes);
+  };
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value nan", "nan"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre, "NaN"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(at + "dx 1\ndy 2", "-9999"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.40282e+38", "-3.4028234663852886e+38"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.4E+38", "-3.4028234663852886e+38"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -99999.99", "-99999.9921875"), false), "1");
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value 0", "0"), false), "1");
+  for (const char* fill : {"-32768", "-99999", "-3.4028234663852886e+38", "9.96921e+36"})
+    EXPECT_EQ(holes_in(grid_of(metre, fill), true), "1") << fill;
+  EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -32768", "-9999"), true), "1");
+  // Ground deeper than 9999 m is none.
+  const auto trench = read_esri_heights(
+      files.write("g.asc", "ncols 2\nnrows 2\ncellsize 100\nNODATA_value -32768\n-9999 -9998 -9950 -10010\n"), {});
+  ASSERT_TRUE(trench);
+  EXPECT_TRUE(trench->notes.empty()) << trench->notes[0];
+  EXPECT_FLOAT_EQ(trench->z_m[2], -9999);
+}
+
+TEST(EsriGrid, OblongCells) {
+  TemporaryFiles files;
+  const auto grid =
+      read_esri_heights(files.write("g.asc", "ncols 3\nnrows 2\nxllcorner 10\nyllcorner 20\ndx 2\ndy 4\n1 2 3 4 5 6"), {});
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->x, (std::vector<double>{11, 13, 15}));
+  EXPECT_EQ(grid->y, (std::vector<double>{22, 26}));
+}
+
+std::string degrees_of(const std::string& corner, const std::string& cell, int edge = 40, bool flat = false) {
+  std::string text =
+      "ncols " + std::to_string(edge) + "\nnrows " + std::to_string(edge) + "\n" + corner + "\ncellsize " + cell + "\n";
+  for (int i = 0; i < edge * edge; ++i) text += std::to_string(flat ? -20.0 : -20 + 3 * std::sin(0.3 * i)) + " ";
+  return text;
+}
+
+TEST(EsriGrid, DegreesBecomeMetresAboutAnOrigin) {
+  TemporaryFiles files;
+  // Lengths of a degree at 60 degrees north: 111 412.4 m along the meridian, 55 799.8 m along the parallel (WGS84: the
+  // meridian's radius, and N cos(latitude)), here of 39 arc seconds.
+  const std::string text = degrees_of("xllcorner 5.0\nyllcorner 60.0", "0.000277777778");
+  const auto grid = read_esri_heights(files.write("g.asc", text), {});
+  ASSERT_TRUE(grid) << grid.error().text;
+  ASSERT_EQ(grid->notes.size(), 2u);
+  EXPECT_THAT(grid->notes[0], HasSubstr("taken as degrees"));
+  EXPECT_THAT(grid->notes[1], HasSubstr("about its middle, latitude 60.005556, longitude 5.005556"));
+  const auto mesh = mesh_from_grid(*grid);
+  ASSERT_TRUE(mesh);
+  expect_sound(mesh->mesh);
+  Vec3 low = mesh->mesh.vertices[0], high = low;
+  for (const Vec3& v : mesh->mesh.vertices)
+    low = {std::min(low.x, v.x), std::min(low.y, v.y), 0}, high = {std::max(high.x, v.x), std::max(high.y, v.y), 0};
+  EXPECT_NEAR(high.y - low.y, 39 * 111412.4 / 3600, 0.1);
+  EXPECT_NEAR(high.x - low.x, 39 * 55799.8 / 3600, 0.2);  // the widest row is 19 arc seconds farther south
+  EXPECT_NEAR(mesh->centre_m.x, 0, 0.1);
+  EXPECT_NEAR(mesh->centre_m.y, 0, 0.1);
+
+  // Every vertex where the geodesy of poses puts the same place, its height apart.
+  const Geodetic origin{rad_from_deg(60.1), rad_from_deg(4.9), 0};
+  const auto placed = read_esri_heights(files.write("g.asc", text), {.geographic = true, .origin = origin});
+  ASSERT_TRUE(placed) << placed.error().text;
+  EXPECT_TRUE(placed->notes.empty());
+  const auto there = mesh_from_grid(*placed);
+  ASSERT_TRUE(there);
+  for (const std::size_t k : {std::size_t{0}, std::size_t{39}, std::size_t{777}, std::size_t{1599}}) {
+    const Vec3d expected =
+        enu_in_enu_of(origin, {rad_from_deg(placed->y[k / 40]), rad_from_deg(placed->x[k % 40]), 0}).position_m;
+    const Vec3d p = to_double(there->mesh.vertices[k]) + there->centre_m;
+    EXPECT_NEAR(p.x, expected.x, 1e-3) << k;
+    EXPECT_NEAR(p.y, expected.y, 1e-3) << k;
+    EXPECT_NEAR(p.z, static_cast<double>(placed->z_m[k]), 1e-5) << k;
+  }
+}
+
+TEST(EsriGrid, SaysWhatItTakesForDegrees) {
+  TemporaryFiles files;
+  const auto is_geographic = [&](const std::string& text, const HeightOptions& options = {}) -> std::string {
+    const auto grid = read_esri_heights(files.write("g.asc", text), options);
+    return !grid ? grid.error().text : grid->origin ? "degrees" : "metres";
+  };
+  const std::string near_zero = "xllcorner 0\nyllcorner 0", far = "xllcorner 500000\nyllcorner 6600000";
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.004166667")), "degrees");
+  EXPECT_EQ(is_geographic(degrees_of("xllcorner -122.5\nyllcorner -47", "0.000833333", 12, true)), "degrees");
+  EXPECT_EQ(is_geographic(degrees_of("xllcorner 237.5\nyllcorner 47", "0.016666667", 12)), "degrees");
+  EXPECT_EQ(is_geographic(degrees_of(far, "0.004166667")), "metres");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "30")), "metres");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.05", 12, true)), "metres");  // a tank
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.004166667"), {.geographic = false}), "metres");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.05", 12, true), {.geographic = true}), "degrees");
+  const std::string seattle = degrees_of("xllcorner 237.5\nyllcorner 47", "0.016666667", 12);
+  EXPECT_EQ(is_geographic(seattle, {.origin = Geodetic{rad_from_deg(47), rad_from_deg(-122.5), 0}}), "degrees");
+  EXPECT_THAT(is_geographic(degrees_of(far, "1"), {.geographic = true}), HasSubstr("no longitudes and latitudes"));
+  EXPECT_THAT(is_geographic(degrees_of(near_zero, "1", 40, true), {.geographic = true}), HasSubstr("at most 5"));
+  EXPECT_THAT(is_geographic(degrees_of("xllcorner 3\nyllcorner 89.5", "0.0002"), {}), HasSubstr("of a pole"));
+  EXPECT_THAT(is_geographic(degrees_of(far, "1"), {.origin = Geodetic{}}), HasSubstr("origin is for a grid in degrees"));
+  files.write("g.prj", "GEOGCS[\"WGS 84\"]");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.05", 12, true)), "degrees");
+  files.write("g.prj", "PROJCS[\"UTM\"]");
+  EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.004166667")), "metres");
 }
 
 // A grey image written with libpng's simple interface.
@@ -155,8 +285,8 @@ TEST(PngHeights, SixteenBitsKeepTheirSteps) {
   const std::uint16_t pixels[6] = {0, 1, 65535, 256, 512, 32768};
   const auto grid = read_png_heights(write_png(files, 3, 2, PNG_FORMAT_LINEAR_Y, pixels), 20, 10, -6.5535, 0);
   ASSERT_TRUE(grid) << grid.error().text;
-  EXPECT_DOUBLE_EQ(grid->x_m.front(), -10);
-  EXPECT_DOUBLE_EQ(grid->y_m.back(), 5);
+  EXPECT_DOUBLE_EQ(grid->x.front(), -10);
+  EXPECT_DOUBLE_EQ(grid->y.back(), 5);
   EXPECT_NEAR(grid->z_m[3], -6.5535, 1e-6);  // first row of the image is the last row of the grid
   EXPECT_NEAR(grid->z_m[4], -6.5534, 1e-6);
   EXPECT_NEAR(grid->z_m[5], 0, 1e-6);
@@ -187,10 +317,286 @@ TEST(PngHeights, WrongFilesAreRefused) {
   }
 }
 
+// Drawing programs store grey so.
+TEST(PngHeights, GreyStoredAsColoursIsRead) {
+  TemporaryFiles files;
+  const std::uint8_t levels[6] = {0, 1, 255, 16, 32, 128};
+  std::vector<std::uint8_t> rgb, rgba;
+  for (const std::uint8_t v : levels) {
+    rgb.insert(rgb.end(), {v, v, v});
+    rgba.insert(rgba.end(), {v, v, v, 255});
+  }
+  const auto expect_levels = [&](const std::filesystem::path& file, const char* what) {
+    const auto grid = read_png_heights(file, 20, 10, -255, 0);
+    ASSERT_TRUE(grid) << what << grid.error().text;
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(grid->z_m[3 + i], levels[i] - 255, 1e-3) << what;
+  };
+  expect_levels(write_png(files, 3, 2, PNG_FORMAT_RGB, rgb.data()), "RGB");
+  expect_levels(write_png(files, 3, 2, PNG_FORMAT_RGBA, rgba.data()), "RGBA");
+  std::vector<std::uint16_t> wide;
+  for (const std::uint8_t v : levels) wide.insert(wide.end(), 3, static_cast<std::uint16_t>(v * 257));
+  const auto linear = read_png_heights(write_png(files, 3, 2, PNG_FORMAT_LINEAR_RGB, wide.data()), 20, 10, -255, 0);
+  ASSERT_TRUE(linear) << linear.error().text;
+  EXPECT_NEAR(linear->z_m[4], -254, 1e-3);
+
+  const auto file = files.path("palette.png");  // indices into equal colours
+  const std::uint8_t indices[6] = {0, 1, 2, 3, 4, 5};
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = 3, image.height = 2, image.format = PNG_FORMAT_RGB_COLORMAP, image.colormap_entries = 6;
+  ASSERT_TRUE(png_image_write_to_file(&image, file.c_str(), 0, indices, 0, rgb.data()));
+  expect_levels(file, "palette");
+  rgb[17] = 129;
+  EXPECT_THAT(read_png_heights(write_png(files, 3, 2, PNG_FORMAT_RGB, rgb.data()), 1, 1, 0, 1).error().text,
+              HasSubstr("not a grey image: it has colours"));
+}
+
+TEST(XyzGrid, PointsOfAnEvenGridInAnyOrder) {
+  TemporaryFiles files;
+  const auto read = [&](const std::string& text) { return read_xyz_heights(files.write("g.xyz", text), {}); };
+  const auto grid = read(
+      "x y z\n500010 100 -1\n500020,100,-2\n500010;110;-3\n\n# missing: 500020 110\n500010 130 -5\n500020 130 nan\n500020 100 "
+      "-7\n");
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->x, (std::vector<double>{500010, 500020}));
+  EXPECT_EQ(grid->y, (std::vector<double>{100, 110, 120, 130}));  // a row that is missing is a row of holes
+  EXPECT_FLOAT_EQ(grid->z_m[0], -1);
+  EXPECT_FLOAT_EQ(grid->z_m[1], -7);
+  EXPECT_FLOAT_EQ(grid->z_m[2], -3);
+  EXPECT_TRUE(std::isnan(grid->z_m[3]) && std::isnan(grid->z_m[4]) && std::isnan(grid->z_m[7]));
+  EXPECT_THAT(grid->notes,
+              ::testing::ElementsAre(HasSubstr("4 of its 8 heights"), HasSubstr("1 points lie where another one was")));
+
+  std::string degrees;  // rounded to five digits, as tools write them
+  for (int j = 0; j < 30; ++j)
+    for (int i = 0; i < 400; ++i) {
+      char line[80];
+      std::snprintf(line, sizeof line, "%.5f %.5f %.2f\n", 5 + i / 3600.0, 60 + j / 3600.0, -20 + 3 * std::sin(0.3 * i + j));
+      degrees += line;
+    }
+  const auto rounded = read(degrees);
+  ASSERT_TRUE(rounded) << rounded.error().text;
+  EXPECT_EQ(rounded->x.size(), 400u);
+  EXPECT_EQ(rounded->y.size(), 30u);
+  EXPECT_TRUE(rounded->origin);
+}
+
+TEST(XyzGrid, FineStepsFarAwayStayInTheirCells) {
+  TemporaryFiles files;
+  std::string text;
+  for (int i = 0; i < 2000; ++i)
+    for (int j = 0; j < 2; ++j) {
+      char line[80];
+      std::snprintf(line, sizeof line, "%.7f %d %d\n", 99'999'000 + 1e-6 * i, j, -1 - i);
+      text += line;
+    }
+  const auto grid = read_xyz_heights(files.write("g.xyz", text), {});
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_FLOAT_EQ(grid->z_m.front(), -1);
+  EXPECT_FLOAT_EQ(grid->z_m.back(), -2000);
+}
+
+TEST(XyzGrid, WrongFilesAreRefused) {
+  TemporaryFiles files;
+  const auto refusal = [&](const std::string& text) {
+    const auto grid = read_xyz_heights(files.write("bad.xyz", text), {});
+    return grid ? std::string("accepted") : grid.error().text;
+  };
+  EXPECT_THAT(refusal(""), HasSubstr("its 0 points are no even grid"));
+  EXPECT_THAT(refusal("1 2\n"), HasSubstr("line 1: three numbers are needed"));
+  EXPECT_THAT(refusal("1 2 3\nx y z\n"), HasSubstr("line 2: three numbers"));
+  EXPECT_THAT(refusal("1 2 3\n1e9 2 3\n"), HasSubstr("line 2: the point is farther"));
+  EXPECT_THAT(refusal("1 2 3\nnan 2 3\n"), HasSubstr("line 2: the point is farther"));
+  EXPECT_THAT(refusal("1 2 3\n2 2 1e9\n"), HasSubstr("line 2: the height 1e9 is beyond"));
+  EXPECT_THAT(refusal("0 0 1\n1 0.3 1\n2.5 1 1\n3.1 2.7 2\n"), HasSubstr("no even grid; make one of them: gdal_grid"));
+  EXPECT_THAT(refusal("0 0 1\n1 1 1\n99999 99999 1\n"), HasSubstr("more than 10 million"));
+}
+
+/// A little-endian TIFF of one strip, from the format's description: field by field.
+struct TiffFile {
+  struct Field {
+    std::uint16_t tag, type;
+    std::uint32_t count;
+    std::string value;  // little-endian
+  };
+  template <class T>
+  static std::string bytes_of(const std::vector<T>& values) {
+    return {reinterpret_cast<const char*>(values.data()), sizeof(T) * values.size()};
+  }
+  std::vector<Field> fields;
+  std::string heights;
+
+  void shorts(std::uint16_t tag, const std::vector<std::uint16_t>& v) {
+    fields.push_back({tag, 3, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+  }
+  void longs(std::uint16_t tag, const std::vector<std::uint32_t>& v) {
+    fields.push_back({tag, 4, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+  }
+  void doubles(std::uint16_t tag, const std::vector<double>& v) {
+    fields.push_back({tag, 12, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+  }
+  void text(std::uint16_t tag, const std::string& v) {
+    fields.push_back({tag, 2, static_cast<std::uint32_t>(v.size() + 1), v + '\0'});
+  }
+
+  template <class T>
+  static TiffFile of(std::uint16_t columns, std::uint16_t rows, const std::vector<T>& heights) {
+    TiffFile f;
+    f.heights = bytes_of(heights);
+    f.shorts(256, {columns}), f.shorts(257, {rows}), f.shorts(258, {8 * sizeof(T)}), f.shorts(259, {1}), f.shorts(262, {1});
+    f.longs(273, {8}), f.shorts(277, {1}), f.shorts(278, {rows}), f.longs(279, {static_cast<std::uint32_t>(f.heights.size())});
+    f.shorts(339, {std::is_floating_point_v<T> ? std::uint16_t{3} : std::is_signed_v<T> ? std::uint16_t{2} : std::uint16_t{1}});
+    return f;
+  }
+  TiffFile& at(double west, double north, double cell_x, double cell_y) {
+    doubles(33550, {cell_x, cell_y, 0});
+    doubles(33922, {0, 0, 0, west, north, 0});
+    return *this;
+  }
+  TiffFile& keys(const std::vector<std::array<std::uint16_t, 2>>& keys) {
+    std::vector<std::uint16_t> words{1, 1, 0, static_cast<std::uint16_t>(keys.size())};
+    for (const auto& [key, value] : keys) words.insert(words.end(), {key, 0, 1, value});
+    shorts(34735, words);
+    return *this;
+  }
+  TiffFile& without(std::uint16_t tag) {
+    std::erase_if(fields, [&](const Field& f) { return f.tag == tag; });
+    return *this;
+  }
+
+  std::string bytes() const {
+    std::vector<Field> sorted = fields;
+    std::sort(sorted.begin(), sorted.end(), [](const Field& a, const Field& b) { return a.tag < b.tag; });
+    const auto word = [](std::uint32_t v) { return bytes_of(std::vector<std::uint32_t>{v}); };
+    const auto half = [](std::uint16_t v) { return bytes_of(std::vector<std::uint16_t>{v}); };
+    const std::size_t directory = 8 + heights.size() + heights.size() % 2;
+    std::string out = "II*" + std::string(1, '\0') + word(static_cast<std::uint32_t>(directory)) + heights, more;
+    out.resize(directory);
+    out += half(static_cast<std::uint16_t>(sorted.size()));
+    const std::size_t behind = directory + 2 + 12 * sorted.size() + 4;
+    for (const Field& f : sorted) {
+      out += half(f.tag) + half(f.type) + word(f.count);
+      std::string value = f.value;
+      if (value.size() > 4) {
+        out += word(static_cast<std::uint32_t>(behind + more.size()));
+        more += value + std::string(value.size() % 2, '\0');
+      } else {
+        value.resize(4);
+        out += value;
+      }
+    }
+    return out + word(0) + more;
+  }
+};
+
+struct GeoTiff : ::testing::Test {
+  TemporaryFiles files;
+  Result<HeightGrid> read(const TiffFile& tiff, const HeightOptions& options = {}) {
+    return read_geo_tiff_heights(files.write("g.tif", tiff.bytes()), options);
+  }
+  void SetUp() override {
+    const auto grid = read_geo_tiff_heights(files.write("g.tif", "?"), {});
+    if (grid.error().kind != ErrorKind::unavailable) return;
+    EXPECT_THAT(grid.error().text, HasSubstr("gdal_translate -of AAIGrid g.tif g.asc"));
+    GTEST_SKIP() << "built without libtiff";
+  }
+};
+const std::vector<float> six{-1, -2, -3, -4, -9999, -6};
+
+TEST_F(GeoTiff, MetresByCornerAndByPoint) {
+  TiffFile area = TiffFile::of(3, 2, six).at(500000, 6600020, 10, 5).keys({{{1024, 1}, {1025, 1}}});
+  area.text(42113, "-9999");
+  const auto grid = read(area);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->x, (std::vector<double>{500005, 500015, 500025}));
+  EXPECT_EQ(grid->y, (std::vector<double>{6600012.5, 6600017.5}));
+  EXPECT_FLOAT_EQ(grid->z_m[3], -1);  // the first row is north
+  EXPECT_TRUE(std::isnan(grid->z_m[1]));
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 of its 6 heights")));
+  const auto points = read(TiffFile::of(3, 2, six).at(500000, 6600020, 10, 5).keys({{{1024, 1}, {1025, 2}}}));
+  ASSERT_TRUE(points);
+  EXPECT_EQ(points->x.front(), 500000);
+  EXPECT_EQ(points->y.back(), 6600020);
+  const auto feet =
+      read(TiffFile::of(3, 2, six).at(1000, 2000, 10, 10).keys({{{1024, 1}, {1025, 2}, {3076, 9002}, {4099, 9002}}}));
+  ASSERT_TRUE(feet) << feet.error().text;
+  EXPECT_NEAR(feet->x.back(), 1020 * 0.3048, 1e-9);
+  EXPECT_NEAR(feet->z_m[3], -0.3048, 1e-6);
+}
+
+TEST_F(GeoTiff, DegreesStandAboutAnOrigin) {
+  const auto grid = read(TiffFile::of(3, 2, std::vector<std::int16_t>{-10, -20, -30, -40, -32768, -60})
+                             .at(5, 60, 0.01, 0.01)
+                             .keys({{{1024, 2}, {1025, 1}, {2054, 9102}}}),
+                         {.origin = Geodetic{rad_from_deg(60), rad_from_deg(5), 0}});
+  ASSERT_TRUE(grid) << grid.error().text;
+  ASSERT_TRUE(grid->origin);
+  EXPECT_NEAR(grid->x[0], 5.005, 1e-12);
+  EXPECT_NEAR(grid->y[1], 59.995, 1e-12);
+  EXPECT_TRUE(std::isnan(grid->z_m[1]));
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 cells of -32768"), HasSubstr("are no data")));
+  EXPECT_FALSE(read(TiffFile::of(3, 2, six).at(5, 60, 0.01, 0.01).keys({{{1024, 1}}}))->origin) << "metres, says the file";
+}
+
+TEST_F(GeoTiff, EveryKindOfNumber) {
+  const auto first = [&](const TiffFile& tiff) {
+    const auto grid = read(TiffFile(tiff).at(0, 100, 10, 10));
+    return grid ? static_cast<double>(grid->z_m[2]) : -1;
+  };
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::uint8_t>{7, 1, 2, 3})), 7);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::int8_t>{-7, 1, 2, 3})), -7);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::uint16_t>{40000, 1, 2, 3})), 40000);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::int32_t>{-70000, 1, 2, 3})), -70000);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<double>{-7.25, 1, 2, 3})), -7.25);
+  TiffFile turned = TiffFile::of(2, 2, six);
+  turned.doubles(34264, {10, 0, 0, 100, 0, 10, 0, 200, 0, 0, 0, 0, 0, 0, 0, 1});  // south first
+  const auto grid = read(turned);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->y, (std::vector<double>{205, 215}));
+  EXPECT_FLOAT_EQ(grid->z_m[0], -1);
+}
+
+TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
+  const auto refusal = [&](const TiffFile& tiff) {
+    const auto grid = read(tiff);
+    return grid ? std::string("accepted") : grid.error().text;
+  };
+  const auto good = [] { return TiffFile::of(3, 2, six).at(0, 100, 10, 10); };
+  EXPECT_EQ(refusal(good()), "accepted");
+  EXPECT_THAT(refusal(TiffFile::of(3, 2, six)), HasSubstr("gdal_translate -a_ullr"));
+  TiffFile picture = good().without(262).without(277);
+  picture.shorts(262, {2}), picture.shorts(277, {3});
+  EXPECT_THAT(refusal(picture), HasSubstr("not one band of heights but a picture"));
+  TiffFile huge = good().without(256).without(257);
+  huge.longs(256, {100000}), huge.longs(257, {100000});
+  EXPECT_THAT(refusal(huge), HasSubstr("more than 10 million"));
+  TiffFile jpeg = good().without(259);
+  jpeg.shorts(259, {7});
+  EXPECT_THAT(refusal(jpeg), HasSubstr("COMPRESS=DEFLATE"));
+  TiffFile turned = TiffFile::of(3, 2, six);
+  turned.doubles(34264, {10, 1, 0, 0, 1, -10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1});
+  EXPECT_THAT(refusal(turned), HasSubstr("gdalwarp"));
+  EXPECT_THAT(refusal(TiffFile::of(3, 2, six).at(0, 0, 0, 10)), HasSubstr("cells that are no lengths"));
+  EXPECT_THAT(refusal(TiffFile::of(2, 2, std::vector<float>{1e9f, 1, 2, 3}).at(0, 0, 1, 1)),
+              HasSubstr("row 1, column 1 is beyond 1e7 m"));
+  EXPECT_EQ(read_geo_tiff_heights("no/such.tif", {}).error().kind, ErrorKind::missing_file);
+  const std::string whole = good().bytes();
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    const auto cut = read_geo_tiff_heights(files.write("cut.tif", whole.substr(0, n)), {});
+    EXPECT_FALSE(cut) << n;
+    if (!cut) {
+      EXPECT_THAT(cut.error().text, HasSubstr("cut.tif: ")) << n;
+    }
+    std::string bent = whole;
+    bent[n] = static_cast<char>(bent[n] ^ 0x55);
+    (void)read_geo_tiff_heights(files.write("bent.tif", bent), {});
+  }
+}
+
 TEST(HeightGrid, TooManyTrianglesAreRefused) {
   HeightGrid grid;
-  grid.x_m.resize(5000);
-  grid.y_m.resize(5000);
+  grid.x.resize(5000);
+  grid.y.resize(5000);
   EXPECT_THAT(mesh_from_grid(grid).error().text, HasSubstr("more than 20 million triangles"));
 }
 

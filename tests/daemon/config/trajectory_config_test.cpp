@@ -27,7 +27,7 @@ std::string directory() {
     std::ofstream(d + "/scene.yaml") << "name: test\n";
     std::ofstream(d + "/missions/dive.tum") << "# frame: ENU_FLU\n0 1 2 -3 0 0 0 1\n60 1 2 -9 0 0 0 1\n";
     std::ofstream(d + "/missions/no-frame.tum") << "0 1 2 -3 0 0 0 1\n60 1 2 -9 0 0 0 1\n";
-    std::ofstream(d + "/missions/broken.csv") << "# frame: ENU_FLU\nt,x,y,z\n0,1,2,3\n0,1,2,3\n";
+    std::ofstream(d + "/missions/broken.csv") << "# frame: ENU_FLU\nt,x,y,z\n1,1,2,3\n0,1,2,3\n";
     std::ofstream(d + "/fleet.csv") << "# frame: ENU_FLU\nbody,t,x,y,z\nrov,0,1,0,0\nauv,0,2,0,0\nrov,9,1,0,0\n";
     std::ofstream(d + "/kitti.txt") << "1 0 0 5 0 1 0 0 0 0 1 0\n1 0 0 6 0 1 0 0 0 0 1 0\n";
     return d;
@@ -58,6 +58,9 @@ TEST(TrajectoryConfig, WordsAndFiles) {
   EXPECT_EQ(plan.about, "missions/dive.tum: tum, ENU_FLU, 2 poses, 60.000 s");
   EXPECT_EQ(plan.rules, motion::PlaybackRules{});
   EXPECT_EQ(plan.trajectory->duration(), seconds(60));
+  std::ofstream(directory() + "/equal.tum") << "# frame: ENU_FLU\n0 0 0 -3 0 0 0 1\n1 0 0 -3 0 0 0 1\n1 1 0 -3 0 0 0 1\n";
+  EXPECT_EQ(vehicle("equal.tum").plan.about,
+            "equal.tum: tum, ENU_FLU, 2 poses, 1.000 s, 1 poses replaced by the next of the same stamp");
 }
 
 TEST(TrajectoryConfig, EveryKey) {
@@ -101,7 +104,7 @@ TEST(TrajectoryConfig, MistakesAreToldWithTheirPlace) {
   EXPECT_THAT(why("orbti"), AllOf(StartsWith("sonard.yaml:4:17: vehicles[0].trajectory: "), HasSubstr("\"orbit\"")));
   EXPECT_THAT(why("dive.tum"), AllOf(StartsWith("sonard.yaml:4:17: vehicles[0].trajectory: "),
                                      HasSubstr("no such file: \"dive.tum\"; looked in /")));
-  EXPECT_THAT(why("missions/broken.csv"), HasSubstr("broken.csv:4: the time does not rise"));
+  EXPECT_THAT(why("missions/broken.csv"), HasSubstr("broken.csv:4: the time falls"));
   EXPECT_THAT(why("missions/no-frame.tum"), HasSubstr("in which frame the poses are is not said"));
   EXPECT_THAT(why("{file: missions/dive.tum, frame: NED_FRD}"), HasSubstr("the file says ENU_FLU"));
   EXPECT_THAT(why("{file: missions/dive.tum, frame: NWU}"), StartsWith("sonard.yaml:4:50: vehicles[0].trajectory.frame: "));

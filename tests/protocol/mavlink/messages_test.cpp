@@ -72,6 +72,7 @@ TEST(MavlinkMessages, CrcExtraAndLengthsFollowFromTheFields) {
   expect_by_the_rule<LocalPositionNed>(28, 28);
   expect_by_the_rule<GlobalPositionInt>(28, 28);
   expect_by_the_rule<GpsGlobalOrigin>(12, 20);
+  expect_by_the_rule<VfrHud>(20, 20);
   expect_by_the_rule<CommandLong>(33, 33);
   expect_by_the_rule<CommandAck>(3, 10);
   expect_by_the_rule<VisionPositionEstimate>(32, 117);
@@ -81,8 +82,9 @@ TEST(MavlinkMessages, CrcExtraAndLengthsFollowFromTheFields) {
 }
 
 TEST(MavlinkMessages, TheTableHasThemByNumber) {
-  const std::vector<std::pair<std::uint32_t, int>> wanted{{0, 50},  {2, 137},  {30, 39},   {31, 246}, {32, 185},  {33, 104},
-                                                          {49, 39}, {76, 152}, {102, 158}, {108, 32}, {138, 109}, {331, 91}};
+  const std::vector<std::pair<std::uint32_t, int>> wanted{{0, 50},   {2, 137},   {30, 39}, {31, 246}, {32, 185},
+                                                          {33, 104}, {49, 39},   {74, 20}, {76, 152}, {102, 158},
+                                                          {108, 32}, {138, 109}, {331, 91}};
   ASSERT_EQ(known_messages().size(), wanted.size());
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     EXPECT_EQ(known_messages()[i].id, wanted[i].first);

@@ -1,4 +1,7 @@
 // Which messages of whom count, what poses come of them, and how they are stamped.
+#include <limits>
+#include <utility>
+
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
 namespace sonar::mavlink {
@@ -55,6 +58,74 @@ TEST(MavlinkPoses, AttitudeAndLocalPositionMeetByTheBootClock) {
   EXPECT_EQ(r.poses[0].sample.stamp.ns, 1'050'000'000);
   EXPECT_NEAR(heading_rad(r.poses[0].sample.pose.orientation), pi / 4, 1e-6);
   expect_near(r.poses[0].sample.pose.position_m, {0, 1, -2}, 1e-9);
+}
+
+GlobalPositionInt depth(std::uint32_t boot_ms, double depth_m, double down_mps = 0) {
+  GlobalPositionInt m;
+  m.boot_ms = boot_ms;
+  m.altitude_mm = m.height_mm = static_cast<std::int32_t>(std::lround(-1000 * depth_m));
+  m.down_cmps = static_cast<std::int16_t>(std::lround(100 * down_mps));
+  return m;
+}
+
+TEST(MavlinkPoses, DepthAndAttitudeAreEnough) {
+  Sender v;
+  Settings settings;
+  settings.held_m = {3, 4, 0};
+  Link link(settings);
+  EXPECT_THAT(link(v(autopilot_heartbeat()) + v(attitude(1000, 1)) + v(depth(1000, 3, 0.5)), 1).poses, IsEmpty());
+  // A pose of each attitude; between two depths the vehicle sinks on, for a second at most.
+  for (const auto& [ms, z_m] : {std::pair{1100u, -3.05}, {1200u, -3.1}, {5900u, -3.5}}) {
+    const Reaction r = link(v(attitude(ms, static_cast<float>(pi / 2))), 1e-3 * ms);
+    ASSERT_EQ(r.poses.size(), 1u) << ms;
+    const control::PoseSample& s = r.poses[0].sample;
+    EXPECT_EQ(r.poses[0].source, "system 1 depth and attitude");
+    expect_near(s.pose.position_m, {3, 4, z_m}, 1e-3);
+    EXPECT_NEAR(heading_rad(s.pose.orientation), pi / 2, 1e-6);
+    EXPECT_EQ(s.stamp.ns, 1'000'000ll * ms);
+    EXPECT_EQ(s.fields, "position attitude rates") << "the velocity is not known";
+  }
+  EXPECT_THAT(link(v(attitude(6100, 0)), 6.1).poses, IsEmpty()) << "the depth is too old";
+  // A position is better, and the depth is forgotten with a fix.
+  EXPECT_EQ(link(v(depth(6200, 2)) + v(local(6200, 1, 2, 5)) + v(attitude(6200, 0)), 6.2).poses.at(0).source,
+            "system 1 LOCAL_POSITION_NED and attitude");
+}
+
+TEST(MavlinkPoses, OfASubmarineThePilotsDisplayGivesTheDepth) {
+  VfrHud hud;
+  hud.altitude_m = -7;
+  for (const bool submarine : {true, false}) {
+    Sender v;
+    Link link;
+    Heartbeat beat = autopilot_heartbeat();
+    if (!submarine) beat.type = 2;
+    const Reaction r = link(v(beat) + v(hud) + v(attitude(1000, 0)), 1);
+    ASSERT_EQ(r.poses.size(), submarine ? 1u : 0u);
+    for (const SourcedPose& pose : r.poses) EXPECT_NEAR(pose.sample.pose.position_m.z, -7, 1e-6);
+  }
+  Sender v;
+  Link both;
+  both(v(autopilot_heartbeat()) + v(depth(900, 2)) + v(hud), 1);
+  EXPECT_NEAR(both(v(attitude(1000, 0)), 1.1).poses.at(0).sample.pose.position_m.z, -2, 1e-6) << "GLOBAL_POSITION_INT is better";
+  hud.altitude_m = std::numeric_limits<float>::quiet_NaN();
+  Link broken;
+  EXPECT_THAT(broken(v(autopilot_heartbeat()) + v(hud) + v(attitude(1000, 0)), 1).poses, IsEmpty());
+}
+
+TEST(MavlinkPoses, APlaceWithoutAnOriginIsADepthOnlyOfASubmarine) {
+  for (const bool submarine : {true, false}) {
+    Sender v;
+    Link link;
+    Heartbeat beat = autopilot_heartbeat();
+    if (!submarine) beat.type = 11;  // a boat
+    GlobalPositionInt m = global(1000, 47.6, -122.33, 12);
+    m.height_mm = -4000;
+    EXPECT_EQ(link(v(beat) + v(m) + v(attitude(1000, 0)), 1).poses.size(), submarine ? 1u : 0u);
+  }
+  Sender v;
+  Link placed(with_origin());
+  EXPECT_EQ(placed(v(autopilot_heartbeat()) + v(global(1000, 47.6, -122.33, -4)) + v(attitude(1000, 0)), 1).poses.at(0).source,
+            "system 1 GLOBAL_POSITION_INT and attitude");
 }
 
 TEST(MavlinkPoses, TheQuaternionSilencesTheAngles) {
@@ -148,8 +219,10 @@ TEST(MavlinkPoses, ZeroZeroIsNoFixAndFarAwayIsAMistake) {
   Sender v;
   Link link(with_origin());
   EXPECT_THAT(link(v(attitude(1, 0)) + v(global(1, 0, 0, 0)), 1).poses, IsEmpty());
-  const Reaction r = link(v(attitude(2, 0)) + v(global(2, -35.363, 149.165, 584)), 1.1);
-  EXPECT_THAT(r.poses, IsEmpty());
+  Link far(with_origin());
+  const Reaction r =
+      far(v(autopilot_heartbeat()) + v(attitude(1, 0)) + v(global(2, -35.363, 149.165, 584)) + v(attitude(2, 0)), 1.1);
+  EXPECT_THAT(r.poses, IsEmpty()) << "nor a depth";
   ASSERT_EQ(r.refusals.size(), 1u);
   EXPECT_THAT(r.refusals[0], HasSubstr("km from world.origin"));
 }

@@ -76,7 +76,7 @@ TEST(MavlinkReports, RatesAreRequestedOnlyWhenWantedAndUntilPosesCome) {
   EXPECT_THAT(requests(asks.on_tick(at_s(0)).replies), IsEmpty()) << "no message yet";
   asks.on_datagram(v(autopilot_heartbeat()), at_s(1));
   using Pairs = std::vector<std::pair<int, int>>;
-  const Pairs wanted{{331, 50000}, {31, 50000}, {32, 50000}};
+  const Pairs wanted{{331, 50000}, {31, 50000}, {32, 50000}, {33, 50000}};
   EXPECT_EQ(requests(asks.on_tick(at_s(1.1)).replies), wanted);
   EXPECT_THAT(requests(asks.on_tick(at_s(2)).replies), IsEmpty());
   EXPECT_EQ(requests(asks.on_tick(at_s(6.2)).replies), wanted) << "again: nothing came of it";
@@ -87,7 +87,7 @@ TEST(MavlinkReports, RatesAreRequestedOnlyWhenWantedAndUntilPosesCome) {
   MavlinkPoses geodetic(settings);
   geodetic.on_datagram(v(autopilot_heartbeat()), at_s(1));
   EXPECT_EQ(requests(geodetic.on_tick(at_s(1)).replies),
-            (Pairs{{331, 50000}, {31, 50000}, {32, 50000}, {108, 50000}, {33, 50000}, {49, 1000000}}));
+            (Pairs{{331, 50000}, {31, 50000}, {32, 50000}, {33, 50000}, {108, 50000}, {49, 1000000}}));
 }
 
 TEST(MavlinkReports, TheFirstSentenceNamesSystemMessagesAndSource) {
@@ -109,7 +109,7 @@ TEST(MavlinkReports, TheFirstSentenceSaysWhatIsMissing) {
 
   EXPECT_THAT(report_of({}, beat),
               EndsWith("no poses yet: an attitude is missing (ATTITUDE_QUATERNION or ATTITUDE); a position is "
-                       "missing (LOCAL_POSITION_NED, or GLOBAL_POSITION_INT with world.origin); set its stream "
+                       "missing (LOCAL_POSITION_NED, or GLOBAL_POSITION_INT with world.origin or depth alone); set its stream "
                        "rates, or request_rates: true"));
   EXPECT_THAT(report_of({}, beat + v(attitude(1, 0)) + v(global)),
               HasSubstr("no poses yet: GLOBAL_POSITION_INT needs world.origin"));
@@ -124,6 +124,16 @@ TEST(MavlinkReports, TheFirstSentenceSaysWhatIsMissing) {
   asks.request_rates = true;
   EXPECT_THAT(report_of(asks, beat), EndsWith("requested (request_rates) but not received"));
   EXPECT_THAT(report_of(origin, v(attitude(1, 0)) + v(GlobalPositionInt{})), HasSubstr("GLOBAL_POSITION_INT has no fix"));
+  Settings held;
+  held.held_m = {5, -2.5, 0};
+  EXPECT_THAT(
+      report_of(held, beat + v(GlobalPositionInt{}) + v(attitude(1, 0))),
+      EndsWith("poses from depth and attitude; x and y are held at 5, -2.5: GLOBAL_POSITION_INT has no fix, and there is no "
+               "LOCAL_POSITION_NED: no DVL or the like"));
+  EXPECT_THAT(report_of({}, beat + v(global) + v(attitude(1, 0))),
+              EndsWith("x and y are held at 0, 0: GLOBAL_POSITION_INT needs world.origin"));
+  EXPECT_THAT(report_of({}, beat + v(VfrHud{}) + v(attitude(1, 0))),
+              EndsWith("x and y are held at 0, 0: GLOBAL_POSITION_INT and LOCAL_POSITION_NED are missing"));
   EXPECT_THAT(report_of(origin, v.version_1(sim)), HasSubstr("poses from SIM_STATE, in steps of up to 0.4 m"));
   Odometry broken = odometry(1, 0);
   broken.frame_id = 99;

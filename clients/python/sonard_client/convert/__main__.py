@@ -1,6 +1,7 @@
 """python3 -m sonard_client.convert IN -o OUT.csv: converts logs of autopilots, robots and instruments to trajectory files.
 
-Reads ArduPilot dataflash (.bin), telemetry logs (.tlog), MCAP, ROS 1 bags and NMEA 0183, detected by content.
+Reads ArduPilot dataflash (.bin), telemetry logs (.tlog), logs of PX4 (.ulg), recordings of ROS 2 (folders, .db3, MCAP) and ROS 1,
+and NMEA 0183, detected by content.
 """
 from __future__ import annotations
 
@@ -13,8 +14,8 @@ from typing import List, Optional
 
 from ..geodesy import parse_origin
 from ..nmea import Assumptions
-from .formats import FORMATS, convert, format_of
-from .track import ConvertError, Track, gap_warning, write_csv
+from .formats import FORMATS, RECORDINGS, convert, format_of
+from .track import ConvertError, Place2, Track, gap_warning, write_csv
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -28,6 +29,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--system", type=int, help="MAVLink system of a telemetry log")
     parser.add_argument("--component", type=int, help="use only messages of this MAVLink component (autopilots are 1)")
     parser.add_argument("--origin", metavar="LAT,LON[,ALT]", help="origin of the world, degrees and m (default: the first fix)")
+    parser.add_argument("--at", metavar="NORTH,EAST", help="place [m] of a vehicle whose log has depth and attitude only (0,0)")
     parser.add_argument("--frame", choices=("ENU_FLU", "NED_FRD"), help="frame of a recording that does not use ROS's ENU_FLU")
     parser.add_argument("--body", help="adds a column `body` with this name, to combine several files")
     parser.add_argument("--keep-time", action="store_true", help="keep the log's times (default: start at 0)")
@@ -56,6 +58,18 @@ def _write(track: Track, options: argparse.Namespace) -> None:
         raise
 
 
+def _place(text: Optional[str]) -> Optional[Place2]:
+    if text is None:
+        return None
+    try:
+        north, east = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"--at {text!r} is not NORTH,EAST in metres") from None
+    if not (abs(north) <= 1e7 and abs(east) <= 1e7):
+        raise ValueError(f"--at {text!r} is out of range: within 1e7 m")
+    return north, east
+
+
 def _run(options: argparse.Namespace) -> None:
     if options.body is not None and not re.fullmatch(r"[^\s,#\"]{1,64}", options.body):
         raise ValueError(f"body {options.body!r}: a name has at most 64 characters, without spaces, commas, quotes and #")
@@ -74,10 +88,10 @@ def _run(options: argparse.Namespace) -> None:
     assumed = Assumptions(heading_deg=options.heading, depth_m=options.depth, depth_is_vehicle=options.depth_is_vehicle,
                           bottom_m=options.bottom)
     track = convert(options.file, kind, options.source, options.topic, origin, options.system, assumed, warn,
-                    options.component)
+                    options.component, _place(options.at))
     if options.frame:
-        if kind not in ("mcap", "rosbag"):
-            raise ValueError(f"--frame is for MCAP and ROS bags only: {kind} is always {track.frame}")
+        if kind not in RECORDINGS:
+            raise ValueError(f"--frame is for recordings of ROS and MCAP only: {kind} is always {track.frame}")
         track.frame = options.frame
     gap = gap_warning(track.rows)
     if gap:

@@ -12,7 +12,7 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 from ..geodesy import Geodetic
 from ..rotations import Quaternion, quaternion_from_rpy, unit
-from .track import ConvertError, Source, Stream, Track, Warn, chosen, track_of
+from .track import ConvertError, Place2, Source, Stream, Track, Warn, chosen, depth_source, track_of
 
 MAGIC = b"\xa3\x95"
 FMT = 128
@@ -25,7 +25,9 @@ _KINDS: Dict[str, Tuple[str, float]] = {
 # In order of preference: the simulator's ground truth, then estimates.
 FULL = ("SIM", "XKF1", "NKF1", "EKF1", "AHR2")
 LOCAL = ("XKF1", "NKF1", "EKF1")  # metres from the filter's origin
-WANTED = FULL + ("ATT", "POS", "GPS", "ORGN")
+# Heights above the home, by message and field, of vehicles without a position; BARO:1 is ArduSub's pressure sensor outside.
+HEIGHTS = (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("BARO:1", "Alt"), ("BARO", "Alt"))
+WANTED = FULL + ("ATT", "POS", "GPS", "ORGN", "CTUN", "BARO")
 EKF_ORIGIN = 0  # type of an ORGN message; 1 is the home of the attitude system
 FIX_2D = 2
 
@@ -111,6 +113,7 @@ class _Gathered:
     def __init__(self) -> None:
         self.attitudes: Dict[str, Stream[Quaternion]] = {}
         self.positions: "Dict[str, Stream]" = {}
+        self.depths: Dict[str, Stream[float]] = {}
         self.origin: Optional[Geodetic] = None
 
     def add(self, name: str, fields: Dict[str, float]) -> None:
@@ -121,6 +124,9 @@ class _Gathered:
             return
         instance = int(fields.get("C", fields.get("I", 0)))
         key = f"{name}:{instance}" if instance else name
+        height = fields.get(dict(HEIGHTS).get(key, ""), math.nan)
+        if math.isfinite(height):
+            self.depths.setdefault(key, []).append((t, -height))
         attitude = _attitude(fields)
         if attitude is not None:
             self.attitudes.setdefault(key, []).append((t, attitude))
@@ -136,10 +142,13 @@ class _Gathered:
     def sources(self) -> List[Source]:
         full = sorted((k for k in self.attitudes if k.split(":")[0] in FULL), key=lambda k: (FULL.index(k.split(":")[0]), k))
         found = [Source(key, self.attitudes[key], self.positions.get(key, [])) for key in full]
-        return found + [Source(f"ATT+{p}", self.attitudes.get("ATT", []), self.positions.get(p, [])) for p in ("POS", "GPS")]
+        found += [Source(f"ATT+{p}", self.attitudes.get("ATT", []), self.positions.get(p, [])) for p in ("POS", "GPS")]
+        depths: Stream[float] = next((self.depths[key] for key, _ in HEIGHTS if key in self.depths), [])
+        return found + [depth_source(a, self.attitudes.get(a, []), depths) for a in ("ATT", "AHR2")]
 
 
-def read_dataflash(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None) -> Track:
+def read_dataflash(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None,
+                   at: Optional[Place2] = None) -> Track:
     """Reads the vehicle's track: NED_FRD, seconds since the autopilot started."""
     data = path.read_bytes()
     if not data.startswith(MAGIC):
@@ -149,4 +158,4 @@ def read_dataflash(path: pathlib.Path, warn: Warn, source: Optional[str] = None,
         gathered.add(name, fields)
     wanted = chosen(gathered.sources(), source, str(path))
     local = wanted.name.split(":")[0] in LOCAL
-    return track_of(wanted, str(path), warn, origin, gathered.origin if local else None)
+    return track_of(wanted, str(path), warn, origin, gathered.origin if local else None, at)

@@ -6,52 +6,90 @@ from typing import Callable, Optional, Union
 
 from ..geodesy import Geodetic
 from ..nmea import Assumptions
-from . import dataflash, mcap, rosbag
+from . import dataflash, mcap, rosbag, rosbag2, ulog
 from .dataflash import read_dataflash
 from .mavlink import frame_length
 from .mcap import read_mcap
 from .nmea_log import read_nmea
 from .rosbag import read_rosbag
+from .rosbag2 import files_of, read_rosbag2
 from .tlog import STAMP_BYTES, read_tlog
-from .track import ConvertError, Track, Warn
+from .track import ConvertError, Place2, Track, Warn
+from .ulog import read_ulog
 
-FORMATS = ("dataflash", "tlog", "mcap", "rosbag", "nmea")
+FORMATS = ("dataflash", "tlog", "mcap", "rosbag", "db3", "ulog", "nmea")
+RECORDINGS = ("mcap", "rosbag", "db3")  # in metres, their frame not said
 _HEAD_BYTES = 4096
+# What people have and this does not read: the first bytes, what they are, what to do; {} is the file.
+_OTHERS = (
+    (b"\x28\xb5\x2f\xfd", "compressed by zstd; unpack it first: zstd -d {}"),
+    (b"\x1f\x8b", "compressed by gzip; unpack it first: gunzip -k {}"),
+    (b"BZh", "compressed by bzip2; unpack it first: bunzip2 -k {}"),
+    (b"PK\x03\x04", "a ZIP archive; unpack it first: unzip {}"),
+    (b"#ROSBAG V1", "a ROS 1 bag of an old format; rewrite it: rosbag migrate {} NEW.bag"),
+    (b"FMT, 128, ", "a dataflash log as text; give the .bin file that it was made from"),
+    (b"\x89HDF\r\n", "HDF5, as .mat files of MATLAB 7.3 are; write its poses as CSV (docs/poses.md)"),
+    (b"MATLAB 5.0", "a MATLAB file; write its poses as CSV (docs/poses.md)"),
+)
+
+
+def _described(path: pathlib.Path, head: bytes) -> str:
+    """Says what a file is that this does not read; empty if that is not known."""
+    for magic, text in _OTHERS:
+        if head.startswith(magic):
+            return text.format(path)
+    first = next((line for line in head.split(b"\n") if line.strip() and not line.startswith(b"#")), head)
+    if all(9 <= byte < 128 for byte in head) and (set(first) <= set(b"0123456789+-.eE, \t\r") or first[:1] in b"tT"):
+        return ("text; sonard plays CSV with a header, TUM, EuRoC and KITTI as they are: name the file in `trajectory:` "
+                "(docs/poses.md)")
+    return ""
 
 
 def format_of(path: pathlib.Path) -> str:
-    """Returns one of FORMATS, or raises ConvertError."""
+    """Returns one of FORMATS, or raises ConvertError. Of a folder: that of its first recording."""
+    if path.is_dir():
+        path = files_of(path)[0]
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     if not head:
         raise ConvertError(f"{path}: the file is empty")
-    for magic, name in ((dataflash.MAGIC, "dataflash"), (mcap.MAGIC, "mcap"), (rosbag.MAGIC, "rosbag")):
+    for magic, name in ((dataflash.MAGIC, "dataflash"), (mcap.MAGIC, "mcap"), (rosbag.MAGIC, "rosbag"), (rosbag2.MAGIC, "db3"),
+                        (ulog.MAGIC, "ulog")):
         if head.startswith(magic):
             return name
     if frame_length(head, STAMP_BYTES) is not None or path.suffix == ".tlog":
         return "tlog"
     if b"$" in head and b"," in head and all(byte < 128 for byte in head):
         return "nmea"
+    described = _described(path, head)
+    if described:
+        raise ConvertError(f"{path}: {described}")
     raise ConvertError(f"{path}: at byte 0: none of {', '.join(FORMATS)}; if its beginning is damaged, name the format "
                        "with --format")
 
 
 def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source: Optional[str] = None,
             topic: Optional[str] = None, origin: Optional[Geodetic] = None, system: Optional[int] = None,
-            assumed: Assumptions = Assumptions(), warn: Warn = lambda text: None, component: Optional[int] = None) -> Track:
+            assumed: Assumptions = Assumptions(), warn: Warn = lambda text: None, component: Optional[int] = None,
+            at: Optional[Place2] = None) -> Track:
     """Reads the track of one vehicle. kind: one of FORMATS; default: detected. source: messages of a dataflash or telemetry log.
-    topic: topic of a recording. system, component: MAVLink system and component of a telemetry log. Raises ConvertError and
+    topic: topic of a recording. system, component: MAVLink system and component of a telemetry log. at: north and east [m]
+    of a vehicle whose log has its depth and no horizontal position. Raises ConvertError and
     OSError."""
     file = pathlib.Path(path)
     chosen = kind or format_of(file)
     readers: "dict[str, Callable[[], Track]]" = {
-        "dataflash": lambda: read_dataflash(file, warn, source, origin),
-        "tlog": lambda: read_tlog(file, warn, source, origin, system, component),
-        "mcap": lambda: read_mcap(file, warn, topic),
+        "dataflash": lambda: read_dataflash(file, warn, source, origin, at),
+        "tlog": lambda: read_tlog(file, warn, source, origin, system, component, at),
+        "mcap": lambda: read_rosbag2(file, warn, topic) if file.is_dir() else read_mcap(file, warn, topic),
         "rosbag": lambda: read_rosbag(file, warn, topic),
+        "db3": lambda: read_rosbag2(file, warn, topic),
+        "ulog": lambda: read_ulog(file, warn, source, origin, at),
         "nmea": lambda: read_nmea(file, warn, origin, assumed)}
     if chosen not in readers:
         raise ValueError(f"format is {chosen!r}: it must be one of {', '.join(FORMATS)}")
-    if origin is not None and chosen in ("mcap", "rosbag"):
+    if origin is not None and chosen in RECORDINGS:
         raise ValueError("an origin needs positions in degrees; poses of recordings are in metres")
+    if at is not None and chosen not in ("dataflash", "tlog", "ulog"):
+        raise ValueError(f"--at is for logs of autopilots without horizontal position: this is {chosen}")
     return readers[chosen]()

@@ -35,6 +35,7 @@ MESSAGES: Dict[int, Message] = {
     32: Message("LOCAL_POSITION_NED", 185, "I6f", "", _names("time_boot_ms x y z vx vy vz")),
     33: Message("GLOBAL_POSITION_INT", 104, "I4i3hH", "", _names("time_boot_ms lat lon alt relative_alt vx vy vz hdg")),
     49: Message("GPS_GLOBAL_ORIGIN", 39, "3i", "Q", _names("latitude longitude altitude time_usec")),
+    74: Message("VFR_HUD", 20, "4fhH", "", _names("airspeed groundspeed alt climb heading throttle")),
     102: Message("VISION_POSITION_ESTIMATE", 158, "Q6f", "84xB", _names("time_usec x y z roll pitch yaw reset_counter")),
     108: Message("SIM_STATE", 32, "21f", "2i", _names(_SIM_STATE)),
     138: Message("ATT_POS_MOCAP", 109, "Q7f", "84x", _names("time_usec q1 q2 q3 q4 x y z")),
@@ -44,6 +45,7 @@ MESSAGES: Dict[int, Message] = {
 }
 # MAV_FRAME, as frame_id and child_frame_id of ODOMETRY.
 LOCAL_NED, LOCAL_FRD = 1, 20
+SUBMARINE = 12  # MAV_TYPE
 BODY_NED, BODY_FRD, BODY_FLU = 8, 12, 13  # BODY_NED is deprecated and means FRD
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import pathlib
 import struct
 import zlib
-from typing import BinaryIO, Dict, Iterator, NamedTuple, Optional
+from typing import BinaryIO, Dict, Iterator, List, NamedTuple, Optional
 
 from .cdr import Broken
 from .compression import Unreadable, unpack
@@ -120,8 +120,7 @@ class _Reader:
             inner = begin + length
 
 
-def read_mcap(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
-    """Reads the poses of one topic; ROS and foxglove use ENU_FLU."""
+def mcap_messages(path: pathlib.Path, warn: Warn) -> List[Recorded]:
     reader = _Reader(str(path), warn)
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
@@ -131,4 +130,9 @@ def read_mcap(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Tr
         raise ConvertError(f"{path}: {reader.why}")
     if reader.refused:
         warn(f"{reader.why}; chunks omitted: {reader.refused}")
-    return track_from(messages, str(path), warn, topic)
+    return messages
+
+
+def read_mcap(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
+    """Reads the poses of one topic; ROS and foxglove use ENU_FLU."""
+    return track_from(mcap_messages(path, warn), str(path), warn, topic)

@@ -15,6 +15,7 @@ class Recorded(NamedTuple):
     logged_s: float
     data: bytes
     at: int  # byte offset in the file, for errors
+    unit: str = "byte"  # what `at` counts
 
 
 class _Topic:
@@ -48,7 +49,7 @@ def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optio
         try:
             found = poses_in(message.topic, message.encoding, message.schema, message.data)
         except Broken as error:
-            faults.append(f"at byte {message.at}, topic {message.topic}: {error}")
+            faults.append(f"at {message.unit} {message.at}, topic {message.topic}: {error}")
             continue
         for pose in found:
             there = topics.setdefault(pose.topic, _Topic(pose.rank, pose.frame))

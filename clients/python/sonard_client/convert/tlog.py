@@ -9,9 +9,9 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 from ..geodesy import Geodetic
 from ..rotations import Quaternion, quaternion_from_rpy, unit
-from .mavlink import (BODY_FLU, BODY_FRD, BODY_NED, LOCAL_FRD, LOCAL_NED, MESSAGES, Frame, fields_of, frame_length,
+from .mavlink import (BODY_FLU, BODY_FRD, BODY_NED, LOCAL_FRD, LOCAL_NED, MESSAGES, SUBMARINE, Frame, fields_of, frame_length,
                       read_frame)
-from .track import ConvertError, Source, Stream, Track, Warn, chosen, track_of
+from .track import ConvertError, Place2, Source, Stream, Track, Warn, chosen, depth_source, track_of
 
 STAMP_BYTES = 8
 RESTART_S = 5.0  # a smaller step back is a delayed frame, not a restart
@@ -93,6 +93,8 @@ class _Vehicle:
         self.senders: "set[int]" = set()  # components that sent any message
         self.attitudes: Dict[str, Stream[Quaternion]] = {}
         self.positions: "Dict[str, Stream]" = {}
+        self.depths: Dict[str, Stream[float]] = {}  # down [m], of messages without a fix
+        self.is_submarine = False
         self.origin: Optional[Geodetic] = None
         self.unsupported: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id
         self.heading_is_local = False
@@ -106,6 +108,8 @@ class _Vehicle:
     def add(self, logged: Logged) -> None:
         fields = fields_of(logged.frame)
         name = MESSAGES[logged.frame.message_id].name if fields is not None else "HEARTBEAT"
+        if fields is not None and name == "HEARTBEAT":
+            self.is_submarine |= fields["type"] == SUBMARINE
         if fields is None or name == "HEARTBEAT" or not self._is_used(name, logged):
             return
         if name == "GPS_GLOBAL_ORIGIN":
@@ -115,6 +119,11 @@ class _Vehicle:
         # Attitude and position are paired by the vehicle's clock if both have it, else by time of receipt.
         t = self._since_start(1e-3 * fields["time_boot_ms"], logged.received_s) if "time_boot_ms" in fields else \
             1e-6 * fields["time_usec"] if fields.get("time_usec") else logged.received_s
+        if name == "VFR_HUD":  # without a time; above the surface of submarines, above sea level or the home of others
+            if math.isfinite(fields["alt"]):
+                now = self._before_s + self._boot[0] + logged.received_s - self._boot[1] if self._boot else logged.received_s
+                self.depths.setdefault(name, []).append((now, -fields["alt"]))
+            return
         attitude: Optional[Quaternion] = None
         position: "Optional[tuple]" = None
         if name == "ODOMETRY" and not _is_supported(fields):
@@ -133,6 +142,8 @@ class _Vehicle:
             place = _simulated_place(fields) if name == "SIM_STATE" else \
                 Geodetic(1e-7 * fields["lat"], 1e-7 * fields["lon"], 1e-3 * fields["alt"])
             position = place if place.is_fix else None
+            if position is None and name == "GLOBAL_POSITION_INT":
+                self.depths.setdefault(name, []).append((t, -1e-3 * fields["relative_alt"]))
         if name in FULL and (attitude is None or position is None):
             return
         self.heading_is_local |= fields.get("frame_id") == LOCAL_FRD
@@ -173,7 +184,9 @@ class _Vehicle:
 
     def sources(self) -> List[Source]:
         pairs = [(n, n) for n in FULL[:2]] + [(a, p) for p in POSITIONS for a in ATTITUDES] + [(n, n) for n in FULL[2:]]
-        return [Source(a if a == p else f"{a}+{p}", self.attitudes.get(a, []), self.positions.get(p, [])) for a, p in pairs]
+        depths = self.depths.get("GLOBAL_POSITION_INT") or (self.depths.get("VFR_HUD") if self.is_submarine else None) or []
+        return [Source(a if a == p else f"{a}+{p}", self.attitudes.get(a, []), self.positions.get(p, [])) for a, p in pairs] + \
+            [depth_source(a, self.attitudes.get(a, []), depths) for a in ATTITUDES]
 
     @property
     def weight(self) -> int:
@@ -192,11 +205,11 @@ def _vehicle(vehicles: Dict[int, _Vehicle], system: Optional[int], name: str, wa
              "selects another")
     if with_poses:
         return vehicles[with_poses[0]]
-    return next((v for v in vehicles.values() if v.unsupported), _Vehicle())  # its warnings give the reason
+    return max(vehicles.values(), key=lambda v: (bool(v.unsupported), len(v.attitudes) + len(v.positions) + len(v.depths)))
 
 
 def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None,
-              system: Optional[int] = None, component: Optional[int] = None) -> Track:
+              system: Optional[int] = None, component: Optional[int] = None, at: Optional[Place2] = None) -> Track:
     """Reads the vehicle's track, NED_FRD; from one component if given."""
     data = path.read_bytes()
     vehicles: Dict[int, _Vehicle] = {}
@@ -227,4 +240,4 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
         warn(f"the vehicle restarted ({vehicle.restarts} x); its clock was continued by the times of receipt")
     local = not isinstance(wanted.positions[0][1], Geodetic)
     of_local = vehicle.origin if local and wanted.name.endswith("LOCAL_POSITION_NED") else None
-    return track_of(wanted, str(path), warn, origin, of_local)
+    return track_of(wanted, str(path), warn, origin, of_local, at)

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import bisect
+import math
 from dataclasses import dataclass, field
 from typing import Callable, List, NamedTuple, Optional, Sequence, TextIO, Tuple, TypeVar, Union
 
@@ -11,6 +12,7 @@ from ..rotations import Quaternion, Vector3, between
 Warn = Callable[[str], None]  # takes one sentence, without the file's name
 Value = TypeVar("Value")
 Stream = List[Tuple[float, Value]]  # times in s
+Place2 = Tuple[float, float]  # north, east [m]
 LONG_GAP_S = 1.0
 
 
@@ -37,16 +39,19 @@ class Source(NamedTuple):
     name: str
     attitudes: Stream[Quaternion]
     positions: "Stream[Union[Vector3, Geodetic]]"
+    held: bool = False  # north and east are not known and stay 0
 
     def __str__(self) -> str:
         return f"{self.name} ({min(len(self.attitudes), len(self.positions))} poses)"
 
 
 def rising(stream: Stream[Value]) -> Stream[Value]:
-    """Drops items whose time does not increase."""
+    """Drops items whose time falls; an item of the same time replaces the one before."""
     kept: Stream[Value] = []
     for item in stream:
-        if not kept or item[0] > kept[-1][0]:
+        if kept and item[0] == kept[-1][0]:
+            kept[-1] = item
+        elif not kept or item[0] > kept[-1][0]:
             kept.append(item)
     return kept
 
@@ -61,7 +66,9 @@ def chosen(sources: Sequence[Source], wanted: Optional[str], name: str) -> Sourc
         listed = ", ".join(map(str, there)) or "none"
         raise ConvertError(f"{name}: no poses of {wanted!r}; sources: {listed}")
     if not there:
-        raise ConvertError(f"{name}: no poses: the file lacks attitude, position or both")
+        lacks = [what for what, has in (("attitudes", any(s.attitudes for s in sources)),
+                                        ("positions and depths", any(s.positions for s in sources))) if not has]
+        raise ConvertError(f"{name}: no poses: the file lacks {' and '.join(lacks) or 'attitudes and positions of one source'}")
     return there[0]
 
 
@@ -85,8 +92,9 @@ def paired(attitudes: Stream[Quaternion], positions: Stream[Vector3]) -> List[Ro
 
 
 def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] = None,
-             own_origin: Optional[Geodetic] = None) -> Track:
-    """Makes a track in NED_FRD. origin: as requested. own_origin: origin of the file's metres, if it contains one."""
+             own_origin: Optional[Geodetic] = None, at: Optional[Place2] = None) -> Track:
+    """Makes a track in NED_FRD. origin: as requested. own_origin: origin of the file's metres, if it contains one. at: north and
+    east of a vehicle that has no horizontal position."""
     attitudes, positions = rising(source.attitudes), rising(source.positions)
     late = len(source.attitudes) + len(source.positions) - len(attitudes) - len(positions)
     if late:
@@ -101,7 +109,14 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
         local = [(t, plane.ned(p)) for t, p in positions if isinstance(p, Geodetic)]
     else:
         local = [(t, (p[0], p[1], p[2])) for t, p in positions]
-        if own_origin is not None:
+        if source.held or _stays(local):
+            held = at or local[0][1][:2]
+            warn(f"no horizontal position (no DVL, UGPS or the like): north and east are held at {held[0]:g}, {held[1]:g}" +
+                 ("" if at else "; --at NORTH,EAST sets them"))
+            comments.append(f"north and east are held at {held[0]:g}, {held[1]:g}: the log has no horizontal position")
+            local = [(t, (held[0], held[1], p[2])) for t, p in local]
+            at = None
+        elif own_origin is not None:
             comments.append(f"origin: {origin or own_origin}")
             if origin is not None:
                 mine, theirs = LocalPlane(origin), LocalPlane(own_origin)
@@ -109,10 +124,23 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
         elif origin is not None:
             raise ConvertError(f"{name}: positions of {source.name} are metres from an unknown origin; omit the origin, or "
                                "select a source with latitude and longitude")
+    if at is not None:
+        raise ValueError(f"--at is for logs without horizontal position: {source.name} has one")
     rows = paired(attitudes, local)
     if not rows:
         raise ConvertError(f"{name}: attitudes and positions of {source.name} do not overlap in time")
     return Track("NED_FRD", source.name, rows, comments)
+
+
+def depth_source(attitude: str, attitudes: Stream[Quaternion], depths: Stream[float]) -> Source:
+    """Of a vehicle that knows its depth and no horizontal position, such as a BlueROV2 without DVL."""
+    return Source(f"{attitude}+depth", attitudes, [(t, (0.0, 0.0, down)) for t, down in depths], held=True)
+
+
+def _stays(positions: Stream[Vector3]) -> bool:
+    """Filters without a horizontal position report one that does not change."""
+    first = positions[0][1]
+    return len(positions) > 1 and all(math.hypot(p[0] - first[0], p[1] - first[1]) < 1e-3 for _, p in positions)
 
 
 def gap_warning(rows: Sequence[Row]) -> str:

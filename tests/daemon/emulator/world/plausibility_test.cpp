@@ -212,6 +212,48 @@ TEST(Plausibility, ATrajectoryWithWAtTheWrongEnd) {
   }
 }
 
+/// A camera that turns and looks down by up to 50 deg, its axes those of pictures or of the IMU beside it (as EuRoC's).
+std::string looking_around(Quatd body_in_flu, bool w_first, const char* comma = " ", const char* unit = "") {
+  std::string lines = "# frame: ENU_FLU\n";
+  for (int i = 0; i < 36; ++i) {
+    const Quatd q = quat_from_rpy({0.05, rad_from_deg(10 + 40 * (i % 2)), rad_from_deg(10 * i)}) * body_in_flu;
+    const std::array<double, 4> in_order = w_first ? std::array{q.w, q.x, q.y, q.z} : std::array{q.x, q.y, q.z, q.w};
+    lines += std::to_string(i) + unit;
+    for (const double v : {1.0, 2.0, -3.0, in_order[0], in_order[1], in_order[2], in_order[3]})
+      lines += comma + std::to_string(v);
+    lines += "\n";
+  }
+  return lines;
+}
+
+TEST(Plausibility, ATrajectoryOfACamera) {
+  const Quatd picture{0.5, -0.5, 0.5, -0.5}, imu{0, std::sqrt(0.5), 0, std::sqrt(0.5)};
+  ASSERT_NEAR(rotate(picture, Vec3d{0, 0, 1}).x, 1, 1e-9);
+  ASSERT_NEAR(rotate(picture, Vec3d{1, 0, 0}).y, -1, 1e-9);
+  ASSERT_NEAR(rotate(imu, Vec3d{1, 0, 0}).z, 1, 1e-9);
+  ASSERT_NEAR(rotate(imu, Vec3d{0, 1, 0}).y, -1, 1e-9);
+  EXPECT_THAT(
+      notes(playing(looking_around(picture, false))),
+      ElementsAre(AllOf(HasSubstr("the poses of dive.tum have the axes of a camera"), HasSubstr("rpy_deg: [0, -90, 90]"))));
+  EXPECT_THAT(notes(playing(looking_around(imu, true, ",", "000000000"), "dive.csv")),
+              ElementsAre(AllOf(HasSubstr("of an IMU beside a camera"), HasSubstr("rpy_deg: [0, -90, 180]"))));
+  EXPECT_THAT(notes(playing(looking_around(Quatd{}, false))), IsEmpty());
+
+  // With the mount that the note offers the sonar looks where the camera looks, and the note is gone.
+  const struct {
+    Quatd body;
+    RollPitchYaw mount;
+  } cures[] = {{picture, {0, -pi / 2, pi / 2}}, {imu, {0, -pi / 2, pi}}};
+  for (const auto& [body, mount] : cures) {
+    Config config = playing(looking_around(body, false));
+    config.sonars[0].mount.orientation = quat_from_rpy(mount);
+    EXPECT_THAT(notes(config), IsEmpty());
+    const Quatd sonar = body * config.sonars[0].mount.orientation;
+    EXPECT_NEAR(rotate(sonar, Vec3d{1, 0, 0}).x, 1, 1e-9);
+    EXPECT_NEAR(rotate(sonar, Vec3d{0, 0, 1}).z, 1, 1e-9);
+  }
+}
+
 TEST(Plausibility, ATrajectoryAboveTheWaterOrUpsideDown) {
   EXPECT_THAT(notes(playing("# frame: ENU_FLU\n0 0 0 -1 0 0 0 1\n1 0 0 2 0 0 0 1\n2 0 0 3 0 0 0 1\n")),
               ElementsAre(HasSubstr("is 2.0 m above the water's surface (z = 0), in 2 of 3 poses of dive.tum; was NED")));

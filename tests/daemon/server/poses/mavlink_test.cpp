@@ -130,6 +130,26 @@ TEST_F(Mavlink, AListeningLinkMovesTheSonarAndAnswersWithHeartbeats) {
   EXPECT_EQ(daemon.status().vehicles().at(0).source(), source);
 }
 
+/// A BlueROV2 without DVL, with nothing said about it.
+TEST_F(Mavlink, DepthAndAttitudeMoveAVehicleAtItsInitialPlace) {
+  DaemonSetup setup = with_link("udpin:HERE:0");
+  setup.edit_config = [](Config& config) { config.vehicles.front().initial_pose.position_m = {5, 6, -1}; };
+  Daemon daemon(setup);
+  const std::uint16_t port = daemon.app().mavlink().listens_at(0).port;
+  Vehicle vehicle(daemon.address());
+  mavlink::GlobalPositionInt depth;
+  depth.boot_ms = 1000, depth.height_mm = -4500;
+  mavlink::Attitude attitude;
+  attitude.boot_ms = 1100, attitude.yaw_rad = 1;
+  vehicle.send(daemon.address(), port, framed(depth, vehicle.who));
+  vehicle.send(daemon.address(), port, framed(attitude, vehicle.who));
+  const auto pose = [&] { return daemon.status().vehicles().at(0).position(); };
+  EXPECT_TRUE(eventually([&] { return std::abs(pose().z() + 4.5) < 1e-6; })) << pose().z();
+  EXPECT_EQ(pose().x(), 5);
+  EXPECT_EQ(pose().y(), 6);
+  EXPECT_TRUE(eventually([&] { return daemon.log_text().find("x and y are held at 5, 6") != std::string::npos; }));
+}
+
 TEST_F(Mavlink, ADiallingLinkSpeaksFirst) {
   const std::string here = "127.0.0.3";
   Vehicle vehicle(here);

@@ -7,6 +7,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <memory>
+
 #include "daemon/config/addresses.hpp"
 #include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
@@ -206,6 +208,17 @@ TEST(Transports, DatagramsAreAnsweredAndSetTheDevicesOwnReceivers) {
   EXPECT_EQ(samples, pattern(ping));
   host.send("receivers", daemon.address(), udp_port);
   EXPECT_TRUE(eventually([&] { return host.next(milliseconds(500)).empty(); }));
+}
+
+/// Hosts of a Ping360 search with a socket at port 30303 of all addresses, where sonard's own computer has it too.
+TEST(Transports, APortThatIsSearchedIsSharedWithHostsOfThisComputer) {
+  auto before = std::make_unique<UdpSocket>("0.0.0.0", udp_port);
+  Daemon daemon(made_up());
+  before.reset();
+  UdpSocket host("0.0.0.0", udp_port);
+  host.send("who", daemon.address(), udp_port);
+  EXPECT_EQ(host.next(), "front 5\n");
+  EXPECT_EQ(host.sender, daemon.address() + ":" + std::to_string(udp_port));
 }
 
 TEST(Transports, ADialogueByDatagramsBelongsToTheHostThatAskedLast) {

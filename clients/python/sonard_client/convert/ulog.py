@@ -1,0 +1,114 @@
+"""Reads logs of PX4 (.ulg): attitude with local or global position, the simulator's ground truth first.
+
+Written from PX4's description of ULog. A message has a size of two bytes, its type and content; F describes formats, A gives a
+format a number, D is data. A truncated log is read up to its last complete message.
+"""
+from __future__ import annotations
+
+import math
+import pathlib
+import struct
+from typing import Dict, List, NamedTuple, Optional, Tuple
+
+from ..geodesy import Geodetic
+from ..rotations import Quaternion, unit
+from .track import ConvertError, Place2, Source, Stream, Track, Warn, chosen, track_of
+
+MAGIC = b"ULog\x01\x12\x35"
+HEAD_BYTES = 16
+_KINDS = {"int8_t": "b", "uint8_t": "B", "int16_t": "h", "uint16_t": "H", "int32_t": "i", "uint32_t": "I", "int64_t": "q",
+          "uint64_t": "Q", "float": "f", "double": "d", "bool": "?", "char": "c"}
+TRUTH = "_groundtruth"
+ATTITUDE, LOCAL, GLOBAL = "vehicle_attitude", "vehicle_local_position", "vehicle_global_position"
+WANTED = tuple(name + more for more in ("", TRUTH) for name in (ATTITUDE, LOCAL, GLOBAL))
+LONGEST_FORMAT = 65536  # bytes of one message
+
+
+class Layout(NamedTuple):
+    body: struct.Struct
+    fields: Dict[str, Tuple[int, int]]  # by name: its first value and how many
+
+
+def _layout(text: str) -> Optional[Layout]:
+    """Of "uint64_t timestamp;float[4] q;"; None with fields of other formats."""
+    codes, fields, at = "<", {}, 0
+    for part in filter(None, text.split(";")):
+        kind, _, name = part.partition(" ")
+        plain, _, count = kind.rstrip("]").partition("[")
+        if plain not in _KINDS or (count and not count.isdigit()) or len(count) > 5:
+            return None
+        number = int(count or 1)
+        codes += f"{number}{_KINDS[plain]}"
+        fields[name] = at, number
+        at += number
+        if at > LONGEST_FORMAT:
+            return None
+    return Layout(struct.Struct(codes), fields)
+
+
+class _Log:
+    def __init__(self, data: bytes, name: str, warn: Warn) -> None:
+        self.attitudes: Dict[str, Stream[Quaternion]] = {}
+        self.positions: "Dict[str, Stream]" = {}
+        self.origin: Optional[Geodetic] = None
+        self._layouts: Dict[str, Optional[Layout]] = {}
+        self._named: Dict[int, str] = {}  # subscriptions of the first instance
+        at = HEAD_BYTES
+        while at + 3 <= len(data):
+            size, kind = struct.unpack_from("<HB", data, at)
+            if at + 3 + size > len(data):
+                warn(f"ends within a message, at byte {at}; all messages before it were read")
+                break
+            self._take(chr(kind), data[at + 3:at + 3 + size], at, warn)
+            at += 3 + size
+
+    def _take(self, kind: str, content: bytes, at: int, warn: Warn) -> None:
+        if kind == "F":
+            name, _, fields = content.decode("latin-1").partition(":")
+            if name in WANTED:
+                self._layouts[name] = _layout(fields)
+                if self._layouts[name] is None:
+                    warn(f"at byte {at}: the format of {name} cannot be read; it is omitted")
+        elif kind == "A" and len(content) > 3 and content[0] == 0:
+            self._named[int.from_bytes(content[1:3], "little")] = content[3:].decode("latin-1")
+        elif kind == "D" and len(content) > 2:
+            name = self._named.get(int.from_bytes(content[:2], "little"), "")
+            layout = self._layouts.get(name)
+            if layout is not None:
+                # The padding at a format's end is not logged.
+                values = layout.body.unpack(content[2:2 + layout.body.size].ljust(layout.body.size, b"\0"))
+                self._add(name, {label: values[first] if number == 1 else values[first:first + number]
+                                 for label, (first, number) in layout.fields.items()})
+
+    def _add(self, name: str, fields: Dict) -> None:
+        t = 1e-6 * (fields.get("timestamp_sample") or fields.get("timestamp") or 0)
+        if name.startswith(ATTITUDE):
+            q = fields.get("q")
+            if isinstance(q, tuple) and len(q) == 4 and abs(sum(p * p for p in q) - 1) < 1e-3:
+                self.attitudes.setdefault(name, []).append((t, unit(q)))
+        elif name.startswith(LOCAL):
+            place = tuple(fields.get(axis, math.nan) for axis in "xyz")
+            if fields.get("z_valid", True) and fields.get("xy_valid", True) and all(map(math.isfinite, place)):
+                self.positions.setdefault(name, []).append((t, place))
+            if self.origin is None and fields.get("xy_global") and fields.get("z_global"):
+                there = Geodetic(fields.get("ref_lat", 0.0), fields.get("ref_lon", 0.0), fields.get("ref_alt", 0.0))
+                self.origin = there if there.is_fix else None
+        else:
+            there = Geodetic(fields.get("lat", 0.0), fields.get("lon", 0.0), fields.get("alt", 0.0))
+            if there.is_fix:
+                self.positions.setdefault(name, []).append((t, there))
+
+    def sources(self) -> List[Source]:
+        return [Source(f"{ATTITUDE}{more}+{position}{more}", self.attitudes.get(ATTITUDE + more, []),
+                       self.positions.get(position + more, [])) for more in (TRUTH, "") for position in (LOCAL, GLOBAL)]
+
+
+def read_ulog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None,
+              at: Optional[Place2] = None) -> Track:
+    """Reads the vehicle's track: NED_FRD, seconds since the autopilot started."""
+    data = path.read_bytes()
+    if not data.startswith(MAGIC):
+        raise ConvertError(f"{path}: at byte 0: not a log of PX4: it does not begin with ULog")
+    log = _Log(data, str(path), warn)
+    wanted = chosen(log.sources(), source, str(path))
+    return track_of(wanted, str(path), warn, origin, log.origin if wanted.name == f"{ATTITUDE}+{LOCAL}" else None, at)

@@ -1,0 +1,307 @@
+// GeoTIFF: heights with coordinates (OGC 19-008r4), through libtiff; the only file that includes it.
+#include <tiffio.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <set>
+#include <span>
+
+#include "core/base/memory_left.hpp"
+#include "core/base/regular_file.hpp"
+#include "core/scene/files/height_values.hpp"
+#include "core/text/format.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::uint64_t most_file_bytes = std::uint64_t{2} << 30, most_block_bytes = 64 << 20;
+constexpr std::uint64_t memory_of_a_cell = 4;
+
+// Tags, and keys of the directory of keys.
+enum : std::uint32_t {
+  pixel_scale = 33550,
+  tie_points = 33922,
+  transformation = 34264,
+  key_directory = 34735,
+  gdal_no_data = 42113,
+};
+enum : std::uint16_t { model_type = 1024, raster_type = 1025, angular_units = 2054, linear_units = 3076, vertical_units = 4099 };
+constexpr std::uint16_t projected = 1, geographic = 2, pixel_is_point = 2, degree = 9102;
+
+struct CloseTiff {
+  void operator()(TIFF* tiff) const { TIFFClose(tiff); }
+};
+using Tiff = std::unique_ptr<TIFF, CloseTiff>;
+
+// The library's sentence, of the file that this thread reads.
+thread_local std::string last_error;
+void on_error(const char*, const char* pattern, va_list arguments) {
+  std::array<char, 200> text{};
+  std::vsnprintf(text.data(), text.size(), pattern, arguments);
+  last_error = text.data();
+}
+
+Tiff open(const std::filesystem::path& file) {
+  TIFFSetErrorHandler(on_error);
+  TIFFSetWarningHandler(nullptr);  // of every tag that it does not know
+  last_error.clear();
+#if TIFFLIB_VERSION >= 20221213
+  const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(), TIFFOpenOptionsFree);
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), static_cast<tmsize_t>(4 * most_block_bytes));
+  return Tiff(TIFFOpenExt(file.c_str(), "rm", options.get()));
+#else
+  return Tiff(TIFFOpen(file.c_str(), "rm"));  // m: the file is not mapped, so that it may shrink
+#endif
+}
+
+/// The values of a tag that the library has no description of; empty without it, or with other types.
+template <class T>
+std::vector<T> values_of(TIFF* tiff, std::uint32_t tag, TIFFDataType type) {
+  const TIFFField* field = TIFFFindField(tiff, tag, TIFF_ANY);
+  if (field == nullptr || TIFFFieldDataType(field) != type || !TIFFFieldPassCount(field)) return {};
+  std::uint32_t count = 0;
+  const T* values = nullptr;
+  if (TIFFFieldReadCount(field) == TIFF_VARIABLE2) {
+    if (TIFFGetField(tiff, tag, &count, &values) != 1) return {};
+  } else {
+    std::uint16_t few = 0;
+    if (TIFFGetField(tiff, tag, &few, &values) != 1) return {};
+    count = few;
+  }
+  return values == nullptr ? std::vector<T>() : std::vector<T>(values, values + std::min<std::uint32_t>(count, 65536));
+}
+
+/// Keys with a value of their own; others are names and numbers that do not matter here.
+struct Keys {
+  explicit Keys(std::vector<std::uint16_t> given) : words(std::move(given)) {}
+  std::optional<std::uint16_t> value_of(std::uint16_t key) const {
+    for (std::size_t at = 4; at + 4 <= words.size(); at += 4)
+      if (words[at] == key && words[at + 1] == 0) return words[at + 3];
+    return std::nullopt;
+  }
+  std::vector<std::uint16_t> words;
+};
+
+struct Picture {
+  std::uint32_t columns = 0, rows = 0;
+  std::uint16_t bits = 1, format = SAMPLEFORMAT_UINT, samples = 1;
+};
+
+/// Place of the middle of the first cell, and steps; y usually falls.
+struct Georeference {
+  double x = 0, y = 0, step_x = 0, step_y = 0;
+};
+
+/// 1 of metres and degrees.
+Result<double> length_unit(std::optional<std::uint16_t> key) {
+  switch (key.value_or(9001)) {
+    case 9001:
+    case 32767:  // the user's: said nowhere
+    case 0:
+      return 1;
+    case 9002:
+      return 0.3048;
+    case 9003:
+      return 1200.0 / 3937;
+    case 9036:
+      return 1000;
+    default:
+      return failure(ErrorKind::bad_data,
+                     "is in units of length of code " + std::to_string(*key) + "; bring it to metres: gdalwarp -t_srs");
+  }
+}
+
+class GeoTiffReader {
+ public:
+  GeoTiffReader(TIFF* tiff, const HeightOptions& options) : tiff_(tiff), options_(options) {}
+
+  Result<HeightGrid> read() {
+    if (auto r = read_description(); !r) return tl::make_unexpected(r.error());
+    const auto place = read_georeference();
+    if (!place) return tl::make_unexpected(place.error());
+    if (auto room = check_memory_for("its heights", memory_of_a_cell * picture_.columns * picture_.rows); !room)
+      return tl::make_unexpected(room.error());
+    raw_.z.assign(std::size_t{picture_.columns} * picture_.rows, 0);
+    const auto no_data = values_of<char>(tiff_, gdal_no_data, TIFF_ASCII);
+    std::string declared(no_data.begin(), std::find(no_data.begin(), no_data.end(), '\0'));
+    declared.erase(0, declared.find_first_not_of(' '));
+    declared.erase(declared.find_last_not_of(' ') + 1);
+    values_ = declared.empty() ? HeightValues(std::nullopt) : HeightValues(declared);
+    if (auto r = TIFFIsTiled(tiff_) ? read_tiles() : read_strips(); !r) return tl::make_unexpected(r.error());
+    const bool north_first = place->step_y < 0;
+    for (std::uint32_t i = 0; i < picture_.columns; ++i) raw_.x.push_back(place->x + i * place->step_x);
+    for (std::uint32_t j = 0; j < picture_.rows; ++j)
+      raw_.y.push_back(place->y + (north_first ? picture_.rows - 1 - j : j) * place->step_y);
+    if (north_first) {
+      const auto row_at = [&](std::size_t row) { return raw_.z.begin() + static_cast<std::ptrdiff_t>(row * picture_.columns); };
+      for (std::size_t row = 0; row < picture_.rows / 2; ++row)
+        std::swap_ranges(row_at(row), row_at(row + 1), row_at(picture_.rows - 1 - row));
+    }
+    raw_.fill_values = values_.fill_values();
+    return finish_heights(std::move(raw_), scaled());
+  }
+
+ private:
+  static tl::unexpected<Error> bad(const std::string& what) { return failure(ErrorKind::bad_data, what); }
+
+  HeightOptions scaled() const {
+    HeightOptions options = options_;
+    options.z_scale *= height_unit_m_;
+    return options;
+  }
+
+  Result<void> read_description() {
+    std::uint16_t compression = COMPRESSION_NONE, photometric = PHOTOMETRIC_MINISBLACK, planes = PLANARCONFIG_CONTIG;
+    TIFFGetField(tiff_, TIFFTAG_IMAGEWIDTH, &picture_.columns);
+    TIFFGetField(tiff_, TIFFTAG_IMAGELENGTH, &picture_.rows);
+    TIFFGetFieldDefaulted(tiff_, TIFFTAG_BITSPERSAMPLE, &picture_.bits);
+    TIFFGetFieldDefaulted(tiff_, TIFFTAG_SAMPLEFORMAT, &picture_.format);
+    TIFFGetFieldDefaulted(tiff_, TIFFTAG_SAMPLESPERPIXEL, &picture_.samples);
+    TIFFGetFieldDefaulted(tiff_, TIFFTAG_COMPRESSION, &compression);
+    TIFFGetFieldDefaulted(tiff_, TIFFTAG_PLANARCONFIG, &planes);
+    TIFFGetField(tiff_, TIFFTAG_PHOTOMETRIC, &photometric);
+    if (picture_.columns < 2 || picture_.rows < 2) return bad("smaller than 2 x 2 heights");
+    if (std::uint64_t{picture_.columns} * picture_.rows > max_mesh_triangles / 2)
+      return bad(
+          text::format("%u x %u heights, more than 10 million; cut a part out (gdal_translate -projwin), or make it coarser "
+                       "(-outsize)",
+                       picture_.columns, picture_.rows));
+    const bool whole = picture_.format == SAMPLEFORMAT_UINT || picture_.format == SAMPLEFORMAT_INT;
+    const bool known = whole ? picture_.bits == 8 || picture_.bits == 16 || picture_.bits == 32
+                             : picture_.format == SAMPLEFORMAT_IEEEFP && (picture_.bits == 32 || picture_.bits == 64);
+    const bool grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
+    if (!grey || !known || (picture_.samples != 1 && planes != PLANARCONFIG_SEPARATE))
+      return bad("not one band of heights but a picture; choose a band of numbers: gdal_translate -b 1 -ot Float32");
+    static const std::set<std::uint16_t> codecs{COMPRESSION_NONE,    COMPRESSION_LZW,      COMPRESSION_ADOBE_DEFLATE,
+                                                COMPRESSION_DEFLATE, COMPRESSION_PACKBITS, COMPRESSION_ZSTD};
+    if (!codecs.contains(compression) || !TIFFIsCODECConfigured(compression))
+      return bad("compressed in a way that is not read here (code " + std::to_string(compression) +
+                 "); write it otherwise: gdal_translate -co COMPRESS=DEFLATE");
+    const std::uint64_t block = TIFFIsTiled(tiff_) ? TIFFTileSize64(tiff_) : TIFFScanlineSize64(tiff_);
+    if (block == 0 || block > most_block_bytes || (!TIFFIsTiled(tiff_) && TIFFStripSize64(tiff_) > 4 * most_block_bytes))
+      return bad("its blocks have more than 64 MiB; write it in tiles: gdal_translate -co TILED=YES");
+    return {};
+  }
+
+  Result<Georeference> read_georeference() {
+    const Keys keys(values_of<std::uint16_t>(tiff_, key_directory, TIFF_SHORT));
+    const auto model = keys.value_of(model_type);
+    if (model == geographic) {
+      raw_.geographic = true;
+      if (const auto unit = keys.value_of(angular_units); unit.value_or(degree) != degree)
+        return bad("has angles that are not in degrees; bring it to them: gdalwarp -t_srs EPSG:4326");
+    } else if (model == projected) {
+      raw_.geographic = false;
+    }
+    const auto height_unit = length_unit(keys.value_of(vertical_units));
+    if (!height_unit) return tl::make_unexpected(height_unit.error());
+    height_unit_m_ = *height_unit;
+    const auto unit = length_unit(model == projected ? keys.value_of(linear_units) : std::nullopt);
+    if (!unit) return tl::make_unexpected(unit.error());
+
+    Georeference place;
+    const auto scale = values_of<double>(tiff_, pixel_scale, TIFF_DOUBLE),
+               tie = values_of<double>(tiff_, tie_points, TIFF_DOUBLE),
+               matrix = values_of<double>(tiff_, transformation, TIFF_DOUBLE);
+    if (scale.size() >= 2 && tie.size() >= 6) {
+      place = {tie[3] - tie[0] * scale[0], tie[4] + tie[1] * scale[1], scale[0], -scale[1]};
+    } else if (matrix.size() == 16) {
+      if (matrix[1] != 0 || matrix[4] != 0) return bad("is turned against its axes; straighten it: gdalwarp");
+      place = {matrix[3], matrix[7], matrix[0], matrix[5]};
+    } else {
+      return bad("has no coordinates (no GeoTIFF); give it some: gdal_translate -a_ullr WEST NORTH EAST SOUTH");
+    }
+    if (keys.value_of(raster_type) != pixel_is_point)  // the corner of the first cell, not its middle
+      place.x += 0.5 * place.step_x, place.y += 0.5 * place.step_y;
+    place = {*unit * place.x, *unit * place.y, *unit * place.step_x, *unit * place.step_y};
+    const double step = std::abs(place.step_y);
+    const bool sound = place.step_x > 1e-7 && place.step_x < 1e5 && step > 1e-7 && step < 1e5 && std::abs(place.x) <= 1e8 &&
+                       std::abs(place.y) <= 1e8;
+    if (!sound) return bad("has cells that are no lengths between 1e-7 and 1e5, or lies farther than 1e8 m away");
+    return place;
+  }
+
+  template <class T>
+  static double number_at(const std::byte* at) {
+    T value;
+    std::memcpy(&value, at, sizeof value);
+    return static_cast<double>(value);
+  }
+  double value_at(const std::byte* at) const {
+    const bool sign = picture_.format == SAMPLEFORMAT_INT;
+    if (picture_.format == SAMPLEFORMAT_IEEEFP) return picture_.bits == 64 ? number_at<double>(at) : number_at<float>(at);
+    if (picture_.bits == 8) return sign ? number_at<std::int8_t>(at) : number_at<std::uint8_t>(at);
+    if (picture_.bits == 16) return sign ? number_at<std::int16_t>(at) : number_at<std::uint16_t>(at);
+    return sign ? number_at<std::int32_t>(at) : number_at<std::uint32_t>(at);
+  }
+
+  /// `width` heights of one row, from a block's bytes, to column and row of the grid.
+  Result<void> take(std::span<const std::byte> bytes, std::uint32_t column, std::uint32_t row, std::uint32_t width) {
+    const std::size_t size = picture_.bits / 8u;
+    width = std::min(width, picture_.columns - column);
+    if (bytes.size() < size * width) return bad("has blocks that are shorter than its cells");
+    for (std::uint32_t i = 0; i < width; ++i) {
+      const double value = value_at(bytes.data() + size * i);
+      const auto height = values_.height_of(value);
+      if (!height) return bad(text::format("the height %g in row %u, column %u is beyond 1e7 m", value, row + 1, column + i + 1));
+      raw_.z[std::size_t{row} * picture_.columns + column + i] = *height;
+    }
+    return {};
+  }
+
+  tl::unexpected<Error> unreadable() const { return bad("cannot be read: " + (last_error.empty() ? "damaged" : last_error)); }
+
+  Result<void> read_strips() {
+    std::vector<std::byte> line(static_cast<std::size_t>(TIFFScanlineSize64(tiff_)));
+    for (std::uint32_t row = 0; row < picture_.rows; ++row) {
+      if (TIFFReadScanline(tiff_, line.data(), row, 0) != 1) return unreadable();
+      if (auto r = take(line, 0, row, picture_.columns); !r) return r;
+    }
+    return {};
+  }
+
+  Result<void> read_tiles() {
+    std::uint32_t width = 0, height = 0;
+    TIFFGetField(tiff_, TIFFTAG_TILEWIDTH, &width);
+    TIFFGetField(tiff_, TIFFTAG_TILELENGTH, &height);
+    const std::uint64_t row_bytes = TIFFTileRowSize64(tiff_);
+    std::vector<std::byte> tile(static_cast<std::size_t>(TIFFTileSize64(tiff_)));
+    if (width == 0 || height == 0 || row_bytes == 0 || row_bytes * height > tile.size()) return unreadable();
+    for (std::uint32_t row = 0; row < picture_.rows; row += std::min(height, picture_.rows - row))
+      for (std::uint32_t column = 0; column < picture_.columns; column += std::min(width, picture_.columns - column)) {
+        if (TIFFReadTile(tiff_, tile.data(), column, row, 0, 0) < 0) return unreadable();
+        for (std::uint32_t j = 0; j < std::min(height, picture_.rows - row); ++j) {
+          const auto bytes = std::span<const std::byte>(tile).subspan(static_cast<std::size_t>(j * row_bytes));
+          if (auto r = take(bytes, column, row + j, width); !r) return r;
+        }
+      }
+    return {};
+  }
+
+  TIFF* tiff_;
+  const HeightOptions& options_;
+  Picture picture_;
+  RawHeights raw_;
+  HeightValues values_{std::nullopt};
+  double height_unit_m_ = 1;
+};
+
+}  // namespace
+
+Result<HeightGrid> read_geo_tiff_heights(const std::filesystem::path& file, const HeightOptions& options) {
+  const auto bad = [&](const std::string& what) { return failure(ErrorKind::bad_data, file.string() + ": " + what); };
+  if (const auto regular = open_regular(file); !regular) return tl::make_unexpected(regular.error());
+  std::error_code error;
+  if (std::filesystem::file_size(file, error) > most_file_bytes || error)
+    return bad("larger than 2 GiB; cut a part out (gdal_translate)");
+  const Tiff tiff = open(file);
+  if (!tiff) return bad("no TIFF, or damaged: " + last_error);
+  auto grid = GeoTiffReader(tiff.get(), options).read();
+  if (!grid) return failure(grid.error().kind, file.string() + ": " + grid.error().text);
+  return grid;
+}
+
+}  // namespace sonar

@@ -1,0 +1,174 @@
+#include "core/scene/files/height_values.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/base/regular_file.hpp"
+#include "core/text/decimal.hpp"
+#include "core/text/format.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr double highest_m = 1e7, least_fill = 1e20;
+constexpr double farthest_deg = 5, nearest_pole_deg = 89;
+constexpr float none = std::numeric_limits<float>::quiet_NaN();
+/// Fill values of programs that write grids, besides those that no height can be.
+constexpr std::array<float, 8> usual_fills{-9999, -32768, -32767, 32767, -99999, 99999, -999999, 65535};
+
+/// One of the last digit that the text of a number has.
+double last_digit(std::string_view word, double value) {
+  int digits = 0;
+  for (const char c : word.substr(0, word.find_first_of("eE"))) digits += (c >= '0' && c <= '9') && (digits > 0 || c != '0');
+  return std::pow(10.0, std::floor(std::log10(std::abs(value))) - std::max(digits, 1) + 1);
+}
+
+struct Span {
+  float low = std::numeric_limits<float>::infinity(), high = -std::numeric_limits<float>::infinity();
+};
+
+/// Undeclared fill values lie far outside of all other heights; a height that happens to be one of them does not.
+void take_out_fills(RawHeights& raw, std::vector<std::string>& notes) {
+  const auto is_usual = [](float z) { return std::find(usual_fills.begin(), usual_fills.end(), z) != usual_fills.end(); };
+  Span rest;
+  for (const float z : raw.z)
+    if (!std::isnan(z) && !is_usual(z)) rest = {std::min(rest.low, z), std::max(rest.high, z)};
+  if (rest.low > rest.high) return;
+  std::array<std::size_t, usual_fills.size()> cells{};
+  constexpr float gap_m = 100;
+  for (float& z : raw.z) {
+    const auto fill = std::find(usual_fills.begin(), usual_fills.end(), z);
+    if (fill == usual_fills.end() || (z > rest.low - gap_m && z < rest.high + gap_m)) continue;
+    ++cells[static_cast<std::size_t>(fill - usual_fills.begin())];
+    z = none;
+  }
+  for (std::size_t k = 0; k < cells.size(); ++k)
+    if (cells[k] > 0)
+      notes.push_back(
+          text::format("%zu cells of %.0f, far from all heights, are taken as no data, although the file does not "
+                       "declare it",
+                       cells[k], static_cast<double>(usual_fills[k])));
+  if (raw.fill_values > 0)
+    notes.push_back(
+        text::format("%zu cells beyond 1e20 m are taken as no data, although the file does not declare it", raw.fill_values));
+}
+
+bool could_be_degrees(const RawHeights& raw) {
+  return raw.x.front() >= -180 && raw.x.back() <= 360 && raw.y.front() >= -90 && raw.y.back() <= 90;
+}
+
+/// Degrees read as metres make ground absurdly steep: 1 m up in 100 m becomes 1000 to 1.
+bool shows_degrees(const RawHeights& raw) {
+  const std::size_t columns = raw.x.size();
+  const double cell = (raw.x.back() - raw.x.front()) / static_cast<double>(columns - 1);
+  if (!could_be_degrees(raw) || cell >= 0.1) return false;
+  double rise = 0;
+  std::size_t steps = 0;
+  for (std::size_t k = 1; k < raw.z.size(); ++k)
+    if (k % columns != 0 && !std::isnan(raw.z[k]) && !std::isnan(raw.z[k - 1]))
+      rise += std::abs(static_cast<double>(raw.z[k]) - static_cast<double>(raw.z[k - 1])), ++steps;
+  const double slope = steps == 0 ? 0 : rise / static_cast<double>(steps) / cell;
+  return slope > 10 || (slope == 0 && cell < 0.005);
+}
+
+Result<void> set_origin(HeightGrid& grid, const HeightOptions& options, bool guessed) {
+  const double longitude = 0.5 * (grid.x.front() + grid.x.back()), latitude = 0.5 * (grid.y.front() + grid.y.back());
+  grid.origin = options.origin.value_or(Geodetic{rad_from_deg(latitude), rad_from_deg(longitude), 0});
+  const double from_longitude = deg_from_rad(grid.origin->longitude_rad), from_latitude = deg_from_rad(grid.origin->latitude_rad);
+  const double turns = std::round((from_longitude - longitude) / 360);  // 0 to 360 and -180 to 180 both name places
+  for (double& x : grid.x) x += 360 * turns;
+  const double far = std::max({std::abs(grid.x.front() - from_longitude), std::abs(grid.x.back() - from_longitude),
+                               std::abs(grid.y.front() - from_latitude), std::abs(grid.y.back() - from_latitude)});
+  if (far > farthest_deg)
+    return failure(ErrorKind::bad_data,
+                   text::format("the grid, in degrees, reaches %.3g degrees from the origin (latitude %.6f, longitude %.6f); "
+                                "at most 5: cut a part out, or set origin",
+                                far, from_latitude, from_longitude));
+  if (std::max(std::abs(grid.y.front()), std::abs(grid.y.back())) > nearest_pole_deg)
+    return failure(ErrorKind::bad_data, "the grid, in degrees, reaches within 1 degree of a pole; project it to metres");
+  if (guessed)
+    grid.notes.push_back(
+        text::format("its coordinates (%.6g, %.6g, cells of %.6g) are taken as degrees; write geographic: true, or "
+                     "false if they are metres",
+                     grid.x.front(), grid.y.front(), grid.x[1] - grid.x[0]));
+  if (!options.origin)
+    grid.notes.push_back(
+        text::format("x and y are about its middle, latitude %.6f, longitude %.6f; set origin: {lat, lon} to place "
+                     "it otherwise",
+                     from_latitude, from_longitude));
+  return {};
+}
+
+}  // namespace
+
+bool is_nan_word(std::string_view word) {
+  if (word.starts_with('-') || word.starts_with('+')) word.remove_prefix(1);
+  return word == "nan" || word == "NaN" || word == "NAN";
+}
+
+std::optional<double> height_number(std::string_view s) {
+  if (const auto v = text::parse_decimal(s)) return v;
+  if (is_nan_word(s)) return std::numeric_limits<double>::quiet_NaN();
+  std::size_t sign = s.starts_with('-') || s.starts_with('+') ? 1 : 0, zeros = sign;
+  while (zeros + 1 < s.size() && s[zeros] == '0' && s[zeros + 1] >= '0' && s[zeros + 1] <= '9') ++zeros;
+  if (zeros == sign) return std::nullopt;
+  return text::parse_decimal(std::string(s.substr(0, sign)) + std::string(s.substr(zeros)));
+}
+
+HeightValues::HeightValues(std::optional<std::string_view> declared) {
+  if (!declared) return;
+  declared_ = height_number(*declared);
+  if (!declared_ || std::isnan(*declared_)) {
+    declared_.reset();
+    return;
+  }
+  // The same value in single precision, and beyond every height also what it was before it was written with few digits.
+  tolerance_ = std::abs(*declared_) > highest_m ? last_digit(*declared, *declared_) : 1e-6 * std::abs(*declared_);
+}
+
+std::optional<float> HeightValues::height_of(double value) {
+  if (std::isnan(value) || (declared_ && std::abs(value - *declared_) <= tolerance_)) return none;
+  if (std::abs(value) <= highest_m) return static_cast<float>(value);
+  if (std::abs(value) < least_fill) return std::nullopt;
+  ++fill_values_;
+  return none;
+}
+
+Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) {
+  HeightGrid grid;
+  take_out_fills(raw, grid.notes);
+  const bool said = options.geographic.has_value() || raw.geographic.has_value();
+  const bool geographic = options.geographic.value_or(raw.geographic.value_or(!said && shows_degrees(raw)));
+  if (geographic && !could_be_degrees(raw))
+    return failure(ErrorKind::bad_data,
+                   "its coordinates are no longitudes and latitudes, in degrees; take geographic: true away");
+  if (options.origin && !geographic)
+    return failure(ErrorKind::bad_data,
+                   "origin is for a grid in degrees; write geographic: true if it is one, else take it away");
+  const auto holes = static_cast<std::size_t>(std::count_if(raw.z.begin(), raw.z.end(), [](float z) { return std::isnan(z); }));
+  if (holes > 0)
+    grid.notes.push_back(text::format("%zu of its %zu heights (%.2g %%) are no data: holes in the ground", holes, raw.z.size(),
+                                      100 * static_cast<double>(holes) / static_cast<double>(raw.z.size())));
+  grid.x = std::move(raw.x);
+  grid.y = std::move(raw.y);
+  grid.z_m = std::move(raw.z);
+  for (float& z : grid.z_m) z = static_cast<float>(static_cast<double>(z) * options.z_scale);
+  if (geographic)
+    if (auto set = set_origin(grid, options, !said); !set) return tl::make_unexpected(set.error());
+  return grid;
+}
+
+std::optional<bool> geographic_by_prj(const std::filesystem::path& heights) {
+  std::filesystem::path prj = heights;
+  const auto text = read_regular(prj.replace_extension(".prj"), 65536);
+  if (!text) return std::nullopt;
+  for (const char* word : {"GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS"})
+    if (text->starts_with(word)) return true;
+  for (const char* word : {"PROJCS", "PROJCRS", "LOCAL_CS"})
+    if (text->starts_with(word)) return false;
+  return std::nullopt;
+}
+
+}  // namespace sonar

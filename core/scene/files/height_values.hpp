@@ -1,0 +1,46 @@
+// What files of heights with coordinates of their own have in common: cells without data, and degrees. Internal to their readers.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/scene/shapes/terrain.hpp"
+
+namespace sonar {
+
+/// The number of a grid file, which may have zeros before it ("007"); nan is one too.
+std::optional<double> height_number(std::string_view word);
+bool is_nan_word(std::string_view word);
+
+/// Which values of a file stand for no data: nan, the declared one, and fill values beyond every height.
+class HeightValues {
+ public:
+  /// `declared` as the file writes it, which may have fewer digits than its values.
+  explicit HeightValues(std::optional<std::string_view> declared);
+  /// NaN for no data; nothing for a number that is neither a height nor a usual fill value.
+  std::optional<float> height_of(double value);
+  std::size_t fill_values() const { return fill_values_; }
+
+ private:
+  std::optional<double> declared_;
+  double tolerance_ = 0;
+  std::size_t fill_values_ = 0;
+};
+
+/// As a file has them.
+struct RawHeights {
+  std::vector<double> x = {}, y = {};   // rising
+  std::vector<float> z = {};            // [y][x], NaN: no data
+  std::optional<bool> geographic = {};  // coordinates in degrees, if the file says
+  std::size_t fill_values = 0;          // undeclared ones beyond every height, which are NaN already
+};
+
+/// Scale, holes, and the origin of degrees. Errors lack the file's name.
+Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
+
+/// What the text of a coordinate system in a file beside says: degrees, metres, or nothing.
+std::optional<bool> geographic_by_prj(const std::filesystem::path& heights);
+
+}  // namespace sonar

@@ -1,0 +1,132 @@
+// Text grids of one point a line, "x y z" (GDAL's XYZ): points of an even grid, in any order, of which some may be missing.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/base/regular_file.hpp"
+#include "core/scene/files/height_values.hpp"
+#include "core/text/format.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::size_t most_xyz_bytes = std::size_t{1} << 30;
+
+struct Point {
+  double x, y;
+  float z;
+};
+
+/// Up to three words between blanks, commas or semicolons; how many there are at least.
+std::size_t split(std::string_view line, std::array<std::string_view, 3>& words) {
+  constexpr std::string_view between = " \t,;\r";
+  std::size_t count = 0;
+  for (std::size_t at = line.find_first_not_of(between); at != std::string_view::npos && count < words.size();) {
+    const std::size_t end = std::min(line.find_first_of(between, at), line.size());
+    words[count++] = line.substr(at, end - at);
+    at = line.find_first_not_of(between, end);
+  }
+  return count;
+}
+
+/// Evenly spaced coordinates that hold all of the given ones, of which some may be missing; empty when they are not even.
+std::vector<double> even_axis(std::vector<double> given) {
+  std::sort(given.begin(), given.end());
+  given.erase(std::unique(given.begin(), given.end()), given.end());
+  if (given.size() < 2) return {};
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < given.size(); ++i) steps.push_back(given[i] - given[i - 1]);
+  std::vector<double> sorted = steps;
+  const std::size_t middle = (sorted.size() - 1) / 2;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(middle), sorted.end());
+  const double usual = sorted[middle];
+  double sum = 0, count = 0;  // the mean is better than one step, which is rounded
+  for (const double step : steps)
+    if (step < 1.5 * usual) sum += step, ++count;
+  const double cells = std::round((given.back() - given.front()) / (sum / count));
+  if (!(cells >= 1 && cells < static_cast<double>(max_mesh_triangles))) return {};
+  const double step = (given.back() - given.front()) / cells;
+  if (!(step > 1e-7 && step < 1e5)) return {};
+  std::vector<double> axis;
+  for (double i = 0; i <= cells; ++i) axis.push_back(given.front() + i * step);
+  const bool even = std::all_of(given.begin(), given.end(), [&](double v) {
+    const double at = (v - given.front()) / step;
+    return std::abs(at - std::round(at)) < 0.2;
+  });
+  return even ? axis : std::vector<double>();
+}
+
+/// By the whole length: one step alone is rounded where coordinates are large.
+std::size_t index_on(const std::vector<double>& axis, double v) {
+  const double last = static_cast<double>(axis.size() - 1);
+  return static_cast<std::size_t>(std::clamp(std::round((v - axis.front()) / (axis.back() - axis.front()) * last), 0.0, last));
+}
+
+Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values) {
+  std::vector<Point> points;
+  std::array<std::string_view, 3> words;
+  std::size_t line = 0;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::size_t count = split(text.substr(at, end - at), words);
+    at = end + 1, ++line;
+    if (count == 0 || words[0].front() == '#') continue;
+    const auto x = height_number(words[0]), y = count > 1 ? height_number(words[1]) : x,
+               z = count > 2 ? height_number(words[2]) : x;
+    if (points.empty() && !x && count == 3) continue;  // names of columns
+    const auto bad = [&](const std::string& what) {
+      return failure(ErrorKind::bad_data, "line " + std::to_string(line) + ": " + what);
+    };
+    if (count < 3 || !x || !y || !z) return bad("three numbers are needed, x y z");
+    if (!(std::abs(*x) <= 1e8 && std::abs(*y) <= 1e8)) return bad("the point is farther than 1e8 m away");
+    const auto height = values.height_of(*z);
+    if (!height) return bad("the height " + std::string(words[2].substr(0, 40)) + " is beyond 1e7 m");
+    if (points.size() >= max_mesh_triangles / 2) return bad("more than 10 million points; use a coarser grid");
+    points.push_back({*x, *y, *height});
+  }
+  return points;
+}
+
+}  // namespace
+
+Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const HeightOptions& options) {
+  const auto bad = [&](std::string what) { return failure(ErrorKind::bad_data, file.string() + ": " + std::move(what)); };
+  const auto text = read_regular(file, most_xyz_bytes);
+  if (!text) return tl::make_unexpected(text.error());
+  if (text->size() > most_xyz_bytes) return bad("larger than 1 GiB; cut it or use a coarser grid");
+  HeightValues values("-9999");
+  const auto points = points_of(*text, values);
+  if (!points) return bad(points.error().text);
+  RawHeights raw{.geographic = geographic_by_prj(file)};
+  const auto axis_of = [&](double Point::*coordinate) {
+    std::vector<double> all;
+    all.reserve(points->size());
+    for (const Point& p : *points) all.push_back(p.*coordinate);
+    return even_axis(std::move(all));
+  };
+  raw.x = axis_of(&Point::x), raw.y = axis_of(&Point::y);
+  const char* const way = "; make one of them: gdal_grid, or gmt surface, then gdal_translate -of AAIGrid";
+  if (raw.x.size() < 2 || raw.y.size() < 2)
+    return bad(std::string("its ") + std::to_string(points->size()) + " points are no even grid" + way);
+  if (raw.x.size() * raw.y.size() > max_mesh_triangles / 2)
+    return bad(text::format("its points span %zu x %zu cells, more than 10 million: no grid, or too fine a one", raw.x.size(),
+                            raw.y.size()) +
+               way);
+  raw.z.assign(raw.x.size() * raw.y.size(), std::numeric_limits<float>::quiet_NaN());
+  std::size_t again = 0;
+  std::vector<bool> taken(raw.z.size());
+  for (const Point& p : *points) {
+    const std::size_t at = index_on(raw.y, p.y) * raw.x.size() + index_on(raw.x, p.x);
+    again += taken[at];
+    taken[at] = true;
+    raw.z[at] = p.z;
+  }
+  raw.fill_values = values.fill_values();
+  auto grid = finish_heights(std::move(raw), options);
+  if (!grid) return bad(grid.error().text);
+  if (again > 0) grid->notes.push_back(text::format("%zu points lie where another one was before, and took its place", again));
+  return grid;
+}
+
+}  // namespace sonar

@@ -1,0 +1,26 @@
+// Which axes the poses of a file are in, seen from what a vehicle does: it stays more or less upright.
+#pragma once
+
+#include <vector>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar {
+
+inline constexpr double tilted = 0.5;  // further than 60 deg from upright
+
+/// How far up the body's z axis points, -1 to 1.
+inline double upright(Quatd q) { return 1 - 2 * (q.x * q.x + q.y * q.y); }
+
+/// Axes of a body, other than ours, that files of poses are often in.
+struct OtherAxes {
+  const char* text;  // "have the axes of a camera"
+  const char* cure;
+  Vec3d up;  // in them
+};
+/// Those in which a body that mostly lies on its side would stay upright, more or less; null: none of them.
+const OtherAxes* axes_of(const std::vector<Pose>& poses);
+/// The mounts turn the sonars upright in these axes.
+bool are_upright(const std::vector<Pose>& mounts, const OtherAxes& axes);
+
+}  // namespace sonar
