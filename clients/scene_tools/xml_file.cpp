@@ -84,7 +84,8 @@ Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const st
   if (text.find('\0') != std::string_view::npos) return bad(1, "is not a text file");
   auto document = std::make_shared<tinyxml2::XMLDocument>();
   const auto bad_nesting = [&](int line) { return bad(line, "elements nest more than " + std::to_string(deepest) + " deep"); };
-  if (document->Parse(text.data(), text.size()) == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) return bad_nesting(document->ErrorLineNum());
+  if (document->Parse(text.data(), text.size()) == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED)
+    return bad_nesting(document->ErrorLineNum());
   if (document->ErrorID() == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) return bad(1, "is empty");
   if (document->Error())
     return bad(document->ErrorLineNum(), std::string("not well-formed XML here (") + document->ErrorName() + ")");
@@ -92,7 +93,8 @@ Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const st
   auto file = std::make_shared<XmlFile>();
   file->path = path;
   file->short_name = std::move(short_name);
-  if (const auto* too_deep = count_elements(document->RootElement(), 1, file->elements)) return bad_nesting(too_deep->GetLineNum());
+  if (const auto* too_deep = count_elements(document->RootElement(), 1, file->elements))
+    return bad_nesting(too_deep->GetLineNum());
   file->document = std::move(document);
   return file;
 }
