@@ -270,6 +270,10 @@ class GeoTiffReader {
     const std::uint64_t row_bytes = TIFFTileRowSize64(tiff_);
     std::vector<std::byte> tile(static_cast<std::size_t>(TIFFTileSize64(tiff_)));
     if (width == 0 || height == 0 || row_bytes == 0 || row_bytes * height > tile.size()) return unreadable();
+    // Every tile is unpacked whole, however few of its cells lie in the picture.
+    if (TIFFNumberOfTiles(tiff_) * std::uint64_t{tile.size()} >
+        most_block_bytes + 4 * std::uint64_t{raw_.z.size()} * (picture_.bits / 8u))
+      return bad("its tiles are much larger than the picture; write it without: gdal_translate -co TILED=NO");
     for (std::uint32_t row = 0; row < picture_.rows; row += std::min(height, picture_.rows - row))
       for (std::uint32_t column = 0; column < picture_.columns; column += std::min(width, picture_.columns - column)) {
         if (TIFFReadTile(tiff_, tile.data(), column, row, 0, 0) < 0) return unreadable();

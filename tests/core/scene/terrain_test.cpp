@@ -579,6 +579,10 @@ TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
   EXPECT_THAT(refusal(TiffFile::of(3, 2, six).at(0, 0, 0, 10)), HasSubstr("cells that are no lengths"));
   EXPECT_THAT(refusal(TiffFile::of(2, 2, std::vector<float>{1e9f, 1, 2, 3}).at(0, 0, 1, 1)),
               HasSubstr("row 1, column 1 is beyond 1e7 m"));
+  // Four tiles of 64 MiB for 256 KiB of heights: small when packed, minutes to unpack if there were thousands.
+  TiffFile tiles = TiffFile::of(2, 16384, std::vector<float>(2)).at(0, 100, 10, 10).without(273).without(278).without(279);
+  tiles.shorts(322, {4096}), tiles.shorts(323, {4096}), tiles.longs(324, {8, 8, 8, 8}), tiles.longs(325, {8, 8, 8, 8});
+  EXPECT_THAT(refusal(tiles), HasSubstr("tiles are much larger than the picture"));
   EXPECT_EQ(read_geo_tiff_heights("no/such.tif", {}).error().kind, ErrorKind::missing_file);
   const std::string whole = good().bytes();
   for (std::size_t n = 0; n < whole.size(); ++n) {
