@@ -26,6 +26,7 @@ enum : std::uint32_t {
   tie_points = 33922,
   transformation = 34264,
   key_directory = 34735,
+  gdal_metadata = 42112,
   gdal_no_data = 42113,
 };
 enum : std::uint16_t { model_type = 1024, raster_type = 1025, angular_units = 2054, linear_units = 3076, vertical_units = 4099 };
@@ -99,7 +100,6 @@ struct Georeference {
 Result<double> length_unit(std::optional<std::uint16_t> key) {
   switch (key.value_or(9001)) {
     case 9001:
-    case 32767:  // the user's: said nowhere
     case 0:
       return 1;
     case 9002:
@@ -186,7 +186,16 @@ class GeoTiffReader {
     return {};
   }
 
+  /// Heights that are not what the cells hold would be wrong by a factor without a word.
+  bool is_scaled() const {
+    const auto more = values_of<char>(tiff_, gdal_metadata, TIFF_ASCII);
+    const std::string_view text(more.data(), more.size());
+    return text.find("role=\"scale\"") != text.npos || text.find("role=\"offset\"") != text.npos;
+  }
+
   Result<Georeference> read_georeference() {
+    if (is_scaled())
+      return bad("stores heights with a scale or an offset; write the heights themselves: gdal_translate -unscale -ot Float32");
     const Keys keys(values_of<std::uint16_t>(tiff_, key_directory, TIFF_SHORT));
     const auto model = keys.value_of(model_type);
     if (model == geographic) {

@@ -125,7 +125,9 @@ HeightValues::HeightValues(std::optional<std::string_view> declared) {
     return;
   }
   // The same value in single precision, and beyond every height also what it was before it was written with few digits.
-  tolerance_ = std::abs(*declared_) > highest_m ? last_digit(*declared, *declared_) : 1e-6 * std::abs(*declared_);
+  // Never so far that a height is it, as 0 would be with the one digit of 1e20.
+  const double size = std::abs(*declared_);
+  tolerance_ = size > highest_m ? std::min(last_digit(*declared, *declared_), 0.5 * (size - highest_m)) : 1e-6 * size;
 }
 
 std::optional<float> HeightValues::height_of(double value) {

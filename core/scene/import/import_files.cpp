@@ -98,14 +98,16 @@ class ObjStream final : public Assimp::IOStream {
     }
     return size == 0 ? 0 : n / size;
   }
-  /// From there on, after following the text to there: the importer goes back to the beginning only.
+  /// From there on, after following the text to there. The importer also seeks the place where it is, before each block.
   aiReturn Seek(std::size_t offset, aiOrigin origin) override {
     if (origin == aiOrigin_CUR) offset += Tell();
     if (origin == aiOrigin_END) offset = size_ - std::min(offset, size_);
-    if (std::fseek(file_.get(), 0, SEEK_SET) != 0) return aiReturn_FAILURE;
-    text_ = {};
+    if (offset < Tell()) {
+      if (std::fseek(file_.get(), 0, SEEK_SET) != 0) return aiReturn_FAILURE;
+      text_ = {};
+    }
     std::array<char, 4096> part;
-    for (std::size_t left = offset; left > 0;) {
+    for (std::size_t left = offset - Tell(); left > 0;) {
       const std::size_t n = std::fread(part.data(), 1, std::min(left, part.size()), file_.get());
       if (n == 0) return aiReturn_FAILURE;
       for (std::size_t i = 0; i < n; ++i) text_.next(part[i]);

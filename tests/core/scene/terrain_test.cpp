@@ -173,6 +173,8 @@ TEST(EsriGrid, KnowsNoDataInEveryForm) {
   EXPECT_EQ(holes_in(grid_of(at + "dx 1\ndy 2", "-9999"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.40282e+38", "-3.4028234663852886e+38"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.4E+38", "-3.4028234663852886e+38"), false), "1");
+  for (const char* few_digits : {"1e20", "-1e38", "2e7"})  // one digit would make every height one of them
+    EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value " + few_digits, few_digits), false), "1") << few_digits;
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -99999.99", "-99999.9921875"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value 0", "0"), false), "1");
   for (const char* fill : {"-32768", "-99999", "-3.4028234663852886e+38", "9.96921e+36"})
@@ -573,6 +575,10 @@ TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
   TiffFile jpeg = good().without(259);
   jpeg.shorts(259, {7});
   EXPECT_THAT(refusal(jpeg), HasSubstr("COMPRESS=DEFLATE"));
+  TiffFile scaled = good();
+  scaled.text(42112, R"(<GDALMetadata><Item name="SCALE" sample="0" role="scale">0.1</Item></GDALMetadata>)");
+  EXPECT_THAT(refusal(scaled), HasSubstr("gdal_translate -unscale"));
+  EXPECT_THAT(refusal(good().keys({{{1024, 1}, {3076, 32767}}})), HasSubstr("units of length of code 32767"));
   TiffFile turned = TiffFile::of(3, 2, six);
   turned.doubles(34264, {10, 1, 0, 0, 1, -10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1});
   EXPECT_THAT(refusal(turned), HasSubstr("gdalwarp"));
