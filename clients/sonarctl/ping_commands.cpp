@@ -1,5 +1,6 @@
 // Command lines of listen, view and stats, which examine pings.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 
 #include "clients/sonarctl/argument_checks.hpp"
@@ -65,6 +66,7 @@ struct SourceArguments {
     source.discover = device.discover;
     source.recording = recording;
     source.connect_patience_s = device.patience_s;
+    source.silence_limit_s = std::max(source.silence_limit_s, device.patience_s);
     source.observe = observe;
     source.control = control;
     source.token_file = token_file;
