@@ -5,12 +5,18 @@
 
 #include "core/text/nearest.hpp"
 #include "protocol/aris/aris.hpp"
+#include "protocol/aris/host.hpp"
 #include "protocol/blueview/blueview.hpp"
+#include "protocol/blueview/host.hpp"
+#include "protocol/host.hpp"
+#include "protocol/oculus/host.hpp"
 #include "protocol/oculus/oculus.hpp"
+#include "protocol/ping/host.hpp"
 #include "protocol/ping/omniscan.hpp"
 #include "protocol/ping/ping360.hpp"
 #include "protocol/ping/surveyor.hpp"
 #include "protocol/vendor.hpp"
+#include "protocol/waterlinked/host.hpp"
 #include "protocol/waterlinked/waterlinked.hpp"
 
 namespace sonar::protocol {
@@ -58,10 +64,45 @@ Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& giv
   return complete;
 }
 
+std::span<const Make> makes() {
+  static const std::array<Make, 7> all{{
+      {.device = &oculus::vendor(), .title = "an Oculus", .ports = oculus::host_ports, .host = oculus::make_host},
+      {.device = &blueview::vendor(),
+       .title = "a BlueView sonar",
+       .ports = blueview::host_ports,
+       .host = blueview::make_host,
+       .each_ping_requested = true},
+      {.device = &aris::vendor(), .title = "an ARIS", .ports = aris::host_ports, .host = aris::make_host, .own_numbers = true},
+      {.device = &waterlinked::vendor(),
+       .title = "a Sonar 3D-15",
+       .ports = waterlinked::host_ports,
+       .host = waterlinked::make_host},
+      {.device = &ping::ping360::vendor(),
+       .title = "a Ping360",
+       .ports = ping::ping360::host_ports,
+       .host = ping::ping360::make_host,
+       .own_numbers = true,
+       .scans = true},
+      {.device = &ping::surveyor::vendor(),
+       .title = "a Surveyor",
+       .ports = ping::surveyor::host_ports,
+       .host = ping::surveyor::make_host,
+       .own_numbers = true},
+      {.device = &ping::omniscan::vendor(),
+       .title = "an Omniscan",
+       .ports = ping::omniscan::host_ports,
+       .host = ping::omniscan::make_host,
+       .own_numbers = true},
+  }};
+  return all;
+}
+
 std::span<const Vendor* const> vendors() {
-  static const std::array<const Vendor*, 7> all{&oculus::vendor(),        &blueview::vendor(),      &aris::vendor(),
-                                                &waterlinked::vendor(),   &ping::ping360::vendor(), &ping::surveyor::vendor(),
-                                                &ping::omniscan::vendor()};
+  static const std::vector<const Vendor*> all = [] {
+    std::vector<const Vendor*> devices;
+    for (const Make& make : makes()) devices.push_back(make.device);
+    return devices;
+  }();
   return all;
 }
 
