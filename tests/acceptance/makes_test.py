@@ -84,7 +84,7 @@ class Observed:
 
     def view(self, daemon, device, _):
         png = pathlib.Path(daemon.folder.name) / "view.png"
-        result = self.ctl("view", device, "--range", 3, "--png", png, *PATIENCE, fails=True)
+        result = self.ctl("view", device, "--range", 8, "--png", png, *PATIENCE, fails=True)
         self.seen["view"] = pixels_of(png) if png.exists() else result.stderr
 
     def examine(self, daemon, device, control):
