@@ -108,7 +108,9 @@ class Host {
 /// A make of sonar, both ends. Adding one = one folder + one line in makes.cpp.
 struct Make {
   const Vendor* device = nullptr;
-  std::string_view title;  // "an ARIS"
+  std::string_view title;    // "an ARIS"
+  std::string_view request;  // what a driver must send to get pings, for "no valid ... among them"
+  std::string_view remedy;   // "send a fire message (type 0x15)"
   std::span<const HostPort> ports;
   /// usage: a setting that such a sonar does not have.
   Result<std::unique_ptr<Host>> (*host)(const Wanted& wanted) = nullptr;
@@ -120,6 +122,8 @@ struct Make {
   std::string_view name() const { return device->name(); }
 };
 std::span<const Make> makes();
+/// The make of a product; of an unknown one the first.
+const Make& make_of_profile(std::string_view profile);
 
 /// usage: a wanted setting that is not among `known`: "range", "rate", "gain", "mode", ... as sonarctl's options.
 Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::initializer_list<std::string_view> known);

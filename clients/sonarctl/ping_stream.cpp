@@ -161,7 +161,8 @@ Result<void> PingStream::start(std::optional<Socket> connected, milliseconds pat
     return failure(ErrorKind::unavailable,
                    place() + " does not answer as " + std::string(make_->title) + " does" + is_sonard_there);
   if (why->kind != ErrorKind::io) return tl::unexpected(*why);
-  return failure(ErrorKind::io, place() + " closed the connection before it answered: all its client slots are taken (clients.max)");
+  return failure(ErrorKind::io,
+                 place() + " closed the connection before it answered: all its client slots are taken (clients.max)");
 }
 
 void PingStream::carry_out(protocol::HostActions actions) {

@@ -23,7 +23,7 @@ FLOORS = {
     "protocol": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/"],
     "protocol/wire": ["core/base/", "protocol/wire/"],
     "protocol/control": ["core/base/", "protocol/control/"],
-    "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/"],
+    "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/", "protocol/host.hpp"],
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
     "protocol/oculus": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
     "protocol/aris": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/aris/"],

@@ -194,7 +194,8 @@ TEST(Doctor, NamesWhoElseHasThePort) {
   expect(line(facts, "ping"), Level::fail, "no ping came within 4.0 s: nginx (pid 99) has the port, not sonard", "stop it");
   sonar.stream.junk_bytes = 300;
   expect(line(facts, "ping"), Level::fail,
-         "sends 300 bytes that are no messages of an Oculus: nginx (pid 99) listens on 0.0.0.0:52100", "another program has the port");
+         "sends 300 bytes that are no messages of an Oculus: nginx (pid 99) listens on 0.0.0.0:52100",
+         "another program has the port");
 }
 
 TEST(Doctor, KnowsWhyNoPingComes) {
@@ -405,6 +406,33 @@ TEST(Doctor, ChecksThePortsOfTheSonarsThatAreThere) {
   facts.sonars[0].at.port = 62312, facts.sonars[0].make = make_at(62312);
   facts.kernel_ports = {true, 32768, 65000, ""};
   expect(line(facts, "ports"), Level::warn, "ports 62312 lie", "ip_local_reserved_ports=62312");
+}
+
+TEST(Doctor, FailsWhileADriverGetsNoPing) {
+  Facts facts = healthy();
+  SonarFacts& sonar = facts.sonars[0];
+  sonar.stream = {};
+  sonar.clients = {"127.0.0.1:40122"};
+  v1::DaemonStatus& status = daemon_in(facts);
+  status.mutable_sonars(0)->MergeFrom(control::message_from<v1::SonarStatus>(
+      R"(profile: "surveyor-240" transmits: true
+         clients { address: "127.0.0.1:40122" connected_s: 5 bytes_read: 17 })"));
+  report(facts);
+  expect(line(facts, "driver"), Level::fail,
+         "127.0.0.1:40122 is connected to front and has not asked for pings: it has sent 17 bytes, no valid request among them",
+         "send set_ping_parameters (3023)");
+  v1::ClientStatus& client = *status.mutable_sonars(0)->mutable_clients(0);
+  client.set_requests(1);  // of standby
+  status.mutable_sonars(0)->set_rate_hz(0);
+  status.mutable_sonars(0)->set_asked_by("127.0.0.1:40122");
+  report(facts);
+  EXPECT_THAT(text_from(run_checks(facts)),
+              AllOf(HasSubstr("warn  front is in standby"),
+                    HasSubstr("fail  127.0.0.1:40122 is connected and gets no ping; ask for a rate above 0")));
+  client.set_pings_written(3);
+  status.mutable_sonars(0)->set_rate_hz(10);
+  report(facts);
+  EXPECT_FALSE(any_failed(run_checks(facts)));
 }
 
 TEST(Doctor, SpeaksJson) {

@@ -3,7 +3,7 @@
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/doctor/check_status.hpp"
+#include "protocol/doctor/judge.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -56,7 +56,7 @@ class SonarChecks {
     if (sends_status(sonar_, facts_.status)) check_status();
     check_connection();
     if (sonar_.stream.outcome == Outcome::pings) check_rate();
-    if (sonar_.stream.outcome == Outcome::not_tried) check_rate_of_others();
+    if (sonar_.stream.outcome == Outcome::not_tried) check_rate_of_others(), check_drivers();
   }
 
  private:
@@ -244,6 +244,27 @@ class SonarChecks {
         "rate " + format("%g", sonar_.reported->rate_hz()) + " Hz requested by " + joined(sonar_.clients) + ", " +
             computing_text(computing_ms()) + ", " + std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",
         less_to_compute);
+  }
+
+  /// What keeps pings from the drivers that are connected, as the daemon sees it. One without a ping is a failure.
+  void check_drivers() {
+    if (!sonar_.reported) return;
+    constexpr double soon_s = 1;  // a driver that does right has a ping within
+    const v1::DaemonStatus& now = facts_.control.latest ? *facts_.control.latest : *facts_.control.status;
+    const v1::DaemonStatus* const before =
+        now.uptime_s() - facts_.control.status->uptime_s() >= soon_s ? facts_.control.status.get() : nullptr;
+    std::vector<Finding> found;
+    for (const Finding& finding : sonar::doctor::judge(now, before))
+      if (finding.sonar == sonar_.reported->name() && finding.level != Level::ok && finding.check != "rate")
+        found.push_back(finding);
+    const bool any_fails = std::any_of(found.begin(), found.end(), [](const Finding& f) { return f.level == Level::fail; });
+    for (const Finding& f : found) add(f.level, f.check, f.text, f.cure);
+    for (const v1::ClientStatus& client : sonar_.reported->clients())
+      if (!any_fails && client.pings_written() == 0 && client.connected_s() >= soon_s)
+        add(Level::fail, "driver",
+            client.address() + " is connected and gets no ping" +
+                (clock().empty() || clock() == "realtime" ? "" : "; clock: " + clock()),
+            found.empty() ? "sonarctl status shows its settings and the clock" : found.front().cure);
   }
 
   void check_rate() {

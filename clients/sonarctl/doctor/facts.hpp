@@ -75,6 +75,7 @@ struct ControlFacts {
   std::string error;                               // why there is no status
   bool token_required = false;                     // the reason, and none was given
   std::shared_ptr<const v1::DaemonStatus> status;  // null = there is none
+  std::shared_ptr<const v1::DaemonStatus> latest;  // after the pings; null = it was not asked again
   std::optional<double> clock_ahead_s;             // the daemon's clock against ours, other computers only
 };
 struct HttpFacts {

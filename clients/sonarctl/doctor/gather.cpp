@@ -123,13 +123,7 @@ class Gathering {
     const std::uint16_t usual = make_of(s).ports.front().number;
     return parse_endpoint(s.listens(), {"", usual}).value_or(Endpoint{"", usual}).port;
   }
-  /// The first of all for a profile that this program does not know.
-  static const Make& make_of(const v1::SonarStatus& s) {
-    const auto profile = protocol::find_profile(s.profile());
-    for (const Make& make : protocol::makes())
-      if (profile && make.device == profile->vendor) return make;
-    return protocol::makes().front();
-  }
+  static const Make& make_of(const v1::SonarStatus& s) { return protocol::make_of_profile(s.profile()); }
   static bool is_at(const v1::SonarStatus& s, const std::string& host) {
     return s.advertised() == host || s.listens().starts_with(host + ":");
   }
@@ -217,6 +211,7 @@ class Gathering {
     const auto status = control_->status(until(short_patience));
     if (!status) return;
     if (auto reported = reported_by(sonar, *status)) sonar.reported = std::move(reported);
+    facts_.control.latest = *status;
   }
 
   void listen_to_all() {
