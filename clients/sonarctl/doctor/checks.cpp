@@ -79,9 +79,10 @@ void check_ports(const Facts& facts, std::vector<Finding>& findings) {
   }
   if (used.empty()) return;
   if (exposed.empty())
-    return findings.push_back(
-        {Level::ok, "ports",
-         "ports " + all + " are " + (inside ? std::string("reserved") : "outside the ephemeral range " + range), ""});
+    return findings.push_back({Level::ok, "ports",
+                               (used.size() == 1 ? "port " + all + " is " : "ports " + all + " are ") +
+                                   (inside ? std::string("reserved") : "outside the ephemeral range " + range),
+                               ""});
   const std::string reserved = ports.reserved.empty() ? exposed : ports.reserved + "," + exposed;
   findings.push_back({Level::warn, "ports",
                       "ports " + exposed + " lie in the ephemeral range " + range + ": an outgoing connection may take one first",
