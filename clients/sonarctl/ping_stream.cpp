@@ -49,6 +49,12 @@ sockaddr_in peer_address(const Socket& socket) {
   return at;
 }
 
+Wanted nothing_wanted() {
+  Wanted nothing;
+  nothing.as_it_is = true;
+  return nothing;
+}
+
 bool is_over(const Result<PingStream>& stream) { return stream || stream.error().kind == ErrorKind::usage; }
 
 }  // namespace
@@ -67,51 +73,62 @@ const Make* make_at(std::uint16_t port) {
 
 Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, const Wanted& wanted, milliseconds patience) {
   const auto deadline = Clock::now() + patience;
-  std::vector<std::pair<const Make*, Endpoint>> streams, others;
+  using Candidate = std::pair<const Make*, Endpoint>;
+  std::vector<Candidate> streams, others;
   for (const Make& one : protocol::makes()) {
     if (make != nullptr && make != &one) continue;
     const Endpoint at{device.host, make != nullptr && device.port != 0 ? device.port : one.ports.front().number};
     (one.ports.front().kind == Kind::tcp ? streams : others).emplace_back(&one, at);
   }
-  const auto started = [&wanted](const auto& candidate, std::optional<Socket> connected,
-                                 milliseconds within) -> Result<PingStream> {
-    auto host = candidate.first->host(wanted);
+  const auto started = [](const Candidate& at, Result<std::unique_ptr<protocol::Host>> host, std::optional<Socket> connected,
+                          milliseconds within) -> Result<PingStream> {
     if (!host) return tl::unexpected(host.error());
-    PingStream stream(*candidate.first, candidate.second, *std::move(host));
+    PingStream stream(*at.first, at.second, *std::move(host));
     if (Result<void> opened = stream.start(std::move(connected), within); !opened) return tl::unexpected(opened.error());
     return stream;
+  };
+  // A sonar that does not have the settings is asked without them: its refusal counts only where such a sonar is.
+  const auto searched = [&](const Candidate& at, milliseconds within) -> Result<PingStream> {
+    auto host = at.first->host(wanted);
+    if (host) return started(at, std::move(host), std::nullopt, within);
+    const auto stream = started(at, at.first->host(nothing_wanted()), std::nullopt, within);
+    return tl::unexpected(is_over(stream) ? host.error() : stream.error());
   };
   if (make != nullptr)
     if (auto host = make->host(wanted); !host) return tl::unexpected(host.error());  // before the sonar is disturbed
   Error failed;
-  for (;;) {
+  for (bool is_last = false;;
+       is_last = Clock::now() >= deadline) {  // the streams once more after the others, which may take long
     if (!streams.empty()) {
       std::vector<Endpoint> places;
       for (const auto& [one, at] : streams) places.push_back(at);
       auto connected =
           connect_first(places, others.empty() ? left_until(deadline) : std::min(left_until(deadline), connect_patience));
-      if (connected) return started(streams[connected->which], std::move(connected->socket), std::max(patience, answer_patience));
+      if (connected) {
+        const Candidate& at = streams[connected->which];
+        return started(at, at.first->host(wanted), std::move(connected->socket), std::max(patience, answer_patience));
+      }
       failed = connected.error();
       if (failed.kind == ErrorKind::usage) return tl::unexpected(failed);
     }
-    for (const auto& candidate : others) {
+    if (is_last) return tl::unexpected(failed);
+    for (const Candidate& candidate : others) {
       const bool by_http = candidate.first->ports.front().kind == Kind::http;
       auto within = make != nullptr ? std::max(left_until(deadline), 1ms) : probe_patience;
       if (by_http) {
         if (make == nullptr && !connect_first({candidate.second}, probe_patience)) continue;
         within = std::max(patience, answer_patience);
       }
-      auto stream = started(candidate, std::nullopt, within);
-      if (is_over(stream) || by_http) return stream;
+      auto stream = searched(candidate, within);
+      if (is_over(stream) || (by_http && make != nullptr)) return stream;  // in a search another web server may be there
       if (streams.empty()) failed = stream.error();
     }
-    if (Clock::now() >= deadline) return tl::unexpected(failed);
     ::poll(nullptr, 0, 20);  // a port that refuses does so at once
   }
 }
 
 PingStream::~PingStream() {
-  if (host_ != nullptr && !ended_) carry_out(host_->on_leave());
+  if (host_ != nullptr && is_started_ && !ended_) carry_out(host_->on_leave());
 }
 
 std::string PingStream::place() const { return (make_->ports.front().kind == Kind::udp ? "udp " : "tcp ") + text_from(device_); }
@@ -155,14 +172,18 @@ Result<void> PingStream::start(std::optional<Socket> connected, milliseconds pat
   carry_out(host_->on_open(own, now()));
   while (!host_->is_open() && !ended_ && !interrupted_ && Clock::now() < deadline) receive(left_until(deadline));
   const std::optional<Error> why = std::exchange(ended_, std::nullopt);
-  if (host_->is_open() && !why) return {};
+  is_started_ = host_->is_open() && !why;
+  if (is_started_) return {};
   if (interrupted_) return failure(ErrorKind::io, "interrupted");
   if (!why || why->kind == ErrorKind::unavailable)
     return failure(ErrorKind::unavailable,
                    place() + " does not answer as " + std::string(make_->title) + " does" + is_sonard_there);
   if (why->kind != ErrorKind::io) return tl::unexpected(*why);
   return failure(ErrorKind::io,
-                 place() + " closed the connection before it answered: all its client slots are taken (clients.max)");
+                 place() + (has_answered_ ? " closed the connection before it took the settings: the daemon stopped, "
+                                            "or closed it; see its log"
+                                          : " closed the connection before it answered: all its client slots are "
+                                            "taken (clients.max)"));
 }
 
 void PingStream::carry_out(protocol::HostActions actions) {
@@ -170,7 +191,10 @@ void PingStream::carry_out(protocol::HostActions actions) {
   for (protocol::HostAction& action : actions) {
     if (ended_) return;
     if (const auto* send = std::get_if<protocol::HostSend>(&action)) {
-      if (const auto sent = write_all(*sockets_[send->port], send->bytes); !sent) ended_ = sent.error();
+      if (send->port >= sockets_.size() || !sockets_[send->port])
+        ended_ = Error{ErrorKind::io, "is sent bytes at a port that is not open"};
+      else if (const auto sent = write_all(*sockets_[send->port], send->bytes); !sent)
+        ended_ = sent.error();
     } else if (const auto* ask = std::get_if<protocol::ResourceRequest>(&action)) {
       const auto reply = http_ask(device_, ask->method, ask->path, ask->body, answer_patience_);
       if (!reply) {
@@ -274,11 +298,9 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
 Result<std::vector<HostPing>> read_recording(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": no such file, or no permission");
-  Wanted nothing;
-  nothing.as_it_is = true;
   for (const Make& make : protocol::makes()) {
     if (make.ports.front().kind != Kind::tcp) continue;
-    const auto host = make.host(nothing);
+    const auto host = make.host(nothing_wanted());
     std::vector<HostPing> pings;
     std::vector<char> chunk(1 << 16);
     in.clear();

@@ -77,6 +77,7 @@ class PingStream {
   std::deque<Item> items_;                           // to be handed out
   std::optional<Error> ended_;                       // the conversation is over; empty text: the sonar closed it
   bool interrupted_ = false, has_answered_ = false;  // has_answered_: at the first port
+  bool is_started_ = false;                          // the sonar is to hear that we leave
   std::ofstream record_;
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };

@@ -164,6 +164,7 @@ class PingHost : public protocol::Host {
   std::string about() const override { return std::string(title_); }
 
  protected:
+  bool asks() const { return request_.has_value(); }
   void ask(HostActions& actions) const {
     if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
   }
@@ -208,8 +209,11 @@ class Ping360Host final : public PingHost {
     constexpr std::array<std::byte, 2> wanted{std::byte{static_cast<std::uint8_t>(Id::protocol_version)}};
     return {protocol::HostSend{0, framed(Id::general_request, 0, wanted)}};
   }
-  /// It does not scan on.
-  HostActions on_leave() override { return {protocol::HostSend{0, framed(Id::motor_off, 0, {})}}; }
+  /// It does not scan on, unless another driver requested the scan.
+  HostActions on_leave() override {
+    if (!is_open_ || !asks()) return {};
+    return {protocol::HostSend{0, framed(Id::motor_off, 0, {})}};
+  }
   bool is_open() const override { return is_open_; }
 
  private:

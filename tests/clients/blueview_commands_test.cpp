@@ -84,6 +84,7 @@ class FakeHead {
   }
   std::atomic<int> pings{0}, settings{0};
   std::atomic<float> stop_m{0}, gain_db{0};
+  std::atomic<bool> closes_at_settings{false};
 
  private:
   void serve() {
@@ -100,7 +101,10 @@ class FakeHead {
       const Read read = read_some(host, received, std::chrono::seconds(10));
       if (read.what != Wait::data) return;
       framer.append(std::span<const std::byte>(received).first(read.size));
-      while (const auto frame = framer.next()) answer(host, *frame);
+      while (const auto frame = framer.next()) {
+        if (closes_at_settings && frame->header.type == FrameType::set) return;
+        answer(host, *frame);
+      }
     }
   }
   void answer(const Socket& host, const blueview::Frame& frame) {
@@ -232,6 +236,15 @@ TEST(BlueViewCommands, WhatIsNoHeadIsSaidToBeNone) {
     const Error closed = fetch_ping(source, 0).error();
     EXPECT_EQ(closed.kind, ErrorKind::io);
     EXPECT_THAT(closed.text, HasSubstr("all its client slots are taken (clients.max)"));
+  }
+  {
+    FakeHead stops;
+    stops.closes_at_settings = true;
+    SourceOptions with_range = source;
+    with_range.wanted.settings.range_m = 20;
+    const Error closed = fetch_ping(with_range, 0).error();
+    EXPECT_EQ(closed.kind, ErrorKind::io);
+    EXPECT_THAT(closed.text, HasSubstr("closed the connection before it took the settings: the daemon stopped, or closed it"));
   }
   const Socket listener = listening(blueview::tcp_port);
   std::thread other([&listener] {
