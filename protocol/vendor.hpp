@@ -322,7 +322,7 @@ class Vendor {
 /// Fills in defaults. Unknown names and values are errors that suggest the nearest valid one.
 Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& given);
 
-/// Adding a vendor = one folder + one line in vendors.cpp.
+/// The devices of makes() (protocol/host.hpp), in that order.
 std::span<const Vendor* const> vendors();
 /// The vendor and model of a profile name, or an error that suggests the nearest name.
 struct Profile {

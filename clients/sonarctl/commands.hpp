@@ -14,18 +14,16 @@
 #include "core/image/draw_fan.hpp"
 #include "core/image/terminal_fan.hpp"
 #include "protocol/control/pose_sample.hpp"
-#include "protocol/oculus/fire.hpp"
 
 namespace sonar::clients {
 
 /// Source of pings: a device or a recording.
 struct SourceOptions {
-  Endpoint device{"127.0.0.2", 52100};
-  SonarKind kind = SonarKind::oculus;
-  bool discover = false;                     // take the device from its status broadcast
-  std::filesystem::path recording;           // instead of a device
-  std::optional<oculus::FireRequest> asked;  // settings to send
-  HeadRequest head;                          // the same for a BlueView head
+  Endpoint device{"127.0.0.2", 0};  // port 0: that of the make
+  const Make* make = nullptr;       // null: any that answers at the host of `device`
+  bool discover = false;            // take the device from its status broadcast
+  std::filesystem::path recording;  // instead of a device
+  Wanted wanted;
   double connect_patience_s = 2;
   double silence_limit_s = 10;  // longest time without a byte
   bool observe = false;         // occupy no client slot, request nothing
@@ -38,7 +36,6 @@ struct ListenOptions {
   double seconds = 0;       // 0 = no limit
   std::uint64_t pings = 0;  // 0 = no limit
   bool json = false, quiet = false;
-  bool triggered = false;        // send the settings again after every ping: one ping a request
   double started_at_unix_s = 0;  // also report the time from then to the first ping
   std::filesystem::path png;     // draw the last ping
   std::filesystem::path record;  // raw bytes

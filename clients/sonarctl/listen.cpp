@@ -4,7 +4,6 @@
 
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/elapsed.hpp"
-#include "clients/sonarctl/picture.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/source.hpp"
 
@@ -23,12 +22,7 @@ std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_
 class Listener {
  public:
   Listener(const ListenOptions& options, OpenedStream opened)
-      : options_(options),
-        stream_(std::move(opened.stream)),
-        asked_(stream_.is_oculus() ? options.source.asked : std::nullopt),
-        received_(!stream_.is_oculus()),
-        log_(asked_),
-        start_(opened.connected_at) {}
+      : options_(options), stream_(std::move(opened.stream)), received_(!stream_.host().counts()), start_(opened.connected_at) {}
 
   /// Until the requested time or number of pings; an error when the device stops earlier.
   Result<void> run() {
@@ -38,19 +32,20 @@ class Listener {
       if (item.what == Wait::data) {
         last_message_ = Clock::now();
         received_ = true;
-        if (Result<void> handled = item.ping ? handle_ping(*item.ping) : handle(*item.other); !handled) return handled;
+        for (const std::string& notice : item.notices) std::fprintf(stderr, "sonarctl: %s\n", notice.c_str());
+        if (item.ping) handle_ping(*item.ping);
       } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
-        return tl::unexpected(silence(options_.source, stream_.device(), received_, "nothing more",
+        return tl::unexpected(silence(options_.source, stream_, received_, "nothing more",
                                       "drivers give up after 10 s; is the daemon stopped or stuck?"));
       }
     }
     return {};
   }
 
-  PingSummary summary() const { return log_.summary(stream_.junk_bytes()); }
+  PingSummary summary() const { return log_.summary(stream_.host().counts()); }
   /// True when settings were sent that pings echo.
-  bool asked() const { return asked_.has_value(); }
-  const std::optional<AnyPing>& last_ping() const { return last_ping_; }
+  bool asked() const { return stream_.host().expects_echo(); }
+  const std::optional<HostPing>& last_ping() const { return last_ping_; }
   std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }
 
  private:
@@ -66,26 +61,13 @@ class Listener {
            " pings: it stopped, or another client holds it (clients.max)";
   }
 
-  Result<void> handle(const oculus::Received& message) {
-    if (std::holds_alternative<oculus::DummyMessage>(message)) log_.add_dummy();
-    if (const auto* other = std::get_if<oculus::OtherMessage>(&message); other != nullptr && !options_.json)
-      std::printf("other message, type 0x%04x, %zu bytes: %s\n", static_cast<unsigned>(other->header.type), other->size,
-                  other->why.c_str());
-    if (const auto* text = std::get_if<oculus::LogText>(&message); text != nullptr && !options_.json)
-      std::printf("message of the device: %s\n", text->text.c_str());
-    return {};
-  }
-
-  Result<void> handle_ping(const AnyPing& ping) {
+  void handle_ping(const HostPing& ping) {
     const double at_s = seconds_since(start_);
     if (!last_ping_) first_ping_after_s_ = first_ping_time();
-    const PingReport report = log_.add(ping, at_s);
+    log_.add(ping, at_s);
     last_ping_ = ping;
-    if (options_.json && !options_.quiet) std::puts(json_from(ping, report, at_s).c_str());
-    if (!options_.json && (!options_.quiet || !report.errors.empty())) std::puts(line_from(ping, report).c_str());
-    // As strict drivers: repeat the request until the echo matches it.
-    const bool unsatisfied = !report.echo_mismatches.empty() && !log_.counts().echo_satisfied_at;
-    return unsatisfied || options_.triggered ? stream_.ask_again() : Result<void>{};
+    if (options_.json && !options_.quiet) std::puts(json_from(ping, at_s).c_str());
+    if (!options_.json && (!options_.quiet || !ping.errors.empty())) std::puts(line_from(ping).c_str());
   }
 
   double first_ping_time() const {
@@ -96,11 +78,10 @@ class Listener {
 
   const ListenOptions& options_;
   PingStream stream_;
-  std::optional<oculus::FireRequest> asked_;
   bool received_;
   PingLog log_;
   Clock::time_point start_, last_message_ = Clock::now();
-  std::optional<AnyPing> last_ping_;
+  std::optional<HostPing> last_ping_;
   std::optional<double> first_ping_after_s_;
 };
 
@@ -112,7 +93,7 @@ Result<void> report(const ListenOptions& options, const Listener& listener) {
     std::printf("first ping after %.3f s%s\n", *listener.first_ping_after_s(),
                 options.started_at_unix_s > 0 ? " from the daemon's start" : "");
   if (!options.png.empty() && listener.last_ping()) {
-    const Result<PolarImage> image = picture_of(*listener.last_ping());
+    const Result<PolarImage> image = listener.last_ping()->picture();
     if (!image) return tl::unexpected(image.error());
     const Result<Raster> fan = draw_fan(*image, options.style);
     if (!fan) return tl::unexpected(fan.error());
@@ -134,7 +115,6 @@ Result<void> listen(const ListenOptions& given) {
   if (!device) return tl::unexpected(device.error());
   auto opened = open_stream(options.source, *device);
   if (!opened) return tl::unexpected(opened.error());
-  if (opened->observes) options.source.asked.reset(), options.triggered = false;
   if (!options.record.empty())
     if (Result<void> recording = opened->stream.record_to(options.record); !recording) return recording;
   if (!options.json) std::printf("connected to %s\n", opened->stream.about().c_str());

@@ -1,35 +1,40 @@
 // Command lines of listen, view and stats, which examine pings.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 
 #include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
-#include "clients/sonarctl/fire_options.hpp"
+#include "clients/sonarctl/setting_options.hpp"
 #include "core/text/arguments.hpp"
 
 namespace sonar::clients {
 namespace {
 
 using text::number;
+using text::one_of;
 using text::whole_number;
 
 /// Options that belong to a source of pings; finish() turns their texts into a SourceOptions once the line is parsed.
 struct SourceArguments {
   DeviceArguments device;
-  bool as_it_is = false, observe = false, is_blueview = false, is_aris = false, is_3d15 = false;
+  bool as_it_is = false, observe = false;
+  std::string make;
   std::string control;
   std::filesystem::path token_file;
   std::string recording;
-  FireArguments fire;
+  SettingArguments settings;
 
   void add_to(CLI::App& app, bool recordings) {
-    device.add_to(app,
-                  "port of the sonar (default: 52100 of an Oculus, 14750 of a BlueView head, 56888 of an ARIS, 62312 of a "
-                  "Surveyor, 51200 of an Omniscan, 12345 of a Ping360 or 80 of a Sonar 3D-15, the first that answers)");
-    app.add_flag("--blueview", is_blueview, "the sonar is a BlueView head; needed on ports other than 14750");
-    app.add_flag("--aris", is_aris, "the sonar is an ARIS; needed on ports other than 56888");
-    app.add_flag("--3d15", is_3d15, "the sonar is a Sonar 3D-15; needed on ports other than 80");
+    std::string usual;
+    std::vector<std::string> names;
+    for (const Make& one : protocol::makes()) {
+      usual += (usual.empty() ? "" : ", ") + std::to_string(one.ports.front().number) + " of " + std::string(one.title);
+      names.emplace_back(one.name());
+    }
+    device.add_to(app, "port of the sonar (default: " + usual + ", the first that answers)");
+    app.add_option("--make", make, "make of the sonar; needed on a port that is not the make's own")->check(one_of(names));
     if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
     app.add_flag("--as-it-is", as_it_is, "send no settings (many sonars then send no pings)");
     app.add_flag("--observe", observe,
@@ -37,39 +42,25 @@ struct SourceArguments {
     app.add_option("--control", control, "HOST:PORT of sonard's control stream, which reports the address for observers")
         ->check(clients::address());
     app.add_option("--token-file", token_file, "the daemon's control.token_file, if it has one");
-    fire.add_to(app);
+    settings.add_to(app);
   }
 
   Result<SourceOptions> finish() const {
     SourceOptions source;
     Result<Endpoint> at = parse_endpoint(device.address, {"127.0.0.2", device.port});
     if (!at) return tl::unexpected(at.error());
-    if (device.discover && is_blueview)
-      return failure(ErrorKind::usage,
-                     "--discover finds Oculus sonars only: leave it out, and give the address of the BlueView head");
-    const bool any_port = at->port == 0;
-    if (any_port)
-      at->port = is_blueview ? blueview::tcp_port : is_aris ? aris::command_port : is_3d15 ? waterlinked_port : oculus::tcp_port;
-    source.kind = SonarKind::oculus;
-    if (is_blueview || at->port == blueview::tcp_port)
-      source.kind = SonarKind::blueview;
-    else if (is_aris || at->port == aris::command_port)
-      source.kind = SonarKind::aris;
-    else if (is_3d15 || at->port == waterlinked_port)
-      source.kind = SonarKind::waterlinked;
-    else if (brping_device_at(at->port))
-      source.kind = SonarKind::brping;
-    else if (any_port && !device.discover)
-      source.kind = SonarKind::either;
+    source.make = make.empty() ? make_at(at->port) : find_make(make);
+    if (source.make == nullptr && at->port != 0) source.make = &protocol::makes().front();
     source.device = *at;
     source.discover = device.discover;
     source.recording = recording;
     source.connect_patience_s = device.patience_s;
+    source.silence_limit_s = std::max(source.silence_limit_s, device.patience_s);
     source.observe = observe;
     source.control = control;
     source.token_file = token_file;
-    if (!as_it_is && recording.empty()) source.asked = fire.request();
-    if (!as_it_is) source.head = fire.head_request();
+    source.wanted = settings.wanted();
+    source.wanted.as_it_is = as_it_is;
     return source;
   }
 };
@@ -130,7 +121,6 @@ Run add_listen(CLI::App& app) {
     if (!style) return tl::unexpected(style.error());
     listen_options.source = std::move(*source);
     listen_options.style = std::move(*style);
-    listen_options.triggered = arguments->source.fire.triggered();
     return listen(listen_options);
   };
 }

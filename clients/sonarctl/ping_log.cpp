@@ -21,29 +21,18 @@ std::string echo_text(const PingSummary& summary) {
 
 }  // namespace
 
-PingReport PingLog::add(const AnyPing& any, Seconds at) {
-  PingReport report;
+void PingLog::add(const HostPing& ping, Seconds at) {
   arrivals_.push_back(at);
   ++summary_.pings;
-  summary_.bytes += facts_of(any).message_size;
-  const auto* ping = std::get_if<oculus::DecodedPing>(&any);
-  summary_.of_head = ping == nullptr;
-  if (summary_.of_head) return report;  // checked when it was decoded
-  report.errors = ping->violations;
-  for (std::string& error : sequence_.add(*ping)) report.errors.push_back(std::move(error));
-  summary_.identity_errors += report.errors.size();
-  summary_.missing_ids = sequence_.skipped_ids();
-  if (asked_) {
-    report.echo_mismatches = oculus::echo_violations(*asked_, *ping);
-    if (report.echo_mismatches.empty() && !summary_.echo_satisfied_at) summary_.echo_satisfied_at = summary_.pings;
-    if (!report.echo_mismatches.empty() && summary_.echo_satisfied_at) ++summary_.echo_lost;
-  }
-  return report;
+  summary_.bytes += ping.facts.message_size;
+  summary_.identity_errors += ping.errors.size();
+  if (ping.echo_mismatches.empty() && !summary_.echo_satisfied_at) summary_.echo_satisfied_at = summary_.pings;
+  if (!ping.echo_mismatches.empty() && summary_.echo_satisfied_at) ++summary_.echo_lost;
 }
 
-PingSummary PingLog::summary(std::uint64_t junk_bytes) const {
+PingSummary PingLog::summary(const std::optional<protocol::Host::Counts>& of_wire) const {
   PingSummary summary = summary_;
-  summary.junk_bytes = junk_bytes;
+  summary.of_wire = of_wire;
   std::vector<double> intervals_ms;
   for (std::size_t i = 1; i < arrivals_.size(); ++i) intervals_ms.push_back(1000 * (arrivals_[i] - arrivals_[i - 1]));
   if (intervals_ms.empty()) return summary;
@@ -68,28 +57,29 @@ std::vector<std::string> complaints(const PingSummary& summary, bool asked) {
   if (summary.pings == 0) found.push_back("no ping arrived");
   if (summary.identity_errors > 0)
     found.push_back(std::to_string(summary.identity_errors) + " broken identities: drivers would drop these pings");
-  if (summary.junk_bytes > 0) found.push_back(std::to_string(summary.junk_bytes) + " bytes between messages that belong to none");
+  if (const auto& of = summary.of_wire; of && of->junk_bytes > 0)
+    found.push_back(std::to_string(of->junk_bytes) + " bytes between messages that belong to none");
   if (asked && summary.pings > 0 && !summary.echo_satisfied_at) found.push_back("the echoed settings never matched the request");
   if (summary.echo_lost > 0)
     found.push_back("the echo was lost again in " + std::to_string(summary.echo_lost) + " pings: is another client connected?");
   return found;
 }
 
-std::string line_from(const AnyPing& ping, const PingReport& report) {
-  const PingFacts f = facts_of(ping);
+std::string line_from(const HostPing& ping) {
+  const protocol::PingFacts& f = ping.facts;
   std::string line = format("ping %u  %u x %u  %u bit  %.2f m  %.4f MHz  %zu bytes", f.number, f.rows, f.beams, f.bits, f.range_m,
                             f.frequency_hz / 1e6, f.message_size);
   if (!f.note.empty()) line += "  " + f.note;
-  for (const std::string& error : report.errors) line += "\n  error: " + error;
-  for (const std::string& mismatch : report.echo_mismatches) line += "\n  echo: " + mismatch;
+  for (const std::string& error : ping.errors) line += "\n  error: " + error;
+  for (const std::string& mismatch : ping.echo_mismatches) line += "\n  echo: " + mismatch;
   return line;
 }
 
 std::string text_from(const PingSummary& s, bool asked) {
   std::string text = format("pings %llu", wide(s.pings));
-  if (!s.of_head)
-    text += format(", missing ids %llu, identity errors %llu, junk bytes %llu, dummies %llu", wide(s.missing_ids),
-                   wide(s.identity_errors), wide(s.junk_bytes), wide(s.dummies));
+  if (s.of_wire)
+    text += format(", missing ids %llu, identity errors %llu, junk bytes %llu, dummies %llu", wide(s.of_wire->missing_pings),
+                   wide(s.identity_errors), wide(s.of_wire->junk_bytes), wide(s.of_wire->dummies));
   text += "\n";
   text += format("rate %.2f Hz, interval p50 %.1f ms, p99 %.1f ms, longest %.1f ms, %.2f MB/s", s.rate_hz, s.interval_p50_ms,
                  s.interval_p99_ms, s.interval_max_ms,
@@ -98,8 +88,8 @@ std::string text_from(const PingSummary& s, bool asked) {
   return text;
 }
 
-std::string json_from(const AnyPing& ping, const PingReport& report, Seconds at) {
-  const PingFacts f = facts_of(ping);
+std::string json_from(const HostPing& ping, Seconds at) {
+  const protocol::PingFacts& f = ping.facts;
   const nlohmann::json out{{"ping", f.number},
                            {"at_s", at},
                            {"rows", f.rows},
@@ -108,24 +98,24 @@ std::string json_from(const AnyPing& ping, const PingReport& report, Seconds at)
                            {"row_m", f.row_m},
                            {"frequency_hz", f.frequency_hz},
                            {"bytes", f.message_size},
-                           {"errors", report.errors},
-                           {"echo_mismatches", report.echo_mismatches}};
+                           {"errors", ping.errors},
+                           {"echo_mismatches", ping.echo_mismatches}};
   return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 std::string json_from(const PingSummary& s, bool asked) {
+  const auto judged = [&s](std::uint64_t value) { return s.of_wire ? nlohmann::json(value) : nlohmann::json(nullptr); };
+  const protocol::Host::Counts of_wire = s.of_wire.value_or(protocol::Host::Counts{});
   nlohmann::json out{{"pings", s.pings},
-                     {"missing_ids", s.missing_ids},
-                     {"identity_errors", s.identity_errors},
-                     {"junk_bytes", s.junk_bytes},
-                     {"dummies", s.dummies},
+                     {"missing_ids", judged(of_wire.missing_pings)},
+                     {"identity_errors", judged(s.identity_errors)},
+                     {"junk_bytes", judged(of_wire.junk_bytes)},
+                     {"dummies", judged(of_wire.dummies)},
                      {"bytes", s.bytes},
                      {"rate_hz", s.rate_hz},
                      {"interval_p50_ms", s.interval_p50_ms},
                      {"interval_p99_ms", s.interval_p99_ms},
                      {"interval_max_ms", s.interval_max_ms}};
-  if (s.of_head)
-    for (const char* key : {"missing_ids", "identity_errors", "junk_bytes", "dummies"}) out[key] = nullptr;
   if (asked) out["echo_satisfied_at"] = s.echo_satisfied_at ? nlohmann::json(*s.echo_satisfied_at) : nlohmann::json(nullptr);
   return nlohmann::json{{"summary", out}}.dump();
 }

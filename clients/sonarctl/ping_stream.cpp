@@ -1,152 +1,328 @@
 #include "clients/sonarctl/ping_stream.hpp"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <array>
-#include <iterator>
+#include <cerrno>
+#include <cstring>
 
+#include "clients/sonarctl/http.hpp"
 #include "core/text/ipv4.hpp"
+#include "protocol/oculus/messages.hpp"
 
 namespace sonar::clients {
-
 namespace {
 
-constexpr std::chrono::milliseconds probe_patience(300);
-constexpr std::chrono::milliseconds answer_patience(3000);  // minimum for a head, which may be computing
+using namespace std::chrono_literals;
+using std::chrono::milliseconds;
+using Clock = std::chrono::steady_clock;
+using Kind = protocol::HostPort::Kind;
+
+constexpr auto probe_patience = 300ms;         // where any make may be
+constexpr auto answer_patience = 3000ms;       // minimum for a sonar that is there, which may be computing
+constexpr auto connect_patience = 2000ms;      // for streams, before other kinds of ports are tried
+constexpr int receive_buffer_bytes = 4 << 20;  // a few pings
+constexpr const char* is_sonard_there = ". Is sonard running there? Its banner names the address of each sonar";
+
+/// What a host knows as time.
+Time now() { return Time(std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch())); }
+
+milliseconds left_until(Clock::time_point deadline) {
+  return std::max(0ms, std::chrono::ceil<milliseconds>(deadline - Clock::now()));
+}
+
+/// Of both ends; the socket API requires the casts.
+sockaddr_in own_address(const Socket& socket) {
+  sockaddr_in at{};
+  socklen_t size = sizeof at;
+  ::getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&at), &size);
+  return at;
+}
+sockaddr_in peer_address(const Socket& socket) {
+  sockaddr_in at{};
+  socklen_t size = sizeof at;
+  ::getpeername(socket.fd(), reinterpret_cast<sockaddr*>(&at), &size);
+  return at;
+}
+
+Wanted nothing_wanted() {
+  Wanted nothing;
+  nothing.as_it_is = true;
+  return nothing;
+}
+
+bool is_over(const Result<PingStream>& stream) { return stream || stream.error().kind == ErrorKind::usage; }
 
 }  // namespace
 
-Result<PingStream> PingStream::open(const Endpoint& device, SonarKind kind, Settings settings,
-                                    std::chrono::milliseconds patience) {
-  const std::optional<HeadRequest> wanted = settings.oculus ? std::optional(settings.head) : std::nullopt;
-  const auto stream_at = [](const Endpoint& place, auto opened) -> Result<PingStream> {
-    if (!opened) return tl::unexpected(opened.error());
-    return PingStream(place, Other(*std::move(opened)));
+const Make* find_make(std::string_view name) {
+  for (const Make& make : protocol::makes())
+    if (make.name() == name) return &make;
+  return nullptr;
+}
+
+const Make* make_at(std::uint16_t port) {
+  for (const Make& make : protocol::makes())
+    if (make.ports.front().number == port) return &make;
+  return nullptr;
+}
+
+Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, const Wanted& wanted, milliseconds patience) {
+  const auto deadline = Clock::now() + patience;
+  using Candidate = std::pair<const Make*, Endpoint>;
+  std::vector<Candidate> streams, others;
+  for (const Make& one : protocol::makes()) {
+    if (make != nullptr && make != &one) continue;
+    const Endpoint at{device.host, make != nullptr && device.port != 0 ? device.port : one.ports.front().number};
+    (one.ports.front().kind == Kind::tcp ? streams : others).emplace_back(&one, at);
+  }
+  const auto started = [](const Candidate& at, Result<std::unique_ptr<protocol::Host>> host, std::optional<Socket> connected,
+                          milliseconds within) -> Result<PingStream> {
+    if (!host) return tl::unexpected(host.error());
+    PingStream stream(*at.first, at.second, *std::move(host));
+    if (Result<void> opened = stream.start(std::move(connected), within); !opened) return tl::unexpected(opened.error());
+    return stream;
   };
-  const Endpoint ping360{device.host, brping_ports[0]}, http{device.host, waterlinked_port};
-  if (kind == SonarKind::waterlinked) return stream_at(device, WaterlinkedStream::open(device, wanted, patience));
-  if (kind == SonarKind::brping && device.port == ping360.port) {
-    auto socket = BrpingStream::find_ping360(ping360, patience);
-    if (!socket) return tl::unexpected(socket.error());
-    return stream_at(ping360, BrpingStream::open(*std::move(socket), BrpingDevice::ping360, wanted));
+  // A sonar that does not have the settings is asked without them: its refusal counts only where such a sonar is.
+  const auto searched = [&](const Candidate& at, milliseconds within) -> Result<PingStream> {
+    auto host = at.first->host(wanted);
+    if (host) return started(at, std::move(host), std::nullopt, within);
+    const auto stream = started(at, at.first->host(nothing_wanted()), std::nullopt, within);
+    return tl::unexpected(is_over(stream) ? host.error() : stream.error());
+  };
+  if (make != nullptr)
+    if (auto host = make->host(wanted); !host) return tl::unexpected(host.error());  // before the sonar is disturbed
+  Error failed;
+  for (bool is_last = false;;
+       is_last = Clock::now() >= deadline) {  // the streams once more after the others, which may take long
+    if (!streams.empty()) {
+      std::vector<Endpoint> places;
+      for (const auto& [one, at] : streams) places.push_back(at);
+      auto connected =
+          connect_first(places, others.empty() ? left_until(deadline) : std::min(left_until(deadline), connect_patience));
+      if (connected) {
+        const Candidate& at = streams[connected->which];
+        return started(at, at.first->host(wanted), std::move(connected->socket), std::max(patience, answer_patience));
+      }
+      failed = connected.error();
+      if (failed.kind == ErrorKind::usage) return tl::unexpected(failed);
+    }
+    if (is_last) return tl::unexpected(failed);
+    for (const Candidate& candidate : others) {
+      const bool by_http = candidate.first->ports.front().kind == Kind::http;
+      auto within = make != nullptr ? std::max(left_until(deadline), 1ms) : probe_patience;
+      if (by_http) {
+        if (make == nullptr && !connect_first({candidate.second}, probe_patience)) continue;
+        within = std::max(patience, answer_patience);
+      }
+      auto stream = searched(candidate, within);
+      if (is_over(stream) || (by_http && make != nullptr)) return stream;  // in a search another web server may be there
+      if (streams.empty()) failed = stream.error();
+    }
+    ::poll(nullptr, 0, 20);  // a port that refuses does so at once
   }
-  std::vector<Endpoint> places{device};
-  if (kind == SonarKind::either)
-    for (const std::uint16_t port : {blueview::tcp_port, aris::command_port, brping_ports[1], brping_ports[2]})
-      places.push_back({device.host, port});
-  auto connected = connect_first(places, patience);
-  if (!connected && kind == SonarKind::either) {
-    if (auto socket = BrpingStream::find_ping360(ping360, probe_patience))
-      return stream_at(ping360, BrpingStream::open(*std::move(socket), BrpingDevice::ping360, wanted));
-    if (connect_first({http}, probe_patience))
-      return stream_at(http, WaterlinkedStream::open(http, wanted, std::max(patience, answer_patience)));
-  }
-  if (!connected) return tl::unexpected(connected.error());
-  const Endpoint& place = places[connected->which];
-  if (kind == SonarKind::brping || connected->which > 2)
-    return stream_at(place, BrpingStream::open(std::move(connected->socket),
-                                               brping_device_at(place.port).value_or(BrpingDevice::surveyor), wanted));
-  if (kind == SonarKind::blueview || connected->which == 1) {
-    auto head = BlueViewStream::open(std::move(connected->socket), settings.head, std::max(patience, answer_patience));
-    if (!head && head.error().kind != ErrorKind::usage)
-      return failure(head.error().kind, "tcp " + text_from(place) + " " + head.error().text);
-    return stream_at(place, std::move(head));
-  }
-  if (kind == SonarKind::aris || connected->which == 2)
-    return stream_at(place, ArisStream::open(std::move(connected->socket), wanted));
-  PingStream stream(place, std::move(connected->socket), std::move(settings.oculus));
-  if (stream.asked_)
-    if (Result<void> sent = stream.ask_again(); !sent) return tl::unexpected(sent.error());
-  return stream;
 }
 
-Result<void> PingStream::ask_again() {
-  return asked_ && is_oculus() ? write_all(socket_, oculus::make_fire(*asked_)) : Result<void>{};
+PingStream::~PingStream() {
+  if (host_ != nullptr && is_started_ && !ended_) carry_out(host_->on_leave());
 }
 
-bool PingStream::is_rejected(std::chrono::milliseconds patience) const {
-  if (const auto* aris = std::get_if<ArisStream>(&other_)) return aris->is_rejected(patience);
-  if (const auto* brping = std::get_if<BrpingStream>(&other_)) return brping->is_rejected(patience);
-  return is_oculus() && ends_without_a_byte(socket_, patience);
+std::string PingStream::place() const { return (make_->ports.front().kind == Kind::udp ? "udp " : "tcp ") + text_from(device_); }
+
+Result<Socket> PingStream::open_port(std::size_t port, milliseconds patience) {
+  const protocol::HostPort& wanted = make_->ports[port];
+  if (wanted.kind == Kind::tcp) return connect_tcp({device_.host, port == 0 ? device_.port : wanted.number}, patience);
+  const auto towards = connect_udp({device_.host, port == 0 ? device_.port : wanted.number});
+  const bool in_group = wanted.group != protocol::Ipv4{};
+  auto socket = wanted.kind == Kind::udp
+                    ? connect_udp({device_.host, port == 0 ? device_.port : wanted.number})
+                    : listen_udp(Endpoint{in_group ? text::format_ipv4(wanted.group) : "0.0.0.0", wanted.number});
+  if (!socket) return socket;
+  ::setsockopt(socket->fd(), SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
+  if (!in_group) return socket;
+  if (!towards) return tl::unexpected(towards.error());
+  ip_mreq membership{};
+  ::inet_pton(AF_INET, text::format_ipv4(wanted.group).c_str(), &membership.imr_multiaddr);
+  membership.imr_interface = own_address(*towards).sin_addr;  // the interface that reaches the device
+  if (::setsockopt(socket->fd(), IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership) != 0)
+    return failure(ErrorKind::unavailable, std::string("cannot join the sonar's multicast group: ") + std::strerror(errno));
+  return socket;
 }
 
-std::string PingStream::about() const {
-  std::string what;
-  if (const auto* blueview = std::get_if<BlueViewStream>(&other_)) what = blueview->about();
-  if (std::holds_alternative<ArisStream>(other_)) what = "an ARIS";
-  if (const auto* brping = std::get_if<BrpingStream>(&other_)) what = brping->about();
-  if (std::holds_alternative<WaterlinkedStream>(other_)) what = "a Sonar 3D-15";
-  return text_from(device_) + (what.empty() ? "" : ", " + what);
+Result<void> PingStream::start(std::optional<Socket> connected, milliseconds patience) {
+  const auto deadline = Clock::now() + patience;
+  answer_patience_ = patience;
+  const auto towards = connect_udp(device_);
+  if (!towards) return tl::unexpected(towards.error());
+  device_ip_ = peer_address(*towards).sin_addr.s_addr;
+  std::vector<std::uint16_t> own;
+  for (std::size_t port = 0; port < make_->ports.size(); ++port) {
+    sockets_.emplace_back(port == 0 ? std::move(connected) : std::nullopt);
+    if (make_->ports[port].kind != Kind::http && !sockets_.back()) {
+      auto socket = open_port(port, patience);
+      if (!socket) return tl::unexpected(socket.error());
+      sockets_.back() = *std::move(socket);
+    }
+    own.push_back(sockets_.back() ? ntohs(own_address(*sockets_.back()).sin_port) : std::uint16_t{0});
+  }
+  carry_out(host_->on_open(own, now()));
+  while (!host_->is_open() && !ended_ && !interrupted_ && Clock::now() < deadline) receive(left_until(deadline));
+  const std::optional<Error> why = std::exchange(ended_, std::nullopt);
+  is_started_ = host_->is_open() && !why;
+  if (is_started_) return {};
+  if (interrupted_) return failure(ErrorKind::io, "interrupted");
+  if (!why || why->kind == ErrorKind::unavailable)
+    return failure(ErrorKind::unavailable,
+                   place() + " does not answer as " + std::string(make_->title) + " does" + is_sonard_there);
+  if (why->kind != ErrorKind::io) return tl::unexpected(*why);
+  return failure(ErrorKind::io,
+                 place() + (has_answered_ ? " closed the connection before it took the settings: the daemon stopped, "
+                                            "or closed it; see its log"
+                                          : " closed the connection before it answered: all its client slots are "
+                                            "taken (clients.max)"));
 }
+
+void PingStream::carry_out(protocol::HostActions actions) {
+  std::vector<std::string> notices;
+  for (protocol::HostAction& action : actions) {
+    if (ended_) return;
+    if (const auto* send = std::get_if<protocol::HostSend>(&action)) {
+      if (send->port >= sockets_.size() || !sockets_[send->port])
+        ended_ = Error{ErrorKind::io, "is sent bytes at a port that is not open"};
+      else if (const auto sent = write_all(*sockets_[send->port], send->bytes); !sent)
+        ended_ = sent.error();
+    } else if (const auto* ask = std::get_if<protocol::ResourceRequest>(&action)) {
+      const auto reply = http_ask(device_, ask->method, ask->path, ask->body, answer_patience_);
+      if (!reply) {
+        ended_ = reply.error();
+      } else {
+        protocol::ResourceReply of_device;
+        of_device.status = reply->status;
+        of_device.body = reply->body;
+        carry_out(host_->on_reply(of_device, now()));
+      }
+    } else if (auto* ping = std::get_if<HostPing>(&action)) {
+      items_.push_back({Wait::data, std::move(*ping), std::exchange(notices, {}), {}});
+    } else if (auto* notice = std::get_if<protocol::Notice>(&action)) {
+      notices.push_back(std::move(notice->text));
+    } else if (auto* error = std::get_if<Error>(&action)) {
+      ended_ = std::move(*error);
+      if (ended_->kind != ErrorKind::usage) ended_->text = place() + " " + ended_->text;
+    }
+  }
+  if (!notices.empty()) items_.push_back({Wait::data, {}, std::move(notices), {}});
+}
+
+void PingStream::receive(milliseconds patience) {
+  if (const auto tick = host_->next_tick()) {
+    const auto until_tick = std::chrono::ceil<milliseconds>(*tick - now());
+    patience = std::clamp(until_tick, 0ms, patience);
+  }
+  std::vector<pollfd> ready;
+  for (const auto& socket : sockets_) ready.push_back({socket ? socket->fd() : -1, POLLIN, 0});
+  const int polled = ::poll(ready.data(), ready.size(), static_cast<int>(patience.count()));
+  if (polled < 0) {
+    if (errno == EINTR)
+      interrupted_ = true;
+    else
+      ended_ = Error{ErrorKind::io, std::strerror(errno)};
+    return;
+  }
+  for (std::size_t port = 0; port < ready.size() && !ended_; ++port)
+    if (ready[port].revents != 0) read_port(port);
+  if (!ended_) carry_out(host_->on_tick(now()));
+}
+
+void PingStream::read_port(std::size_t port) {
+  std::size_t size = 0;
+  if (make_->ports[port].kind == Kind::tcp) {
+    const Read read = read_some(*sockets_[port], chunk_, 0ms);
+    if (read.what == Wait::closed) ended_ = Error{ErrorKind::io, read.error};
+    size = read.size;
+  } else {
+    const Datagram datagram = receive_from(*sockets_[port], chunk_, 0ms);
+    if (datagram.what == Wait::closed) ended_ = Error{ErrorKind::unavailable, datagram.error};
+    size = datagram.ip == device_ip_ ? datagram.size : 0;  // ignore datagrams from other senders
+  }
+  if (size == 0) return;
+  has_answered_ = has_answered_ || port == 0;
+  const auto received = std::span<const std::byte>(chunk_).first(size);
+  if (record_.is_open() && port == 0) {
+    for (const std::byte b : received) record_.put(static_cast<char>(b));
+    if (!record_) {
+      ended_ = Error{ErrorKind::io, "the recording cannot be written any further: is the disk full?"};
+      return;
+    }
+  }
+  const auto messages = [this] { return host_->counts().value_or(protocol::Host::Counts{}).messages; };
+  const auto before = messages();
+  const std::size_t items = items_.size();
+  carry_out(host_->on_bytes(port, received, now()));
+  if (messages() > before && items_.size() == items) items_.push_back({Wait::data, {}, {}, {}});
+}
+
+PingStream::Item PingStream::next(milliseconds patience) {
+  const auto deadline = Clock::now() + patience;
+  for (;;) {
+    if (items_.empty() && !ended_) carry_out(host_->on_demand(now()));
+    if (!items_.empty()) {
+      Item item = std::move(items_.front());
+      items_.pop_front();
+      return item;
+    }
+    if (ended_) return {Wait::closed, {}, {}, ended_->text};
+    receive(left_until(deadline));
+    if (std::exchange(interrupted_, false)) return {Wait::interrupted, {}, {}, {}};
+    if (items_.empty() && !ended_ && Clock::now() >= deadline) return {};
+  }
+}
+
+bool PingStream::is_rejected(milliseconds patience) const {
+  return make_->ports.front().kind == Kind::tcp && !has_answered_ && ends_without_a_byte(*sockets_.front(), patience);
+}
+
+std::string PingStream::about() const { return text_from(device_) + ", " + host_->about(); }
 
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
-  if (is_blueview())
-    return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is a BlueView head at " + text_from(device_) +
-                                         "; hosts record it with BVTSonar_CreateFile");
-  if (!is_oculus()) return failure(ErrorKind::usage, "only Oculus sonars are recorded; this is " + about());
+  if (make_->ports.size() != 1 || make_->ports.front().kind != Kind::tcp)
+    return failure(ErrorKind::usage, "only pings that come by TCP are recorded as raw bytes; this is " + about());
   record_.open(file, std::ios::binary | std::ios::trunc);
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
   return {};
 }
 
-PingStream::Item PingStream::next(std::chrono::milliseconds patience) {
-  if (!is_oculus())
-    return std::visit(
-        [patience](auto& stream) -> Item {
-          if constexpr (std::is_same_v<std::decay_t<decltype(stream)>, std::monostate>) {
-            return {};
-          } else {
-            auto item = stream.next(patience);
-            Item out{item.what, {}, {}, std::move(item.error)};
-            if (item.ping) out.ping = *std::move(item.ping);
-            return out;
-          }
-        },
-        other_);
-  const auto deadline = std::chrono::steady_clock::now() + patience;
-  for (;;) {
-    if (auto message = decoder_.next()) {
-      if (auto* ping = std::get_if<oculus::DecodedPing>(&*message)) return {Wait::data, std::move(*ping), {}, {}};
-      return {Wait::data, {}, std::move(message), {}};
-    }
-    std::array<std::byte, 65536> chunk;
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-    const Read read = read_some(socket_, chunk, left);
-    if (read.what != Wait::data) return {read.what, {}, {}, read.error};
-    const auto received = std::span<const std::byte>(chunk).first(read.size);
-    if (record_.is_open()) {
-      for (const std::byte b : received) record_.put(static_cast<char>(b));
-      if (!record_) return {Wait::closed, {}, {}, "the recording cannot be written any further: is the disk full?"};
-    }
-    decoder_.append(received);
-  }
-}
-
-Result<std::vector<oculus::DecodedPing>> read_recording(const std::filesystem::path& file) {
+Result<std::vector<HostPing>> read_recording(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": no such file, or no permission");
-  oculus::Decoder decoder;
-  std::vector<oculus::DecodedPing> pings;
-  std::vector<char> chunk(1 << 16);
-  while (in.read(chunk.data(), static_cast<std::streamsize>(chunk.size())), in.gcount() > 0) {
-    wire::Bytes bytes;
-    for (std::streamsize i = 0; i < in.gcount(); ++i) bytes.push_back(static_cast<std::byte>(chunk[static_cast<std::size_t>(i)]));
-    decoder.append(bytes);
-    while (auto message = decoder.next())
-      if (auto* ping = std::get_if<oculus::DecodedPing>(&*message)) pings.push_back(std::move(*ping));
+  for (const Make& make : protocol::makes()) {
+    if (make.ports.front().kind != Kind::tcp) continue;
+    const auto host = make.host(nothing_wanted());
+    std::vector<HostPing> pings;
+    std::vector<char> chunk(1 << 16);
+    in.clear();
+    in.seekg(0);
+    while (host && (in.read(chunk.data(), static_cast<std::streamsize>(chunk.size())), in.gcount() > 0)) {
+      const auto bytes = std::as_bytes(std::span(chunk)).first(static_cast<std::size_t>(in.gcount()));
+      for (protocol::HostAction& action : (*host)->on_bytes(0, bytes, Time{}))
+        if (auto* ping = std::get_if<HostPing>(&action)) pings.push_back(std::move(*ping));
+    }
+    if (!pings.empty()) return pings;
   }
-  if (pings.empty())
-    return failure(ErrorKind::bad_data, file.string() + " holds no Oculus ping: it must be the raw bytes of the TCP stream");
-  return pings;
+  return failure(ErrorKind::bad_data,
+                 file.string() + " holds no ping of a known sonar: it must be the raw bytes of its TCP stream");
 }
 
-Result<Discovered> discover(std::chrono::milliseconds patience) {
+Result<Discovered> discover(milliseconds patience) {
   auto socket = listen_udp(oculus::status_port);
   if (!socket) return tl::unexpected(socket.error());
-  const auto deadline = std::chrono::steady_clock::now() + patience;
+  const auto deadline = Clock::now() + patience;
   for (;;) {
     std::array<std::byte, 2048> datagram;
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-    const Read read = read_some(*socket, datagram, left);
+    const Read read = read_some(*socket, datagram, left_until(deadline));
     if (read.what != Wait::data)
       return failure(ErrorKind::unavailable, "no status datagram on udp " + std::to_string(oculus::status_port) +
                                                  ": is a sonar running, and does its status_to reach this machine?");

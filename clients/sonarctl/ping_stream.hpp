@@ -1,80 +1,89 @@
-// Sources of decoded pings: the TCP stream of a device (after sending settings), a recording of one, and the status datagrams
-// that announce a device. All kinds of sonars. Shared by listen, view, stats and doctor.
+// Runs the host of a make of sonar over blocking sockets: pings of a device for listen, view, stats and doctor. And other sources
+// of pings: raw recordings, and the status datagrams that announce a device.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
-#include "clients/sonarctl/any_ping.hpp"
-#include "clients/sonarctl/aris_stream.hpp"
-#include "clients/sonarctl/blueview_stream.hpp"
-#include "clients/sonarctl/brping_stream.hpp"
 #include "clients/sonarctl/net.hpp"
-#include "clients/sonarctl/waterlinked_stream.hpp"
 #include "core/base/result.hpp"
+#include "protocol/host.hpp"
 #include "protocol/oculus/decode.hpp"
 
 namespace sonar::clients {
 
-/// Kind of sonar at an address; either: an Oculus there, or another at its own port, the first that answers. brping: that of the
-/// ping protocol which is usual at that port. waterlinked: a Sonar 3D-15.
-enum class SonarKind { oculus, blueview, either, aris, brping, waterlinked };
+using protocol::HostPing;
+using protocol::Make;
+using protocol::PingFacts;
+using protocol::Wanted;
 
-/// Settings to send, by kind of sonar. Without `oculus` none: an ARIS is not sent `head` either.
-struct Settings {
-  std::optional<oculus::FireRequest> oculus;
-  HeadRequest head;
-};
+/// Null: no make has this name.
+const Make* find_make(std::string_view name);
+/// The make that is usual at this port; null: none is.
+const Make* make_at(std::uint16_t port);
 
 class PingStream {
  public:
-  /// Connects, greets a head, and sends the settings. `patience`: for the connection, and for a head's answers.
-  static Result<PingStream> open(const Endpoint& device, SonarKind kind, Settings settings, std::chrono::milliseconds patience);
+  /// Connects and opens the conversation. `make`: null = the first that answers at its own port. `patience`: for the connection
+  /// and for answers. usage: settings that the sonar does not have; io: closed; unavailable: no answer; bad_data: another
+  /// service.
+  static Result<PingStream> open(const Endpoint& device, const Make* make, const Wanted& wanted,
+                                 std::chrono::milliseconds patience);
+  PingStream(PingStream&&) = default;
+  ~PingStream();
 
   struct Item {
     Wait what = Wait::timed_out;
-    std::optional<AnyPing> ping;            // with Wait::data this,
-    std::optional<oculus::Received> other;  // or this
+    std::optional<HostPing> ping;      // with Wait::data; without one: another message
+    std::vector<std::string> notices;  // of the host
     std::string error;
   };
-  /// The next message, or the event that replaced it within `patience`.
+  /// The next ping or message, or the event that replaced it within `patience`. A sonar that sends pings on request is asked.
   Item next(std::chrono::milliseconds patience);
-  /// Sends the settings once more. No effect on heads, which have confirmed them.
-  Result<void> ask_again();
-  /// True when the sonar closes the connection before the first byte; waits for that byte, at most `patience`. Never true of a
-  /// head, which has greeted.
+  /// True when the sonar closes the connection before the first byte; waits for that byte, at most `patience`.
   bool is_rejected(std::chrono::milliseconds patience) const;
-  /// Also writes every received byte to this file. usage: of another sonar than an Oculus.
+  /// Also writes every byte received by TCP to this file. usage: of a sonar that sends pings otherwise.
   Result<void> record_to(const std::filesystem::path& file);
-  std::uint64_t junk_bytes() const { return decoder_.skipped_bytes(); }
+
+  const protocol::Host& host() const { return *host_; }
+  const Make& make() const { return *make_; }
   const Endpoint& device() const { return device_; }
-  bool is_blueview() const { return std::holds_alternative<BlueViewStream>(other_); }
-  bool is_oculus() const { return std::holds_alternative<std::monostate>(other_); }
-  /// "127.0.0.2:14750, BlueView P900-90, serial 7001"
+  /// "127.0.0.2:14750, a BlueView P900-90, serial 7001"
   std::string about() const;
 
  private:
-  PingStream(Endpoint device, Socket socket, std::optional<oculus::FireRequest> asked)
-      : device_(std::move(device)), socket_(std::move(socket)), asked_(std::move(asked)) {}
-  using Other = std::variant<std::monostate, BlueViewStream, ArisStream, BrpingStream, WaterlinkedStream>;
-  PingStream(Endpoint device, Other other) : device_(std::move(device)), socket_(-1), other_(std::move(other)) {}
+  PingStream(const Make& make, Endpoint device, std::unique_ptr<protocol::Host> host)
+      : make_(&make), device_(std::move(device)), host_(std::move(host)) {}
+  Result<void> start(std::optional<Socket> connected, std::chrono::milliseconds patience);
+  Result<Socket> open_port(std::size_t port, std::chrono::milliseconds patience);
+  void carry_out(protocol::HostActions actions);
+  void receive(std::chrono::milliseconds patience);
+  void read_port(std::size_t port);
+  std::string place() const;  // "tcp 127.0.0.2:14750"
 
+  const Make* make_;
   Endpoint device_;
-  Socket socket_;  // of an Oculus
-  Other other_;    // another sonar's
-  std::optional<oculus::FireRequest> asked_;
-  oculus::Decoder decoder_;
+  std::unique_ptr<protocol::Host> host_;
+  std::vector<std::optional<Socket>> sockets_;  // by port; none of kind http
+  std::uint32_t device_ip_ = 0;                 // in network order
+  std::chrono::milliseconds answer_patience_{};
+  std::deque<Item> items_;                           // to be handed out
+  std::optional<Error> ended_;                       // the conversation is over; empty text: the sonar closed it
+  bool interrupted_ = false, has_answered_ = false;  // has_answered_: at the first port
+  bool is_started_ = false;                          // the sonar is to hear that we leave
   std::ofstream record_;
+  std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };
 
-/// Every ping of a raw dump: messages back to back, exactly the bytes of the TCP stream.
-Result<std::vector<oculus::DecodedPing>> read_recording(const std::filesystem::path& file);
+/// Every ping of a raw dump: messages back to back, exactly the bytes of a TCP stream.
+Result<std::vector<HostPing>> read_recording(const std::filesystem::path& file);
 
 /// Waits for the status broadcast of a device on UDP 52102; reports deviations that real drivers reject in `complaints`.
 struct Discovered {

@@ -12,6 +12,7 @@
 #include "clients/sonarctl/source.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/oculus/decode.hpp"
+#include "protocol/oculus/host.hpp"
 #include "protocol/recording/message_splitter.hpp"
 #include "protocol/recording/recording.hpp"
 
@@ -117,8 +118,10 @@ class Recorder {
   }
 
   Result<void> ask() {
-    if (!options_.source.asked) return {};
-    const wire::Bytes fire = oculus::make_fire(*options_.source.asked);
+    if (options_.source.wanted.as_it_is) return {};
+    const auto asked = oculus::fire_from(options_.source.wanted);
+    if (!asked) return tl::unexpected(asked.error());
+    const wire::Bytes fire = oculus::make_fire(*asked);
     if (Result<void> sent = write_all(socket_, fire); !sent) return sent;
     return files_.write({stamps_.now(), Origin::client, Carrier::stream, fire});
   }
@@ -130,7 +133,7 @@ class Recorder {
       const std::uint64_t pings = files_.pings();
       if (Result<void> written = files_.write(*message); !written) return written;
       if (message->bytes.size() >= oculus::header_size) device_id_ = oculus::header_of(message->bytes).source;
-      if (options_.triggered && files_.pings() > pings)
+      if (options_.source.wanted.more.contains("trigger") && files_.pings() > pings)
         if (Result<void> asked = ask(); !asked) return asked;
     }
     return {};

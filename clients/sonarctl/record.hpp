@@ -11,8 +11,7 @@
 namespace sonar::clients {
 
 struct RecordOptions {
-  SourceOptions source;  // a device; or source.recording, a recording of any kind
-  bool triggered = false;
+  SourceOptions source;                           // a device; or source.recording, a recording of any kind
   std::filesystem::path pcap, mcap, oculus, raw;  // at least one
   double seconds = 0;                             // 0 = no limit
   std::uint64_t pings = 0;                        // 0 = no limit

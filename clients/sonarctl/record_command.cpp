@@ -4,9 +4,10 @@
 
 #include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
-#include "clients/sonarctl/fire_options.hpp"
 #include "clients/sonarctl/record.hpp"
+#include "clients/sonarctl/setting_options.hpp"
 #include "core/text/arguments.hpp"
+#include "protocol/oculus/messages.hpp"
 
 namespace sonar::clients {
 
@@ -23,7 +24,7 @@ Run add_record(CLI::App& app) {
     DeviceArguments device;
     std::string control, status_on;
     bool as_it_is = false, no_status = false;
-    FireArguments fire;
+    SettingArguments settings;
   };
   const auto arguments = std::make_shared<Arguments>();
   RecordOptions& options = arguments->options;
@@ -47,7 +48,7 @@ Run add_record(CLI::App& app) {
   command.add_option("--sonar", options.sonar, "with --from: selects one of several: by address in captures, by name in MCAP")
       ->needs(from);
   command.add_flag("--as-it-is", arguments->as_it_is, "send no settings (many sonars then send no pings)");
-  arguments->fire.add_to(command);
+  arguments->settings.add_to(command);
   return [arguments]() -> Result<void> {
     RecordOptions chosen = arguments->options;
     const Result<Endpoint> device = parse_endpoint(arguments->device.address, {"127.0.0.2", arguments->device.port});
@@ -58,8 +59,8 @@ Run add_record(CLI::App& app) {
     const Result<Endpoint> status_on = parse_endpoint(arguments->status_on, chosen.status_on);
     if (!status_on) return tl::unexpected(status_on.error());
     chosen.status_on = *status_on;
-    if (!arguments->as_it_is) chosen.source.asked = arguments->fire.request();
-    chosen.triggered = arguments->fire.triggered();
+    chosen.source.wanted = arguments->settings.wanted();
+    chosen.source.wanted.as_it_is = arguments->as_it_is;
     chosen.status = !arguments->no_status;
     chosen.control->address = arguments->control;
     if (arguments->control.empty()) chosen.control.reset();

@@ -17,16 +17,13 @@ namespace {
 constexpr int stale_pings = 4;
 constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without a free slot closes at once
 
-Result<AnyPing> fetch_recorded(const SourceOptions& source, std::size_t number) {
+Result<HostPing> fetch_recorded(const SourceOptions& source, std::size_t number) {
   auto pings = read_recording(source.recording);
   if (!pings) return tl::unexpected(pings.error());
   if (number < pings->size()) return std::move((*pings)[number]);
   return failure(ErrorKind::usage, source.recording.string() + " holds pings 0 to " + std::to_string(pings->size() - 1) +
                                        ", not " + std::to_string(number));
 }
-
-constexpr const char* heads_have_no_observers =
-    "only Oculus sonars have observers; a BlueView head serves several hosts: leave out --observe";
 
 /// The address for observers, as reported by the sonard that serves the device.
 Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& device) {
@@ -39,23 +36,23 @@ Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& devic
     if (s.listens() != text_from(device) && s.advertised() + port != text_from(device) &&
         s.listens() != std::string("0.0.0.0").append(port))
       continue;
-    if (s.observers().empty()) return failure(ErrorKind::unavailable, "this sonar accepts no observers (observers.max is 0)");
+    if (s.observers().empty())
+      return failure(ErrorKind::unavailable,
+                     "this sonar accepts no observers: its make has none, or observers.max is 0; leave out --observe");
     auto at = parse_endpoint(s.observers(), device);
     if (at) at->host = device.host;
     return at;
   }
-  for (const v1::SonarStatus& s : (*status)->sonars())
-    if (s.advertised() == device.host && s.profile().starts_with("blueview"))
-      return failure(ErrorKind::usage, heads_have_no_observers);
   return failure(ErrorKind::unavailable, "the sonard at " + text_from(control->at()) + " serves no sonar at " +
                                              text_from(device) + "; --control names another");
 }
 
-Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device) {
-  if (source.kind == SonarKind::blueview) return failure(ErrorKind::usage, heads_have_no_observers);
+Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device, const Make& make) {
   const auto at = observers_of(source, device);
   if (!at) return tl::unexpected(at.error());
-  auto stream = PingStream::open(*at, SonarKind::oculus, {}, milliseconds_from(source.connect_patience_s));
+  Wanted nothing;
+  nothing.as_it_is = true;
+  auto stream = PingStream::open(*at, &make, nothing, milliseconds_from(source.connect_patience_s));
   if (!stream) return tl::unexpected(stream.error());
   const auto now = std::chrono::steady_clock::now();
   if (stream->is_rejected(first_byte_within))
@@ -67,40 +64,36 @@ Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device
   return OpenedStream{*std::move(stream), now, true};
 }
 
-Result<AnyPing> fetch_live(const SourceOptions& given) {
-  SourceOptions source = given;
+Result<HostPing> fetch_live(const SourceOptions& source) {
   const Result<Endpoint> device = find_device(source, false);
   if (!device) return tl::unexpected(device.error());
   auto opened = open_stream(source, *device);
   if (!opened) return tl::unexpected(opened.error());
   PingStream* const stream = &opened->stream;
-  if (opened->observes) source.asked.reset();
   auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
-  bool received = !stream->is_oculus();  // a head greeted; an ARIS has only pings
+  bool received = !stream->host().counts();  // of which other messages are not told from junk
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
     PingStream::Item item = stream->next(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(500)));
     if (item.what == Wait::closed)
       return failure(ErrorKind::io,
-                     item.error.empty() || !stream->is_blueview()
+                     item.error.empty()
                          ? "the device closed the connection before a ping arrived: another client may be connected "
                            "(clients.max)"
                          : "no ping arrived: " + item.error);
     if (item.what != Wait::data && left.count() <= 0) {
-      const char* const hint = !stream->is_oculus() ? "is the daemon's clock stopped (clock), or the daemon stuck?"
-                               : opened->observes   ? "the sonar has no client that requests pings"
-                                                    : "is the sonar in standby?";
-      return tl::unexpected(silence(source, *device, received, "no ping", hint));
+      const char* const hint = opened->observes
+                                   ? "the sonar has no client that requests pings"
+                                   : "is the sonar in standby? Is the daemon's clock stopped (clock), or the daemon stuck?";
+      return tl::unexpected(silence(source, *stream, received, "no ping", hint));
     }
     received = received || item.what == Wait::data;
     if (!item.ping) continue;
-    if (const auto* of = std::get_if<PicturePing>(&*item.ping); of != nullptr && !of->is_whole) {
+    if (!item.ping->is_whole) {
       give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
       continue;
     }
-    const auto* ping = std::get_if<oculus::DecodedPing>(&*item.ping);
-    const bool as_asked = ping == nullptr || !source.asked || oculus::echo_violations(*source.asked, *ping).empty();
-    if (as_asked || ++stale > stale_pings) return *std::move(item.ping);
+    if (item.ping->echo_mismatches.empty() || ++stale > stale_pings) return *std::move(item.ping);
   }
   return failure(ErrorKind::io, "interrupted before a ping arrived");
 }
@@ -108,12 +101,16 @@ Result<AnyPing> fetch_live(const SourceOptions& given) {
 }  // namespace
 
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device) {
-  if (source.observe) return observe(source, device);
-  auto stream = PingStream::open(device, source.kind, {source.asked, source.head}, milliseconds_from(source.connect_patience_s));
+  const Make* const make = source.make != nullptr ? source.make : make_at(device.port);
+  if (source.observe) {
+    const Make& usual = make != nullptr ? *make : protocol::makes().front();
+    return observe(source, {device.host, device.port != 0 ? device.port : usual.ports.front().number}, usual);
+  }
+  auto stream = PingStream::open(device, make, source.wanted, milliseconds_from(source.connect_patience_s));
   if (!stream) return tl::unexpected(stream.error());
   const auto now = std::chrono::steady_clock::now();
   if (!stream->is_rejected(first_byte_within)) return OpenedStream{*std::move(stream), now};
-  auto observed = observe(source, device);
+  auto observed = observe(source, stream->device(), stream->make());
   if (observed) return observed;
   return failure(ErrorKind::io,
                  "the device closed the connection before a ping arrived: another client may be connected (clients.max); "
@@ -123,13 +120,14 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
 
 std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::milliseconds(static_cast<std::int64_t>(s * 1000)); }
 
-Error silence(const SourceOptions& source, const Endpoint& device, bool received, const std::string& what,
+Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
               const std::string& hint) {
   const std::string limit = text::format("%g s", source.silence_limit_s);
   if (received) return {ErrorKind::io, what + " arrived within " + limit + ": " + hint};
   return {ErrorKind::unavailable,
-          "no Oculus message arrived from tcp " + text_from(device) + " within " + limit + ": is it an Oculus sonar?" +
-              (source.asked ? "" : " Some sonars send nothing before they receive settings (--as-it-is sends none).") +
+          "no message of " + std::string(stream.make().title) + " arrived from tcp " + text_from(stream.device()) + " within " +
+              limit + ": is it another sonar?" +
+              (source.wanted.as_it_is ? " Some sonars send nothing before they receive settings (--as-it-is sends none)." : "") +
               " sonard's banner names the address of each sonar"};
 }
 
@@ -142,7 +140,7 @@ Result<Endpoint> find_device(const SourceOptions& source, bool say) {
   return found->device;
 }
 
-Result<AnyPing> fetch_ping(const SourceOptions& source, std::size_t number) {
+Result<HostPing> fetch_ping(const SourceOptions& source, std::size_t number) {
   return source.recording.empty() ? fetch_live(source) : fetch_recorded(source, number);
 }
 

@@ -23,11 +23,11 @@ struct OpenedStream {
 /// observers; then with a note on standard error.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
-/// Error: `what` did not arrive within source.silence_limit_s, or no Oculus message arrived at all (`received` false).
-Error silence(const SourceOptions& source, const Endpoint& device, bool received, const std::string& what,
+/// Error: `what` did not arrive within source.silence_limit_s, or no message of the make arrived at all (`received` false).
+Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
               const std::string& hint);
 
 /// Ping `number` of a recording, or the first of a device that was made with the requested settings.
-Result<AnyPing> fetch_ping(const SourceOptions& source, std::size_t number);
+Result<HostPing> fetch_ping(const SourceOptions& source, std::size_t number);
 
 }  // namespace sonar::clients

@@ -3,7 +3,6 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/sonarctl/image_statistics.hpp"
-#include "clients/sonarctl/picture.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "core/text/format.hpp"
 
@@ -50,14 +49,13 @@ void print_plain(const nlohmann::json& stats, const std::string& prefix) {
 }  // namespace
 
 Result<void> stats(const StatsOptions& options) {
-  const Result<AnyPing> ping = fetch_ping(options.source, options.ping);
+  const Result<HostPing> ping = fetch_ping(options.source, options.ping);
   if (!ping) return tl::unexpected(ping.error());
-  const Result<PolarImage> image = picture_of(*ping);
+  const Result<PolarImage> image = ping->picture();
   if (!image) return tl::unexpected(image.error());
   const Result<Window> window = parse_window(options.window, *image);
   if (!window) return tl::unexpected(window.error());
-  nlohmann::json stats{{"window", speckle_stats(*image, *window, saturation_of(facts_of(*ping)))},
-                       {"range", range_stats(*image)}};
+  nlohmann::json stats{{"window", speckle_stats(*image, *window, saturation_of(ping->facts))}, {"range", range_stats(*image)}};
   if (!options.shadow.empty()) {
     const Result<Window> shadow = parse_window(options.shadow, *image), around = parse_window(options.surroundings, *image);
     if (!shadow) return tl::unexpected(shadow.error());

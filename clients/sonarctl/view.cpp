@@ -1,6 +1,5 @@
 #include <cstdio>
 
-#include "clients/sonarctl/picture.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/terminal.hpp"
 #include "clients/sonarctl/view_caption.hpp"
@@ -40,9 +39,9 @@ Result<std::vector<std::string>> lines_of(const ViewOptions& options, const Pola
 }
 
 Result<void> view_one(const ViewOptions& options) {
-  const Result<AnyPing> ping = fetch_ping(options.source, options.ping);
+  const Result<HostPing> ping = fetch_ping(options.source, options.ping);
   if (!ping) return tl::unexpected(ping.error());
-  const Result<PolarImage> image = picture_of(*ping);
+  const Result<PolarImage> image = ping->picture();
   if (!image) return tl::unexpected(image.error());
   if (!options.png.empty()) {
     FanPainter painter(options.style);
@@ -56,7 +55,7 @@ Result<void> view_one(const ViewOptions& options) {
   if (!lines) return tl::unexpected(lines.error());
   for (const std::string& line : *lines) std::puts(line.c_str());
   ViewCaption caption;
-  caption.add(*ping, 0);
+  caption.add(*ping, std::nullopt, 0);
   std::puts(caption.text().c_str());
   return {};
 }
@@ -70,7 +69,7 @@ class LiveView {
   Result<void> run() {
     const LiveScreen screen(options_.terminal && terminal_facts().is_terminal);
     double heard_s = now_s();
-    bool received = !stream_.is_oculus();  // a head greeted; an ARIS has only pings
+    bool received = !stream_.host().counts();  // of which other messages are not told from junk
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
       PingStream::Item item = stream_.next(std::chrono::milliseconds(500));
       if (item.what == Wait::closed)
@@ -79,8 +78,7 @@ class LiveView {
       if (item.what == Wait::data) heard_s = now_s();
       received = received || item.what == Wait::data;
       if (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s)
-        return tl::unexpected(
-            silence(options_.source, stream_.device(), received, "nothing more", "is the daemon stopped or stuck?"));
+        return tl::unexpected(silence(options_.source, stream_, received, "nothing more", "is the daemon stopped or stuck?"));
       if (!item.ping) continue;
       const Result<bool> read = show(*item.ping, screen);
       if (!read) return tl::unexpected(read.error());
@@ -91,9 +89,9 @@ class LiveView {
 
  private:
   /// False when the output was closed.
-  Result<bool> show(const AnyPing& ping, const LiveScreen& screen) {
-    figures_.add(ping, now_s());
-    const Result<PolarImage> image = picture_of(ping);
+  Result<bool> show(const HostPing& ping, const LiveScreen& screen) {
+    figures_.add(ping, stream_.host().counts(), now_s());
+    const Result<PolarImage> image = ping.picture();
     if (!image) return tl::unexpected(image.error());
     if (!options_.png.empty())
       if (const Result<Raster> fan = write_picture(options_, painter_, *image); !fan) return tl::unexpected(fan.error());

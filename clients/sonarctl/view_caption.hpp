@@ -11,15 +11,15 @@ namespace sonar::clients {
 
 class ViewCaption {
  public:
-  void add(const AnyPing& ping, Seconds at);
+  /// `of_wire`: counts of the host after the ping, if it has any.
+  void add(const HostPing& ping, const std::optional<protocol::Host::Counts>& of_wire, Seconds at);
   std::uint64_t pings() const { return pings_; }
   /// "ping 123  10.00 m  2.1 MHz  512 beams x 437 rows  10.0 Hz  no gaps"; the rate from the second ping on.
   std::string text() const;
 
  private:
   static constexpr std::size_t remembered = 20;  // arrivals that determine the rate
-  oculus::PingSequence sequence_;
-  bool has_sequence_ = false;  // false for heads, whose numbers may skip
+  std::optional<std::uint64_t> missed_;
   std::deque<Seconds> arrivals_;
   std::uint64_t pings_ = 0;
   std::string ping_text_;

@@ -2,6 +2,7 @@
 // Made from any vendor's decoded ping; drawn by draw_fan, measured by image_statistics.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -16,6 +17,13 @@ struct PolarImage {
   double start_m = 0;               // nothing is known nearer than that
 
   float at(std::size_t row, std::size_t beam) const { return samples[row * beams + beam]; }
+  /// The code that so many samples of a thousand do not exceed, at least 1.
+  float brightest(std::size_t per_mille) const {
+    std::vector<float> codes = samples;
+    const auto place = codes.begin() + static_cast<std::ptrdiff_t>((codes.size() - 1) * per_mille / 1000);
+    std::nth_element(codes.begin(), place, codes.end());
+    return std::max(1.0f, *place);
+  }
   double range_m() const { return start_m + static_cast<double>(rows) * row_spacing_m; }
 };
 

@@ -1,7 +1,6 @@
 #include "protocol/aris/options.hpp"
 
 #include <array>
-#include <charconv>
 
 namespace sonar::aris {
 
@@ -21,21 +20,6 @@ std::span<const protocol::Option> options() {
       {option_name::datagram_bytes, {}, "1400", "longest datagram: above 1472 they are fragmented on Ethernet", 1400, 65000},
   }};
   return all;
-}
-
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name) {
-  const auto found = values.find(std::string(name));
-  if (found != values.end()) return found->second;
-  for (const protocol::Option& option : options())
-    if (option.name == name) return option.default_value;
-  return {};
-}
-
-double number_option(const protocol::OptionValues& values, std::string_view name) {
-  const std::string_view text = text_option(values, name);
-  double value = 0;
-  std::from_chars(text.data(), text.data() + text.size(), value);
-  return value;
 }
 
 }  // namespace sonar::aris

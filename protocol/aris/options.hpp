@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "protocol/vendor.hpp"
+#include "protocol/option_values.hpp"
 
 namespace sonar::aris {
 
@@ -14,8 +14,7 @@ inline constexpr std::string_view cycle = "cycle", reordered = "reordered", rece
 }
 
 std::span<const protocol::Option> options();
-/// The configured value, or the default.
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
-double number_option(const protocol::OptionValues& values, std::string_view name);
+using protocol::number_option;
+using protocol::text_option;
 
 }  // namespace sonar::aris

@@ -17,4 +17,17 @@ wire::Bytes deflated(wire::BytesView plain) {
   return result;
 }
 
+wire::Bytes inflated(wire::BytesView packed, std::size_t size) {
+  constexpr std::size_t best = 1032;  // zlib's own bound: no stream grows by more than this
+  if (size > best * packed.size() + 64 || size == 0) return {};
+  std::vector<Bytef> in(packed.size()), out(size);
+  if (!packed.empty()) std::memcpy(in.data(), packed.data(), packed.size());
+  auto made = static_cast<uLongf>(size);
+  auto used = static_cast<uLong>(packed.size());
+  if (uncompress2(out.data(), &made, in.data(), &used) != Z_OK || made != size || used != packed.size()) return {};
+  wire::Bytes result(size);
+  std::memcpy(result.data(), out.data(), size);
+  return result;
+}
+
 }  // namespace sonar::blueview

@@ -19,9 +19,4 @@ std::span<const protocol::Option> options() {
   return all;
 }
 
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name) {
-  const auto it = values.find(std::string(name));
-  return it == values.end() ? std::string_view{} : std::string_view(it->second);
-}
-
 }  // namespace sonar::blueview

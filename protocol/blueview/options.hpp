@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "protocol/vendor.hpp"
+#include "protocol/option_values.hpp"
 
 namespace sonar::blueview {
 
@@ -13,6 +13,6 @@ inline constexpr std::string_view heads_base = "heads_base", strict_range = "str
 }
 
 std::span<const protocol::Option> options();
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
+using protocol::text_option;
 
 }  // namespace sonar::blueview

@@ -7,6 +7,7 @@
 
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
+#include "protocol/host.hpp"
 
 namespace sonar::doctor {
 namespace {
@@ -37,12 +38,15 @@ std::string addresses_of(const v1::SonarStatus& sonar) {
   return all;
 }
 
-/// "127.0.0.2, TCP port 52100".
+/// "127.0.0.2, TCP port 52100"; of a sonar without streams its address.
 std::string where_to_connect(const v1::SonarStatus& sonar) {
   const std::size_t colon = sonar.listens().rfind(':');
   if (colon == std::string::npos) return sonar.advertised();
   const std::string host = sonar.listens().substr(0, colon);
-  return (host == "0.0.0.0" ? sonar.advertised() : host) + ", TCP port " + sonar.listens().substr(colon + 1);
+  const protocol::Make& make = protocol::make_of_profile(sonar.profile());
+  const bool by_udp = make.ports.front().kind == protocol::HostPort::Kind::udp;
+  return (host == "0.0.0.0" ? sonar.advertised() : host) + (by_udp ? ", UDP port " : ", TCP port ") +
+         sonar.listens().substr(colon + 1);
 }
 
 const v1::SonarStatus* find(const v1::DaemonStatus* in, const std::string& name) {
@@ -85,6 +89,7 @@ class SonarJudge {
              std::vector<Finding>& findings)
       : status_(status),
         sonar_(sonar),
+        make_(protocol::make_of_profile(sonar.profile())),
         before_(find(before, sonar.name())),
         past_s_(before == nullptr ? 0 : status.uptime_s() - before->uptime_s()),
         findings_(findings) {}
@@ -126,9 +131,9 @@ class SonarJudge {
     std::string last;
     if (!gone.address().empty())
       last = "; the last one, " + gone.address() + ", left at " + utc_text(gone.utc_ns()) + ": " + gone.why();
-    const std::string cure = sonar_.profile().starts_with("waterlinked-")
-                                 ? "post true to /acoustics/enabled and a mode to /udp of " + sonar_.advertised()
-                                 : "point a driver at " + where_to_connect(sonar_);
+    const bool by_http = make_.ports.front().kind == protocol::HostPort::Kind::http;  // no driver stays connected
+    const std::string cure =
+        by_http ? std::string(make_.remedy) + ", of " + sonar_.advertised() : "point a driver at " + where_to_connect(sonar_);
     add(Level::warn, "driver",
         "No driver is connected to " + sonar_.name() +
             (sonar_.preview() ? "; pings are a preview for viewers alone" : "; nothing is simulated without one") + last,
@@ -168,17 +173,13 @@ class SonarJudge {
   }
 
   void check_what_it_sent(const v1::ClientStatus& client) {
-    const bool blueview = sonar_.profile().starts_with("blueview-"), aris = sonar_.profile().starts_with("aris-");
-    const std::string wanted = blueview ? "request for a ping" : aris ? "command" : "fire message";
     std::string sent = "it has sent nothing";
     if (client.bytes_read() > 0)
-      sent = "it has sent " + counted(client.bytes_read(), "byte") + ", no valid " + wanted + " among them";
+      sent = "it has sent " + counted(client.bytes_read(), "byte") + ", no valid " + std::string(make_.request) + " among them";
     if (!client.complaint().empty()) sent += " (" + client.complaint() + ")";
-    const std::string cure = blueview ? "send a request for a ping, or a subscription"
-                             : aris   ? "send SET_FRAMESTREAM_RECEIVER and SET_ACOUSTICS"
-                                      : "send a fire message (type 0x15)";
     add(sonar_.pinging() ? Level::warn : Level::fail, "driver",
-        client.address() + " is connected to " + sonar_.name() + " and has not fired: " + sent, cure, client.address());
+        client.address() + " is connected to " + sonar_.name() + " and has not asked for pings: " + sent,
+        std::string(make_.remedy), client.address());
   }
 
   void check_reading(const v1::ClientStatus& client) {
@@ -236,6 +237,7 @@ class SonarJudge {
 
   const v1::DaemonStatus& status_;
   const v1::SonarStatus& sonar_;
+  const protocol::Make& make_;
   const v1::SonarStatus* before_;
   double past_s_;
   std::vector<Finding>& findings_;

@@ -1,8 +1,6 @@
 #include "protocol/oculus/options.hpp"
 
 #include <array>
-#include <charconv>
-#include <cmath>
 
 namespace sonar::oculus {
 namespace {
@@ -76,37 +74,9 @@ const std::array<protocol::Option, 22> option_rows{{
      "which pattern the elevation width belongs to: transmit times receive, or one of them"},
 }};
 
-std::string_view default_of(std::string_view name) {
-  for (const protocol::Option& option : option_rows)
-    if (option.name == name) return option.default_value;
-  return {};
-}
-
-bool parse_number(std::string_view text, double& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc{} && end == text.data() + text.size() && std::isfinite(value) && value > 0;
-}
-
 }  // namespace
 
 std::span<const protocol::Option> options() { return option_rows; }
-
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name) {
-  const auto found = values.find(std::string(name));
-  return found == values.end() ? default_of(name) : std::string_view(found->second);
-}
-
-double number_option(const protocol::OptionValues& values, std::string_view name) {
-  double value = 0;
-  if (parse_number(text_option(values, name), value)) return value;
-  parse_number(default_of(name), value);
-  return value;
-}
-
-std::optional<double> given_number(const protocol::OptionValues& values, std::string_view name) {
-  double value = 0;
-  return parse_number(text_option(values, name), value) ? std::optional(value) : std::nullopt;
-}
 
 std::string options_table() {
   std::string text;

@@ -2,12 +2,11 @@
 // The first allowed value of each is the default; read through the accessors here by dialogue, frame and beacon.
 #pragma once
 
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
-#include "protocol/vendor.hpp"
+#include "protocol/option_values.hpp"
 
 namespace sonar::oculus {
 
@@ -25,13 +24,9 @@ inline constexpr std::string_view before_first_fire = "before_first_fire", gain_
 }
 
 std::span<const protocol::Option> options();
-
-/// The configured value, or the default when the map lacks it.
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
-/// For free numbers; the default when the text is not a finite number above 0.
-double number_option(const protocol::OptionValues& values, std::string_view name);
-/// For numbers that replace the product's value: nullopt keeps that value.
-std::optional<double> given_number(const protocol::OptionValues& values, std::string_view name);
+using protocol::given_number;
+using protocol::number_option;
+using protocol::text_option;
 
 /// Rows of the table in docs/protocols/oculus.md, section 7: name, values, default, meaning.
 std::string options_table();

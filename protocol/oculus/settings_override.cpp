@@ -14,18 +14,18 @@ constexpr std::array<PingRate, 5> rates{PingRate::hz2, PingRate::hz5, PingRate::
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
+void set(FireSettings& fire, std::uint8_t bit, bool on) {
+  fire.flags = static_cast<std::uint8_t>(on ? fire.flags | bit : fire.flags & ~bit);
+}
+
+}  // namespace
+
 PingRate nearest_rate(double rate_hz) {
   PingRate nearest = rates.front();
   for (const PingRate rate : rates)
     if (std::abs(table_rate_hz(rate) - rate_hz) < std::abs(table_rate_hz(nearest) - rate_hz)) nearest = rate;
   return nearest;
 }
-
-void set(FireSettings& fire, std::uint8_t bit, bool on) {
-  fire.flags = static_cast<std::uint8_t>(on ? fire.flags | bit : fire.flags & ~bit);
-}
-
-}  // namespace
 
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   FireRequest fire = fire_of(device.settings.get());

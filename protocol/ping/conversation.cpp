@@ -1,7 +1,5 @@
 #include "protocol/ping/conversation.hpp"
 
-#include <charconv>
-
 namespace sonar::ping {
 namespace {
 
@@ -9,18 +7,6 @@ constexpr std::size_t longest_reason = 80;   // of a nack: an answer is little l
 constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hostile host can cause
 
 }  // namespace
-
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name) {
-  const auto found = values.find(std::string(name));
-  return found == values.end() ? std::string_view{} : std::string_view(found->second);
-}
-
-double number_option(const protocol::OptionValues& values, std::string_view name) {
-  const std::string_view text = text_option(values, name);
-  double value = 0;
-  std::from_chars(text.data(), text.data() + text.size(), value);
-  return value;
-}
 
 protocol::Option silence_option() {
   return {option_name::silence_s,

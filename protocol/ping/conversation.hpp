@@ -4,14 +4,14 @@
 
 #include <string_view>
 
+#include "protocol/option_values.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::ping {
 
-/// Of complete options; 0 for a word.
-double number_option(const protocol::OptionValues& values, std::string_view name);
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
+using protocol::number_option;
+using protocol::text_option;
 
 /// Options that every product has.
 namespace option_name {

@@ -18,12 +18,4 @@ std::span<const protocol::Option> options() {
   return all;
 }
 
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name) {
-  const auto found = values.find(std::string(name));
-  if (found != values.end()) return found->second;
-  for (const protocol::Option& option : options())
-    if (option.name == name) return option.default_value;
-  return {};
-}
-
 }  // namespace sonar::waterlinked

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "protocol/vendor.hpp"
+#include "protocol/option_values.hpp"
 
 namespace sonar::waterlinked {
 
@@ -14,7 +14,6 @@ inline constexpr std::string_view release = "release", rip = "rip", acoustics_at
 }
 
 std::span<const protocol::Option> options();
-/// The configured value, or the default.
-std::string_view text_option(const protocol::OptionValues& values, std::string_view name);
+using protocol::text_option;
 
 }  // namespace sonar::waterlinked

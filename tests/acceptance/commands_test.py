@@ -67,7 +67,7 @@ class Mistakes(unittest.TestCase):
         self.expect(run(SONARCTL, "veiw"), 64, 'unknown command "veiw"; did you mean "view"?')
         self.expect(run(SONARCTL, "pose"), 64, "once, circle, line")
         self.expect(run(SONARCTL, "pose", "once", "--xzy", "0,0,0"), 64, 'did you mean "--xyz"?', "sonarctl pose once --help")
-        self.expect(run(SONARCTL, "listen", "--rate", "7"), 64, "--rate")
+        self.expect(run(SONARCTL, "listen", "--rate", "often"), 64, "--rate")
         self.expect(run(SONARCTL, "view", "--png", "x.png", "--from-raw", "y", "--colour-map", "pink"), 64, "gray, copper")
         self.expect(run(SONARCTL, "listen", "127.0.0.1:port"), 64, "127.0.0.1:port", "HOST:PORT")
 
@@ -91,7 +91,8 @@ class Mistakes(unittest.TestCase):
         for line, *expected in words:
             with self.subTest(sonard=line):
                 self.expect_one_line("sonard: ", run(SONARD, *line), *expected)
-        words = [(["listen", "--rate", "7"], "--rate", '"7" is not one of: 2, 5, 10, 15, 40, standby', "sonarctl listen --help"),
+        words = [(["listen", "--rate", "often"], "--rate", '"often" is not', "standby", "sonarctl listen --help"),
+                 (["listen", "--make", "sonar"], "--make", "oculus, blueview, aris"),
                  (["listen", "--seconds", "long"], "--seconds", '"long" is not a number of 0 or more'),
                  (["listen", "--range", "5", "--range-percent", "5"], "--range excludes --range-percent"),
                  (["listen", "127.0.0.1:port"], '"127.0.0.1:port" is not an address: write HOST:PORT'),

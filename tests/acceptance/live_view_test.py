@@ -496,7 +496,7 @@ class Doctor(unittest.TestCase):
         with self.daemon_and_viewer() as (daemon, viewer):
             self.assertIn(f"point a driver at {daemon.address}, TCP port 52100", viewer.first_of("/doctor")["findings"][0]["cure"])
             with Client(daemon.address) as client:
-                finding = self.named(viewer, "driver", self.name_of(client), "has not fired", "sent nothing")
+                finding = self.named(viewer, "driver", self.name_of(client), "has not asked for pings", "sent nothing")
                 self.assertEqual((finding["sonar"], finding["client"], finding["level"]), ("front", self.name_of(client), 2))
                 client.send(b"PING\r\n")
                 self.named(viewer, "driver", "it has sent 6 bytes, no valid fire message among them")

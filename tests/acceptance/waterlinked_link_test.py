@@ -199,7 +199,7 @@ class Images(unittest.TestCase):
             self.assertEqual(json.loads(self.ask(daemon, "/acoustics/range")[1])["max"], 12)
             self.assertEqual(json.loads(self.ask(daemon, "/acoustics/mode")[1]), "high-frequency")
             picture = pathlib.Path(folder) / "fan.png"
-            drawn = daemon.ctl("view", "--png", picture, "--3d15")
+            drawn = daemon.ctl("view", "--png", picture, "--make", "waterlinked")
             self.assertEqual(drawn.returncode, 0, drawn.stderr)
             self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
             refused = daemon.ctl("listen", "--range", 16)

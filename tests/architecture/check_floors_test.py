@@ -121,7 +121,7 @@ class Innocent(unittest.TestCase):
             "core/text/strict_yaml.cpp": "#include <yaml-cpp/parser.h>\n",
             "protocol/control/control.cpp": '#include "control.pb.h"\n',
             "protocol/oculus/a.cpp": "// reinterpret_cast is not for us\nchar t[9]; int n = std::snprintf(t, 9, \"%d\", 1);\n",
-            "protocol/vendors.cpp": '#include "protocol/oculus/oculus.hpp"\n',
+            "protocol/makes.cpp": '#include "protocol/oculus/oculus.hpp"\n',
             "daemon/server/system/asio.hpp": "#pragma once\n#include <utility>\n#include <boost/asio.hpp>\n",
             "daemon/commands/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
             "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/oculus/decode.hpp"\n',

@@ -13,7 +13,7 @@
 #include <string>
 #include <thread>
 
-#include "clients/sonarctl/blueview_stream.hpp"
+#include "clients/sonarctl/ping_stream.hpp"
 #include "daemon/server/app.hpp"
 #include "daemon/server/engine/choose_engine.hpp"
 #include "daemon/server/system/real_time.hpp"
@@ -329,18 +329,15 @@ Result<json> find_cost_of_clients(const ScenePointer& scene, int clients, double
 }
 
 Result<json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double seconds, const BenchOptions& options) {
-  using clients::BlueViewStream;
   constexpr std::chrono::seconds patience(patience_s);
   auto service = Service::start(scene, options, sonars_of("blueview-p900-90", sonars), true);
   if (!service) return tl::make_unexpected(service.error());
-  std::vector<BlueViewStream> streams;
+  std::vector<clients::PingStream> streams;
   for (int i = 0; i < sonars; ++i) {
-    auto socket = clients::connect_tcp({own_address(i), blueview::tcp_port}, patience);
-    if (!socket) return tl::make_unexpected(socket.error());
     // A head's own interval is 1 s; sound alone sets the limit then.
-    clients::HeadRequest fast;
-    fast.rate_hz = 1000;
-    auto stream = BlueViewStream::open(*std::move(socket), fast, patience);
+    clients::Wanted fast;
+    fast.settings.rate_hz = 1000;
+    auto stream = clients::PingStream::open({own_address(i), 0}, clients::find_make("blueview"), fast, patience);
     if (!stream) return tl::make_unexpected(stream.error());
     streams.push_back(*std::move(stream));
   }

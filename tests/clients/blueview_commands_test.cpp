@@ -13,8 +13,8 @@
 #include <thread>
 
 #include "clients/bvtsdk/core/description.hpp"
+#include "clients/bvtsdk/core/polar_ping.hpp"
 #include "clients/sonarctl/commands.hpp"
-#include "clients/sonarctl/picture.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "protocol/blueview/frames.hpp"
 
@@ -84,6 +84,7 @@ class FakeHead {
   }
   std::atomic<int> pings{0}, settings{0};
   std::atomic<float> stop_m{0}, gain_db{0};
+  std::atomic<bool> closes_at_settings{false};
 
  private:
   void serve() {
@@ -100,7 +101,10 @@ class FakeHead {
       const Read read = read_some(host, received, std::chrono::seconds(10));
       if (read.what != Wait::data) return;
       framer.append(std::span<const std::byte>(received).first(read.size));
-      while (const auto frame = framer.next()) answer(host, *frame);
+      while (const auto frame = framer.next()) {
+        if (closes_at_settings && frame->header.type == FrameType::set) return;
+        answer(host, *frame);
+      }
     }
   }
   void answer(const Socket& host, const blueview::Frame& frame) {
@@ -137,8 +141,7 @@ class FakeHead {
 
 SourceOptions anything_there() {
   SourceOptions source;
-  source.device = {address, 52100};
-  source.kind = SonarKind::either;
+  source.device = {address, 0};
   source.silence_limit_s = 10;
   return source;
 }
@@ -156,7 +159,6 @@ TEST(BlueViewCommands, ListenFindsTheHeadAndAsksForEachPing) {
   FakeHead head;
   ListenOptions options;
   options.source = anything_there();
-  options.source.asked = oculus::FireRequest{};  // what an Oculus there would have been sent
   options.pings = 5;
   const std::string text = captured([&] { return listen(options); });
   EXPECT_THAT(text, HasSubstr("connected to " + address + ":14750, BlueView P900-90, serial 7001"));
@@ -172,7 +174,7 @@ TEST(BlueViewCommands, SamplesAreDrawnWhereTheyAre) {
   FakeHead head;
   const auto ping = fetch_ping(anything_there(), 0);
   ASSERT_TRUE(ping) << ping.error().text;
-  const auto image = picture_of(*ping);
+  const auto image = ping->picture();
   ASSERT_TRUE(image) << image.error().text;
   EXPECT_EQ(image->rows, 20u);
   EXPECT_EQ(image->beams, 8u);
@@ -205,21 +207,21 @@ TEST(BlueViewCommands, StatsMeasureTheSamplesAsSent) {
 TEST(BlueViewCommands, WhatIsWishedIsSet) {
   FakeHead head;
   SourceOptions source = anything_there();
-  source.head.range_m = 20;
-  source.head.gain_percent = 75;
+  source.wanted.settings.range_m = 20;
+  source.wanted.settings.gain_percent = 75;
   ASSERT_TRUE(fetch_ping(source, 0));
   EXPECT_EQ(head.stop_m, 20);
   EXPECT_EQ(head.gain_db, 24);
-  source.head.range_m = 101;
+  source.wanted.settings.range_m = 101;
   EXPECT_THAT(fetch_ping(source, 0).error().text, HasSubstr("BlueView P900-90 has a range of 2 to 100 m"));
-  source.head = {};
-  source.head.head = 1;
+  source.wanted = {};
+  source.wanted.settings.mode = 1;
   EXPECT_THAT(fetch_ping(source, 0).error().text, HasSubstr("has 1 head(s), no mode 2"));
-  source.head = {};
-  source.head.oculus_only = {"--beams"};
+  source.wanted = {};
+  source.wanted.settings.beams = 256;
   const Error refused = fetch_ping(source, 0).error();
   EXPECT_EQ(refused.kind, ErrorKind::usage);
-  EXPECT_THAT(refused.text, HasSubstr("--beams applies to Oculus sonars; this is a BlueView P900-90"));
+  EXPECT_THAT(refused.text, HasSubstr("--beams does not apply to a BlueView sonar, which has --range, --rate, --gain, --mode"));
 }
 
 TEST(BlueViewCommands, WhatIsNoHeadIsSaidToBeNone) {
@@ -235,6 +237,15 @@ TEST(BlueViewCommands, WhatIsNoHeadIsSaidToBeNone) {
     EXPECT_EQ(closed.kind, ErrorKind::io);
     EXPECT_THAT(closed.text, HasSubstr("all its client slots are taken (clients.max)"));
   }
+  {
+    FakeHead stops;
+    stops.closes_at_settings = true;
+    SourceOptions with_range = source;
+    with_range.wanted.settings.range_m = 20;
+    const Error closed = fetch_ping(with_range, 0).error();
+    EXPECT_EQ(closed.kind, ErrorKind::io);
+    EXPECT_THAT(closed.text, HasSubstr("closed the connection before it took the settings: the daemon stopped, or closed it"));
+  }
   const Socket listener = listening(blueview::tcp_port);
   std::thread other([&listener] {
     const Socket client(::accept4(listener.fd(), nullptr, nullptr, SOCK_CLOEXEC));
@@ -247,17 +258,6 @@ TEST(BlueViewCommands, WhatIsNoHeadIsSaidToBeNone) {
   other.join();
   EXPECT_EQ(other_service.kind, ErrorKind::bad_data);
   EXPECT_THAT(other_service.text, HasSubstr("tcp " + address + ":14750 is not a BVE1 link"));
-}
-
-TEST(BlueViewCommands, RawBytesAreOfOculusSonarsOnly) {
-  FakeHead head;
-  ListenOptions options;
-  options.source = anything_there();
-  options.record = std::filesystem::path(testing::TempDir()) / "blueview_commands.raw";
-  const Result<void> done = listen(options);
-  EXPECT_EQ(done.error().kind, ErrorKind::usage);
-  EXPECT_THAT(done.error().text, HasSubstr("only Oculus sonars are recorded"));
-  EXPECT_FALSE(std::filesystem::exists(options.record));
 }
 
 }  // namespace

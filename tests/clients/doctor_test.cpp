@@ -4,6 +4,7 @@
 
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "clients/sonarctl/doctor/proc_net.hpp"
+#include "clients/sonarctl/ping_stream.hpp"
 #include "tests/protocol/control/message_from.hpp"
 
 namespace sonar::clients::doctor {
@@ -111,7 +112,7 @@ TEST(Doctor, WarnsOfPortsThatOthersMayTake) {
                         "connection may take one first; reserve: sysctl "
                         "net.ipv4.ip_local_reserved_ports=52100,52102\n8 checks, 0 errors, 1 warning\n"));
   facts.kernel_ports.reserved = "8080,52101-52110";
-  expect(line(facts, "ports"), Level::warn, "ports 52100 lie", "ip_local_reserved_ports=8080,52101-52110,52100,52102");
+  expect(line(facts, "ports"), Level::warn, "ports 52100 lie", "ip_local_reserved_ports=8080,52101-52110,52100");
   facts.kernel_ports = {true, 10000, 50000, ""};
   expect(line(facts, "ports"), Level::ok, "outside the ephemeral range 10000-50000", "");
   facts.kernel_ports.known = false;
@@ -193,7 +194,8 @@ TEST(Doctor, NamesWhoElseHasThePort) {
   expect(line(facts, "ping"), Level::fail, "no ping came within 4.0 s: nginx (pid 99) has the port, not sonard", "stop it");
   sonar.stream.junk_bytes = 300;
   expect(line(facts, "ping"), Level::fail,
-         "sends 300 bytes that are not Oculus messages: nginx (pid 99) listens on 0.0.0.0:52100", "another program has the port");
+         "sends 300 bytes that are no messages of an Oculus: nginx (pid 99) listens on 0.0.0.0:52100",
+         "another program has the port");
 }
 
 TEST(Doctor, KnowsWhyNoPingComes) {
@@ -356,7 +358,7 @@ Facts healthy_head() {
   Facts facts = healthy();
   facts.status.received.clear();  // heads send no status
   SonarFacts& sonar = facts.sonars[0];
-  sonar.at.port = 14750, sonar.blueview = true;
+  sonar.at.port = 14750, sonar.make = make_at(14750);
   sonar.stream.rows = 315, sonar.stream.bits = 16, sonar.stream.asked_hz = 0;
   v1::SonarStatus& head = *daemon_in(facts).mutable_sonars(0);
   head.set_profile("blueview-p900-90");
@@ -364,7 +366,7 @@ Facts healthy_head() {
   head.set_rate_hz(15);
   report(facts);
   facts.heads = {{"127.0.0.2:14750", "BlueView P900-90", "7001"}};
-  facts.kernel_ports.reserved = "";
+  facts.kernel_ports = {};
   return facts;
 }
 
@@ -397,6 +399,40 @@ TEST(Doctor, SaysWhatIsWrongWithAHead) {
   expect(line(facts, "ping"), Level::warn, "all its client slots are taken", "clients.max");
   s.outcome = Outcome::refused;
   expect(line(facts, "ping"), Level::fail, "refuses the connection", "sonard --demo blueview");
+}
+
+TEST(Doctor, ChecksThePortsOfTheSonarsThatAreThere) {
+  Facts facts = healthy();
+  facts.sonars[0].at.port = 62312, facts.sonars[0].make = make_at(62312);
+  facts.kernel_ports = {true, 32768, 65000, ""};
+  expect(line(facts, "ports"), Level::warn, "ports 62312 lie", "ip_local_reserved_ports=62312");
+}
+
+TEST(Doctor, FailsWhileADriverGetsNoPing) {
+  Facts facts = healthy();
+  SonarFacts& sonar = facts.sonars[0];
+  sonar.stream = {};
+  sonar.clients = {"127.0.0.1:40122"};
+  v1::DaemonStatus& status = daemon_in(facts);
+  status.mutable_sonars(0)->MergeFrom(control::message_from<v1::SonarStatus>(
+      R"(profile: "surveyor-240" transmits: true
+         clients { address: "127.0.0.1:40122" connected_s: 5 bytes_read: 17 })"));
+  report(facts);
+  expect(line(facts, "driver"), Level::fail,
+         "127.0.0.1:40122 is connected to front and has not asked for pings: it has sent 17 bytes, no valid request among them",
+         "send set_ping_parameters (3023)");
+  v1::ClientStatus& client = *status.mutable_sonars(0)->mutable_clients(0);
+  client.set_requests(1);  // of standby
+  status.mutable_sonars(0)->set_rate_hz(0);
+  status.mutable_sonars(0)->set_asked_by("127.0.0.1:40122");
+  report(facts);
+  EXPECT_THAT(text_from(run_checks(facts)),
+              AllOf(HasSubstr("warn  front is in standby"),
+                    HasSubstr("fail  127.0.0.1:40122 is connected and gets no ping; ask for a rate above 0")));
+  client.set_pings_written(3);
+  status.mutable_sonars(0)->set_rate_hz(10);
+  report(facts);
+  EXPECT_FALSE(any_failed(run_checks(facts)));
 }
 
 TEST(Doctor, SpeaksJson) {

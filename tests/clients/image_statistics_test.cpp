@@ -7,7 +7,6 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "clients/sonarctl/picture.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
 #include "core/base/random.hpp"
 
@@ -78,7 +77,7 @@ TEST(Capture, HasItsPublishedFigures) {
   const auto pings = read_recording(file);
   ASSERT_TRUE(pings) << pings.error().text;
   ASSERT_EQ(pings->size(), 3u);
-  const PolarImage image = *picture_of(pings->front());
+  const PolarImage image = *pings->front().picture();
   const Window w = *parse_window("400:650", image);
   EXPECT_NEAR(correlation(image, w, 0, 1), 0.80, 0.005);
   EXPECT_NEAR(correlation(image, w, 0, 2), 0.61, 0.005);

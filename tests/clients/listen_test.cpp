@@ -85,20 +85,18 @@ class FakeDevice {
   std::thread thread_;
 };
 
-oculus::FireRequest asked() {
-  oculus::FireRequest fire;
-  fire.settings.mode = 2;
-  fire.settings.flags = oculus::flag::range_in_metres | oculus::flag::simple_result | oculus::flag::gain_assist;
-  fire.settings.range = 2;
-  fire.settings.gain_percent = 50;
-  fire.settings.sound_speed_mps = 1500;
-  return fire;
+protocol::Wanted wanted() {
+  protocol::Wanted all;
+  all.settings.range_m = 2;
+  all.more = {{"gain-assist", "on"}, {"speed-of-sound", "1500"}};
+  return all;
 }
 
 ListenOptions quiet(const Endpoint& device, std::uint64_t pings) {
   ListenOptions options;
   options.source.device = device;
-  options.source.asked = asked();
+  options.source.make = find_make("oculus");
+  options.source.wanted = wanted();
   options.pings = pings;
   options.seconds = 20;
   options.quiet = true;
@@ -154,6 +152,7 @@ TEST(Listen, RefusesBrokenSizesJunkAndWrongEchoes) {
 /// `--seconds` and the time of the first ping do not include the wait for a device that starts late.
 TEST(Listen, CountsTimeFromTheConnection) {
   SourceOptions source;
+  source.make = find_make("oculus");
   source.device.host = "127.0.0.2";
   const Socket device = bound(SOCK_STREAM, source.device.port);
   source.connect_patience_s = 20;
@@ -174,8 +173,8 @@ TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
   options.source.silence_limit_s = 0.3;
   const Result<void> nothing = listen(options);
   EXPECT_EQ(nothing.error().kind, ErrorKind::unavailable);
-  EXPECT_THAT(nothing.error().text, HasSubstr("no Oculus message arrived from tcp " + text_from(silent.endpoint()) +
-                                              " within 0.3 s: is it an Oculus sonar?"));
+  EXPECT_THAT(nothing.error().text, HasSubstr("no message of an Oculus arrived from tcp " + text_from(silent.endpoint()) +
+                                              " within 0.3 s: is it another sonar?"));
 
   std::uint16_t free_port = 0;
   { const Socket briefly = bound(SOCK_STREAM, free_port); }
@@ -197,8 +196,9 @@ TEST(Listen, SaysWhenTheDeviceFallsSilent) {
 
 TEST(View, TellsAnotherServiceFromASonarInStandby) {
   ViewOptions options;
+  options.source.make = find_make("oculus");
   options.terminal = true;
-  options.source.asked = asked();
+  options.source.wanted = wanted();
   options.source.silence_limit_s = 0.3;
   for (const bool live : {false, true}) {
     SCOPED_TRACE(live);
@@ -207,7 +207,7 @@ TEST(View, TellsAnotherServiceFromASonarInStandby) {
     options.live = live;
     const Result<void> done = view(options);
     EXPECT_EQ(done.error().kind, ErrorKind::unavailable);
-    EXPECT_THAT(done.error().text, HasSubstr("is it an Oculus sonar?"));
+    EXPECT_THAT(done.error().text, HasSubstr("is it another sonar?"));
   }
   FakeDevice standby(1, [](std::uint32_t, const oculus::FireSettings&) { return oculus::make_dummy(7001); });
   options.source.device = standby.endpoint();

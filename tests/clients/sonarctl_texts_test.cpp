@@ -36,27 +36,27 @@ TEST(Terminal, ShowsWhatItCan) {
       << "the first that is set counts";
 }
 
-oculus::DecodedPing ping(std::uint32_t id) {
-  oculus::DecodedPing decoded;
-  decoded.head.fixed.ping_id = id;
-  decoded.head.fixed.row_count = 400;
-  decoded.head.fixed.beam_count = 512;
-  decoded.head.fixed.range_resolution_m = 0.025;
-  decoded.head.fixed.frequency_hz = 2.1e6;
-  return decoded;
+protocol::HostPing ping(std::uint32_t id) {
+  protocol::HostPing ping;
+  ping.facts = {id, 512, 400, 8, 0.025, 10, 2.1e6, 1000};
+  return ping;
 }
 
 TEST(ViewCaption, TellRateAndGaps) {
+  const auto missing = [](std::uint64_t pings) { return protocol::Host::Counts{0, 0, 0, pings}; };
   ViewCaption figures;
-  figures.add(ping(7), 100.0);
+  figures.add(ping(7), missing(0), 100.0);
   EXPECT_EQ(figures.text(), "ping 7  10.00 m  2.1 MHz  512 beams x 400 rows");
-  figures.add(ping(8), 100.1);
+  figures.add(ping(8), missing(0), 100.1);
   EXPECT_EQ(figures.text(), "ping 8  10.00 m  2.1 MHz  512 beams x 400 rows  10.0 Hz  no gaps");
-  figures.add(ping(11), 100.2);
+  figures.add(ping(11), missing(2), 100.2);
   EXPECT_THAT(figures.text(), HasSubstr("10.0 Hz  2 missed"));
-  for (std::uint32_t i = 0; i < 50; ++i) figures.add(ping(12 + i), 101.0 + 0.5 * i);
+  for (std::uint32_t i = 0; i < 50; ++i) figures.add(ping(12 + i), missing(2), 101.0 + 0.5 * i);
   EXPECT_THAT(figures.text(), HasSubstr("  2.0 Hz")) << "of late, not of all time";
   EXPECT_EQ(figures.pings(), 53u);
+  ViewCaption unnumbered;
+  for (std::uint32_t i = 0; i < 2; ++i) unnumbered.add(ping(i), std::nullopt, i);
+  EXPECT_THAT(unnumbered.text(), testing::EndsWith("1.0 Hz"));
 }
 
 TEST(StatusText, NamesEverything) {

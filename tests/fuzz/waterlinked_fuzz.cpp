@@ -17,6 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   protocol::DeviceState device;
   device.id = 7001;
   device.model = vendor.models().front();
+  device.options = *protocol::check_options(vendor, {});
   device.settings = vendor.initial_settings(device).vendor_settings;
   const std::string text(data, data + size);
   const std::size_t end = std::min(text.find('\n'), text.size());

@@ -1,10 +1,9 @@
 #include <algorithm>
 
-#include "clients/sonarctl/brping_stream.hpp"
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/doctor/check_status.hpp"
+#include "protocol/doctor/judge.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -41,7 +40,10 @@ const ReceivedStatus* status_from(const Facts& facts, const std::string& host) {
 class SonarChecks {
  public:
   SonarChecks(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings)
-      : facts_(facts), sonar_(sonar), findings_(findings), at_((is_ping360() ? "udp " : "tcp ") + text_from(sonar.at)) {
+      : facts_(facts),
+        sonar_(sonar),
+        findings_(findings),
+        at_((sonar.make->ports.front().kind == protocol::HostPort::Kind::udp ? "udp " : "tcp ") + text_from(sonar.at)) {
     if (facts.sonars.size() > 1) prefix_ = (sonar.name.empty() ? sonar.at.host : sonar.name) + ": ";
   }
 
@@ -50,11 +52,11 @@ class SonarChecks {
     if (sonar_.out_of_time)
       return add(Level::warn, "ping", sonar_.at.host + " was not examined: the time limit was reached",
                  "raise it with --within SECONDS, or give the address of this sonar alone");
-    if (sonar_.by_http) return check_images();
-    if (!sonar_.blueview && !sonar_.aris && !sonar_.brping) check_status();
+    if (is_by_http(sonar_)) return check_images();
+    if (sends_status(sonar_, facts_.status)) check_status();
     check_connection();
     if (sonar_.stream.outcome == Outcome::pings) check_rate();
-    if (sonar_.stream.outcome == Outcome::not_tried) check_rate_of_others();
+    if (sonar_.stream.outcome == Outcome::not_tried) check_rate_of_others(), check_drivers();
   }
 
  private:
@@ -62,8 +64,6 @@ class SonarChecks {
     findings_.push_back({level, check, prefix_ + text, cure});
   }
 
-  /// Its pings come as fast as its head turns.
-  bool is_ping360() const { return sonar_.brping && sonar_.at.port == brping_ports[0]; }
   bool answers() const { return sonar_.stream.outcome >= Outcome::closed_without_a_byte || !sonar_.clients.empty(); }
 
   /// Images go by UDP, for which no client connects: only the daemon knows of them.
@@ -154,11 +154,12 @@ class SonarChecks {
     const std::string waited = " within " + format("%.1f", s.waited_s) + " s";
     if (!s.error.empty())  // not the greeting of sonard
       return add(Level::fail, "ping", s.error, "another program has the port; stop it, or give the sonar's own address");
-    if (s.junk_bytes > 0 && s.dummies == 0) {
+    if (s.junk_bytes > 0 && s.others == 0) {
       std::string who;
       for (const PortHolder& holder : sonar_.listeners) who = ": " + text_of(holder) + " listens on " + holder.at;
       return add(Level::fail, "ping",
-                 at_ + " sends " + std::to_string(s.junk_bytes) + " bytes that are not Oculus messages" + who,
+                 at_ + " sends " + std::to_string(s.junk_bytes) + " bytes that are no messages of " +
+                     std::string(sonar_.make->title) + who,
                  "another program has the port; stop it, or give the sonar's own address");
     }
     const std::string text = at_ + " accepts, but no ping came" + waited;
@@ -236,13 +237,34 @@ class SonarChecks {
 
   /// The rate that another, connected client requested.
   void check_rate_of_others() {
-    if (!sonar_.reported || is_ping360() || !sonar_.reported->pinging() || clock() != "realtime" ||
+    if (!sonar_.reported || sonar_.make->scans || !sonar_.reported->pinging() || clock() != "realtime" ||
         !too_slow_for(sonar_.reported->rate_hz()))
       return;
     add(Level::warn, "rate",
         "rate " + format("%g", sonar_.reported->rate_hz()) + " Hz requested by " + joined(sonar_.clients) + ", " +
             computing_text(computing_ms()) + ", " + std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",
         less_to_compute);
+  }
+
+  /// What keeps pings from the drivers that are connected, as the daemon sees it. One without a ping is a failure.
+  void check_drivers() {
+    if (!sonar_.reported) return;
+    constexpr double soon_s = 1;  // a driver that does right has a ping within
+    const v1::DaemonStatus& now = facts_.control.latest ? *facts_.control.latest : *facts_.control.status;
+    const v1::DaemonStatus* const before =
+        now.uptime_s() - facts_.control.status->uptime_s() >= soon_s ? facts_.control.status.get() : nullptr;
+    std::vector<Finding> found;
+    for (const Finding& finding : sonar::doctor::judge(now, before))
+      if (finding.sonar == sonar_.reported->name() && finding.level != Level::ok && finding.check != "rate")
+        found.push_back(finding);
+    const bool any_fails = std::any_of(found.begin(), found.end(), [](const Finding& f) { return f.level == Level::fail; });
+    for (const Finding& f : found) add(f.level, f.check, f.text, f.cure);
+    for (const v1::ClientStatus& client : sonar_.reported->clients())
+      if (!any_fails && client.pings_written() == 0 && client.connected_s() >= soon_s)
+        add(Level::fail, "driver",
+            client.address() + " is connected and gets no ping" +
+                (clock().empty() || clock() == "realtime" ? "" : "; clock: " + clock()),
+            found.empty() ? "sonarctl status shows its settings and the clock" : found.front().cure);
   }
 
   void check_rate() {
@@ -255,13 +277,14 @@ class SonarChecks {
                  format("%.1f", s.rate_hz) +
                      " pings per second of this computer's clock; the daemon uses another (clock: " + clock() + ")",
                  "");
-    const bool is_asked_hz = s.asked && !sonar_.blueview && !sonar_.aris && !sonar_.brping;
-    const double expected_hz = is_asked_hz ? s.asked_hz : sonar_.reported && !is_ping360() ? sonar_.reported->rate_hz() : 0;
+    const bool is_asked_hz = s.asked && s.asked_hz > 0;
+    const double expected_hz = is_asked_hz ? s.asked_hz : sonar_.reported && !sonar_.make->scans ? sonar_.reported->rate_hz() : 0;
     std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
-    if (expected_hz > 0) text += (sonar_.blueview ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
+    if (expected_hz > 0) text += (sonar_.make->each_ping_requested ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
     text += latency_text();
     const bool slow = expected_hz > 0 && s.rate_hz < 0.85 * expected_hz;
-    if (too_slow_for(slow || sonar_.blueview ? expected_hz : fastest_hz)) text += ", " + computing_text(computing_ms());
+    if (too_slow_for(slow || sonar_.make->each_ping_requested ? expected_hz : fastest_hz))
+      text += ", " + computing_text(computing_ms());
     if (slow) return add(Level::warn, "rate", text + ": the simulation is slower than the rate", less_to_compute);
     if (s.missing > 0)
       return add(Level::warn, "rate", text + ", " + std::to_string(s.missing) + " pings missing",

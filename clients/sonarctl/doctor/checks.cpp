@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "core/text/format.hpp"
 
@@ -53,29 +54,39 @@ std::vector<Finding> run_checks(const Facts& facts) {
   for (const SonarFacts& sonar : facts.sonars) check_sonar(facts, sonar, findings);
   check_identities(facts.status, findings);
   check_daemon(facts, findings);
-  const bool heads_only = std::all_of(facts.sonars.begin(), facts.sonars.end(), [](const SonarFacts& s) { return s.blueview; });
-  if (!heads_only || facts.sonars.empty()) check_ports(facts.kernel_ports, findings);  // theirs are below that range
+  check_ports(facts, findings);
   return findings;
 }
 
-void check_ports(const KernelPorts& ports, std::vector<Finding>& findings) {
+/// Of the sonars that were examined, whatever their makes.
+void check_ports(const Facts& facts, std::vector<Finding>& findings) {
+  const KernelPorts& ports = facts.kernel_ports;
   if (!ports.known) return;
-  const std::string range = std::to_string(ports.low) + "-" + std::to_string(ports.high);
-  std::string exposed;
-  for (const int port : {52100, 52102})
-    if (port >= ports.low && port <= ports.high && !reserves(ports.reserved, port))
-      exposed.append(exposed.empty() ? "" : ",").append(std::to_string(port));
-  if (exposed.empty()) {
-    const bool outside = ports.high < 52100 || ports.low > 52102;
-    findings.push_back({Level::ok, "ports",
-                        "ports 52100,52102 are " + (outside ? "outside the ephemeral range " + range : std::string("reserved")),
-                        ""});
-    return;
+  std::set<int> used;
+  for (const SonarFacts& sonar : facts.sonars) {
+    used.insert(sonar.at.port);
+    for (const protocol::Port& port : sonar.make->device->ports())
+      if (port.number != 0) used.insert(port.number);
   }
-  const std::string all = ports.reserved.empty() ? "52100,52102" : ports.reserved + ",52100,52102";
+  const std::string range = std::to_string(ports.low) + "-" + std::to_string(ports.high);
+  std::string all, exposed;
+  bool inside = false;
+  for (const int port : used) {
+    all.append(all.empty() ? "" : ",").append(std::to_string(port));
+    if (port < ports.low || port > ports.high) continue;
+    inside = true;
+    if (!reserves(ports.reserved, port)) exposed.append(exposed.empty() ? "" : ",").append(std::to_string(port));
+  }
+  if (used.empty()) return;
+  if (exposed.empty())
+    return findings.push_back({Level::ok, "ports",
+                               (used.size() == 1 ? "port " + all + " is " : "ports " + all + " are ") +
+                                   (inside ? std::string("reserved") : "outside the ephemeral range " + range),
+                               ""});
+  const std::string reserved = ports.reserved.empty() ? exposed : ports.reserved + "," + exposed;
   findings.push_back({Level::warn, "ports",
                       "ports " + exposed + " lie in the ephemeral range " + range + ": an outgoing connection may take one first",
-                      "reserve: sysctl net.ipv4.ip_local_reserved_ports=" + all});
+                      "reserve: sysctl net.ipv4.ip_local_reserved_ports=" + reserved});
 }
 
 std::string text_from(const std::vector<Finding>& findings) {

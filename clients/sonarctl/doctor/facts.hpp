@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clients/sonarctl/net.hpp"
+#include "protocol/host.hpp"
 
 namespace sonar::v1 {  // of control.pb.h
 class DaemonStatus;
@@ -41,9 +42,9 @@ struct StatusFacts {
 
 struct StreamFacts {
   enum class Outcome { not_tried, refused, unreachable, closed_without_a_byte, no_ping, pings } outcome = Outcome::not_tried;
-  std::string error;   // of the connection, or of the greeting
-  bool asked = false;  // settings were sent, since no other client was connected
-  std::uint64_t junk_bytes = 0, dummies = 0;
+  std::string error;                         // of the connection, or of the greeting
+  bool asked = false;                        // settings were sent, since no other client was connected
+  std::uint64_t junk_bytes = 0, others = 0;  // others: messages that are no pings
   double first_ping_ms = 0, waited_s = 0;
   unsigned beams = 0, rows = 0, bits = 0;
   std::uint64_t pings = 0, missing = 0, broken = 0;
@@ -57,10 +58,7 @@ struct StreamFacts {
 };
 struct SonarFacts {
   Endpoint at;
-  bool blueview = false;   // a BlueView head, no Oculus
-  bool aris = false;       // an ARIS
-  bool brping = false;     // of the ping protocol
-  bool by_http = false;    // a Sonar 3D-15: HTTP, and images by UDP, for which no client connects
+  const protocol::Make* make = &protocol::makes().front();
   std::string name;        // from the control stream; empty = not known
   std::string unresolved;  // why its name has no address
   bool on_this_host = false;
@@ -77,6 +75,7 @@ struct ControlFacts {
   std::string error;                               // why there is no status
   bool token_required = false;                     // the reason, and none was given
   std::shared_ptr<const v1::DaemonStatus> status;  // null = there is none
+  std::shared_ptr<const v1::DaemonStatus> latest;  // after the pings; null = it was not asked again
   std::optional<double> clock_ahead_s;             // the daemon's clock against ours, other computers only
 };
 struct HttpFacts {
@@ -93,6 +92,14 @@ struct HttpFacts {
 struct BlueViewHead {
   std::string at, model, serial;
 };
+/// By HTTP, with images by UDP: no client connects for them.
+inline bool is_by_http(const SonarFacts& sonar) { return sonar.make->ports.front().kind == protocol::HostPort::Kind::http; }
+/// Drivers find it by status messages to the port that StatusFacts are of.
+inline bool sends_status(const SonarFacts& sonar, const StatusFacts& status) {
+  const protocol::Port* const beacon = sonar.make->device->port(protocol::Port::Kind::udp_beacon);
+  return beacon != nullptr && beacon->number == status.on.port;
+}
+
 /// sysctl values of the computer doctor runs on.
 struct KernelPorts {
   bool known = false;

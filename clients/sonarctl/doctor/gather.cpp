@@ -2,13 +2,11 @@
 
 #include <algorithm>
 
-#include "clients/sonarctl/brping_stream.hpp"
 #include "clients/sonarctl/doctor/probes.hpp"
 #include "clients/sonarctl/doctor/proc_net.hpp"
 #include "clients/sonarctl/doctor/watch_pings.hpp"
-#include "clients/sonarctl/waterlinked_stream.hpp"
-#include "protocol/aris/messages.hpp"
-#include "protocol/blueview/frames.hpp"
+#include "clients/sonarctl/ping_stream.hpp"
+#include "protocol/blueview/link.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/oculus/messages.hpp"
 
@@ -98,9 +96,7 @@ class Gathering {
   /// The sonard processes that listen on ports of sonars.
   void note_daemons(const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
     for (const SocketLine& socket : sockets) {
-      const bool of_sonars = socket.local_port == oculus::tcp_port || socket.local_port == blueview::tcp_port ||
-                             socket.local_port == aris::command_port || brping_device_at(socket.local_port).has_value();
-      if (socket.state != listening || !of_sonars) continue;
+      if (socket.state != listening || make_at(socket.local_port) == nullptr) continue;
       PortHolder holder = holder_of(socket, programs);
       if (holder.program == "sonard") facts_.daemons.push_back(std::move(holder));
     }
@@ -124,22 +120,10 @@ class Gathering {
   }
 
   static std::uint16_t port_of(const v1::SonarStatus& s) {
-    const std::uint16_t usual = is_blueview(s) ? blueview::tcp_port
-                                : is_aris(s)   ? aris::command_port
-                                : is_http(s)   ? waterlinked_port
-                                : brping_of(s) ? brping_ports[static_cast<std::size_t>(*brping_of(s))]
-                                               : oculus::tcp_port;
+    const std::uint16_t usual = make_of(s).ports.front().number;
     return parse_endpoint(s.listens(), {"", usual}).value_or(Endpoint{"", usual}).port;
   }
-  static bool is_blueview(const v1::SonarStatus& s) { return s.profile().starts_with("blueview-"); }
-  static bool is_aris(const v1::SonarStatus& s) { return s.profile().starts_with("aris-"); }
-  static bool is_http(const v1::SonarStatus& s) { return s.profile().starts_with("waterlinked-"); }
-  static std::optional<BrpingDevice> brping_of(const v1::SonarStatus& s) {
-    constexpr std::string_view profiles[] = {"ping360", "surveyor-", "omniscan-"};
-    for (std::size_t i = 0; i < std::size(profiles); ++i)
-      if (s.profile().starts_with(profiles[i])) return static_cast<BrpingDevice>(i);
-    return std::nullopt;
-  }
+  static const Make& make_of(const v1::SonarStatus& s) { return protocol::make_of_profile(s.profile()); }
   static bool is_at(const v1::SonarStatus& s, const std::string& host) {
     return s.advertised() == host || s.listens().starts_with(host + ":");
   }
@@ -154,21 +138,20 @@ class Gathering {
       if (head.at.starts_with(given.host + ":")) return *parse_endpoint(head.at, {});
     return {given.host, oculus::tcp_port};
   }
-  bool is_blueview(const Endpoint& at) const {
+  const Make& make_of(const Endpoint& at) const {
     if (facts_.control.status)
       for (const v1::SonarStatus& s : facts_.control.status->sonars())
-        if (is_at(s, at.host) && port_of(s) == at.port) return is_blueview(s);
-    return at.port == blueview::tcp_port || std::any_of(facts_.heads.begin(), facts_.heads.end(),
-                                                        [&at](const BlueViewHead& head) { return head.at == text_from(at); });
+        if (is_at(s, at.host) && port_of(s) == at.port) return make_of(s);
+    const bool is_head = std::any_of(facts_.heads.begin(), facts_.heads.end(),
+                                     [&at](const BlueViewHead& head) { return head.at == text_from(at); });
+    const Make* const found = make_at(is_head ? blueview::tcp_port : at.port);
+    return found != nullptr ? *found : protocol::makes().front();
   }
 
   void add_sonar(const Endpoint& at, const std::string& name) {
     SonarFacts sonar;
     sonar.at = at;
-    sonar.blueview = is_blueview(at);
-    sonar.aris = at.port == aris::command_port;
-    sonar.brping = brping_device_at(at.port).has_value();
-    sonar.by_http = at.port == waterlinked_port;
+    sonar.make = &make_of(at);
     sonar.name = name;
     facts_.sonars.push_back(std::move(sonar));
   }
@@ -192,7 +175,7 @@ class Gathering {
     for (const SocketLine& socket : sockets)
       if (socket.state == established && socket.local_port == sonar.at.port && socket.local_host == sonar.at.host)
         sonar.clients.push_back(socket.remote_host + ":" + std::to_string(socket.remote_port));
-    if (!sonar.clients.empty() || sonar.blueview || sonar.aris || sonar.brping || sonar.by_http) return;
+    if (!sonar.clients.empty() || !sends_status(sonar, status_.facts())) return;
     status_.listen(sonar.at.host, no_later_than(start_ + first_status));
     for (const ReceivedStatus& received : status_.facts().received)
       if (!received.client.empty() && (received.advertised == sonar.at.host || received.from == sonar.at.host))
@@ -217,7 +200,7 @@ class Gathering {
       return;
     }
     note_clients(sonar, sockets);
-    if (!sonar.by_http && (sonar.clients.empty() || questions_.take))
+    if (!is_by_http(sonar) && (sonar.clients.empty() || questions_.take))
       watch_pings(sonar, control_ ? &*control_ : nullptr, deadline_, facts_.control);
     update_stats(sonar);
   }
@@ -228,12 +211,12 @@ class Gathering {
     const auto status = control_->status(until(short_patience));
     if (!status) return;
     if (auto reported = reported_by(sonar, *status)) sonar.reported = std::move(reported);
+    facts_.control.latest = *status;
   }
 
   void listen_to_all() {
     for (const SonarFacts& sonar : facts_.sonars)  // the others have no such message
-      if (!sonar.blueview && !sonar.aris && !sonar.brping && !sonar.by_http)
-        status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
+      if (sends_status(sonar, status_.facts())) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
     status_.finish();
     facts_.status = status_.facts();
   }

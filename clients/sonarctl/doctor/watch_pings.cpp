@@ -16,43 +16,29 @@ using namespace std::chrono_literals;
 using Outcome = StreamFacts::Outcome;
 
 constexpr std::uint64_t enough_pings = 15;
+constexpr double usual_hz = 10;  // of a driver that wants no other rate
 constexpr auto connect_patience = 1000ms, watch_time = 1600ms;
 
 double unix_now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
-/// Common settings of drivers; version 2 carries readable stamps.
-oculus::FireRequest usual_request() {
-  oculus::FireRequest fire;
-  fire.version = 2;
-  fire.settings.mode = 2;
-  fire.settings.ping_rate = oculus::PingRate::hz10;
-  fire.settings.flags = oculus::flag::range_in_metres | oculus::flag::simple_result | oculus::flag::beams_512;
-  fire.settings.range = 10;
-  fire.settings.gain_percent = 50;
-  return fire;
-}
-
 class Watch {
  public:
   Watch(StreamFacts& facts, Steady::time_point deadline) : facts_(facts), deadline_(deadline) {}
 
   void run(PingStream stream) {
-    std::uint64_t others = 0;
     bool ended = false;
     while (!ended && !over() && interrupted == 0) {
       const PingStream::Item item = stream.next(std::min<std::chrono::milliseconds>(50ms, left_until(deadline_)));
       ended = item.what == Wait::closed;
       if (item.what != Wait::data) continue;
-      if (item.ping)
-        add(*item.ping);
-      else
-        ++others;
+      if (item.ping) add(*item.ping);
     }
-    facts_.junk_bytes = stream.junk_bytes();
-    facts_.dummies = others;
+    const auto of_wire = stream.host().counts().value_or(protocol::Host::Counts{});
+    facts_.junk_bytes = of_wire.junk_bytes;
+    facts_.others = of_wire.messages - facts_.pings;
     facts_.waited_s = seconds_since(start_);
-    const bool nothing = facts_.pings == 0 && others == 0 && facts_.junk_bytes == 0;
+    const bool nothing = facts_.pings == 0 && facts_.others == 0 && facts_.junk_bytes == 0;
     facts_.outcome = facts_.pings > 0 ? Outcome::pings : nothing && ended ? Outcome::closed_without_a_byte : Outcome::no_ping;
-    conclude();
+    conclude(of_wire.missing_pings);
   }
 
   /// Per ping, by the events of the control stream: delay from transmission to arrival, and computing time.
@@ -80,27 +66,25 @@ class Watch {
     return facts_.pings > 0 ? seconds_since(first_) * 1s >= watch_time : Steady::now() >= give_up_;
   }
 
-  void add(const AnyPing& ping) {
+  void add(const HostPing& ping) {
     const double at_s = seconds_since(start_);
-    const PingFacts seen = facts_of(ping);
+    const PingFacts& seen = ping.facts;
     if (facts_.pings == 0) {
       first_ = Steady::now();
       facts_.first_ping_ms = 1000 * at_s;
       facts_.beams = seen.beams, facts_.rows = seen.rows, facts_.bits = seen.bits;
     }
-    const PingReport report = log_.add(ping, at_s);
+    log_.add(ping, at_s);
     ++facts_.pings;
-    if (!report.errors.empty() && ++facts_.broken == 1) facts_.first_complaint = report.errors.front();
+    if (!ping.errors.empty() && ++facts_.broken == 1) facts_.first_complaint = ping.errors.front();
     if (facts_.pings == 1) return;  // the first ping includes the initial setup: reported separately
     arrived_unix_s_[seen.number] = unix_now_s();
-    if (const auto* stamped = std::get_if<oculus::DecodedPing>(&ping); stamped && stamped->head.fixed.ping_start_time_s > 0)
-      behind_stamp_s_.push_back(at_s - stamped->head.fixed.ping_start_time_s);
+    if (ping.fired_s) behind_stamp_s_.push_back(at_s - *ping.fired_s);
   }
 
-  void conclude() {
-    const PingSummary summary = log_.summary(0);
-    facts_.rate_hz = summary.rate_hz;
-    facts_.missing = summary.missing_ids;
+  void conclude(std::uint64_t missing) {
+    facts_.rate_hz = log_.summary(std::nullopt).rate_hz;
+    facts_.missing = missing;
     if (behind_stamp_s_.size() < 3) return;
     const double promptest = *std::min_element(behind_stamp_s_.begin(), behind_stamp_s_.end());
     facts_.spread_p99_ms = 1000 * (percentile(behind_stamp_s_, 0.99) - promptest);
@@ -110,7 +94,7 @@ class Watch {
   Steady::time_point start_ = Steady::now(), first_ = start_, deadline_;
   Steady::time_point give_up_ =
       start_ + left_until(deadline_) / 2;  // for the first ping; the rest of the time is for other sonars
-  PingLog log_{std::nullopt};
+  PingLog log_;
   std::map<std::uint32_t, double> arrived_unix_s_;
   std::vector<double> behind_stamp_s_;
 };
@@ -135,25 +119,21 @@ void set_latency(SonarFacts& sonar, const std::vector<double>& delays_s, Control
 
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks) {
   StreamFacts& facts = sonar.stream;
-  Settings settings;
-  if (sonar.clients.empty()) settings.oculus = usual_request();
-  facts.asked = sonar.blueview || settings.oculus.has_value();  // heads are asked for every ping
-  facts.asked_hz = settings.oculus && !sonar.blueview && !sonar.aris && !sonar.brping ? 10 : 0;
+  Wanted wanted;
+  wanted.as_it_is = !sonar.clients.empty();
+  wanted.stamped = true;
+  facts.asked = !wanted.as_it_is || sonar.make->each_ping_requested;
   Watch watch(facts, deadline);
   auto stream =
-      PingStream::open(sonar.at,
-                       sonar.blueview ? SonarKind::blueview
-                       : sonar.aris   ? SonarKind::aris
-                       : sonar.brping ? SonarKind::brping
-                                      : SonarKind::oculus,
-                       std::move(settings), std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
+      PingStream::open(sonar.at, sonar.make, wanted, std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
   if (!stream) {
     facts.error = stream.error().text;
     facts.outcome = outcome_of(stream.error());
     return;
   }
+  facts.asked_hz = stream->host().expects_echo() ? usual_hz : 0;
   watch.run(std::move(*stream));
-  if (control == nullptr || sonar.aris || sonar.brping) return;  // whose numbers of pings are not the daemon's
+  if (control == nullptr || sonar.make->own_numbers) return;
   const Watch::DaemonTimes daemon_times = watch.daemon_times(*control, sonar.name);
   if (!daemon_times.computing_ms.empty()) facts.computing_ms = percentile(daemon_times.computing_ms, 0.5);
   set_latency(sonar, daemon_times.delays_s, clocks);

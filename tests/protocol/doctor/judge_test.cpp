@@ -110,7 +110,7 @@ TEST(SocketTable, FailedAttempts) {
 TEST(Judge, ConnectedAndNeverFired) {
   const Finding f = trouble(with(silent + "}"), "driver");
   EXPECT_EQ(f.level, Level::fail);
-  EXPECT_EQ(f.text, "127.0.0.1:40122 is connected to front and has not fired: it has sent nothing");
+  EXPECT_EQ(f.text, "127.0.0.1:40122 is connected to front and has not asked for pings: it has sent nothing");
   EXPECT_EQ(f.client, "127.0.0.1:40122");
   EXPECT_EQ(f.sonar, "front");
   EXPECT_THAT(

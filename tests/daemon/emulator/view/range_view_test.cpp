@@ -16,6 +16,7 @@ Ping ping_with(std::size_t column, std::size_t row) {
   const protocol::Profile profile = *protocol::find_profile("waterlinked-3d15");
   protocol::DeviceState device;
   device.model = profile.model;
+  device.options = *protocol::check_options(*profile.vendor, {});
   const protocol::ChangeSettings initial = profile.vendor->initial_settings(device);
   Ping ping;
   ping.request.model = profile.model;

@@ -1,5 +1,5 @@
-// The images of a Sonar 3D-15 as sonarctl draws and lists them.
-#include "clients/sonarctl/waterlinked_stream.hpp"
+// The images of a Sonar 3D-15 as its host draws and lists them.
+#include "protocol/waterlinked/host.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,15 +9,15 @@
 
 #include "core/base/geometry.hpp"
 
-namespace sonar::clients {
+namespace sonar::waterlinked::host_test {
 namespace {
 
 using testing::HasSubstr;
 
 constexpr std::uint32_t columns = 5, rows = 3;
 
-waterlinked::RangeMessage nothing_there() {
-  waterlinked::RangeMessage m;
+RangeMessage nothing_there() {
+  RangeMessage m;
   m.shot.sequence = 7;
   m.shot.range_m = 15;
   m.shot.width = columns;
@@ -29,14 +29,14 @@ waterlinked::RangeMessage nothing_there() {
   return m;
 }
 
-TEST(WaterlinkedStream, DrawsAReturnAtItsColumnAndHorizontalRange) {
+TEST(WaterlinkedHost, DrawsAReturnAtItsColumnAndHorizontalRange) {
   auto ranges = nothing_there();
-  waterlinked::StrengthMessage strengths{ranges.shot, std::vector<std::uint8_t>(columns * rows)};
+  StrengthMessage strengths{ranges.shot, std::vector<std::uint8_t>(columns * rows)};
   ranges.pixels[0] = 20;  // the lowest row, most to port: 10 m at 45 degrees to port, 20 down
   strengths.pixels[0] = 99;
   const auto ping = ping_from(ranges, &strengths);
   ASSERT_TRUE(ping);
-  const PolarImage& image = ping->image;
+  const PolarImage image = *ping->picture();
   ASSERT_EQ(image.beams, columns);
   EXPECT_DOUBLE_EQ(image.azimuth_rad.front(), pi / 4);
   EXPECT_DOUBLE_EQ(image.azimuth_rad.back(), -pi / 4);
@@ -49,14 +49,14 @@ TEST(WaterlinkedStream, DrawsAReturnAtItsColumnAndHorizontalRange) {
   EXPECT_THAT(ping->facts.note, HasSubstr("1 returns from 10.00 to 10.00 m"));
 }
 
-TEST(WaterlinkedStream, DrawsRangesWithoutTheirStrengthsAndSaysSo) {
+TEST(WaterlinkedHost, DrawsRangesWithoutTheirStrengthsAndSaysSo) {
   auto ranges = nothing_there();
   EXPECT_THAT(ping_from(ranges, nullptr)->facts.note, HasSubstr("no returns, without their strengths"));
   ranges.pixels[columns + 2] = 10;
-  EXPECT_EQ(ping_from(ranges, nullptr)->image.at(100, 2), 255) << "5 m of 15, ahead";
+  EXPECT_EQ(ping_from(ranges, nullptr)->picture()->at(100, 2), 255) << "5 m of 15, ahead";
 }
 
-TEST(WaterlinkedStream, TakesNoImageWhoseFieldsCannotBe) {
+TEST(WaterlinkedHost, TakesNoImageWhoseFieldsCannotBe) {
   const auto refuses = [](auto change) {
     auto ranges = nothing_there();
     change(ranges);
@@ -71,9 +71,9 @@ TEST(WaterlinkedStream, TakesNoImageWhoseFieldsCannotBe) {
   EXPECT_TRUE(refuses([](auto& r) { r.shot.horizontal_deg = 0; }));
   EXPECT_TRUE(refuses([](auto& r) { r.pixel_scale_m = std::numeric_limits<float>::infinity(); }));
   auto ranges = nothing_there();
-  const waterlinked::StrengthMessage of_another{ranges.shot, std::vector<std::uint8_t>(columns)};
+  const StrengthMessage of_another{ranges.shot, std::vector<std::uint8_t>(columns)};
   EXPECT_FALSE(ping_from(ranges, &of_another));
 }
 
 }  // namespace
-}  // namespace sonar::clients
+}  // namespace sonar::waterlinked::host_test

@@ -5,12 +5,18 @@
 
 #include "core/text/nearest.hpp"
 #include "protocol/aris/aris.hpp"
+#include "protocol/aris/host.hpp"
 #include "protocol/blueview/blueview.hpp"
+#include "protocol/blueview/host.hpp"
+#include "protocol/host.hpp"
+#include "protocol/oculus/host.hpp"
 #include "protocol/oculus/oculus.hpp"
+#include "protocol/ping/host.hpp"
 #include "protocol/ping/omniscan.hpp"
 #include "protocol/ping/ping360.hpp"
 #include "protocol/ping/surveyor.hpp"
 #include "protocol/vendor.hpp"
+#include "protocol/waterlinked/host.hpp"
 #include "protocol/waterlinked/waterlinked.hpp"
 
 namespace sonar::protocol {
@@ -58,10 +64,73 @@ Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& giv
   return complete;
 }
 
+std::span<const Make> makes() {
+  static const std::array<Make, 7> all{{
+      {.device = &oculus::vendor(),
+       .title = "an Oculus",
+       .request = "fire message",
+       .remedy = "send a fire message (type 0x15)",
+       .ports = oculus::host_ports,
+       .host = oculus::make_host},
+      {.device = &blueview::vendor(),
+       .title = "a BlueView sonar",
+       .request = "request for a ping",
+       .remedy = "send a request for a ping, or a subscription",
+       .ports = blueview::host_ports,
+       .host = blueview::make_host,
+       .each_ping_requested = true},
+      {.device = &aris::vendor(),
+       .title = "an ARIS",
+       .request = "command",
+       .remedy = "send SET_FRAMESTREAM_RECEIVER and SET_ACOUSTICS",
+       .ports = aris::host_ports,
+       .host = aris::make_host,
+       .own_numbers = true},
+      {.device = &waterlinked::vendor(),
+       .title = "a Sonar 3D-15",
+       .request = "request",
+       .remedy = "post true to /acoustics/enabled and a mode to /udp, below /api/v1/integration",
+       .ports = waterlinked::host_ports,
+       .host = waterlinked::make_host},
+      {.device = &ping::ping360::vendor(),
+       .title = "a Ping360",
+       .request = "request",
+       .remedy = "send auto_transmit (2602), or transducer (2601) with transmit 1",
+       .ports = ping::ping360::host_ports,
+       .host = ping::ping360::make_host,
+       .own_numbers = true,
+       .scans = true},
+      {.device = &ping::surveyor::vendor(),
+       .title = "a Surveyor",
+       .request = "request",
+       .remedy = "send set_ping_parameters (3023) with ping_enable 1",
+       .ports = ping::surveyor::host_ports,
+       .host = ping::surveyor::make_host,
+       .own_numbers = true},
+      {.device = &ping::omniscan::vendor(),
+       .title = "an Omniscan",
+       .request = "request",
+       .remedy = "send os_ping_params (2197) with enable 1",
+       .ports = ping::omniscan::host_ports,
+       .host = ping::omniscan::make_host,
+       .own_numbers = true},
+  }};
+  return all;
+}
+
+const Make& make_of_profile(std::string_view profile) {
+  for (const Make& make : makes())
+    for (const auto& model : make.device->models())
+      if (model->profile == profile) return make;
+  return makes().front();
+}
+
 std::span<const Vendor* const> vendors() {
-  static const std::array<const Vendor*, 7> all{&oculus::vendor(),        &blueview::vendor(),      &aris::vendor(),
-                                                &waterlinked::vendor(),   &ping::ping360::vendor(), &ping::surveyor::vendor(),
-                                                &ping::omniscan::vendor()};
+  static const std::vector<const Vendor*> all = [] {
+    std::vector<const Vendor*> devices;
+    for (const Make& make : makes()) devices.push_back(make.device);
+    return devices;
+  }();
   return all;
 }
 

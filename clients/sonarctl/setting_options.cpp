@@ -1,0 +1,72 @@
+#include "clients/sonarctl/setting_options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+
+#include "core/text/arguments.hpp"
+
+namespace sonar::clients {
+namespace {
+
+using text::number;
+using text::one_of;
+using text::whole_number;
+
+std::string complaint_about_rate(std::string& given) {
+  double hz = 0;
+  const auto [end, error] = std::from_chars(given.data(), given.data() + given.size(), hz);
+  const bool is_number = error == std::errc{} && end == given.data() + given.size() && hz > 0 && hz <= 1000;
+  return is_number || given == "standby" ? "" : "\"" + given + "\" is not a number above 0 and up to 1000, or standby";
+}
+
+}  // namespace
+
+void SettingArguments::add_to(CLI::App& app) {
+  const auto group = [](CLI::Option* option) { return option->group("Settings of the sonar"); };
+  const auto value = [&](const char* name, std::optional<double>& to, const char* help) {
+    return group(app.add_option_function<double>(
+        name, [&to](double given) { to = given; }, help));
+  };
+  const auto extra = [&](const std::string& name, const char* help) {
+    return group(app.add_option("--" + name, more[name], help));
+  };
+  group(
+      app.add_option_function<std::uint32_t>(
+          "--mode", [this](std::uint32_t given) { settings.mode = given - 1; },
+          "from 1, as the sonar's models list them: of an Oculus 1 low frequency, wide, 2 high frequency, narrow; of a BlueView "
+          "sonar the head"))
+      ->check(whole_number(1, 100));
+  CLI::Option* metres = value("--range", settings.range_m, "metres")->check(number(0.0, 1000.0));
+  extra("range-percent", "of the mode's maximum, instead of metres")->check(number(0.0, 100.0))->excludes(metres);
+  value("--gain", settings.gain_percent, "per cent of what can be set")->check(number(0.0, 100.0));
+  group(app.add_option_function<std::string>(
+            "--rate", [this](const std::string& given) { settings.rate_hz = given == "standby" ? 0 : std::stod(given); },
+            "maximum ping rate [Hz], any number, of an Oculus the nearest of these; or standby"))
+      ->check(CLI::Validator(complaint_about_rate, "2|5|10|15|40|standby", "rate"));
+  group(app.add_option_function<std::uint32_t>(
+            "--beams", [this](std::uint32_t given) { settings.beams = given; }, ""))
+      ->check(one_of({"256", "512"}));
+  group(app.add_option_function<std::uint32_t>(
+            "--bits", [this](std::uint32_t given) { settings.sample_bits = given; }, "bits per sample; 32 needs --version 2"))
+      ->check(one_of({"8", "16", "32"}));
+  extra("gamma", "wire value: gamma = value / 255")->check(whole_number(0, 255));
+  extra("speed-of-sound", "m/s; 0 = the sonar computes it")->check(number(0.0, 2000.0));
+  extra("salinity", "ppt")->check(number(0.0, 50.0));
+  extra("version", "version of the messages")->check(whole_number(0, 2));
+  group(app.add_flag_function(
+      "--gains", [this](std::int64_t) { settings.row_gains = true; }, "request a gain in front of every row"));
+  group(app.add_flag_function(
+      "--gain-assist", [this](std::int64_t) { more["gain-assist"] = "on"; }, "flag bit 4"));
+  group(app.add_flag_function(
+      "--trigger", [this](std::int64_t) { more["trigger"] = "on"; }, "one ping for each request (network trigger)"));
+}
+
+protocol::Wanted SettingArguments::wanted() const {
+  protocol::Wanted wanted;
+  wanted.settings = settings;
+  for (const auto& [name, given] : more)
+    if (!given.empty()) wanted.more.emplace(name, given);
+  return wanted;
+}
+
+}  // namespace sonar::clients

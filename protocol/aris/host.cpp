@@ -1,0 +1,178 @@
+#include "protocol/aris/host.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "protocol/aris/encode_frame.hpp"
+#include "protocol/aris/models.hpp"
+
+namespace sonar::aris {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::HostActions;
+
+constexpr auto ping_after = 1s;
+constexpr double nominal_sound_speed_mps = 1490;
+constexpr std::uint32_t most_pulse_us = 80;
+constexpr std::size_t commands = 0, frames = 1;  // ports
+
+/// The settings for a product, or none: it has no such range or mode.
+std::optional<Acoustics> acoustics_for(const SonarModel& model, const protocol::SettingsOverride& wanted) {
+  const Product& product = product_of(model);
+  Acoustics a = product.initial;
+  if (wanted.mode) {
+    if (*wanted.mode >= model.modes.size()) return std::nullopt;
+    const ModeChoice choice = choice_of(product, static_cast<int>(*wanted.mode));
+    if (choice.telephoto) return std::nullopt;
+    a.ping_mode = choice.ping_mode;
+    a.frequency = choice.frequency;
+    a.cycle_us = shortest_cycle_us(a);
+  }
+  if (wanted.gain_percent) a.gain_db = static_cast<float>(highest_gain_db * *wanted.gain_percent / 100);
+  if (wanted.range_m) {
+    if (*wanted.range_m > product.window_end_m) return std::nullopt;
+    const double window_us = 2e6 * *wanted.range_m / nominal_sound_speed_mps - a.start_delay_us;
+    a.sample_period_us = static_cast<std::uint32_t>(std::clamp(std::ceil(window_us / 2000), 4.0, 100.0));
+    a.samples_per_beam =
+        static_cast<std::uint32_t>(std::clamp<double>(window_us / a.sample_period_us, least_samples, most_samples));
+    a.cycle_us = shortest_cycle_us(a);
+    a.pulse_us = std::max(a.pulse_us, std::min(a.sample_period_us, most_pulse_us));
+  }
+  const double rate_hz = wanted.rate_hz.value_or(static_cast<double>(a.frame_rate_hz));
+  a.frame_rate_hz = static_cast<float>(std::clamp(rate_hz, 1.0, highest_frame_rate_hz(product, a, std::nullopt)));
+  a.cookie = 1;
+  return judge(a, product, false).used;  // with the longest pulse of the product
+}
+
+PolarImage picture_of(const DecodedFrame& frame, const std::vector<double>& azimuth_rad) {
+  PolarImage image;
+  image.rows = frame.samples;
+  image.beams = frame.beams;
+  image.row_spacing_m = static_cast<double>(frame.header.window_length_m) / static_cast<double>(frame.samples);
+  image.start_m = static_cast<double>(frame.header.window_start_m);
+  image.azimuth_rad = azimuth_rad;
+  image.samples.reserve(image.rows * image.beams);
+  for (std::size_t row = 0; row < image.rows; ++row)
+    for (std::size_t beam = image.beams; beam > 0; --beam)
+      image.samples.push_back(static_cast<float>(std::to_integer<int>(frame.picture[row * image.beams + beam - 1])));
+  return image;
+}
+
+/// The mode that a frame states; null: a product or mode that we do not know.
+const FrequencyMode* mode_of(const DecodedFrame& frame) {
+  for (const auto& model : models()) {
+    const Product& product = product_of(*model);
+    if (static_cast<std::uint32_t>(product.system) != frame.header.system) continue;
+    const auto mode = mode_index(
+        product, {frame.header.ping_mode, static_cast<Frequency>(frame.header.frequency), frame.header.large_lens != 0});
+    if (!mode) return nullptr;
+    const FrequencyMode& found = model->modes[static_cast<std::size_t>(*mode)];
+    return found.beam_azimuths_rad.size() == frame.beams ? &found : nullptr;
+  }
+  return nullptr;
+}
+
+class ArisHost final : public protocol::Host {
+ public:
+  explicit ArisHost(const protocol::Wanted& wanted) : wanted_(wanted) {}
+
+  /// The device does not say what it is, except in beacons that may not come here. It refuses the settings of other products; the
+  /// order matters to an ARIS 1800, which also takes those of a 1200. Frames begin with the receiver.
+  HostActions on_open(std::span<const std::uint16_t> own, Time now) override {
+    HostActions actions;
+    std::uint32_t cookie = 0;
+    for (const auto& model : models()) {
+      auto acoustics = wanted_.as_it_is ? std::nullopt : acoustics_for(*model, wanted_.settings);
+      if (!acoustics) continue;
+      acoustics->cookie = asked_[product_of(*model).system] = ++cookie;
+      Command command;
+      command.type = CommandType::set_acoustics;
+      command.acoustics = *acoustics;
+      send(command, now, actions);
+    }
+    Command command;
+    command.type = CommandType::set_receiver;
+    command.receiver = Receiver{own[frames], ""};
+    send(command, now, actions);
+    return actions;
+  }
+
+  HostActions on_bytes(std::size_t port, wire::BytesView received, Time) override {
+    HostActions actions;
+    if (port != frames) return actions;
+    bytes_ += received.size();
+    auto frame = assembler_.add(received);
+    if (!frame) return actions;
+    warn_of(*frame, actions);
+    const FrequencyMode* const mode = mode_of(*frame);
+    if (mode == nullptr) return actions;
+    const FrameHeader& h = frame->header;
+    const double length_m = static_cast<double>(h.window_length_m);
+    protocol::HostPing ping;
+    ping.facts = {static_cast<std::uint32_t>(frame->index),       static_cast<unsigned>(frame->beams),
+                  static_cast<unsigned>(frame->samples),          8,
+                  length_m / static_cast<double>(frame->samples), static_cast<double>(h.window_start_m) + length_m,
+                  static_cast<double>(mode->centre_hz),           std::exchange(bytes_, 0)};
+    ping.picture = [kept = std::make_shared<const DecodedFrame>(*std::move(frame)), mode]() -> Result<PolarImage> {
+      return picture_of(*kept, mode->beam_azimuths_rad);  // a row of models(), which stays
+    };
+    actions.emplace_back(std::move(ping));
+    return actions;
+  }
+
+  HostActions on_tick(Time now) override {
+    HostActions actions;
+    if (now < next_tick()) return actions;
+    Command command;
+    command.type = CommandType::ping;
+    command.ping.emplace();
+    send(command, now, actions);
+    return actions;
+  }
+  std::optional<Time> next_tick() const override { return sent_at_ + ping_after; }
+  std::string about() const override { return "an ARIS"; }
+
+ private:
+  void send(const Command& command, Time now, HostActions& actions) {
+    sent_at_ = now;
+    actions.emplace_back(protocol::HostSend{commands, framed(command)});
+  }
+
+  /// Once each: settings that the sonar does not use, frames of which datagrams were lost.
+  void warn_of(const DecodedFrame& frame, HostActions& actions) {
+    constexpr int settled = 3;  // the first frames may still have the settings of before
+    const FrameHeader& h = frame.header;
+    if (frame.index >= settled && !asked_.empty() && !warned_of_settings_) {
+      const auto cookie = asked_.find(static_cast<SystemType>(h.system));
+      warned_of_settings_ =
+          cookie == asked_.end() || (h.applied_cookie != cookie->second && h.constrained_cookie != cookie->second);
+      if (warned_of_settings_) actions.emplace_back(protocol::Notice{"the sonar does not use the settings that were sent to it"});
+    }
+    if (assembler_.incomplete() > 0 && !std::exchange(warned_of_losses_, true))
+      actions.emplace_back(
+          protocol::Notice{"a frame before number " + std::to_string(frame.index) + " is left out: datagrams were lost"});
+  }
+
+  protocol::Wanted wanted_;
+  FrameAssembler assembler_;
+  std::map<SystemType, std::uint32_t> asked_;  // the cookie of the settings for each product; empty = none were sent
+  bool warned_of_settings_ = false, warned_of_losses_ = false;
+  Time sent_at_{};
+  std::size_t bytes_ = 0;  // received since the last whole frame
+};
+
+}  // namespace
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
+  if (auto known = protocol::accept_settings(wanted, "an ARIS", {"range", "rate", "gain", "mode"}); !known)
+    return tl::unexpected(known.error());
+  const auto fits = [&wanted](const auto& model) { return acoustics_for(*model, wanted.settings).has_value(); };
+  if (!wanted.as_it_is && std::none_of(models().begin(), models().end(), fits))
+    return failure(ErrorKind::usage, "no ARIS has this range and mode: the longest range is 100 m, that of an ARIS 1200");
+  return std::make_unique<ArisHost>(wanted);
+}
+
+}  // namespace sonar::aris

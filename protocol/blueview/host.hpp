@@ -1,0 +1,16 @@
+// The driver of a BlueView sonar on sonard's link (docs/protocols/blueview-link.md): greeting, settings, pings requested one by
+// one.
+#pragma once
+
+#include <array>
+
+#include "protocol/blueview/link.hpp"
+#include "protocol/host.hpp"
+
+namespace sonar::blueview {
+
+inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+
+}  // namespace sonar::blueview

@@ -1,0 +1,131 @@
+// The driver's end of a make's wire: what a driver sends, and how the bytes of a sonar become pings. The counterpart of Dialogue,
+// as pure: no sockets, no clock, no log. The caller opens the ports, reports what arrives and carries out the HostActions.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/image/polar_image.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::protocol {
+
+/// The settings that a user wants. Unset values: as the sonar has them, or as a usual driver sends them.
+struct Wanted {
+  bool as_it_is = false;                         // send no settings and request no pings
+  bool stamped = false;                          // prefer messages that state when a ping was fired
+  SettingsOverride settings;                     // the same for every make
+  std::map<std::string, std::string> more = {};  // settings of one make: name of sonarctl's option without dashes, and value
+};
+
+struct PingFacts {
+  std::uint32_t number = 0;
+  unsigned beams = 0, rows = 0, bits = 0;
+  double row_m = 0, range_m = 0;  // range_m: far end of the last row
+  double frequency_hz = 0;
+  std::size_t message_size = 0;  // bytes, of all its messages
+  std::string note = {};         // more for the line of a ping
+};
+/// A ping as a host decoded it.
+struct HostPing {
+  PingFacts facts;
+  std::function<Result<PolarImage>()> picture;    // of a mechanical scan: the sector as scanned so far
+  bool is_whole = true;                           // of a mechanical scan: the sector was scanned once
+  std::vector<std::string> errors = {};           // of identities and sequence
+  std::vector<std::string> echo_mismatches = {};  // settings that do not have the requested value yet
+  std::optional<double> fired_s = {};             // by the clock of the device
+};
+
+/// Bytes for a port of the host, counted from 0.
+struct HostSend {
+  std::size_t port = 0;
+  Bytes bytes;
+};
+/// In order. ResourceRequest: to port 0, of kind http; the reply goes to on_reply. Error: the host gives up; its
+/// text says what the sonar does ("refuses a request: ..."), that of usage is a sentence.
+using HostAction = std::variant<HostSend, ResourceRequest, HostPing, Notice, Error>;
+using HostActions = std::vector<HostAction>;
+
+/// A port that a host opens. The first is the one that a user may give another number.
+struct HostPort {
+  enum class Kind {
+    tcp,         // connects to `number` of the device
+    udp,         // sends to `number` of the device, and receives its answers
+    udp_listen,  // receives at `number` (0: any free one), with `group` as a member of that multicast group
+    http,        // requests resources at `number`
+  } kind{};
+  std::uint16_t number = 0;
+  Ipv4 group{};
+};
+
+class Host {
+ public:
+  virtual ~Host() = default;
+  /// The ports are open. `own`: their numbers at this end.
+  virtual HostActions on_open(std::span<const std::uint16_t> own, Time now) = 0;
+  /// A piece of a stream, of any size, or a datagram. Any garbage; never throws, never grows without bound.
+  virtual HostActions on_bytes(std::size_t port, BytesView received, Time now) = 0;
+  virtual HostActions on_reply(const ResourceReply& reply, Time now) {
+    static_cast<void>(reply), static_cast<void>(now);
+    return {};
+  }
+  /// Keep-alives. Called at or after next_tick().
+  virtual HostActions on_tick(Time now) {
+    static_cast<void>(now);
+    return {};
+  }
+  virtual std::optional<Time> next_tick() const { return std::nullopt; }
+  /// The caller wants a ping: of a wire where each is requested. Called whenever it waits for one.
+  virtual HostActions on_demand(Time now) {
+    static_cast<void>(now);
+    return {};
+  }
+  /// Called before the ports are closed.
+  virtual HostActions on_leave() { return {}; }
+
+  /// The sonar has answered and its settings are requested.
+  virtual bool is_open() const { return true; }
+  /// "an ARIS", "a BlueView P900-90, serial 7001"
+  virtual std::string about() const = 0;
+  /// Of a wire whose messages can be told from other bytes and are numbered.
+  struct Counts {
+    std::uint64_t messages = 0, dummies = 0, junk_bytes = 0, missing_pings = 0;
+  };
+  virtual std::optional<Counts> counts() const { return std::nullopt; }
+  /// Pings echo the settings that were sent: HostPing::echo_mismatches is judged.
+  virtual bool expects_echo() const { return false; }
+};
+
+/// A make of sonar, both ends. Adding one = one folder + one line in makes.cpp.
+struct Make {
+  const Vendor* device = nullptr;
+  std::string_view title;    // "an ARIS"
+  std::string_view request;  // what a driver must send to get pings, for "no valid ... among them"
+  std::string_view remedy;   // "send a fire message (type 0x15)"
+  std::span<const HostPort> ports;
+  /// usage: a setting that such a sonar does not have.
+  Result<std::unique_ptr<Host>> (*host)(const Wanted& wanted) = nullptr;
+
+  bool each_ping_requested = false;  // by its hosts; a rate is a limit
+  bool own_numbers = false;          // of pings: not those of sonard's events
+  bool scans = false;                // pings come as fast as its head turns
+
+  std::string_view name() const { return device->name(); }
+};
+std::span<const Make> makes();
+/// The make of a product; of an unknown one the first.
+const Make& make_of_profile(std::string_view profile);
+
+/// usage: a wanted setting that is not among `known`: "range", "rate", "gain", "mode", ... as sonarctl's options.
+Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::initializer_list<std::string_view> known);
+
+}  // namespace sonar::protocol

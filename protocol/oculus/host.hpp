@@ -1,0 +1,19 @@
+// The driver of an Oculus: fire messages out, ping results in.
+#pragma once
+
+#include <array>
+
+#include "protocol/host.hpp"
+#include "protocol/oculus/fire.hpp"
+
+namespace sonar::oculus {
+
+inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
+
+/// The fire message of the settings; what is not wanted: high frequency, 10 m, 10 Hz, 50 %, 512 beams, 8 bits; rates are the
+/// nearest that a fire message can ask for. usage: a mode or setting that it has not.
+Result<FireRequest> fire_from(const protocol::Wanted& wanted);
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+
+}  // namespace sonar::oculus

@@ -1,0 +1,284 @@
+#include "protocol/ping/host.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/geometry.hpp"
+#include "core/text/format.hpp"
+#include "protocol/ping/messages.hpp"
+#include "protocol/ping/omniscan_messages.hpp"
+
+namespace sonar::ping {
+namespace {
+
+using protocol::HostActions;
+using protocol::HostPing;
+using text::format;
+
+constexpr double sample_unit_s = 25e-9, sound_mps = 1500;
+constexpr int grads = 400, sector = 201, first_grad = 300;  // of a scan: half a circle, port to starboard
+constexpr double usual_range_m = 10;
+constexpr std::size_t point_rows = 300;  // of a picture of points
+
+/// 0: as the device likes.
+double period_ms_of(const protocol::SettingsOverride& wanted) {
+  const double rate_hz = wanted.rate_hz.value_or(0);
+  return rate_hz > 0 ? std::clamp(1000 / rate_hz, 1.0, 30000.0) : 0;
+}
+
+Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
+  PingParameters p{.end_mm = static_cast<std::int32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
+                   .enable = static_cast<std::uint8_t>(wanted.rate_hz == 0.0 ? 0 : 1),
+                   .yz = 1,
+                   .atof = 0};
+  if (wanted.gain_percent) p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent));
+  if (const double ms = period_ms_of(wanted); ms > 0) p.period_ms = static_cast<std::int16_t>(std::lround(ms));
+  return framed_message(Id::set_ping_parameters, 0, p);
+}
+
+Bytes omniscan_request(const protocol::SettingsOverride& wanted) {
+  OsPingParams p{.length_mm = static_cast<std::uint32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
+                 .enable = static_cast<std::uint8_t>(wanted.rate_hz == 0.0 ? 0 : 1)};
+  p.period_ms = static_cast<std::uint32_t>(std::lround(wanted.rate_hz ? period_ms_of(wanted) : 100));
+  if (wanted.gain_percent) p.gain = static_cast<std::int16_t>(std::lround(7 * *wanted.gain_percent / 100));
+  return framed_message(Id::os_ping_params, 0, p);
+}
+
+Bytes ping360_request(const protocol::SettingsOverride& wanted) {
+  const double range_m = wanted.range_m.value_or(usual_range_m);
+  AutoTransmit t;
+  const double window = 2 * range_m / sound_mps / sample_unit_s;  // in units of the sample period
+  t.samples = static_cast<std::uint16_t>(std::clamp(window / 80, 200.0, 1000.0));
+  t.period = static_cast<std::uint16_t>(std::clamp(window / t.samples, 80.0, 40000.0));
+  t.transmit_us = static_cast<std::uint16_t>(std::clamp(8000 * range_m / sound_mps, 5.0, 500.0));  // the makers' rule
+  t.khz = 750;
+  t.gain = static_cast<std::uint8_t>(std::lround(wanted.gain_percent.value_or(0) / 50));
+  t.start = first_grad;
+  t.stop = (first_grad + sector - 1) % grads;
+  return framed_message(Id::auto_transmit, 0, t);
+}
+
+/// Of a message that is followed by others of the payload.
+template <class M>
+std::optional<BytesView> read_front(const Frame& frame, M& message) {
+  wire::Reader reader(frame.payload);
+  fields(reader, message);
+  if (!reader.ok()) return std::nullopt;
+  return BytesView(frame.payload).subspan(wire::wire_size<M>());
+}
+
+HostPing points_of(const YzPointData& data, BytesView rest) {
+  HostPing found;
+  std::vector<std::pair<double, double>> polar;  // azimuth, range
+  wire::Reader reader(rest);
+  for (int i = 0; i < data.points; ++i) {
+    float y = 0, z = 0;
+    reader("y", y);
+    reader("z", z);
+    if (!reader.ok() || !std::isfinite(y) || !std::isfinite(z)) break;
+    polar.emplace_back(std::atan2(static_cast<double>(y), -static_cast<double>(z)),
+                       std::hypot(static_cast<double>(y), static_cast<double>(z)));
+  }
+  std::sort(polar.begin(), polar.end(), std::greater<>());
+  polar.erase(std::unique(polar.begin(), polar.end(), [](auto a, auto b) { return a.first == b.first; }), polar.end());
+  PolarImage image;
+  image.rows = point_rows;
+  image.beams = polar.size();
+  image.row_spacing_m = static_cast<double>(data.end_m) / point_rows;
+  image.samples.resize(image.rows * image.beams);
+  double nearest_m = 0, farthest_m = 0;
+  for (std::size_t i = 0; i < polar.size(); ++i) {
+    const auto [azimuth, range_m] = polar[i];
+    image.azimuth_rad.push_back(azimuth);
+    nearest_m = i == 0 ? range_m : std::min(nearest_m, range_m);
+    farthest_m = std::max(farthest_m, range_m);
+    const double row = range_m / image.row_spacing_m;
+    if (row >= 0 && row < static_cast<double>(point_rows)) image.samples[static_cast<std::size_t>(row) * image.beams + i] = 255;
+  }
+  const double end_m = static_cast<double>(data.end_m);
+  found.facts = {data.ping, static_cast<unsigned>(polar.size()), 1, 32, end_m, end_m, 240e3, 0};
+  found.facts.note = polar.empty() ? "no points" : format("points from %.2f to %.2f m", nearest_m, farthest_m);
+  found.picture = [image = std::move(image)]() -> Result<PolarImage> {
+    if (image.beams >= 2) return image;
+    return failure(ErrorKind::usage, "a picture takes two points at least: sonarctl listen prints those of a Surveyor");
+  };
+  return found;
+}
+
+HostPing profile_of(const OsMonoProfile& data, BytesView rest) {
+  HostPing found;
+  std::vector<std::uint16_t> powers;
+  wire::Reader reader(rest);
+  for (std::uint16_t i = 0, power = 0; i < data.results && reader.ok(); ++i) {
+    reader("power", power);
+    if (reader.ok()) powers.push_back(power);
+  }
+  const double start_m = 1e-3 * data.start_mm, row_m = 1e-3 * data.length_mm / std::max<double>(data.results, 1);
+  found.facts = {data.ping,
+                 1,
+                 static_cast<unsigned>(powers.size()),
+                 16,
+                 row_m,
+                 start_m + static_cast<double>(powers.size()) * row_m,
+                 static_cast<double>(data.hz),
+                 0};
+  found.picture = []() -> Result<PolarImage> {
+    return failure(ErrorKind::usage, "one beam makes no picture: sonarctl listen prints the profiles of an Omniscan");
+  };
+  if (powers.empty()) return found;
+  const auto top = std::max_element(powers.begin(), powers.end());
+  const double db = static_cast<double>(data.lowest_db) +
+                    static_cast<double>(*top) / 65535 * static_cast<double>(data.highest_db - data.lowest_db);
+  found.facts.note =
+      format("strongest %.1f dB at %.2f m", db, start_m + (static_cast<double>(top - powers.begin()) + 0.5) * row_m);
+  return found;
+}
+
+class PingHost : public protocol::Host {
+ public:
+  PingHost(std::string_view title, std::optional<Bytes> request) : title_(title), request_(std::move(request)) {}
+
+  HostActions on_open(std::span<const std::uint16_t>, Time) override {
+    HostActions actions;
+    ask(actions);
+    return actions;
+  }
+  HostActions on_bytes(std::size_t, BytesView received, Time) override {
+    HostActions actions;
+    framer_.append(received);
+    while (const auto frame = framer_.next()) {
+      if (!frame->sum_is_right) continue;
+      on_frame(*frame, actions);
+      if (frame->header.id == Id::nack) {
+        std::string why;
+        for (std::size_t i = 2; i < frame->payload.size(); ++i) why += static_cast<char>(frame->payload[i]);
+        actions.emplace_back(Error{ErrorKind::bad_data, "refused a request: " + why});
+      }
+      if (auto ping = ping_from(*frame)) {
+        ping->facts.message_size = header_size + frame->payload.size() + sum_size;
+        actions.emplace_back(*std::move(ping));
+      }
+    }
+    return actions;
+  }
+  std::string about() const override { return std::string(title_); }
+
+ protected:
+  bool asks() const { return request_.has_value(); }
+  void ask(HostActions& actions) const {
+    if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
+  }
+  virtual void on_frame(const Frame&, HostActions&) {}
+  virtual std::optional<HostPing> ping_from(const Frame& frame) = 0;
+
+ private:
+  std::string_view title_;
+  std::optional<Bytes> request_;  // for pings; empty: none are requested
+  Framer framer_{65535};
+};
+
+class SurveyorHost final : public PingHost {
+ public:
+  using PingHost::PingHost;
+
+ private:
+  std::optional<HostPing> ping_from(const Frame& frame) override {
+    YzPointData data;
+    const auto rest = frame.header.id == Id::yz_point_data ? read_front(frame, data) : std::nullopt;
+    return rest ? std::optional(points_of(data, *rest)) : std::nullopt;
+  }
+};
+
+class OmniscanHost final : public PingHost {
+ public:
+  using PingHost::PingHost;
+
+ private:
+  std::optional<HostPing> ping_from(const Frame& frame) override {
+    OsMonoProfile data;
+    const auto rest = frame.header.id == Id::os_mono_profile ? read_front(frame, data) : std::nullopt;
+    return rest ? std::optional(profile_of(data, *rest)) : std::nullopt;
+  }
+};
+
+/// Asks for the protocol version first, which changes nothing: a sonar by UDP is there when it answers.
+class Ping360Host final : public PingHost {
+ public:
+  using PingHost::PingHost;
+  HostActions on_open(std::span<const std::uint16_t>, Time) override {
+    constexpr std::array<std::byte, 2> wanted{std::byte{static_cast<std::uint8_t>(Id::protocol_version)}};
+    return {protocol::HostSend{0, framed(Id::general_request, 0, wanted)}};
+  }
+  /// It does not scan on, unless another driver requested the scan.
+  HostActions on_leave() override {
+    if (!is_open_ || !asks()) return {};
+    return {protocol::HostSend{0, framed(Id::motor_off, 0, {})}};
+  }
+  bool is_open() const override { return is_open_; }
+
+ private:
+  void on_frame(const Frame&, HostActions& actions) override {
+    if (!std::exchange(is_open_, true)) ask(actions);
+  }
+  std::optional<HostPing> ping_from(const Frame& frame) override {
+    const auto line_of = [&](auto data) -> std::optional<HostPing> {
+      const auto rest = read_front(frame, data);
+      if (!rest || data.count == 0) return std::nullopt;
+      return line(data.angle, data.period, data.khz, rest->first(std::min<std::size_t>(rest->size(), data.count)));
+    };
+    if (frame.header.id == Id::auto_device_data) return line_of(AutoDeviceData{});
+    return frame.header.id == Id::device_data ? line_of(DeviceData{}) : std::nullopt;
+  }
+
+  HostPing line(std::uint16_t angle, unsigned period, unsigned khz, BytesView samples) {
+    const double row_m = period * sample_unit_s * sound_mps / 2;
+    if (sector_.rows != samples.size() || sector_.row_spacing_m != row_m) {
+      sector_ = {};
+      sector_.rows = samples.size();
+      sector_.beams = sector;
+      sector_.row_spacing_m = row_m;
+      for (int i = 0; i < sector; ++i) sector_.azimuth_rad.push_back((sector / 2 - i) * 2 * pi / grads);
+      sector_.samples.resize(sector_.rows * sector_.beams);
+      scanned_.assign(sector, false);
+    }
+    const auto beam = static_cast<std::size_t>((angle + grads - first_grad) % grads);
+    if (beam < sector_.beams) {
+      scanned_[beam] = true;
+      for (std::size_t row = 0; row < sector_.rows; ++row)
+        sector_.samples[row * sector_.beams + beam] = static_cast<float>(std::to_integer<int>(samples[row]));
+    }
+    HostPing ping;
+    ping.facts = {++pings_, 1, static_cast<unsigned>(samples.size()), 8, row_m, sector_.range_m(), 1e3 * khz, 0};
+    ping.facts.note = "angle " + std::to_string(angle) + " grad";
+    ping.picture = [image = sector_]() -> Result<PolarImage> { return image; };
+    ping.is_whole = std::find(scanned_.begin(), scanned_.end(), false) == scanned_.end();
+    return ping;
+  }
+
+  bool is_open_ = false;
+  PolarImage sector_;          // as scanned so far
+  std::vector<bool> scanned_;  // which beams of it
+  std::uint32_t pings_ = 0;    // which a Ping360 does not number
+};
+
+template <class Product>
+Result<std::unique_ptr<protocol::Host>> host_of(std::string_view title, Bytes (*request)(const protocol::SettingsOverride&),
+                                                std::initializer_list<std::string_view> known, const protocol::Wanted& wanted) {
+  if (auto accepted = protocol::accept_settings(wanted, title, known); !accepted) return tl::unexpected(accepted.error());
+  if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, std::string(title) + " has one mode only");
+  return std::make_unique<Product>(title, wanted.as_it_is ? std::nullopt : std::optional(request(wanted.settings)));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<protocol::Host>> ping360::make_host(const protocol::Wanted& wanted) {
+  return host_of<Ping360Host>("a Ping360", ping360_request, {"range", "gain", "mode"}, wanted);
+}
+Result<std::unique_ptr<protocol::Host>> surveyor::make_host(const protocol::Wanted& wanted) {
+  return host_of<SurveyorHost>("a Surveyor", surveyor_request, {"range", "rate", "gain", "mode"}, wanted);
+}
+Result<std::unique_ptr<protocol::Host>> omniscan::make_host(const protocol::Wanted& wanted) {
+  return host_of<OmniscanHost>("an Omniscan", omniscan_request, {"range", "rate", "gain", "mode"}, wanted);
+}
+
+}  // namespace sonar::ping

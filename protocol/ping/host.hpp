@@ -1,0 +1,25 @@
+// Hosts of the ping protocol (docs/protocols/ping.md): of a Ping360 by UDP, of a Surveyor or an Omniscan by TCP.
+#pragma once
+
+#include <array>
+
+#include "protocol/host.hpp"
+
+namespace sonar::ping {
+
+namespace ping360 {
+inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::udp, 12345}}};
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+}  // namespace ping360
+
+namespace surveyor {
+inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 62312}}};
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+}  // namespace surveyor
+
+namespace omniscan {
+inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 51200}}};
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+}  // namespace omniscan
+
+}  // namespace sonar::ping

@@ -1,0 +1,23 @@
+// A program that uses a Sonar 3D-15 (docs/protocols/waterlinked.md): settings over HTTP, images by multicast.
+#pragma once
+
+#include <array>
+
+#include "protocol/host.hpp"
+#include "protocol/waterlinked/messages.hpp"
+#include "protocol/waterlinked/settings.hpp"
+
+namespace sonar::waterlinked {
+
+inline constexpr std::uint16_t http_port = 80;
+inline constexpr std::array<protocol::HostPort, 2> host_ports{
+    {{protocol::HostPort::Kind::http, http_port},
+     {protocol::HostPort::Kind::udp_listen, multicast_group.port, multicast_group.ip}}};
+
+/// Seen from above: of every column of pixels the strengths at their horizontal ranges; without strengths all the same. Nothing:
+/// the messages are not of one image.
+std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const StrengthMessage* strengths);
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+
+}  // namespace sonar::waterlinked

@@ -1,0 +1,114 @@
+"""Every make of sonar serves and shows what it did when makes_expected.json was written, for changes that must not alter it: in
+stepped time the bytes and samples that a recording holds, the lines of `sonarctl listen`, the picture of `sonarctl view` and the
+findings of `sonarctl doctor`. The table of fault support is pinned by fault_docs_test.
+
+`makes_test.py --write` writes the file anew, with SONARD_BUILD set.
+"""
+import hashlib
+import json
+import os
+import pathlib
+import re
+import sys
+import unittest
+import zlib
+
+os.environ.update(SONARD_SIMD="portable", SONARD_EMBREE_ISA="sse2")  # whatever the processor: samples differ in their last digits
+
+import mcap_checker  # noqa: E402
+from running_sonard import SONARCTL, Sonard, run  # noqa: E402
+
+EXPECTED = pathlib.Path(__file__).with_name("makes_expected.json")
+# The port, and settings for `sonarctl listen`.
+MAKES = {"oculus-m1200d": (52100, "--range", 3, "--gain", 60, "--rate", 5, "--mode", 1),
+         "blueview-p900-90": (14750, "--range", 3, "--gain", 60, "--rate", 5, "--mode", 1),
+         "aris-3000": (56888, "--range", 3, "--gain", 60, "--rate", 5),
+         "waterlinked-3d15": (80, "--range", 3, "--mode", 2),
+         "ping360": (12345, "--range", 3, "--gain", 60),
+         "surveyor-240": (62312, "--range", 3, "--gain", 60, "--rate", 5),
+         "omniscan-450": (51200, "--range", 3, "--gain", 60, "--rate", 5)}
+PINGS = 4
+LONGEST_BEACON = 142  # bytes; beacons hold the address, which differs from run to run
+PATIENCE = ("--wait", 120)
+# Little to compute.
+CHEAP = ["--clock", "stepped", "--threads", 1, "--fixed-fan", 2]
+for part in ("volume", "conical", "crosstalk", "shared-noise", "defocus", "uneven"):
+    CHEAP += [f"--{part}", "off"]
+VOLATILE = {"at_s", "rate_hz", "interval_max_ms", "interval_p50_ms", "interval_p99_ms"}
+
+
+def pixels_of(png):
+    """SHA-256 of the uncompressed rows: which zlib packed them does not matter."""
+    data, at, packed = png.read_bytes(), 8, b""
+    while at < len(data):
+        size, kind = int.from_bytes(data[at:at + 4], "big"), data[at + 4:at + 8]
+        packed += data[at + 8:at + 8 + size] if kind == b"IDAT" else b""
+        at += size + 12
+    return hashlib.sha256(zlib.decompress(packed)).hexdigest()
+
+
+def steady(value):
+    """Without fields that depend on the time of day."""
+    if isinstance(value, dict):
+        return {name: steady(inner) for name, inner in value.items() if name not in VOLATILE}
+    return [steady(inner) for inner in value] if isinstance(value, list) else value
+
+
+class Observed:
+    """One make, from a run of the daemon for each command."""
+
+    def __init__(self, profile):
+        self.profile, self.seen = profile, {}
+        self.port, *self.settings = MAKES[profile]
+        for observe in (self.record_and_listen, self.view, self.examine):
+            with Sonard(scene="l-targets.yaml", profile=profile, trajectory="orbit", more="recording: {folder: .}",
+                        mount="{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}", arguments=CHEAP) as daemon:
+                observe(daemon, f"{daemon.address}:{self.port}", ("--control", f"{daemon.address}:14770"))
+
+    def ctl(self, *arguments, fails=False):
+        result = run(SONARCTL, *arguments, patience_s=300)
+        assert fails or result.returncode == 0, f"{self.profile} {arguments}: {result.stdout}{result.stderr}"
+        return result
+
+    def record_and_listen(self, daemon, device, control):
+        self.ctl("recording", "start", "run.mcap", *control)
+        lines = self.ctl("listen", device, "--json", "--pings", PINGS, *self.settings, *PATIENCE).stdout
+        self.ctl("recording", "stop", *control)
+        self.seen["listen"] = [steady(json.loads(line)) for line in lines.splitlines()]
+        recorded = {}
+        for topic, _, data in mcap_checker.check((pathlib.Path(daemon.folder.name) / "run.mcap").read_bytes()).messages:
+            recorded.setdefault(topic, []).append(data)
+        served = recorded.get("/front/device", []) + recorded.get("/front/status", [])
+        for what, messages in (("served", [m for m in served if len(m) > LONGEST_BEACON]), ("image", recorded["/front/image"])):
+            self.seen[what] = [hashlib.sha256(message).hexdigest() for message in messages[:PINGS]]
+
+    def view(self, daemon, device, _):
+        png = pathlib.Path(daemon.folder.name) / "view.png"
+        result = self.ctl("view", device, "--range", 8, "--png", png, *PATIENCE, fails=True)
+        self.seen["view"] = pixels_of(png) if png.exists() else result.stderr
+
+    def examine(self, daemon, device, control):
+        result = self.ctl("doctor", device, "--json", "--status-on", daemon.address, *control, "--http", f"{daemon.address}:8088",
+                          "--within", 120)
+        masked = json.loads(re.sub(r"\d+(\.\d+)+|\d+", "0", result.stdout))
+        self.seen["doctor"] = [[f[key] for key in ("level", "check", "text", "cure")] for f in masked["findings"]
+                               if f["check"] not in ("ports", "rate")]
+
+
+class Makes(unittest.TestCase):
+    maxDiff = None
+
+    def test_nothing_has_changed(self):
+        expected = json.loads(EXPECTED.read_text(encoding="utf-8"))
+        for profile in MAKES:
+            seen = Observed(profile).seen
+            for what, value in seen.items():
+                with self.subTest(profile=profile, what=what):
+                    self.assertEqual(value, expected[profile][what])
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--write"]:
+        EXPECTED.write_text(json.dumps({profile: Observed(profile).seen for profile in MAKES}, indent=1) + "\n", encoding="utf-8")
+    else:
+        unittest.main()

@@ -1,0 +1,190 @@
+// Sonars that PingStream searches without a port, or does not find: programs of a few lines have the ports of makes, others
+// nothing.
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <atomic>
+#include <thread>
+
+#include "clients/sonarctl/ping_stream.hpp"
+#include "protocol/blueview/frames.hpp"
+#include "protocol/oculus/host.hpp"
+#include "protocol/oculus/messages.hpp"
+#include "protocol/ping/messages.hpp"
+
+namespace sonar::clients::search_test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+const std::string address = "127.0.0.9";
+
+Socket bound(int type, std::uint16_t port) {
+  Socket socket(::socket(AF_INET, type | SOCK_CLOEXEC, 0));
+  const int yes = 1;
+  ::setsockopt(socket.fd(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_port = htons(port);
+  ::inet_pton(AF_INET, address.c_str(), &at.sin_addr);
+  // The cast is the sockets interface's own.
+  EXPECT_EQ(::bind(socket.fd(), reinterpret_cast<sockaddr*>(&at), sizeof at), 0);
+  return socket;
+}
+
+/// Runs `serve` for each connection until the end of the test.
+class Server {
+ public:
+  Server(std::uint16_t port, std::function<void(const Socket&)> serve) : listener_(bound(SOCK_STREAM, port)) {
+    ::listen(listener_.fd(), 4);
+    thread_ = std::thread([this, serve = std::move(serve)] {
+      for (;;) {
+        const Socket client(::accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC));
+        if (client.fd() < 0) return;
+        serve(client);
+      }
+    });
+  }
+  ~Server() {
+    ::shutdown(listener_.fd(), SHUT_RDWR);
+    thread_.join();
+  }
+
+ private:
+  Socket listener_;
+  std::thread thread_;
+};
+
+/// False: the client left without a request.
+bool refuse_as_a_web_server(const Socket& client) {
+  std::array<std::byte, 1024> request;
+  if (read_some(client, request, 60s).what != Wait::data) return false;
+  const std::string reply = "HTTP/1.0 404 Not Found\r\nContent-Type: text/html\r\n\r\n<h1>no such page</h1>";
+  return write_all(client, std::as_bytes(std::span(reply.data(), reply.size()))).has_value();
+}
+
+/// A Ping360 as far as a host can tell; what it was sent.
+class Ping360 {
+ public:
+  explicit Ping360(bool answers) : socket_(bound(SOCK_DGRAM, 12345)) {
+    thread_ = std::thread([this, answers] { serve(answers); });
+  }
+  /// The ids of all datagrams until now.
+  std::vector<ping::Id> received() {
+    if (thread_.joinable()) {
+      const auto last = connect_udp({address, 12345});
+      static_cast<void>(write_all(*last, ping::framed(ping::Id::reset, 0, {})));  // behind the others
+      thread_.join();
+    }
+    return ids_;
+  }
+  ~Ping360() { received(); }
+
+ private:
+  void serve(bool answers) {
+    for (;;) {
+      std::array<std::byte, 2048> datagram;
+      sockaddr_in from{};
+      socklen_t length = sizeof from;
+      const ssize_t size =
+          ::recvfrom(socket_.fd(), datagram.data(), datagram.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
+      if (size <= 0) return;
+      ping::Framer framer{65535};
+      framer.append(std::span<const std::byte>(datagram).first(static_cast<std::size_t>(size)));
+      const auto frame = framer.next();
+      if (!frame) continue;
+      if (frame->header.id == ping::Id::reset) return;
+      ids_.push_back(frame->header.id);
+      if (!answers || frame->header.id != ping::Id::general_request) continue;
+      const wire::Bytes version = ping::framed(ping::Id::protocol_version, 1, std::array<std::byte, 4>{std::byte{1}});
+      ::sendto(socket_.fd(), version.data(), version.size(), 0, reinterpret_cast<const sockaddr*>(&from), length);
+    }
+  }
+
+  Socket socket_;
+  std::vector<ping::Id> ids_;
+  std::thread thread_;
+};
+
+Wanted with_rate() {
+  Wanted wanted;
+  wanted.settings.rate_hz = 5;
+  return wanted;
+}
+
+TEST(Search, EndsWithoutACrashWhereNoAddressOrRouteIs) {
+  for (const Make& make : protocol::makes()) {
+    const auto unnamed = PingStream::open({"no-such-host.invalid", 0}, &make, {}, 100ms);
+    ASSERT_FALSE(unnamed);
+    EXPECT_EQ(unnamed.error().kind, ErrorKind::usage) << unnamed.error().text;
+  }
+  const auto far = PingStream::open({"10.1.1.1", 0}, nullptr, {}, 100ms);
+  ASSERT_FALSE(far);
+  EXPECT_EQ(far.error().kind, ErrorKind::unavailable) << far.error().text;
+}
+
+TEST(Search, RefusesSettingsOnlyOfASonarThatIsThere) {
+  for (const std::uint32_t mode : {0u, 1u}) {
+    Wanted wanted = with_rate();
+    wanted.settings.mode = mode;
+    const auto nothing = PingStream::open({address, 0}, nullptr, wanted, 100ms);
+    ASSERT_FALSE(nothing);
+    EXPECT_EQ(nothing.error().kind, ErrorKind::unavailable) << nothing.error().text;
+    EXPECT_THAT(nothing.error().text, HasSubstr("cannot connect to tcp " + address + ":52100"));
+  }
+  Ping360 sonar(true);
+  const auto refused = PingStream::open({address, 0}, nullptr, with_rate(), 60s);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::usage);
+  EXPECT_THAT(refused.error().text, HasSubstr("--rate does not apply to a Ping360"));
+  EXPECT_THAT(sonar.received(), testing::Each(ping::Id::general_request)) << "its scan goes on";
+}
+
+TEST(Search, StopsOnlyScansThatItStarted) {
+  Ping360 of_another_driver(false);
+  EXPECT_FALSE(PingStream::open({address, 0}, find_make("ping360"), {}, 100ms));
+  EXPECT_THAT(of_another_driver.received(), testing::ElementsAre(ping::Id::general_request));
+  for (const bool as_it_is : {true, false}) {
+    SCOPED_TRACE(as_it_is);
+    Ping360 sonar(true);
+    Wanted wanted;
+    wanted.as_it_is = as_it_is;
+    EXPECT_TRUE(PingStream::open({address, 0}, find_make("ping360"), wanted, 60s));
+    if (as_it_is)
+      EXPECT_THAT(sonar.received(), testing::ElementsAre(ping::Id::general_request));
+    else
+      EXPECT_THAT(sonar.received(),
+                  testing::ElementsAre(ping::Id::general_request, ping::Id::auto_transmit, ping::Id::motor_off));
+  }
+}
+
+TEST(Search, GoesOnBesideAWebServer) {
+  std::atomic<int> requests = 0;
+  Socket sonar = bound(SOCK_STREAM, oculus::tcp_port);
+  const Server web(80, [&](const Socket& client) {
+    if (refuse_as_a_web_server(client) && ++requests == 1) ::listen(sonar.fd(), 4);
+  });
+  const auto found = PingStream::open({address, 0}, nullptr, {}, 60s);
+  ASSERT_TRUE(found) << found.error().text;
+  EXPECT_EQ(found->make().name(), "oculus");
+  EXPECT_EQ(requests, 1);
+}
+
+TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
+  const Server web(80, refuse_as_a_web_server);
+  const auto nothing = PingStream::open({address, 0}, nullptr, {}, 100ms);
+  ASSERT_FALSE(nothing);
+  EXPECT_EQ(nothing.error().kind, ErrorKind::unavailable);
+  EXPECT_THAT(nothing.error().text, HasSubstr("cannot connect to tcp " + address + ":52100"));
+  const auto named = PingStream::open({address, 0}, find_make("waterlinked"), {}, 100ms);
+  ASSERT_FALSE(named);
+  EXPECT_THAT(named.error().text, HasSubstr("is no Sonar 3D-15"));
+}
+
+}  // namespace
+}  // namespace sonar::clients::search_test

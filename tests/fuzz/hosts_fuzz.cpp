@@ -1,0 +1,50 @@
+// What a sonar of any make sends to its host. The first byte chooses the make; then pieces: port, length in two bytes, bytes. At
+// a port of kind http a piece is the body of a reply.
+#include <cstdlib>
+
+#include "protocol/host.hpp"
+
+namespace {
+
+using namespace sonar;
+
+/// The host's requests are dropped; what it decoded must be whole.
+void check(const protocol::HostActions& actions, std::size_t ports) {
+  for (const protocol::HostAction& action : actions) {
+    if (const auto* send = std::get_if<protocol::HostSend>(&action); send != nullptr && send->port >= ports) std::abort();
+    const auto* ping = std::get_if<protocol::HostPing>(&action);
+    if (ping == nullptr) continue;
+    const auto picture = ping->picture();
+    if (picture && (picture->samples.size() != picture->rows * picture->beams || picture->azimuth_rad.size() != picture->beams))
+      std::abort();
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const protocol::Make& make = protocol::makes()[data[0] % protocol::makes().size()];
+  const auto host = *make.host({});
+  const std::vector<std::uint16_t> own(make.ports.size(), 40000);
+  Time now(std::chrono::seconds(1'700'000'000));
+  check(host->on_open(own, now), own.size());
+  for (std::size_t at = 1; at + 3 <= size;) {
+    const std::size_t port = data[at] % own.size(), stated = data[at + 1] + 256u * data[at + 2];
+    at += 3;
+    protocol::Bytes piece;
+    for (const std::size_t end = std::min(size, at + stated); at < end; ++at) piece.push_back(static_cast<std::byte>(data[at]));
+    now += std::chrono::milliseconds(100);
+    if (make.ports[port].kind == protocol::HostPort::Kind::http) {
+      protocol::ResourceReply reply;
+      for (const std::byte b : piece) reply.body.push_back(static_cast<char>(b));
+      check(host->on_reply(reply, now), own.size());
+    } else {
+      check(host->on_bytes(port, piece, now), own.size());
+    }
+    check(host->on_tick(now), own.size());
+    check(host->on_demand(now), own.size());
+  }
+  check(host->on_leave(), own.size());
+  return 0;
+}

@@ -1,0 +1,282 @@
+// The host of each make against the device of the same make, in memory and virtual time: settings take, pings arrive, however the
+// bytes are split; bytes that are cut off, or junk, end in no ping and no crash.
+#include "protocol/host.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <random>
+
+namespace sonar::protocol::hosts_test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+Wanted all_that_is_known(const Make& make, double range_m) {
+  Wanted wanted;
+  wanted.settings.range_m = range_m;
+  for (auto SettingsOverride::*setting : {&SettingsOverride::rate_hz, &SettingsOverride::gain_percent}) {
+    Wanted more = wanted;
+    more.settings.*setting = setting == &SettingsOverride::rate_hz ? 5 : 50;
+    if (make.host(more)) wanted = more;
+  }
+  wanted.settings.mode = 0;
+  return wanted;
+}
+
+class Talk {
+ public:
+  /// Streams arrive in pieces of so many bytes; 0: as they are written.
+  Talk(const Make& of, const Wanted& wanted, std::size_t piece = 0, std::size_t model = 0)
+      : make(of), device(*of.device), piece_(piece), host(*of.host(wanted)) {
+    state.name = "front";
+    state.id = 7001;
+    state.model = device.models()[model];
+    state.water = {12, 30, 8.0, 0};
+    state.options = *check_options(device, {});
+    const ChangeSettings first = device.initial_settings(state);
+    state.settings = first.vendor_settings;
+    settings = first.settings;
+    port_ = device.port(Port::Kind::tcp_stream);
+    if (make.ports.front().kind == HostPort::Kind::udp) port_ = device.port(Port::Kind::udp_dialogue);
+    if (port_ != nullptr) dialogue_ = device.converse(*port_, state, now);
+    const std::vector<std::uint16_t> own(make.ports.size(), 40000);
+    carry_out(host->on_open(own, now));
+  }
+
+  /// A tenth of a second at a time, with a ping in each where the device is not asked for single ones.
+  void run(int steps) {
+    for (int i = 0; i < steps && !error; ++i) {
+      now += 100ms;
+      while (dialogue_ && dialogue_->next_tick() <= now) react(dialogue_->on_tick(now, false));
+      carry_out(host->on_tick(now));
+      carry_out(host->on_demand(now));
+      const bool by_request = make.each_ping_requested || make.scans;
+      if (!by_request && settings.rate_hz > 0 && host->is_open()) ping();
+      while (requested_ > 0) --requested_, ping();
+    }
+  }
+
+  void carry_out(HostActions actions) {
+    for (HostAction& action : actions) {
+      if (const auto* send = std::get_if<HostSend>(&action)) {
+        ASSERT_TRUE(dialogue_) << "bytes for a port without a conversation";
+        react(dialogue_->on_bytes(send->bytes, now));
+      } else if (const auto* ask = std::get_if<ResourceRequest>(&action)) {
+        const ResourceReply reply = device.on_http(*device.port(Port::Kind::http), *ask, state, now);
+        obey(reply.events);
+        carry_out(host->on_reply(reply, now));
+      } else if (auto* ping = std::get_if<HostPing>(&action)) {
+        pings.push_back(std::move(*ping));
+      } else if (auto* failed = std::get_if<Error>(&action)) {
+        error = *failed;
+      }
+    }
+  }
+
+  const Make& make;
+  const Vendor& device;
+  std::size_t piece_;
+  std::unique_ptr<Host> host;
+  DeviceState state;
+  PingSettings settings;
+  Time now = Time(1'700'000'000s);
+  std::vector<HostPing> pings;
+  std::vector<std::pair<std::size_t, Bytes>> sent;  // by the device, with the host's port
+  std::optional<Error> error;
+
+ private:
+  void react(const Reaction& reaction) {
+    for (const Bytes& reply : reaction.replies) deliver(0, reply);
+    obey(reaction.events);
+  }
+  void obey(const std::vector<Event>& events) {
+    for (const Event& event : events) {
+      if (const auto* change = std::get_if<ChangeSettings>(&event)) {
+        state.settings = change->vendor_settings;
+        settings = change->settings;
+      }
+      if (const auto* request = std::get_if<RequestPing>(&event)) {
+        ++requested_;
+        with_ = request->with;
+      }
+      if (const auto* close = std::get_if<Close>(&event)) error = Error{ErrorKind::io, close->why};
+    }
+  }
+
+  void deliver(std::size_t port, const Bytes& bytes) {
+    sent.emplace_back(port, bytes);
+    const std::size_t step = piece_ == 0 || make.ports[port].kind != HostPort::Kind::tcp ? bytes.size() : piece_;
+    for (std::size_t at = 0; at < bytes.size(); at += step)
+      carry_out(host->on_bytes(port, BytesView(bytes).subspan(at, std::min(step, bytes.size() - at)), now));
+  }
+
+  void ping() {
+    Ping made;
+    PingRequest& request = made.request;
+    request.model = state.model;
+    request.number = PingNumber{++state.last_ping};
+    request.fired_at = now;
+    request.settings = settings;
+    request.vendor_settings = with_ ? with_ : state.settings;
+    request.water = state.water;
+    const auto beams = static_cast<std::size_t>(settings.beam_count), rows = static_cast<std::size_t>(settings.range_bin_count);
+    for (std::size_t i = 0; i < beams; ++i)
+      made.beam_azimuth_rad.push_back(beams < 2 ? 0.0f : 0.5f - static_cast<float>(i) / static_cast<float>(beams - 1));
+    const std::size_t sample_bytes = static_cast<std::size_t>(std::max(settings.format.bits / 8, 1));
+    for (std::size_t i = 0; i < beams * rows * sample_bytes; ++i) made.samples.push_back(static_cast<std::byte>(i * 7 % 251));
+    const auto framed = device.frame(made, state);
+    const Port* const stream = device.port(Port::Kind::udp_stream);
+    if (dialogue_) {
+      const auto delivery = dialogue_->on_ping(request.vendor_settings.get(), framed ? framed->size() : 0, now);
+      for (const Bytes& prefix : delivery.prefixes) {
+        if (!framed) continue;
+        Bytes whole = prefix;
+        whole.insert(whole.end(), framed->begin(), framed->end());
+        deliver(0, whole);
+      }
+      obey(delivery.events);
+    }
+    if (framed && port_->kind == Port::Kind::tcp_stream) return;
+    const std::size_t to = make.ports.size() - 1;
+    for (const Bytes& datagram : device.datagrams(stream != nullptr ? *stream : *port_, made, state)) deliver(to, datagram);
+  }
+
+  const Port* port_ = nullptr;
+  std::unique_ptr<Dialogue> dialogue_;
+  std::shared_ptr<const VendorSettings> with_;
+  int requested_ = 0;
+};
+
+constexpr double range_m = 3;
+std::size_t model_of(const Make& make) { return make.name() == "aris" ? 2 : 0; }  // an ARIS 3000 shows 3 m
+
+class Hosts : public testing::TestWithParam<Make> {};
+INSTANTIATE_TEST_SUITE_P(OfEveryMake, Hosts, testing::ValuesIn(makes().begin(), makes().end()),
+                         [](const auto& of) { return std::string(of.param.name()); });
+
+TEST_P(Hosts, SetWhatIsWantedAndGetPings) {
+  const Make& make = GetParam();
+  const Wanted wanted = all_that_is_known(make, range_m);
+  Talk talk(make, wanted, 0, model_of(make));
+  talk.run(30);
+  ASSERT_FALSE(talk.error) << talk.error->text;
+  EXPECT_TRUE(talk.host->is_open());
+  EXPECT_NEAR(talk.settings.range_m, range_m, 0.2) << "as with `sonarctl set sonar --range`";
+  if (wanted.settings.gain_percent) {
+    EXPECT_NEAR(make.device->gain_percent(talk.state), 50, make.scans ? 50 : 8) << "a Ping360 has three steps";
+  }
+  if (wanted.settings.rate_hz && !make.each_ping_requested) {
+    EXPECT_NEAR(talk.settings.rate_hz, 5, 0.3);
+  }
+  ASSERT_GT(talk.pings.size(), 2u);
+  const HostPing& ping = talk.pings.back();
+  EXPECT_THAT(ping.errors, testing::IsEmpty());
+  EXPECT_THAT(ping.echo_mismatches, testing::IsEmpty());
+  EXPECT_NEAR(ping.facts.range_m, make.name() == "waterlinked" ? range_m : talk.settings.range_m, 0.2);
+  EXPECT_GT(ping.facts.message_size, 50u);
+  const auto picture = ping.picture();
+  if (!picture) {
+    EXPECT_THAT(picture.error().text, HasSubstr("picture"));
+  } else {
+    EXPECT_GT(picture->rows, 10u);
+    EXPECT_EQ(picture->samples.size(), picture->rows * picture->beams);
+    EXPECT_EQ(picture->azimuth_rad.size(), picture->beams);
+  }
+}
+
+TEST_P(Hosts, ReadTheSameHoweverAStreamIsSplit) {
+  const auto pings_of = [](std::size_t piece) {
+    Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), piece, model_of(GetParam()));
+    talk.run(6);
+    std::vector<std::pair<std::uint32_t, std::vector<float>>> all;
+    for (const HostPing& ping : talk.pings) all.emplace_back(ping.facts.number, ping.picture().value_or(PolarImage{}).samples);
+    return all;
+  };
+  const auto whole = pings_of(0);
+  ASSERT_FALSE(whole.empty());
+  for (const std::size_t piece : {1u, 2u, 7u, 16u, 1000u}) EXPECT_EQ(pings_of(piece), whole) << piece;
+}
+
+/// What the device sent, cut off anywhere or damaged anywhere, to a host that has got everything before it.
+TEST_P(Hosts, SurviveWhatIsCutOffOrDamaged) {
+  Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), 0, model_of(GetParam()));
+  talk.run(6);
+  const auto [port, last] = talk.sent.back();
+  std::mt19937 random(7);
+  for (int i = 0; i < 200; ++i) {
+    Talk other(GetParam(), all_that_is_known(GetParam(), range_m), 0, model_of(GetParam()));
+    other.run(2);
+    const std::size_t before = other.pings.size();
+    Bytes bytes(last.begin(), last.begin() + static_cast<std::ptrdiff_t>(i < 100 ? random() % last.size() : last.size()));
+    for (std::size_t k = 0; i >= 100 && k < 4; ++k)
+      bytes[random() % std::min<std::size_t>(bytes.size(), 64)] = static_cast<std::byte>(random());
+    other.carry_out(other.host->on_bytes(port, bytes, other.now));
+    if (i < 100) {
+      EXPECT_EQ(other.pings.size(), before) << bytes.size() << " of " << last.size() << " bytes";
+    }
+    for (const HostPing& ping : other.pings) static_cast<void>(ping.picture());
+    if (i % 20 != 0) continue;  // a device by TCP alone is followed by its next bytes
+    other.run(1);
+  }
+}
+
+TEST_P(Hosts, SurviveJunk) {
+  std::mt19937 random(11);
+  Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), 0, model_of(GetParam()));
+  for (int i = 0; i < 300; ++i) {
+    Bytes junk(random() % 3000);
+    for (std::byte& b : junk) b = static_cast<std::byte>(random());
+    const std::size_t port = talk.make.ports.size() - 1;
+    talk.carry_out(talk.host->on_bytes(port, junk, talk.now));
+  }
+  EXPECT_THAT(talk.pings, testing::IsEmpty());
+}
+
+TEST_P(Hosts, RefuseWhatTheyDoNotHave) {
+  Wanted wanted;
+  wanted.more["no-such-setting"] = "1";
+  const auto host = GetParam().host(wanted);
+  ASSERT_FALSE(host);
+  EXPECT_EQ(host.error().kind, ErrorKind::usage);
+  EXPECT_THAT(host.error().text, HasSubstr("--no-such-setting does not apply to " + std::string(GetParam().title)));
+  Wanted mode;
+  mode.settings.mode = 99;
+  const auto far = GetParam().host(mode);
+  if (far) {
+    Talk talk(GetParam(), mode);  // heads are known from the greeting
+    ASSERT_TRUE(talk.error);
+    EXPECT_EQ(talk.error->kind, ErrorKind::usage);
+  }
+}
+
+TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
+  Wanted nothing;
+  nothing.as_it_is = true;
+  Talk talk(GetParam(), nothing, 0, model_of(GetParam()));
+  const auto before = talk.state.settings;
+  const PingSettings first = GetParam().device->initial_settings(talk.state).settings;
+  talk.run(3);
+  EXPECT_EQ(talk.settings.range_m, first.range_m);
+  EXPECT_EQ(talk.settings.rate_hz, first.rate_hz);
+  EXPECT_TRUE(before);
+}
+
+TEST(Makes, HaveNamesAndPortsOfTheirOwn) {
+  for (const Make& one : makes()) {
+    EXPECT_FALSE(one.title.empty());
+    for (const Make& other : makes())
+      if (&one != &other) {
+        EXPECT_NE(one.name(), other.name());
+        EXPECT_NE(one.ports.front().number, other.ports.front().number);
+      }
+    bool served = false;
+    for (const Port& port : one.device->ports()) served = served || port.number == one.ports.front().number;
+    EXPECT_TRUE(served) << "the device listens where its host connects";
+  }
+}
+
+}  // namespace
+}  // namespace sonar::protocol::hosts_test
