@@ -288,6 +288,11 @@ class WithoutHorizontalPosition(WithFolder):
         with self.assertRaisesRegex(ConvertError, "lacks attitudes"):
             self.convert(self.telemetry(("GLOBAL_POSITION_INT",)))
 
+    def test_depths_before_the_vehicles_clock_is_known(self):
+        """VFR_HUD has no time; that of receipt would be decades after the vehicle's start."""
+        first = (1_699_999_999_000_000).to_bytes(8, "big") + made.mavlink_frame("VFR_HUD", (0, 0, -1, 0, 0, 0))
+        self.assert_held(self.convert(first + self.telemetry(("HEARTBEAT", "ATTITUDE", "VFR_HUD"))), range(20), t0=25)
+
     def test_a_position_is_preferred(self):
         both = made.telemetry_log() + self.telemetry(("GLOBAL_POSITION_INT", "VFR_HUD"))
         self.assertEqual(self.convert(both).source, "ATTITUDE+LOCAL_POSITION_NED")
@@ -320,6 +325,19 @@ class WithoutHorizontalPosition(WithFolder):
         track = self.convert(log)
         self.assertEqual(track.source, "XKF1")
         self.assert_held(track, range(20), (0.5, 0.25))
+        self.assert_held(self.convert(log, at=(3, 4)), range(20), (3, 4))
+
+    def test_the_origin_counts_for_a_vehicle_that_stands_still(self):
+        log = self.dataflash("XKF1", lambda down, angles: [(0, *angles, 0, 0, 0, 0, 0.5, 0.25, down, 0, 0, 0, 0)])
+        with self.assertRaisesRegex(ConvertError, "metres from an unknown origin"):
+            self.convert(log, origin=HERE)
+        place = round(1e7 * HERE.latitude_deg), round(1e7 * HERE.longitude_deg), round(100 * HERE.altitude_m)
+        log += made.dataflash_format("ORGN") + made.dataflash_message("ORGN", 0, 0, *place)
+        track = self.convert(log, origin=Geodetic(*made.degrees_at(-30, 20, 0)))
+        for got, wanted in zip(track.rows[0].position_m, (30.5, -19.75, made.moment(0)[3])):
+            self.assertAlmostEqual(got, wanted, delta=0.01)
+        self.assertEqual(len(self.warned), 1)
+        self.assertIn("north and east do not change: the vehicle stands still, or", self.warned[0])
         self.assert_held(self.convert(log, at=(3, 4)), range(20), (3, 4))
 
 
