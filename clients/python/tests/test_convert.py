@@ -5,6 +5,7 @@ import math
 import random
 import shutil
 import sqlite3
+import struct
 import unittest
 from unittest import mock
 
@@ -410,6 +411,38 @@ class Px4(WithFolder):
         track = self.convert(made.ulog(truth=True))
         self.assertEqual(track.source, "vehicle_attitude_groundtruth+vehicle_local_position_groundtruth")
         self.assertAlmostEqual(track.rows[0].position_m[2], 102)
+
+    def of_formats(self, *formats, content=b"\x01" * 32):
+        log = b"ULog\x01\x12\x35\x01" + bytes(8) + b"".join(made.ulog_message("F", text.encode("latin-1")) for text in formats)
+        for number, text in enumerate(formats):
+            log += made.ulog_message("A", bytes([0]) + struct.pack("<H", number) + text.partition(":")[0].encode())
+            log += made.ulog_message("D", struct.pack("<H", number) + content)
+        return log
+
+    def test_formats_of_other_types_are_omitted(self):
+        stamp = "uint64_t timestamp;"
+        attitude, local, place = "vehicle_attitude", "vehicle_local_position", "vehicle_global_position"
+        for name, fields, said in (
+                (attitude, "uint64_t[2] timestamp;float[4] q;", r"timestamp is uint64_t\[2\], not uint64_t"),
+                (attitude, stamp + "char[4] q;", r"q is char\[4\], not float or double\[4\]"),
+                (attitude, stamp + "float[3] q;", r"q is float\[3\], not"),
+                (attitude, stamp + "float[\xb2] q;", "'float.*' is not a field of a known type"),
+                (attitude, stamp + "float[0] q;", "is not a field of a known type"),
+                (attitude, "float[4] q;", "it has no timestamp"),
+                (place, stamp + "char lat;char lon;char alt;", "lat is char, not float or double"),
+                (local, stamp + "float x;float[3] y;float z;", r"y is float\[3\], not"),
+                (local, stamp + "float x;float y;float z;float z;", "z occurs twice"),
+                (local, stamp + "float x;float y;float z;float[65535] a;", "longer than a message"),
+                (local, stamp + "double ref_lat;char[4] xy_global;", r"xy_global is char\[4\]")):
+            with self.subTest(fields), self.assertRaisesRegex(ConvertError, "log: no poses"):
+                self.convert(self.of_formats(f"{name}:{fields}"))
+            self.assertRegex(self.warned[0], f"^at byte 16: {name} is omitted: its format cannot be read: .*{said}")
+
+    def test_messages_shorter_than_their_format_are_omitted(self):
+        with self.assertRaises(ConvertError):
+            self.convert(self.of_formats("vehicle_local_position:uint64_t timestamp;uint8_t[60000] a;float x;float y;float z;"))
+        self.assertEqual(self.warned[0],
+                         "messages of vehicle_local_position omitted because they are shorter than their format: 1")
 
     def test_truncated(self):
         log = made.ulog()
