@@ -81,12 +81,13 @@ fs::path model_in(const fs::path& folder) {
   return best;
 }
 
-/// The file itself, or the model that a folder or the newest version in it holds.
-fs::path file_at(const fs::path& place) {
+/// The file itself, or the model that a folder holds, or the newest version in it, or only the version that is named (not -1).
+fs::path file_at(const fs::path& place, int named = -1) {
   if (!is_folder(place)) return is_file(place) ? place : fs::path();
   if (fs::path model = model_in(place); !model.empty()) return model;
   for (const fs::path& version : versions_in(place))
-    if (fs::path model = model_in(version); !model.empty()) return model;
+    if (named < 0 || version_of(version) == named)
+      if (fs::path model = model_in(version); !model.empty()) return model;
   return {};
 }
 
@@ -108,17 +109,17 @@ std::string without_escapes(std::string_view text) {
 }
 
 /// Searches the folders, then beside and above the referencing file: models lie next to each other, packages contain their files.
-fs::path look_around(const fs::path& wanted, const fs::path& from_file, const std::vector<fs::path>& folders) {
+fs::path look_around(const fs::path& wanted, const fs::path& from_file, const std::vector<fs::path>& folders, int version = -1) {
   for (const fs::path& folder : folders)
-    if (const fs::path found = file_at(folder / wanted); !found.empty()) return found;
+    if (const fs::path found = file_at(folder / wanted, version); !found.empty()) return found;
   std::error_code error;
   fs::path above = fs::absolute(from_file, error).parent_path();
   const std::string first = wanted.empty() ? std::string() : wanted.begin()->string();
   for (int up = 0; up < 8 && !above.empty(); ++up, above = above.parent_path()) {
     for (const fs::path& place : {above / wanted, above / "models" / wanted})
-      if (const fs::path found = file_at(place); !found.empty()) return found;
+      if (const fs::path found = file_at(place, version); !found.empty()) return found;
     if (!first.empty() && (above.filename() == first || (up < 4 && !model_in(above).empty())))
-      if (const fs::path found = file_at(above / wanted.lexically_relative(first)); !found.empty()) return found;
+      if (const fs::path found = file_at(above / wanted.lexically_relative(first), version); !found.empty()) return found;
     if (above == above.parent_path()) break;
   }
   return {};
@@ -164,9 +165,10 @@ fs::path find_in_fuel_caches(const FuelAddress& address) {
         if (!model.empty()) model = child_of(model, part);
       if (model.empty()) continue;
       std::vector<fs::path> places = versions_in(model);
-      places.push_back(model);
+      const int named = version_of(address.version);
+      if (named < 0) places.push_back(model);
       for (fs::path place : places) {
-        if (version_of(address.version) >= 0 && place != model && version_of(place) != version_of(address.version)) continue;
+        if (named >= 0 && version_of(place) != named) continue;
         for (const std::string& part : address.inside)
           if (!place.empty()) place = child_of(place, part);
         if (fs::path found = place.empty() ? place : file_at(place); !found.empty()) return found;
@@ -203,11 +205,12 @@ fs::path find_resource(std::string_view uri, const fs::path& from_file, const st
     if (address)
       if (fs::path found = find_in_fuel_caches(*address); !found.empty()) return found;
     const std::string name = address && address->inside.empty() ? address->name : fs::path(path).filename().string();
+    const int version = address && address->inside.empty() ? version_of(address->version) : -1;
     if (name.empty()) return {};
     for (const fs::path& folder : folders)
       if (const fs::path there = child_of(folder, name); !there.empty())
-        if (const fs::path found = file_at(there); !found.empty()) return found;
-    return look_around(name, from_file, folders);
+        if (const fs::path found = file_at(there, version); !found.empty()) return found;
+    return look_around(name, from_file, folders, version);
   }
   const fs::path wanted = fs::path(path).lexically_normal();
   if (scheme == "model" || scheme == "package")

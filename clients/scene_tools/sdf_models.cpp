@@ -13,20 +13,36 @@ constexpr std::size_t most_models = 4096, most_elements = 5'000'000;
 
 bool is_true(std::string_view text) { return text == "true" || text == "1"; }
 
-/// What an included model is that has no echo, or none of its own: by the last part of its address. Empty for all others.
-std::string kind_without_echo(std::string_view uri) {
+/// The last part of an address in small letters: "coast water" for ".../models/Coast%20Water".
+std::string model_name(std::string_view uri) {
   std::string name(uri.substr(uri.find_last_of('/') + 1));
   for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c == '_' ? ' ' : c;
   for (std::size_t at = 0; (at = name.find("%20")) != std::string::npos;) name.replace(at, 3, " ");
+  return name;
+}
+
+/// The kind of a well-known model without an echo of its own, which is left out even where it is found. Empty for all others.
+std::string known_kind_without_echo(std::string_view name) {
   if (name == "sun") return "light";
   if (name == "sky" || name == "skybox") return "sky";
-  if (name == "axes" || name.ends_with(" frame")) return "coordinate frame";
-  if (name == "waves" || name == "coast water" || name == "ocean waves" || name == "ocean" || name == "ocean surface")
-    return "drawn water surface";
+  if (name == "north east down frame") return "coordinate frame";
+  if (name == "waves" || name == "coast water" || name == "ocean waves" || name == "ocean surface") return "drawn water surface";
   return {};
 }
 
-bool is_fuel(std::string_view uri) { return uri.starts_with("https://") || uri.starts_with("http://"); }
+/// The kind of a model that is not found and probably has no echo. Empty for all others.
+std::string probable_kind_without_echo(std::string_view name) {
+  if (name == "axes" || name.ends_with(" frame")) return "coordinate frame";
+  return name == "ocean" ? "drawn water surface" : "";
+}
+
+/// The shell command that fetches a model of a Fuel server. Empty for an address that a shell could read as something else.
+std::string fetch_command(std::string_view uri) {
+  constexpr std::string_view safe = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789:/._-+~% ";
+  if (!uri.starts_with("https://") && !uri.starts_with("http://")) return {};
+  if (uri.size() > 200 || uri.find_first_not_of(safe) != std::string_view::npos) return {};
+  return "gz fuel download --url '" + std::string(uri) + "'";
+}
 
 std::string text_or(std::string_view text, const char* otherwise) { return std::string(text.empty() ? otherwise : text); }
 
@@ -69,7 +85,7 @@ void SdfTree::report_missing() {
   std::string list;
   for (const Missing& m : missing_) {
     const std::string uri = plain(m.uri, 200);
-    const std::string fetch = is_fuel(m.uri) ? "gz fuel download --url \"" + uri + "\"" : "";
+    const std::string fetch = fetch_command(m.uri);
     const std::string times = m.includes > 1 ? " (" + std::to_string(m.includes) + " includes)" : "";
     if (options_.skip_missing)
       findings_.leave_out(m.at, "include of " + uri + times + ": not found" + (fetch.empty() ? "" : "; fetch it: " + fetch));
@@ -165,9 +181,14 @@ void SdfTree::add_include(SdfModel& parent, const Element& include, int include_
   if (include_depth >= most_includes_deep)
     return findings_.fail(include.place(),
                           std::string("include: ") + shown + " is more than 16 includes deep; does it include itself?");
-  if (const std::string kind = kind_without_echo(uri); !kind.empty()) return findings_.leave_out_of_no_echo(kind);
+  const std::string name = model_name(uri);
+  const auto leave_out_kind = [&](const std::string& kind) {
+    findings_.leave_out_of_no_echo(kind, kind == "light" ? "" : uri.substr(uri.find_last_of('/') + 1));
+  };
+  if (const std::string kind = known_kind_without_echo(name); !kind.empty()) return leave_out_kind(kind);
   const std::filesystem::path path = library_.find(uri, include.file()->path);
   if (path.empty()) {
+    if (const std::string kind = probable_kind_without_echo(name); !kind.empty()) return leave_out_kind(kind);
     const auto known = std::find_if(missing_.begin(), missing_.end(), [&](const Missing& m) { return m.uri == uri; });
     if (known != missing_.end())
       ++known->includes;

@@ -9,6 +9,7 @@
 namespace sonar::scene_tools {
 namespace {
 
+constexpr std::size_t most_names = 8;
 constexpr std::string_view blanks = " \t\r\n\f\v";
 
 std::string_view trimmed(const char* text) {
@@ -104,12 +105,27 @@ void Findings::fail(const Place& at, const std::string& what) {
 }
 std::vector<std::string> Findings::left_out() const {
   std::string counts;
-  for (const auto& [kind, n] : of_no_echo_)
-    counts += (counts.empty() ? "" : ", ") + std::to_string(n) + " " + kind + (n == 1 ? "" : "s");
+  for (const auto& [kind, found] : of_no_echo_) {
+    counts += (counts.empty() ? "" : ", ") + std::to_string(found.count) + " " + kind + (found.count == 1 ? "" : "s");
+    std::string names;
+    for (const std::string& name : found.names) names += (names.empty() ? "" : ", ") + name;
+    if (!names.empty()) counts += " (" + names + (found.more_names ? ", .." : "") + ")";
+  }
   std::vector<std::string> all;
   if (!counts.empty()) all.push_back(counts + ": without an echo");
   all.insert(all.end(), left_out_.begin(), left_out_.end());
   return all;
+}
+
+void Findings::leave_out_of_no_echo(const std::string& kind, std::string_view name) {
+  Counted& found = of_no_echo_[kind];
+  ++found.count;
+  const std::string shown = plain(name, 60);
+  if (shown.empty() || found.names.contains(shown)) return;
+  if (found.names.size() < most_names)
+    found.names.insert(shown);
+  else
+    found.more_names = true;
 }
 
 void Findings::leave_out(const Place& at, const std::string& what) {

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <unordered_set>
@@ -69,8 +70,9 @@ Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const st
 class Findings {
  public:
   void fail(const Place& at, const std::string& what);
-  void leave_out(const Place& at, const std::string& what);                    // each place and sentence once
-  void leave_out_of_no_echo(const std::string& kind) { ++of_no_echo_[kind]; }  // "light": counted, not listed
+  void leave_out(const Place& at, const std::string& what);  // each place and sentence once
+  /// "light": counted; the names of models, which may be empty, are listed with the count.
+  void leave_out_of_no_echo(const std::string& kind, std::string_view name = {});
   bool failed() const { return error_.has_value(); }
   const std::optional<Error>& error() const { return error_; }
   /// First, in one line, how many of what has no echo.
@@ -79,7 +81,12 @@ class Findings {
  private:
   std::optional<Error> error_;
   std::vector<std::string> left_out_;
-  std::map<std::string, std::size_t> of_no_echo_;
+  struct Counted {
+    std::size_t count = 0;
+    std::set<std::string> names = {};  // the first few
+    bool more_names = false;
+  };
+  std::map<std::string, Counted> of_no_echo_;
   std::unordered_set<std::string> seen_;
 };
 

@@ -5,15 +5,17 @@ import math
 import random
 import shutil
 import sqlite3
+import struct
 import unittest
 from unittest import mock
 
 import made_logs as made
 from converted import WithFolder
 
-from sonard_client.convert import ConvertError, Geodetic, convert, format_of
+from sonard_client.convert import ConvertError, Geodetic, convert, format_of, rosbag2
 from sonard_client.convert.__main__ import main
 from sonard_client.convert.mavlink import crc
+from sonard_client.convert.rosbag2 import files_of
 from sonard_client.geodesy import LocalPlane, ecef, parse_origin
 from sonard_client.nmea import Assumptions
 from sonard_client.rotations import between, quaternion_from_rpy
@@ -288,6 +290,11 @@ class WithoutHorizontalPosition(WithFolder):
         with self.assertRaisesRegex(ConvertError, "lacks attitudes"):
             self.convert(self.telemetry(("GLOBAL_POSITION_INT",)))
 
+    def test_depths_before_the_vehicles_clock_is_known(self):
+        """VFR_HUD has no time; that of receipt would be decades after the vehicle's start."""
+        first = (1_699_999_999_000_000).to_bytes(8, "big") + made.mavlink_frame("VFR_HUD", (0, 0, -1, 0, 0, 0))
+        self.assert_held(self.convert(first + self.telemetry(("HEARTBEAT", "ATTITUDE", "VFR_HUD"))), range(20), t0=25)
+
     def test_a_position_is_preferred(self):
         both = made.telemetry_log() + self.telemetry(("GLOBAL_POSITION_INT", "VFR_HUD"))
         self.assertEqual(self.convert(both).source, "ATTITUDE+LOCAL_POSITION_NED")
@@ -320,6 +327,19 @@ class WithoutHorizontalPosition(WithFolder):
         track = self.convert(log)
         self.assertEqual(track.source, "XKF1")
         self.assert_held(track, range(20), (0.5, 0.25))
+        self.assert_held(self.convert(log, at=(3, 4)), range(20), (3, 4))
+
+    def test_the_origin_counts_for_a_vehicle_that_stands_still(self):
+        log = self.dataflash("XKF1", lambda down, angles: [(0, *angles, 0, 0, 0, 0, 0.5, 0.25, down, 0, 0, 0, 0)])
+        with self.assertRaisesRegex(ConvertError, "metres from an unknown origin"):
+            self.convert(log, origin=HERE)
+        place = round(1e7 * HERE.latitude_deg), round(1e7 * HERE.longitude_deg), round(100 * HERE.altitude_m)
+        log += made.dataflash_format("ORGN") + made.dataflash_message("ORGN", 0, 0, *place)
+        track = self.convert(log, origin=Geodetic(*made.degrees_at(-30, 20, 0)))
+        for got, wanted in zip(track.rows[0].position_m, (30.5, -19.75, made.moment(0)[3])):
+            self.assertAlmostEqual(got, wanted, delta=0.01)
+        self.assertEqual(len(self.warned), 1)
+        self.assertIn("north and east do not change: the vehicle stands still, or", self.warned[0])
         self.assert_held(self.convert(log, at=(3, 4)), range(20), (3, 4))
 
 
@@ -368,6 +388,108 @@ class RecordingsOfRos2(WithFolder):
         with self.assertRaisesRegex(ConvertError, "r_0.db3.zstd is compressed; unpack it first: zstd -d "):
             format_of(folder)
 
+    def test_parts_that_are_not_read_are_named(self):
+        folder = self.folder_of("sub/r_0.db3", "r_1.db3.zstd", "r_2.db3.zstd", "r_3.db3", "'r_\x1b4.mcap'")
+        for name in ("r_0.db3", "r_2.db3"):
+            made.db3(folder / name, self.TOPICS)
+        for name in ("r_1.db3.zstd", "r_2.db3.zstd"):
+            (folder / name).write_bytes(b"x")
+        self.assertEqual([p.name for p in files_of(folder, self.warned.append)], ["r_0.db3", "r_2.db3"])
+        self.assertEqual(self.warned, [
+            "parts of the recording are compressed, so they are omitted; unpack them first: zstd -d: r_1.db3.zstd",
+            "parts of the recording are omitted: metadata.yaml lists them, and they are not in the folder: r_3.db3, r_?4.mcap"])
+        self.warned = []
+        convert(folder, warn=self.warned.append)
+        self.assertEqual(len([text for text in self.warned if "parts of the recording" in text]), 2)
+
+    def test_metadata_of_blank_lines(self):
+        folder = self.folder_of()
+        made.db3(folder / "r_0.db3", self.TOPICS)
+        for text in ("\n" * (1 << 20), " " * (1 << 20), "- " + " " * (1 << 20), "- a.db3" * (1 << 17) + " x", "- \n" * (1 << 18)):
+            (folder / "metadata.yaml").write_text(text)
+            self.assertEqual(len(files_of(folder)), 1)  # a quadratic search takes hours
+
+    def test_messages_that_are_not_merged_yet(self):
+        path, copy = self.folder / "live.db3", self.folder / "copy.db3"
+        made.db3(path, [("/odom", "nav_msgs/msg/Odometry", [(100, made.odometry(0))])])
+        with contextlib.closing(sqlite3.connect(path)) as base:
+            base.execute("PRAGMA journal_mode=WAL")
+            base.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 101000000000, ?)", (made.odometry(1),))
+            base.commit()
+            for end in ("", "-wal"):
+                shutil.copy(f"{path}{end}", f"{copy}{end}")
+        self.assertEqual(len(convert(copy).rows), 2)
+        self.assertGreater((self.folder / "copy.db3-wal").stat().st_size, 0)
+
+    def test_changes_that_were_not_finished(self):
+        path, copy = self.folder / "live.db3", self.folder / "copy.db3"
+        made.db3(path, self.TOPICS)
+        with contextlib.closing(sqlite3.connect(path)) as base:
+            base.execute("PRAGMA cache_size=1")  # so that pages are written before the end
+            base.execute("UPDATE topics SET name = '/half'")
+            base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 1, ?)", [(bytes(5000),)] * 50)
+            for end in ("", "-journal"):
+                shutil.copy(f"{path}{end}", f"{copy}{end}")
+            base.rollback()
+        with self.assertRaisesRegex(ConvertError, "copy.db3: its writer did not end .*: copy.db3-journal belongs to it"):
+            convert(copy)
+
+    def test_only_stored_tables_are_read(self):
+        endless = "AS WITH RECURSIVE c(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM c) SELECT n AS id, "
+        for table, statement, said in (
+                ("messages", f"CREATE VIEW messages {endless} 1 AS topic_id, n AS timestamp, x'00' AS data FROM c",
+                 "messages is not a stored table"),
+                ("topics", f"CREATE VIEW topics {endless} '/a' AS name, 'nav_msgs/msg/Odometry' AS type, 'cdr' AS "
+                 "serialization_format FROM c", "topics is not a stored table"),
+                ("messages", "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, data AS (zeroblob(900000000)))",
+                 "column data of messages is not stored")):
+            with self.subTest(said):
+                path = self.folder / "log"
+                path.unlink(missing_ok=True)
+                made.db3(path, self.TOPICS)
+                with contextlib.closing(sqlite3.connect(path)) as base, base:
+                    base.execute(f"DROP TABLE {table}")
+                    base.execute(statement)
+                with self.assertRaisesRegex(ConvertError, f"log: not a recording of ROS 2, or damaged: {said}"):
+                    convert(path)
+
+    def repeating(self, topic_id):
+        """A file of some kB whose tree of messages lists the same pages again and again."""
+        path = self.folder / "log"
+        with contextlib.closing(sqlite3.connect(path)) as base:
+            base.execute("PRAGMA page_size=512")
+            base.execute("VACUUM")
+        made.db3(path, [("/odom", "nav_msgs/msg/Odometry", [(i, b"x") for i in range(1000)])])
+        with contextlib.closing(sqlite3.connect(path)) as base, base:
+            base.execute("UPDATE messages SET topic_id = ?", (topic_id,))
+            root, = base.execute("SELECT rootpage FROM sqlite_master WHERE name = 'messages'").fetchone()
+        data = bytearray(path.read_bytes())
+
+        def children(page):
+            at = 512 * (page - 1)
+            cells = struct.unpack_from(">H", data, at + 3)[0]
+            self.assertEqual(data[at], 5)  # an inner page
+            return [at + 8] + [at + struct.unpack_from(">H", data, at + 12 + 2 * i)[0] for i in range(cells)]
+
+        places = children(root)
+        inner, leaf = (struct.unpack_from(">I", data, at)[0] for at in places[:2])
+        for level, below in ((root, inner), (inner, leaf)):
+            if level == inner:
+                data[512 * (inner - 1):512 * inner] = data[512 * (root - 1):512 * root]
+            for at in children(level):
+                struct.pack_into(">I", data, at, below)
+        path.write_bytes(data)
+        return path
+
+    def test_tables_that_list_more_than_the_file_holds(self):
+        for topic_id, steps in ((1, rosbag2.STEPS_PER_BYTE), (2, 0.05)):  # its messages are read, or only stepped over
+            path = self.repeating(topic_id)
+            with self.subTest(topic_id), mock.patch.object(rosbag2, "STEPS_PER_BYTE", steps), \
+                    mock.patch.object(rosbag2, "_STEPS_AT_ONCE", 1000), \
+                    self.assertRaisesRegex(ConvertError, "log: its tables list more than a file of this size can hold"):
+                convert(path)
+            path.unlink()
+
     def test_messages_compressed_one_by_one(self):
         path = made.db3(self.folder / "log", [("/odom", "nav_msgs/msg/Odometry", [(1, b"\x28\xb5\x2f\xfd...")])])
         with self.assertRaisesRegex(ConvertError, "compressed one by one; .*ros2 bag convert"):
@@ -392,6 +514,38 @@ class Px4(WithFolder):
         track = self.convert(made.ulog(truth=True))
         self.assertEqual(track.source, "vehicle_attitude_groundtruth+vehicle_local_position_groundtruth")
         self.assertAlmostEqual(track.rows[0].position_m[2], 102)
+
+    def of_formats(self, *formats, content=b"\x01" * 32):
+        log = b"ULog\x01\x12\x35\x01" + bytes(8) + b"".join(made.ulog_message("F", text.encode("latin-1")) for text in formats)
+        for number, text in enumerate(formats):
+            log += made.ulog_message("A", bytes([0]) + struct.pack("<H", number) + text.partition(":")[0].encode())
+            log += made.ulog_message("D", struct.pack("<H", number) + content)
+        return log
+
+    def test_formats_of_other_types_are_omitted(self):
+        stamp = "uint64_t timestamp;"
+        attitude, local, place = "vehicle_attitude", "vehicle_local_position", "vehicle_global_position"
+        for name, fields, said in (
+                (attitude, "uint64_t[2] timestamp;float[4] q;", r"timestamp is uint64_t\[2\], not uint64_t"),
+                (attitude, stamp + "char[4] q;", r"q is char\[4\], not float or double\[4\]"),
+                (attitude, stamp + "float[3] q;", r"q is float\[3\], not"),
+                (attitude, stamp + "float[\xb2] q;", "'float.*' is not a field of a known type"),
+                (attitude, stamp + "float[0] q;", "is not a field of a known type"),
+                (attitude, "float[4] q;", "it has no timestamp"),
+                (place, stamp + "char lat;char lon;char alt;", "lat is char, not float or double"),
+                (local, stamp + "float x;float[3] y;float z;", r"y is float\[3\], not"),
+                (local, stamp + "float x;float y;float z;float z;", "z occurs twice"),
+                (local, stamp + "float x;float y;float z;float[65535] a;", "longer than a message"),
+                (local, stamp + "double ref_lat;char[4] xy_global;", r"xy_global is char\[4\]")):
+            with self.subTest(fields), self.assertRaisesRegex(ConvertError, "log: no poses"):
+                self.convert(self.of_formats(f"{name}:{fields}"))
+            self.assertRegex(self.warned[0], f"^at byte 16: {name} is omitted: its format cannot be read: .*{said}")
+
+    def test_messages_shorter_than_their_format_are_omitted(self):
+        with self.assertRaises(ConvertError):
+            self.convert(self.of_formats("vehicle_local_position:uint64_t timestamp;uint8_t[60000] a;float x;float y;float z;"))
+        self.assertEqual(self.warned[0],
+                         "messages of vehicle_local_position omitted because they are shorter than their format: 1")
 
     def test_truncated(self):
         log = made.ulog()

@@ -530,37 +530,60 @@ class TimeLeft(unittest.TestCase):
         self.assertEqual(judge_main.TimeLeft([], 4).after(CASES[0], 0.0), "")
 
 
+class Clock:
+    """Stands in for time: it goes on only while something sleeps, and longer where the computer stalls."""
+
+    def __init__(self, stalls=()):
+        self.now, self.stalls, self.sleeps = 1000.0, dict(stalls), 0
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.sleeps += 1
+        self.now += seconds + self.stalls.get(self.sleeps, 0)
+
+
 class Waiting(unittest.TestCase):
     """A busy computer is slow; a driver that does nothing is stuck."""
 
-    def waited(self, steps, timeout_s):
-        scene = mock.Mock()
+    def waited(self, happens_s, timeout_s, stalls=(), most=8):
+        """happens_s: times after the start at which something happens."""
+        scene, clock = mock.Mock(), Clock(stalls)
         scene.driver.poll.return_value = None
         scene.driver.samples = []
-        began, counts = time.monotonic(), iter(steps)
-        last = [0]
+        began = clock.now
 
         def moves():
-            last[0] = next(counts, last[0])
-            return last[0]
-        done = Scene.wait(scene, lambda: last[0] >= 8, timeout_s, moves)
-        return done, time.monotonic() - began
+            return sum(clock.now >= began + at for at in happens_s)
+        with mock.patch("sonard_client.judge.scene.time", clock):
+            done = Scene.wait(scene, lambda: moves() >= most, timeout_s, moves)
+        return done, clock.now - began
 
     def test_goes_on_while_something_happens(self):
-        done, seconds = self.waited([n // 2 for n in range(20)], 0.3)  # 0.1 s between two events, 0.8 s in all
+        done, seconds = self.waited([0.1 * n for n in range(1, 9)], 0.3)
         self.assertTrue(done)
-        self.assertGreater(seconds, 0.3)
+        self.assertGreaterEqual(seconds, 0.8)
+
+    def test_goes_on_after_a_stall_in_which_something_happened(self):
+        done, seconds = self.waited([0.1, 0.2, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4], 0.3, stalls={4: 0.6})
+        self.assertTrue(done)
+        self.assertGreaterEqual(seconds, 1.4)
+
+    def test_looks_at_the_condition_after_a_stall(self):
+        self.assertTrue(self.waited([0.1 * n for n in range(1, 9)], 0.3, stalls={1: 100})[0])
 
     def test_ends_when_nothing_happens(self):
-        done, seconds = self.waited([0, 1, 2, 3], 0.3)
+        done, seconds = self.waited([0.1, 0.2, 0.25], 0.3)
         self.assertFalse(done)
-        self.assertGreaterEqual(seconds, 0.3)
+        self.assertGreaterEqual(seconds, 0.55 - 1e-9)
+        self.assertLess(seconds, 0.75)
 
     def test_ends_at_last(self):
-        scene = mock.Mock()
-        scene.driver.poll.return_value = None
-        scene.driver.samples = []
-        self.assertFalse(Scene.wait(scene, lambda: False, 0.1, time.monotonic))
+        done, seconds = self.waited([0.1 * n for n in range(1, 100)], 0.3, most=50)
+        self.assertFalse(done)
+        self.assertGreaterEqual(seconds, 1.8 - 1e-9)
+        self.assertLess(seconds, 2.1)
 
 
 class CommandLine(unittest.TestCase):

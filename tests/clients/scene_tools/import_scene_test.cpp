@@ -132,6 +132,14 @@ TEST_F(ImportScene, FuelModelsAreFoundInTheCachesOfGazebo) {
   const auto given = run(sdf(fuel + "hmoyen/models/Sand Bed</uri></include>"));
   ASSERT_TRUE(given) << given.error().text;
   EXPECT_THAT(text(), HasSubstr("size_m: [20, 20, 1]"));
+  EXPECT_TRUE(run(sdf(fuel + "hmoyen/models/Sand Bed/2</uri></include>")));
+  EXPECT_THAT(text(), HasSubstr("size_m: [1, 1, 1]"));
+  // Another version than the one named is not taken instead of it.
+  const std::string third = sdf(fuel + "hmoyen/models/Sand Bed/3</uri></include>");
+  EXPECT_THAT(error(third), HasSubstr("gz fuel download --url 'https://fuel.gazebosim.org/1.0/hmoyen/models/Sand Bed/3'"));
+  const Environment again("HOME", files.path("home").string());
+  options.model_folders.clear();
+  EXPECT_THAT(error(third), HasSubstr("hmoyen/models/Sand Bed/3'"));
 }
 
 TEST_F(ImportScene, AnEmptySceneIsAnErrorThatSaysWhatIsMissing) {
@@ -141,8 +149,8 @@ TEST_F(ImportScene, AnEmptySceneIsAnErrorThatSaysWhatIsMissing) {
       sdf("<light name='l'/><include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/Sand Heightmap</uri></include>");
   EXPECT_THAT(error(world),
               ::testing::AllOf(HasSubstr("w.sdf: nothing in it has a shape"), HasSubstr("left out: 1 light"),
-                               HasSubstr("gz fuel download --url \"https://fuel.gazebosim.org/1.0/hmoyen/models/Sand "
-                                         "Heightmap\"")));
+                               HasSubstr("gz fuel download --url 'https://fuel.gazebosim.org/1.0/hmoyen/models/Sand "
+                                         "Heightmap'")));
   EXPECT_FALSE(std::filesystem::exists(options.out));
 }
 

@@ -172,8 +172,8 @@ TEST(ReadSdf, WhatASceneCannotHoldIsNamedOnceWithItsLine) {
           "</include><include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/North East Down frame</uri></include>"));
   ASSERT_TRUE(world) << world.error().text;
   EXPECT_THAT(r.findings.left_out(),
-              ElementsAre("1 coordinate frame, 3 lights: without an echo", "w.sdf:4: actor \"walker\"", "w.sdf:5: plugin \"p\"",
-                          "w.sdf:5: joint \"j\" (prismatic): stays as it is drawn",
+              ElementsAre("1 coordinate frame (North East Down frame), 3 lights: without an echo", "w.sdf:4: actor \"walker\"",
+                          "w.sdf:5: plugin \"p\"", "w.sdf:5: joint \"j\" (prismatic): stays as it is drawn",
                           "w.sdf:5: geometry polyline: not a shape that a scene has", "model:/cam:2: sensor \"eye\""));
 }
 
@@ -205,15 +205,47 @@ TEST(ReadSdf, MissingModelsAreNamedOnceEachWithTheCommandThatFetchesThem) {
                                 "<include><uri>model://gone</uri></include>" + model("m", link("l")));
   EXPECT_EQ(r.error(world),
             "w.sdf:3: include: models that are not here; fetch them, give the folder that holds them with --model-path, or go on "
-            "without them with --skip-missing: gz fuel download --url \"" +
-                rock + "\" (2 includes); model://gone");
+            "without them with --skip-missing: gz fuel download --url '" +
+                rock + "' (2 includes); model://gone");
   r.options.skip_missing = true;
   ASSERT_TRUE(r.read(world));
   EXPECT_THAT(r.findings.left_out(), ElementsAre("w.sdf:3: include of " + rock +
                                                      " (2 includes): not found; fetch it: gz fuel "
-                                                     "download --url \"" +
-                                                     rock + "\"",
+                                                     "download --url '" +
+                                                     rock + "'",
                                                  "w.sdf:5: include of model://gone: not found"));
+}
+
+TEST(ReadSdf, NoCommandIsGivenForAddressesThatAShellWouldRun) {
+  Reading r;
+  for (const char* more : {"$(id)", "`id`", "x' ; id ; '", "x\" ; id ; \"", "a\nid", "a;id", "a|id", "a&amp;id", "a\\"}) {
+    const std::string said =
+        r.error(sdf(std::string("<include><uri>https://fuel.example/1.0/a/models/") + more + "</uri></include>"));
+    EXPECT_THAT(said, HasSubstr("--skip-missing: https://fuel.example/1.0/a/models/")) << more;
+    EXPECT_THAT(said, ::testing::Not(HasSubstr("gz fuel"))) << more;
+  }
+  EXPECT_THAT(r.error(sdf("<include><uri>https://fuel.example/" + std::string(300, 'a') + "</uri></include>")),
+              ::testing::Not(HasSubstr("gz fuel")));
+}
+
+TEST(ReadSdf, ModelsNamedLikeFramesOrWaterAreReadWhereTheyAreFound) {
+  Reading r;
+  const std::vector<std::string> names{"a_frame", "axes", "ocean"};
+  std::string includes;
+  for (const std::string& name : names) {
+    r.files["model://" + name] = "<sdf>" + model(name, link("l")) + "</sdf>";
+    includes += "<include><uri>model://" + name + "</uri></include>";
+  }
+  const auto world = r.read(sdf(includes));
+  ASSERT_TRUE(world) << world.error().text;
+  EXPECT_EQ(world->shapes.size(), 3u);
+  EXPECT_THAT(r.findings.left_out(), ElementsAre());
+  r.files.clear();
+  const auto without = r.read(sdf(includes + model("m", link("l"))));
+  ASSERT_TRUE(without) << without.error().text;
+  EXPECT_EQ(without->shapes.size(), 1u);
+  EXPECT_THAT(r.findings.left_out(),
+              ElementsAre("2 coordinate frames (a_frame, axes), 1 drawn water surface (ocean): without an echo"));
 }
 
 TEST(ReadSdf, CirclesAndDepthsEnd) {

@@ -1,10 +1,11 @@
 """Reads recordings of ROS 2: SQLite files (.db3) and the folders that `ros2 bag record` makes, of SQLite or MCAP files."""
 from __future__ import annotations
 
+import contextlib
 import pathlib
 import re
 import sqlite3
-from typing import Iterator, List, Optional
+from typing import Dict, Iterator, List, Optional
 from urllib.parse import quote
 
 from .mcap import MAGIC as MCAP_MAGIC
@@ -16,26 +17,103 @@ from .track import ConvertError, Track, Warn
 MAGIC = b"SQLite format 3\0"
 METADATA = "metadata.yaml"
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-_MESSAGES = "SELECT id, timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp, id"
+COLUMNS = {"topics": ("id", "name", "type", "serialization_format"), "messages": ("id", "topic_id", "timestamp", "data")}
+MOST_TOPICS = 500  # that may hold poses
+MOST_MESSAGE_BYTES = 16 << 20
+ROW_BYTES = 8  # a stored message takes more, besides its data
+STEPS_PER_BYTE = 10  # instructions of SQLite; a scan takes about 20 a row
+_STEPS_AT_ONCE = 100_000
+_PARTS_NAMED = 20
+_PART = re.compile(r"^[ \t]*-[ \t]+[\"']?([^\"'\s:]+\.(?:db3|mcap)(?:\.zstd)?)[\"']?[ \t\r]*$", re.MULTILINE)
+
+
+def _unmerged(path: pathlib.Path) -> Optional[pathlib.Path]:
+    """The file beside a database that holds its last changes, if its writer did not end as it should."""
+    beside = (path.with_name(path.name + end) for end in ("-wal", "-journal"))
+    return next((p for p in beside if p.is_file() and p.stat().st_size), None)
+
+
+class _Base:
+    """A database that may be hostile: only stored tables are read, and no more of them than the file can hold."""
+
+    def __init__(self, path: pathlib.Path, unmerged: Optional[pathlib.Path]) -> None:
+        resolved = path.resolve()
+        self.bytes_left = resolved.stat().st_size + (unmerged.stat().st_size if unmerged else 0)
+        self._steps_left = STEPS_PER_BYTE * (self.bytes_left + (1 << 20))
+        self.exceeded = False
+        options = "mode=ro" if unmerged else "mode=ro&immutable=1"
+        self.base = sqlite3.connect(f"file:{quote(str(resolved))}?{options}", uri=True)
+        self.base.text_factory = lambda raw: raw.decode("utf-8", "replace")
+        self.base.set_progress_handler(self._is_too_long, _STEPS_AT_ONCE)
+        if hasattr(self.base, "setlimit"):  # since Python 3.11
+            self.base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(1 << 20, min(self.bytes_left, (1 << 31) - 1)))
+
+    def close(self) -> None:
+        self.base.close()
+
+    def _is_too_long(self) -> bool:
+        self._steps_left -= _STEPS_AT_ONCE
+        self.exceeded |= self._steps_left < 0
+        return self.exceeded
+
+    def _check(self) -> None:
+        """Views, virtual tables and generated columns are programs, not data."""
+        self.base.execute("PRAGMA trusted_schema=OFF")
+        for table, needed in COLUMNS.items():
+            kinds = self.base.execute("SELECT type, rootpage FROM sqlite_master WHERE name = ? COLLATE NOCASE",
+                                      (table,)).fetchall()
+            if not kinds:
+                raise sqlite3.DatabaseError(f"no such table: {table}")
+            if len(kinds) > 1 or kinds[0][0] != "table" or not kinds[0][1]:
+                raise sqlite3.DatabaseError(f"{table} is not a stored table")
+            hidden = {str(row[1]).lower(): row[6] for row in self.base.execute(f"PRAGMA table_xinfo({table})")}
+            for column in needed:
+                if hidden.get(column, 0):
+                    raise sqlite3.DatabaseError(f"column {column} of {table} is not stored")
+
+    def rows(self, warn: Warn) -> Iterator[Recorded]:
+        self._check()
+        topics = {}
+        for number, *texts in self.base.execute(f"SELECT {', '.join(COLUMNS['topics'])} FROM topics"):
+            topic, schema, encoding = map(str, texts)
+            if isinstance(number, int) and may_hold_poses(encoding, schema):
+                topics[number] = topic, encoding, schema
+            if len(topics) > MOST_TOPICS:
+                raise sqlite3.DatabaseError(f"more than {MOST_TOPICS} topics with poses")
+        # Without ORDER BY, which makes SQLite copy all rows before the first.
+        select = ("SELECT id, topic_id, timestamp, CASE WHEN typeof(data) = 'blob' AND length(data) <= ? THEN data END FROM "
+                  f"messages WHERE topic_id IN ({','.join('?' * len(topics))})")
+        odd: Dict[str, int] = {}
+        for row, number, stamp_ns, data in self.base.execute(select, (MOST_MESSAGE_BYTES, *topics)):
+            topic, encoding, schema = topics[number]
+            self.bytes_left -= ROW_BYTES + (len(data) if isinstance(data, bytes) else 0)
+            if self.bytes_left < 0:
+                self.exceeded = True
+                return
+            if isinstance(row, int) and isinstance(stamp_ns, int) and isinstance(data, bytes):
+                yield Recorded(topic, encoding, schema, 1e-9 * stamp_ns, data, row, "message")
+            else:
+                odd[topic] = odd.get(topic, 0) + 1
+        for topic, count in sorted(odd.items()):
+            warn(f"messages of {topic} omitted because they have no time, no bytes or more than {MOST_MESSAGE_BYTES >> 20} MiB: "
+                 f"{count}")
 
 
 def _rows(path: pathlib.Path, warn: Warn) -> Iterator[Recorded]:
-    base = sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1", uri=True)
-    try:
-        base.text_factory = lambda raw: raw.decode("utf-8", "replace")
-        for number, topic, schema, encoding in base.execute("SELECT id, name, type, serialization_format FROM topics").fetchall():
-            if not may_hold_poses(str(encoding), str(schema)):
-                continue
-            odd = 0
-            for row, stamp_ns, data in base.execute(_MESSAGES, (number,)):
-                if isinstance(row, int) and isinstance(stamp_ns, int) and isinstance(data, bytes):
-                    yield Recorded(str(topic), str(encoding), str(schema), 1e-9 * stamp_ns, data, row, "message")
-                else:
-                    odd += 1
-            if odd:
-                warn(f"messages of {topic} omitted because they have no time or no bytes: {odd}")
-    finally:
-        base.close()
+    unmerged = _unmerged(path.resolve())
+    with contextlib.closing(_Base(path, unmerged)) as base:
+        try:
+            yield from base.rows(warn)
+        except sqlite3.Error as error:
+            if unmerged and not base.exceeded:
+                raise ConvertError(f"{path}: its writer did not end as it should: {unmerged.name} belongs to it, and the two "
+                                   f"cannot be read together: {error}; copy both and repair the copy: sqlite3 COPY 'PRAGMA "
+                                   "journal_mode=DELETE'") from None
+            if not base.exceeded:
+                raise
+        if base.exceeded:
+            raise ConvertError(f"{path}: its tables list more than a file of this size can hold; it is damaged or not a "
+                               "recording of ROS 2")
 
 
 def db3_messages(path: pathlib.Path, warn: Warn) -> List[Recorded]:
@@ -51,10 +129,24 @@ def db3_messages(path: pathlib.Path, warn: Warn) -> List[Recorded]:
             raise ConvertError(f"{path}: not a recording of ROS 2, or damaged: {error}; a damaged one may be repaired by "
                                "ros2 bag reindex") from None
         warn(f"is damaged ({error}); {len(found)} messages before that were read")
-    return found
+    return sorted(found, key=lambda message: (message.logged_s, message.at))
 
 
-def files_of(folder: pathlib.Path) -> List[pathlib.Path]:
+def _warn_of_missing(folder: pathlib.Path, there: List[pathlib.Path], listed: List[str], warn: Warn) -> None:
+    """Names the parts of a recording that are not read: absent, or compressed and not unpacked."""
+    names = {p.name for p in there}
+    plain = dict.fromkeys(name[:-len(".zstd")] if name.endswith(".zstd") else name for name in listed)
+    packed = [p.name for p in sorted(folder.glob("*.zstd")) if p.name[:-len(".zstd")] not in names]
+    absent = [name for name in plain if name not in names and name + ".zstd" not in packed]
+    for missing, what in ((packed, "are compressed, so they are omitted; unpack them first: zstd -d"),
+                          (absent, f"are omitted: {METADATA} lists them, and they are not in the folder")):
+        if missing:
+            shown = ["".join(c if c.isprintable() else "?" for c in name[:200]) for name in missing[:_PARTS_NAMED]]
+            more = f" and {len(missing) - _PARTS_NAMED} more" if len(missing) > _PARTS_NAMED else ""
+            warn(f"parts of the recording {what}: {', '.join(shown)}{more}")
+
+
+def files_of(folder: pathlib.Path, warn: Warn = lambda text: None) -> List[pathlib.Path]:
     """The files of a recording's folder in the order of time: as its metadata lists them, else by name."""
     there = sorted(p for p in folder.iterdir() if p.suffix in (".db3", ".mcap") and p.is_file())
     try:
@@ -62,20 +154,21 @@ def files_of(folder: pathlib.Path) -> List[pathlib.Path]:
             text = file.read(1 << 20).decode("utf-8", "replace")
     except FileNotFoundError:
         text = ""
-    listed = re.findall(r"^\s*-\s+[\"']?([^\"'\s:]+\.(?:db3|mcap)(?:\.zstd)?)[\"']?\s*$", text, re.MULTILINE)
+    listed = [name.rpartition("/")[2] for name in _PART.findall(text)]  # older versions write the folder, too
     rank = {name: number for number, name in reversed(list(enumerate(listed)))}
     if not there:
         packed = sorted(p.name for p in folder.glob("*.zstd"))
         if packed:
             raise ConvertError(f"{folder}: {packed[0]} is compressed; unpack it first: zstd -d {folder / packed[0]}")
         raise ConvertError(f"{folder}: a folder without .db3 and .mcap files; give a log, or the folder of a recording")
+    _warn_of_missing(folder, there, listed, warn)
     return sorted(there, key=lambda p: (rank.get(p.name, len(rank)), p.name))
 
 
 def read_rosbag2(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
     """Reads the poses of one topic of a file or a folder, ENU_FLU."""
     messages: List[Recorded] = []
-    for file in files_of(path) if path.is_dir() else [path]:
+    for file in files_of(path, warn) if path.is_dir() else [path]:
         with file.open("rb") as opened:
             is_mcap = opened.read(len(MCAP_MAGIC)) == MCAP_MAGIC
         messages += mcap_messages(file, warn) if is_mcap else db3_messages(file, warn)

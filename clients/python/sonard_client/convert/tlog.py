@@ -120,8 +120,8 @@ class _Vehicle:
         t = self._since_start(1e-3 * fields["time_boot_ms"], logged.received_s) if "time_boot_ms" in fields else \
             1e-6 * fields["time_usec"] if fields.get("time_usec") else logged.received_s
         if name == "VFR_HUD":  # without a time; above the surface of submarines, above sea level or the home of others
-            if math.isfinite(fields["alt"]):
-                now = self._before_s + self._boot[0] + logged.received_s - self._boot[1] if self._boot else logged.received_s
+            if math.isfinite(fields["alt"]) and self._boot is not None:  # else its time since start is not known yet
+                now = self._before_s + self._boot[0] + logged.received_s - self._boot[1]
                 self.depths.setdefault(name, []).append((now, -fields["alt"]))
             return
         attitude: Optional[Quaternion] = None

@@ -109,13 +109,14 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
         local = [(t, plane.ned(p)) for t, p in positions if isinstance(p, Geodetic)]
     else:
         local = [(t, (p[0], p[1], p[2])) for t, p in positions]
-        if source.held or _stays(local):
+        stays = not source.held and _stays(local)
+        if source.held or (stays and (at is not None or (origin is None and own_origin is None))):
             held = at or local[0][1][:2]
             warn(f"no horizontal position (no DVL, UGPS or the like): north and east are held at {held[0]:g}, {held[1]:g}" +
-                 ("" if at else "; --at NORTH,EAST sets them"))
+                 ("" if at else "; --at NORTH,EAST sets them") + ("" if origin is None else "; the origin is not used"))
             comments.append(f"north and east are held at {held[0]:g}, {held[1]:g}: the log has no horizontal position")
             local = [(t, (held[0], held[1], p[2])) for t, p in local]
-            at = None
+            at, stays = None, False
         elif own_origin is not None:
             comments.append(f"origin: {origin or own_origin}")
             if origin is not None:
@@ -124,6 +125,9 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
         elif origin is not None:
             raise ConvertError(f"{name}: positions of {source.name} are metres from an unknown origin; omit the origin, or "
                                "select a source with latitude and longitude")
+        if stays:
+            warn("north and east do not change: the vehicle stands still, or its horizontal position is not known; --at "
+                 "NORTH,EAST places it elsewhere")
     if at is not None:
         raise ValueError(f"--at is for logs without horizontal position: {source.name} has one")
     rows = paired(attitudes, local)

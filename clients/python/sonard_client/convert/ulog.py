@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 import pathlib
+import re
 import struct
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import Dict, List, NamedTuple, Optional, Tuple, Union
 
 from ..geodesy import Geodetic
 from ..rotations import Quaternion, unit
@@ -21,29 +22,47 @@ _KINDS = {"int8_t": "b", "uint8_t": "B", "int16_t": "h", "uint16_t": "H", "int32
 TRUTH = "_groundtruth"
 ATTITUDE, LOCAL, GLOBAL = "vehicle_attitude", "vehicle_local_position", "vehicle_global_position"
 WANTED = tuple(name + more for more in ("", TRUTH) for name in (ATTITUDE, LOCAL, GLOBAL))
-LONGEST_FORMAT = 65536  # bytes of one message
+LONGEST_FORMAT = 65535  # bytes of one message
+_FIELD = re.compile(r"([a-z0-9_]+)(?:\[([0-9]{1,5})\])? ([A-Za-z0-9_]+)")
+_REAL, _FLAG = ("float", "double"), ("bool", "uint8_t")
+# The fields that are read: their types, and how many values they have.
+_READ: Dict[str, Tuple[Tuple[str, ...], int]] = {
+    **dict.fromkeys(("timestamp", "timestamp_sample"), (("uint64_t",), 1)), "q": (_REAL, 4),
+    **dict.fromkeys(("x", "y", "z", "lat", "lon", "alt", "ref_lat", "ref_lon", "ref_alt"), (_REAL, 1)),
+    **dict.fromkeys(("xy_valid", "z_valid", "xy_global", "z_global"), (_FLAG, 1))}
 
 
 class Layout(NamedTuple):
-    body: struct.Struct
+    body: struct.Struct  # up to the last field that is read; the padding at a format's end is not logged
     fields: Dict[str, Tuple[int, int]]  # by name: its first value and how many
 
 
-def _layout(text: str) -> Optional[Layout]:
-    """Of "uint64_t timestamp;float[4] q;"; None with fields of other formats."""
-    codes, fields, at = "<", {}, 0
+def _layout(text: str) -> Union[Layout, str]:
+    """Of "uint64_t timestamp;float[4] q;": the fields of _READ, or why it cannot be read."""
+    codes, fields, at, size, read = "<", {}, 0, 0, 1
     for part in filter(None, text.split(";")):
-        kind, _, name = part.partition(" ")
-        plain, _, count = kind.rstrip("]").partition("[")
-        if plain not in _KINDS or (count and not count.isdigit()) or len(count) > 5:
-            return None
-        number = int(count or 1)
-        codes += f"{number}{_KINDS[plain]}"
+        match = _FIELD.fullmatch(part)
+        if match is None or match[1] not in _KINDS or match[2] is not None and int(match[2]) == 0:
+            return f"{part[:80]!r} is not a field of a known type"
+        number, name, code = int(match[2] or 1), match[3], _KINDS[match[1]]
+        size += number * struct.calcsize("<" + code)
+        if size > LONGEST_FORMAT:
+            return f"it is longer than a message, {LONGEST_FORMAT} bytes"
+        if name not in _READ:
+            codes += f"{number * struct.calcsize('<' + code)}x"
+            continue
+        kinds, wanted = _READ[name]
+        if name in fields:
+            return f"{name} occurs twice"
+        if match[1] not in kinds or number != wanted:
+            return f"{name} is {part[:-len(name) - 1]}, not {' or '.join(kinds)}" + (f"[{wanted}]" if wanted > 1 else "")
+        codes += f"{number}{code}"
         fields[name] = at, number
         at += number
-        if at > LONGEST_FORMAT:
-            return None
-    return Layout(struct.Struct(codes), fields)
+        read = len(codes)
+    if "timestamp" not in fields:
+        return "it has no timestamp"
+    return Layout(struct.Struct(codes[:read]), fields)
 
 
 class _Log:
@@ -51,7 +70,8 @@ class _Log:
         self.attitudes: Dict[str, Stream[Quaternion]] = {}
         self.positions: "Dict[str, Stream]" = {}
         self.origin: Optional[Geodetic] = None
-        self._layouts: Dict[str, Optional[Layout]] = {}
+        self._layouts: Dict[str, Layout] = {}
+        self._short: Dict[str, int] = {}  # messages that are shorter than their format
         self._named: Dict[int, str] = {}  # subscriptions of the first instance
         at = HEAD_BYTES
         while at + 3 <= len(data):
@@ -61,24 +81,30 @@ class _Log:
                 break
             self._take(chr(kind), data[at + 3:at + 3 + size], at, warn)
             at += 3 + size
+        for label, count in sorted(self._short.items()):
+            warn(f"messages of {label} omitted because they are shorter than their format: {count}")
 
     def _take(self, kind: str, content: bytes, at: int, warn: Warn) -> None:
         if kind == "F":
             name, _, fields = content.decode("latin-1").partition(":")
             if name in WANTED:
-                self._layouts[name] = _layout(fields)
-                if self._layouts[name] is None:
-                    warn(f"at byte {at}: the format of {name} cannot be read; it is omitted")
+                layout = _layout(fields)
+                if isinstance(layout, Layout):
+                    self._layouts[name] = layout
+                else:
+                    self._layouts.pop(name, None)
+                    warn(f"at byte {at}: {name} is omitted: its format cannot be read: {layout}")
         elif kind == "A" and len(content) > 3 and content[0] == 0:
             self._named[int.from_bytes(content[1:3], "little")] = content[3:].decode("latin-1")
         elif kind == "D" and len(content) > 2:
             name = self._named.get(int.from_bytes(content[:2], "little"), "")
-            layout = self._layouts.get(name)
-            if layout is not None:
-                # The padding at a format's end is not logged.
-                values = layout.body.unpack(content[2:2 + layout.body.size].ljust(layout.body.size, b"\0"))
+            known = self._layouts.get(name)
+            if known is not None and len(content) < 2 + known.body.size:
+                self._short[name] = self._short.get(name, 0) + 1
+            elif known is not None:
+                values = known.body.unpack_from(content, 2)
                 self._add(name, {label: values[first] if number == 1 else values[first:first + number]
-                                 for label, (first, number) in layout.fields.items()})
+                                 for label, (first, number) in known.fields.items()})
 
     def _add(self, name: str, fields: Dict) -> None:
         t = 1e-6 * (fields.get("timestamp_sample") or fields.get("timestamp") or 0)

@@ -150,12 +150,15 @@ class Scene:
         to six times it, whenever their value changes: a busy computer is slow, and a driver that does nothing is stuck."""
         began = time.monotonic()
         deadline, before = began + timeout_s, moves() if moves else None
-        while time.monotonic() < deadline:
+        while True:
+            looked = time.monotonic()  # before moves(), so that what happened during a stall of this computer counts
             if moves and (now := moves()) != before:
-                before, deadline = now, min(began + 6 * timeout_s, time.monotonic() + timeout_s)
+                before, deadline = now, min(began + 6 * timeout_s, looked + timeout_s)
             self.journal.read()
             if until():
                 return True
+            if looked >= deadline:
+                return False
             if self.driver.poll() is not None:
                 return until()
             if self.driver.samples and self.driver.samples[-1].resident_mib > _MOST_MIB:
@@ -164,4 +167,3 @@ class Scene:
                 self.driver.poll()
                 return False
             time.sleep(_STEP_S)
-        return until()
