@@ -274,7 +274,7 @@ PingStream::Item PingStream::next(milliseconds patience) {
       items_.pop_front();
       return item;
     }
-    if (ended_) return {Wait::closed, {}, {}, ended_->text};
+    if (ended_) return {Wait::closed, {}, {}, ended_->text, ended_->kind};
     receive(left_until(deadline));
     if (std::exchange(interrupted_, false)) return {Wait::interrupted, {}, {}, {}};
     if (items_.empty() && !ended_ && Clock::now() >= deadline) return {};
@@ -285,11 +285,22 @@ bool PingStream::is_rejected(milliseconds patience) const {
   return make_->ports.front().kind == Kind::tcp && !has_answered_ && ends_without_a_byte(*sockets_.front(), patience);
 }
 
+std::string PingStream::own() const {
+  if (!sockets_.front()) return {};
+  const sockaddr_in at = own_address(*sockets_.front());
+  std::array<char, INET_ADDRSTRLEN> host{};
+  ::inet_ntop(AF_INET, &at.sin_addr, host.data(), host.size());
+  return text_from({host.data(), ntohs(at.sin_port)});
+}
+
 std::string PingStream::about() const { return text_from(device_) + ", " + host_->about(); }
 
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (make_->ports.size() != 1 || make_->ports.front().kind != Kind::tcp)
     return failure(ErrorKind::usage, "only pings that come by TCP are recorded as raw bytes; this is " + about());
+  if (make_->each_ping_requested)  // a recording begins after the greeting, without which its pings mean nothing
+    return failure(ErrorKind::usage, "only sonars that send pings unasked are recorded as raw bytes; this is " + about() +
+                                         ": read pings with sonarctl listen --json, or record with the hosts of that make");
   record_.open(file, std::ios::binary | std::ios::trunc);
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
   return {};

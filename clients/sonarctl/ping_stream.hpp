@@ -44,6 +44,7 @@ class PingStream {
     std::optional<HostPing> ping;      // with Wait::data; without one: another message
     std::vector<std::string> notices;  // of the host
     std::string error;
+    ErrorKind kind = ErrorKind::io;  // of the error
   };
   /// The next ping or message, or the event that replaced it within `patience`. A sonar that sends pings on request is asked.
   Item next(std::chrono::milliseconds patience);
@@ -55,6 +56,8 @@ class PingStream {
   const protocol::Host& host() const { return *host_; }
   const Make& make() const { return *make_; }
   const Endpoint& device() const { return device_; }
+  /// "127.0.0.1:41022", our end at the first port; of http there is none.
+  std::string own() const;
   /// "127.0.0.2:14750, a BlueView P900-90, serial 7001"
   std::string about() const;
 

@@ -26,6 +26,13 @@ std::string utc_text(std::int64_t ns) {
   const std::int64_t s = ns / 1'000'000'000 % 86'400;
   return format("%02d:%02d:%02d UTC", static_cast<int>(s / 3600), static_cast<int>(s / 60 % 60), static_cast<int>(s % 60));
 }
+/// By itself or by the daemon.
+bool left_before_first_ping(const v1::Visit& gone) { return gone.why().ends_with(before_first_ping); }
+bool was_disconnected(const v1::Visit& gone) {
+  std::string why = gone.why();
+  if (left_before_first_ping(gone)) why.resize(why.size() - before_first_ping.size());
+  return std::find(left_by_itself.begin(), left_by_itself.end(), why) == left_by_itself.end();
+}
 bool is_recent(const v1::Visit& visit) { return !visit.address().empty() && visit.ago_s() < recent_s; }
 
 std::string counted(std::uint64_t count, const std::string& what) {
@@ -99,6 +106,7 @@ class SonarJudge {
     if (sonar_.clients().empty() && !sonar_.pinging()) return check_absence();
     for (const v1::ClientStatus& client : sonar_.clients()) check_client(client);
     check_who_left();
+    check_observer();
     check_settings();
     if (sonar_.pinging() && before_ != nullptr && past_s_ > 0) check_rate();
   }
@@ -143,6 +151,7 @@ class SonarJudge {
           searched.address() + " searched for sonars at " + utc_text(searched.utc_ns()) +
               " and was answered, but has not connected",
           "it must connect to " + where_to_connect(sonar_) + "; a firewall may drop that", searched.address());
+    if (left_before_first_ping(gone)) check_who_left();
     check_observer();
   }
 
@@ -156,10 +165,11 @@ class SonarJudge {
 
   void check_who_left() {
     const v1::Visit& gone = sonar_.gone();
-    if (is_recent(gone) && std::find(left_by_itself.begin(), left_by_itself.end(), gone.why()) == left_by_itself.end())
-      add(Level::warn, "driver",
-          "The connection of " + gone.address() + " ended at " + utc_text(gone.utc_ns()) + ": " + gone.why(), "", gone.address());
-    check_observer();
+    if (!is_recent(gone) || !was_disconnected(gone)) return;
+    const bool got_none = left_before_first_ping(gone);
+    add(got_none ? Level::fail : Level::warn, "driver",
+        "The connection of " + gone.address() + " ended at " + utc_text(gone.utc_ns()) + ": " + gone.why(),
+        got_none ? std::string(make_.remedy) : "", gone.address());
   }
 
   void check_client(const v1::ClientStatus& client) {

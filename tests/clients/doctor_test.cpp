@@ -435,6 +435,75 @@ TEST(Doctor, FailsWhileADriverGetsNoPing) {
   EXPECT_FALSE(any_failed(run_checks(facts)));
 }
 
+TEST(Doctor, FailsWhileAnotherDriverGetsNoPing) {
+  Facts facts = healthy();
+  v1::SonarStatus& front = *daemon_in(facts).mutable_sonars(0);
+  front.MergeFrom(control::message_from<v1::SonarStatus>(
+      R"(profile: "oculus-m1200d" transmits: true clients { address: "127.0.0.1:40122" connected_s: 5 bytes_read: 17 })"));
+  const auto last = std::make_shared<v1::DaemonStatus>(*facts.control.status);
+  last->mutable_sonars(0)->MergeFrom(control::message_from<v1::SonarStatus>(
+      R"(clients { address: "127.0.0.1:40300" connected_s: 2 requests: 1 } gone { address: "127.0.0.1:40300" why: "x" ago_s: 1 }
+         turned_away { address: "127.0.0.1:40300" why: "no place is free" ago_s: 1 })"));
+  facts.control.latest = last;
+  report(facts);
+  facts.sonars[0].stream.own = "127.0.0.1:40300";
+  for (const Outcome outcome : {Outcome::pings, Outcome::closed_without_a_byte, Outcome::no_ping}) {
+    facts.sonars[0].stream.outcome = outcome;
+    expect(line(facts, "driver"), Level::fail, "127.0.0.1:40122 is connected to front and has not asked for pings",
+           "send a fire message");
+    EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("40300")));
+  }
+  facts.sonars[0].stream.outcome = Outcome::pings;
+  last->mutable_sonars(0)->mutable_clients(0)->set_requests(1);
+  last->mutable_sonars(0)->mutable_clients(0)->set_pings_written(20);
+  EXPECT_FALSE(any_failed(run_checks(facts)));
+  EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("8 checks, 0 errors"));
+}
+
+TEST(Doctor, OnlyWarnsOfAClientTurnedAwayFromPlacesThatAreUsedWell) {
+  Facts facts = healthy();
+  facts.sonars[0].stream = {};
+  facts.sonars[0].clients = {"127.0.0.1:40122"};
+  v1::SonarStatus& front = *daemon_in(facts).mutable_sonars(0);
+  front.MergeFrom(control::message_from<v1::SonarStatus>(
+      R"(profile: "oculus-m1200d" transmits: true pinging: true
+         clients { address: "127.0.0.1:40122" connected_s: 5 requests: 1 pings_written: 9 }
+         turned_away { address: "10.0.0.7:1" why: "no place is free" utc_ns: 3723000000000 ago_s: 5 })"));
+  report(facts);
+  expect(line(facts, "places"), Level::warn, "10.0.0.7:1 was turned away", "clients.max");
+  EXPECT_FALSE(any_failed(run_checks(facts)));
+  front.mutable_clients(0)->set_pings_written(0);
+  front.mutable_clients(0)->set_requests(0);
+  report(facts);
+  expect(line(facts, "places"), Level::fail, "10.0.0.7:1 was turned away", "clients.max");
+}
+
+TEST(Doctor, WaitsForTheFirstPingAsLongAsItTakes) {
+  Facts facts = healthy();
+  facts.sonars[0].stream = {};
+  facts.sonars[0].clients = {"127.0.0.1:40122"};
+  v1::SonarStatus& front = *daemon_in(facts).mutable_sonars(0);
+  front.MergeFrom(control::message_from<v1::SonarStatus>(
+      R"(profile: "oculus-m1200d" transmits: true pinging: true figures { simulation_ms: 1500 }
+         clients { address: "127.0.0.1:40122" connected_s: 3 requests: 1 })"));
+  report(facts);
+  EXPECT_FALSE(any_failed(run_checks(facts))) << "two periods and two pings take 3.2 s";
+  front.mutable_clients(0)->set_connected_s(3.5);
+  report(facts);
+  expect(line(facts, "driver"), Level::fail, "127.0.0.1:40122 is connected and gets no ping", "sonarctl status");
+}
+
+TEST(Doctor, PrintsWhatTheSonarAnswered) {
+  Facts facts = healthy();
+  StreamFacts& s = facts.sonars[0].stream;
+  s = {};
+  s.outcome = Outcome::no_ping;
+  s.refuses = true;
+  s.error = "tcp 127.0.0.2:62312 refused a request: wrong range";
+  expect(line(facts, "ping"), Level::fail, s.error, "sonarctl status");
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("another program")));
+}
+
 TEST(Doctor, SpeaksJson) {
   Facts facts = healthy();
   facts.kernel_ports.reserved = "";

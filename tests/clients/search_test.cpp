@@ -10,6 +10,7 @@
 #include <atomic>
 #include <thread>
 
+#include "clients/sonarctl/doctor/watch_pings.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/host.hpp"
@@ -184,6 +185,26 @@ TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
   const auto named = PingStream::open({address, 0}, find_make("waterlinked"), {}, 100ms);
   ASSERT_FALSE(named);
   EXPECT_THAT(named.error().text, HasSubstr("is no Sonar 3D-15"));
+}
+
+TEST(WatchPings, KeepsWhatTheSonarRefuses) {
+  const Server surveyor(62312, [](const Socket& client) {
+    std::array<std::byte, 1024> request;
+    if (read_some(client, request, 60s).what != Wait::data) return;
+    wire::Bytes why{std::byte{0}, std::byte{0}};
+    for (const char c : std::string("wrong range")) why.push_back(static_cast<std::byte>(c));
+    static_cast<void>(write_all(client, ping::framed(ping::Id::nack, 0, why)));
+    while (read_some(client, request, 60s).what == Wait::data) continue;
+  });
+  doctor::SonarFacts sonar;
+  sonar.at = {address, 62312};
+  sonar.make = make_at(62312);
+  doctor::ControlFacts clocks;
+  doctor::watch_pings(sonar, nullptr, doctor::Steady::now() + 60s, clocks);
+  EXPECT_EQ(sonar.stream.outcome, doctor::StreamFacts::Outcome::no_ping);
+  EXPECT_TRUE(sonar.stream.refuses);
+  EXPECT_EQ(sonar.stream.error, "tcp 127.0.0.9:62312 refused a request: wrong range");
+  EXPECT_THAT(sonar.stream.own, testing::StartsWith("127.0.0.1:"));
 }
 
 }  // namespace

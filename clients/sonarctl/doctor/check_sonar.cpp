@@ -14,6 +14,7 @@ using sonar::doctor::less_to_compute;
 using text::format;
 
 constexpr double fastest_hz = 40;  // that an Oculus can be asked for
+constexpr double soon_s = 1;       // for a driver to ask for pings
 
 std::string joined(const auto& words) {
   std::string text;
@@ -56,7 +57,8 @@ class SonarChecks {
     if (sends_status(sonar_, facts_.status)) check_status();
     check_connection();
     if (sonar_.stream.outcome == Outcome::pings) check_rate();
-    if (sonar_.stream.outcome == Outcome::not_tried) check_rate_of_others(), check_drivers();
+    if (sonar_.stream.outcome == Outcome::not_tried) check_rate_of_others();
+    check_drivers();
   }
 
  private:
@@ -152,6 +154,7 @@ class SonarChecks {
   void check_no_ping() {
     const StreamFacts& s = sonar_.stream;
     const std::string waited = " within " + format("%.1f", s.waited_s) + " s";
+    if (s.refuses) return add(Level::fail, "ping", s.error, "sonarctl status shows its settings; see sonard's log");
     if (!s.error.empty())  // not the greeting of sonard
       return add(Level::fail, "ping", s.error, "another program has the port; stop it, or give the sonar's own address");
     if (s.junk_bytes > 0 && s.others == 0) {
@@ -249,22 +252,60 @@ class SonarChecks {
   /// What keeps pings from the drivers that are connected, as the daemon sees it. One without a ping is a failure.
   void check_drivers() {
     if (!sonar_.reported) return;
-    constexpr double soon_s = 1;  // a driver that does right has a ping within
-    const v1::DaemonStatus& now = facts_.control.latest ? *facts_.control.latest : *facts_.control.status;
+    const v1::DaemonStatus now = without_us();
     const v1::DaemonStatus* const before =
         now.uptime_s() - facts_.control.status->uptime_s() >= soon_s ? facts_.control.status.get() : nullptr;
+    const v1::SonarStatus* const reported = find(now);
+    if (reported == nullptr) return;
+    const bool all_get_pings = std::all_of(reported->clients().begin(), reported->clients().end(),
+                                           [](const v1::ClientStatus& client) { return client.pings_written() > 0; });
     std::vector<Finding> found;
-    for (const Finding& finding : sonar::doctor::judge(now, before))
-      if (finding.sonar == sonar_.reported->name() && finding.level != Level::ok && finding.check != "rate")
-        found.push_back(finding);
+    for (Finding& finding : sonar::doctor::judge(now, before)) {
+      if (finding.sonar != reported->name() || finding.level == Level::ok || finding.check == "rate") continue;
+      if (finding.check == "places" && all_get_pings) finding.level = Level::warn;  // it can come as soon as one leaves
+      if (has_connected() && (finding.client.empty() || finding.level != Level::fail)) continue;  // pings are there to be had
+      found.push_back(std::move(finding));
+    }
     const bool any_fails = std::any_of(found.begin(), found.end(), [](const Finding& f) { return f.level == Level::fail; });
     for (const Finding& f : found) add(f.level, f.check, f.text, f.cure);
-    for (const v1::ClientStatus& client : sonar_.reported->clients())
-      if (!any_fails && client.pings_written() == 0 && client.connected_s() >= soon_s)
+    for (const v1::ClientStatus& client : reported->clients())
+      if (!any_fails && client.pings_written() == 0 && client.connected_s() >= first_ping_within_s(client, *reported))
         add(Level::fail, "driver",
             client.address() + " is connected and gets no ping" +
                 (clock().empty() || clock() == "realtime" ? "" : "; clock: " + clock()),
             found.empty() ? "sonarctl status shows its settings and the clock" : found.front().cure);
+  }
+
+  bool has_connected() const { return sonar_.stream.outcome != Outcome::not_tried; }
+
+  const v1::SonarStatus* find(const v1::DaemonStatus& in) const {
+    const auto found = std::find_if(in.sonars().begin(), in.sonars().end(),
+                                    [this](const v1::SonarStatus& sonar) { return sonar.name() == sonar_.reported->name(); });
+    return found == in.sonars().end() ? nullptr : &*found;
+  }
+
+  /// The last status, and in it nothing of our own connection: who left or was turned away is from before.
+  v1::DaemonStatus without_us() const {
+    const v1::DaemonStatus& first = *facts_.control.status;
+    v1::DaemonStatus now = facts_.control.latest ? *facts_.control.latest : first;
+    if (!has_connected()) return now;
+    for (v1::SonarStatus& sonar : *now.mutable_sonars()) {
+      if (sonar.name() != sonar_.reported->name()) continue;
+      sonar.clear_gone(), sonar.clear_turned_away();
+      if (const v1::SonarStatus* const then = find(first))
+        *sonar.mutable_gone() = then->gone(), *sonar.mutable_turned_away() = then->turned_away();
+      auto& clients = *sonar.mutable_clients();
+      clients.erase(std::remove_if(clients.begin(), clients.end(),
+                                   [this](const v1::ClientStatus& client) { return client.address() == sonar_.stream.own; }),
+                    clients.end());
+    }
+    return now;
+  }
+
+  /// A driver that does right has a ping within.
+  static double first_ping_within_s(const v1::ClientStatus& client, const v1::SonarStatus& of) {
+    if (client.requests() == 0 || of.rate_hz() <= 0) return soon_s;
+    return std::max(soon_s, 2 / of.rate_hz() + 2e-3 * of.figures().simulation_ms());
   }
 
   void check_rate() {

@@ -43,6 +43,8 @@ struct StatusFacts {
 struct StreamFacts {
   enum class Outcome { not_tried, refused, unreachable, closed_without_a_byte, no_ping, pings } outcome = Outcome::not_tried;
   std::string error;                         // of the connection, or of the greeting
+  bool refuses = false;                      // `error` is what the sonar answered to a request
+  std::string own;                           // our end of the connection; empty = there was none
   bool asked = false;                        // settings were sent, since no other client was connected
   std::uint64_t junk_bytes = 0, others = 0;  // others: messages that are no pings
   double first_ping_ms = 0, waited_s = 0;

@@ -29,6 +29,8 @@ class Watch {
     while (!ended && !over() && interrupted == 0) {
       const PingStream::Item item = stream.next(std::min<std::chrono::milliseconds>(50ms, left_until(deadline_)));
       ended = item.what == Wait::closed;
+      facts_.refuses = ended && item.kind != ErrorKind::io && item.kind != ErrorKind::unavailable;
+      if (facts_.refuses) facts_.error = item.error;
       if (item.what != Wait::data) continue;
       if (item.ping) add(*item.ping);
     }
@@ -37,7 +39,9 @@ class Watch {
     facts_.others = of_wire.messages - facts_.pings;
     facts_.waited_s = seconds_since(start_);
     const bool nothing = facts_.pings == 0 && facts_.others == 0 && facts_.junk_bytes == 0;
-    facts_.outcome = facts_.pings > 0 ? Outcome::pings : nothing && ended ? Outcome::closed_without_a_byte : Outcome::no_ping;
+    facts_.outcome = facts_.pings > 0                      ? Outcome::pings
+                     : nothing && ended && !facts_.refuses ? Outcome::closed_without_a_byte
+                                                           : Outcome::no_ping;
     conclude(of_wire.missing_pings);
   }
 
@@ -131,6 +135,7 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
     facts.outcome = outcome_of(stream.error());
     return;
   }
+  facts.own = stream->own();
   facts.asked_hz = stream->host().expects_echo() ? usual_hz : 0;
   watch.run(std::move(*stream));
   if (control == nullptr || sonar.make->own_numbers) return;

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "daemon/server/system/listen.hpp"
+#include "protocol/doctor/check_status.hpp"
 
 namespace sonar {
 namespace {
@@ -374,7 +375,7 @@ void Device::carry_out(const Closed& action) {
   } else if (action.role == Role::observer) {
     report_visit(Role::observer, VisitLog::Kind::gone, "observer gone: " + action.why, {{"observer", action.peer}});
   } else {
-    gone_ = Visit{action.peer, action.why};
+    gone_ = Visit{action.peer, action.why + std::string(action.pings_written == 0 ? doctor::before_first_ping : "")};
     report_visit(Role::client, VisitLog::Kind::gone, "client gone: " + action.why,
                  {{"client", action.peer}, {"pings", action.pings_written}, {"dropped", action.pings_dropped}});
     parent_.on_client(*this, action.peer, false, action.why);

@@ -51,6 +51,11 @@ std::vector<std::string> troubles(const std::vector<Finding>& findings) {
   return texts;
 }
 
+bool any_fails(const v1::DaemonStatus& status) {
+  const auto findings = judge(status, nullptr);
+  return std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.level == Level::fail; });
+}
+
 TEST(Judge, AllIsWellWithADriverThatReads) {
   const v1::DaemonStatus now = with(pinging + driver, R"(vehicles { name: "rov" source: "json 127.0.0.1" } engine: "embree")");
   v1::DaemonStatus before = two_seconds_before(now);
@@ -154,6 +159,25 @@ TEST(Judge, OneThatWasDisconnected) {
   const std::string gone = R"(gone { address: "10.0.0.7:1" why: "took no byte for 10000 ms" utc_ns: 3723000000000 ago_s: 5 })";
   EXPECT_THAT(trouble(with(pinging + driver + gone), "driver").text,
               HasSubstr("ended at 01:02:03 UTC: took no byte for 10000 ms"));
+  EXPECT_FALSE(any_fails(with(pinging + driver + gone)));
+  EXPECT_FALSE(any_fails(with(gone)));
+}
+
+TEST(Judge, OneThatWasDisconnectedBeforeItsFirstPing) {
+  const auto left = [](const std::string& why, const std::string& ago_s) {
+    return "gone { address: \"10.0.0.7:1\" why: \"" + why + ", before its first ping\" utc_ns: 3723000000000 ago_s: " + ago_s +
+           " }";
+  };
+  const std::string junk = "is not a BVE1 link: a frame has another magic number";
+  for (const std::string& others : {std::string(), pinging + driver}) {
+    const auto findings = judge(with(others + left(junk, "5")), nullptr);
+    const auto found = std::find_if(findings.begin(), findings.end(), [](const Finding& f) { return f.level == Level::fail; });
+    ASSERT_NE(found, findings.end());
+    EXPECT_EQ(found->text, "The connection of 10.0.0.7:1 ended at 01:02:03 UTC: " + junk + ", before its first ping");
+    EXPECT_EQ(found->cure, "send a fire message (type 0x15)");
+    EXPECT_FALSE(any_fails(with(others + left(junk, "90"))));
+    EXPECT_FALSE(any_fails(with(others + left("closed by the client", "5"))));
+  }
 }
 
 TEST(Judge, PosesThatStopOrComeTooLate) {
