@@ -32,7 +32,7 @@ class Listener {
       if (item.what == Wait::data) {
         last_message_ = Clock::now();
         received_ = true;
-        for (const std::string& notice : item.notices) std::fprintf(stderr, "sonarctl: %s\n", notice.c_str());
+        print_notices(item.notices);
         if (item.ping) handle_ping(*item.ping);
       } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
         return tl::unexpected(silence(options_.source, stream_, received_, "nothing more",

@@ -51,6 +51,9 @@ struct SourceArguments {
     if (!at) return tl::unexpected(at.error());
     source.make = make.empty() ? make_at(at->port) : find_make(make);
     if (source.make == nullptr && at->port != 0) source.make = &protocol::makes().front();
+    if (device.discover && !make.empty() && source.make != &protocol::makes().front())
+      return failure(ErrorKind::usage, "--discover finds " + std::string(protocol::makes().front().title) +
+                                           " only: leave it out, and give the address of " + std::string(source.make->title));
     source.device = *at;
     source.discover = device.discover;
     source.recording = recording;

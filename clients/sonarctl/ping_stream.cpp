@@ -298,6 +298,9 @@ std::string PingStream::about() const { return text_from(device_) + ", " + host_
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (make_->ports.size() != 1 || make_->ports.front().kind != Kind::tcp)
     return failure(ErrorKind::usage, "only pings that come by TCP are recorded as raw bytes; this is " + about());
+  if (make_->each_ping_requested)  // a recording begins after the greeting, without which its pings mean nothing
+    return failure(ErrorKind::usage, "only sonars that send pings unasked are recorded as raw bytes; this is " + about() +
+                                         ": read pings with sonarctl listen --json, or record with the hosts of that make");
   record_.open(file, std::ios::binary | std::ios::trunc);
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
   return {};

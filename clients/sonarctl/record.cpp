@@ -198,6 +198,8 @@ void report(const RecordFiles& files, double seconds) {
 }
 
 Result<void> record_device(const RecordOptions& options) {
+  if (!options.source.wanted.as_it_is)
+    if (const auto asked = oculus::fire_from(options.source.wanted); !asked) return tl::unexpected(asked.error());
   const Result<Endpoint> device = find_device(options.source, true);
   if (!device) return tl::unexpected(device.error());
   std::optional<Steering> steering;

@@ -34,25 +34,29 @@ void SettingArguments::add_to(CLI::App& app) {
       app.add_option_function<std::uint32_t>(
           "--mode", [this](std::uint32_t given) { settings.mode = given - 1; },
           "from 1, as the sonar's models list them: of an Oculus 1 low frequency, wide, 2 high frequency, narrow; of a BlueView "
-          "sonar the head"))
+          "sonar the head. Default: 2 of an Oculus, otherwise the make's own"))
       ->check(whole_number(1, 100));
-  CLI::Option* metres = value("--range", settings.range_m, "metres")->check(number(0.0, 1000.0));
+  CLI::Option* metres = value("--range", settings.range_m, "metres. Default: 10; of BlueView, ARIS and 3D-15 their own")
+                            ->check(number(0.0, 1000.0));
   extra("range-percent", "of the mode's maximum, instead of metres")->check(number(0.0, 100.0))->excludes(metres);
-  value("--gain", settings.gain_percent, "per cent of what can be set")->check(number(0.0, 100.0));
+  value("--gain", settings.gain_percent, "per cent of what can be set. Default: 50 of an Oculus, otherwise the make's own")
+      ->check(number(0.0, 100.0));
   group(app.add_option_function<std::string>(
             "--rate", [this](const std::string& given) { settings.rate_hz = given == "standby" ? 0 : std::stod(given); },
-            "maximum ping rate [Hz], any number, of an Oculus the nearest of these; or standby"))
+            "maximum ping rate [Hz], any number, of an Oculus the nearest of these; or standby. Default: 10 of Oculus and "
+            "Omniscan, otherwise the make's own"))
       ->check(CLI::Validator(complaint_about_rate, "2|5|10|15|40|standby", "rate"));
   group(app.add_option_function<std::uint32_t>(
-            "--beams", [this](std::uint32_t given) { settings.beams = given; }, ""))
+            "--beams", [this](std::uint32_t given) { settings.beams = given; }, "default: 512"))
       ->check(one_of({"256", "512"}));
   group(app.add_option_function<std::uint32_t>(
-            "--bits", [this](std::uint32_t given) { settings.sample_bits = given; }, "bits per sample; 32 needs --version 2"))
+            "--bits", [this](std::uint32_t given) { settings.sample_bits = given; },
+            "bits per sample; 32 needs --version 2. Default: 8"))
       ->check(one_of({"8", "16", "32"}));
-  extra("gamma", "wire value: gamma = value / 255")->check(whole_number(0, 255));
-  extra("speed-of-sound", "m/s; 0 = the sonar computes it")->check(number(0.0, 2000.0));
-  extra("salinity", "ppt")->check(number(0.0, 50.0));
-  extra("version", "version of the messages")->check(whole_number(0, 2));
+  extra("gamma", "wire value: gamma = value / 255. Default: 127")->check(whole_number(0, 255));
+  extra("speed-of-sound", "m/s; 0 (default) = the sonar computes it")->check(number(0.0, 2000.0));
+  extra("salinity", "ppt. Default: 0")->check(number(0.0, 50.0));
+  extra("version", "version of the messages. Default: 0")->check(whole_number(0, 2));
   group(app.add_flag_function(
       "--gains", [this](std::int64_t) { settings.row_gains = true; }, "request a gain in front of every row"));
   group(app.add_flag_function(

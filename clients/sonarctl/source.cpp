@@ -75,6 +75,7 @@ Result<HostPing> fetch_live(const SourceOptions& source) {
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
     PingStream::Item item = stream->next(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(500)));
+    print_notices(item.notices);
     if (item.what == Wait::closed)
       return failure(ErrorKind::io,
                      item.error.empty()
@@ -116,6 +117,10 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
                  "the device closed the connection before a ping arrived: another client may be connected (clients.max); "
                  "connecting as an observer failed too: " +
                      observed.error().text);
+}
+
+void print_notices(const std::vector<std::string>& notices) {
+  for (const std::string& notice : notices) std::fprintf(stderr, "sonarctl: %s\n", notice.c_str());
 }
 
 std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::milliseconds(static_cast<std::int64_t>(s * 1000)); }

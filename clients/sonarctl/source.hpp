@@ -23,6 +23,9 @@ struct OpenedStream {
 /// observers; then with a note on standard error.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
+/// To standard error.
+void print_notices(const std::vector<std::string>& notices);
+
 /// Error: `what` did not arrive within source.silence_limit_s, or no message of the make arrived at all (`received` false).
 Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
               const std::string& hint);

@@ -61,13 +61,23 @@ Result<void> view_one(const ViewOptions& options) {
 }
 
 class LiveView {
+  static constexpr std::size_t most_notices = 20;
+
  public:
   LiveView(const ViewOptions& options, PingStream stream)
       : options_(options), stream_(std::move(stream)), painter_(options.style) {}
 
   /// Succeeds when interrupted, after the requested pings, or when the output was closed.
   Result<void> run() {
-    const LiveScreen screen(options_.terminal && terminal_facts().is_terminal);
+    const Result<void> ran = draw();
+    print_notices(notices_);  // the screen would have hidden them
+    return ran;
+  }
+
+ private:
+  Result<void> draw() {
+    const bool has_screen = options_.terminal && terminal_facts().is_terminal;
+    const LiveScreen screen(has_screen);
     double heard_s = now_s();
     bool received = !stream_.host().counts();  // of which other messages are not told from junk
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
@@ -77,6 +87,9 @@ class LiveView {
                                           "; it stopped, or another client holds it (clients.max)");
       if (item.what == Wait::data) heard_s = now_s();
       received = received || item.what == Wait::data;
+      if (!has_screen) print_notices(item.notices);
+      for (std::string& notice : item.notices)
+        if (has_screen && notices_.size() < most_notices) notices_.push_back(std::move(notice));
       if (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s)
         return tl::unexpected(silence(options_.source, stream_, received, "nothing more", "is the daemon stopped or stuck?"));
       if (!item.ping) continue;
@@ -87,7 +100,6 @@ class LiveView {
     return {};
   }
 
- private:
   /// False when the output was closed.
   Result<bool> show(const HostPing& ping, const LiveScreen& screen) {
     figures_.add(ping, stream_.host().counts(), now_s());
@@ -110,6 +122,7 @@ class LiveView {
   PingStream stream_;
   FanPainter painter_;
   ViewCaption figures_;
+  std::vector<std::string> notices_;
 };
 
 Result<void> view_live(const ViewOptions& options) {

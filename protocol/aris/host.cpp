@@ -169,6 +169,7 @@ class ArisHost final : public protocol::Host {
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
   if (auto known = protocol::accept_settings(wanted, "an ARIS", {"range", "rate", "gain", "mode"}); !known)
     return tl::unexpected(known.error());
+  if (wanted.settings.rate_hz == 0.0) return failure(ErrorKind::usage, "an ARIS has no standby: its least rate is 1 Hz");
   const auto fits = [&wanted](const auto& model) { return acoustics_for(*model, wanted.settings).has_value(); };
   if (!wanted.as_it_is && std::none_of(models().begin(), models().end(), fits))
     return failure(ErrorKind::usage, "no ARIS has this range and mode: the longest range is 100 m, that of an ARIS 1200");

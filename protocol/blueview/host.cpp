@@ -276,6 +276,8 @@ class BlueViewHost final : public protocol::Host {
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
   if (auto known = protocol::accept_settings(wanted, "a BlueView sonar", {"range", "rate", "gain", "mode"}); !known)
     return tl::unexpected(known.error());
+  if (wanted.settings.rate_hz == 0.0)
+    return failure(ErrorKind::usage, "a BlueView sonar has no standby: it pings when it is asked");
   return std::make_unique<BlueViewHost>(wanted);
 }
 

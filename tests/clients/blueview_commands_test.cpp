@@ -170,6 +170,20 @@ TEST(BlueViewCommands, ListenFindsTheHeadAndAsksForEachPing) {
   EXPECT_EQ(head.settings, 0) << "nothing was wished";
 }
 
+TEST(BlueViewCommands, NoFileIsWrittenThatCouldNotBeRead) {
+  FakeHead head;
+  ListenOptions options;
+  options.source = anything_there();
+  options.pings = 2;
+  options.record = std::filesystem::path(testing::TempDir()) / "blueview_commands.raw";
+  std::filesystem::remove(options.record);
+  const Result<void> done = listen(options);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().kind, ErrorKind::usage);
+  EXPECT_THAT(done.error().text, HasSubstr("only sonars that send pings unasked are recorded"));
+  EXPECT_FALSE(std::filesystem::exists(options.record));
+}
+
 TEST(BlueViewCommands, SamplesAreDrawnWhereTheyAre) {
   FakeHead head;
   const auto ping = fetch_ping(anything_there(), 0);

@@ -29,6 +29,17 @@ std::string complaint(const std::vector<std::string>& words) {
   return {};
 }
 
+/// With single spaces instead of line breaks and columns.
+std::string unwrapped(const std::string& text) {
+  std::string words;
+  for (const char c : text)
+    if (c != '\n' && c != ' ')
+      words.push_back(c);
+    else if (!words.empty() && words.back() != ' ')
+      words.push_back(' ');
+  return words;
+}
+
 TEST(CommandLine, NamesTheNearestCommand) {
   EXPECT_EQ(complaint({"veiw"}), "unknown command \"veiw\"; did you mean \"view\"? (sonarctl --help)");
   EXPECT_EQ(complaint({"pose", "cirlce"}), "unknown command \"cirlce\"; did you mean \"circle\"? (sonarctl pose --help)");
@@ -39,6 +50,25 @@ TEST(CommandLine, NamesTheNearestOption) {
   EXPECT_EQ(complaint({"view", "--rnage", "3"}), "unknown option \"--rnage\"; did you mean \"--range\"? (sonarctl view --help)");
   EXPECT_THAT(complaint({"set", "sonar", "--gian=3"}), HasSubstr("did you mean \"--gain\"? (sonarctl set sonar --help)"));
   EXPECT_THAT(complaint({"--verison"}), HasSubstr("did you mean \"--version\"?"));
+}
+
+TEST(CommandLine, HelpNamesTheDefaultsOfSettings) {
+  CLI::App app("", "sonarctl");
+  const auto command = add_listen(app);
+  const std::string help = app.get_subcommand("listen")->help();
+  for (const char* words : {"Default: 10; of BlueView, ARIS and 3D-15 their own", "Default: 50 of an Oculus",
+                            "Default: 2 of an Oculus", "Default: 10 of Oculus and Omniscan", "default: 512", "Default: 127"})
+    EXPECT_THAT(unwrapped(help), HasSubstr(words));
+}
+
+TEST(CommandLine, DiscoveryFindsOneMakeOnly) {
+  CLI::App app("", "sonarctl");
+  const auto command = add_view(app);
+  app.parse("view --discover --make blueview --png ping.png");
+  const Result<void> done = command();
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().kind, ErrorKind::usage);
+  EXPECT_EQ(done.error().text, "--discover finds an Oculus only: leave it out, and give the address of a BlueView sonar");
 }
 
 TEST(CommandLine, GoodLinesAreAccepted) {

@@ -7,10 +7,12 @@
 
 #include <array>
 #include <atomic>
+#include <fstream>
 #include <thread>
 
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
+#include "clients/sonarctl/record.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/json_pose.hpp"
@@ -192,6 +194,45 @@ TEST(Listen, SaysWhenTheDeviceFallsSilent) {
   const Result<void> done = listen(options);
   EXPECT_EQ(done.error().kind, ErrorKind::io);
   EXPECT_THAT(done.error().text, HasSubstr("nothing more arrived within 0.3 s"));
+}
+
+TEST(View, PrintsWhatTheDeviceSaysBesidePings) {
+  for (const bool live : {false, true}) {
+    SCOPED_TRACE(live);
+    FakeDevice device(1, [](std::uint32_t, const oculus::FireSettings& echo) {
+      wire::Bytes bytes = oculus::make_log(7001, "water in the housing");
+      const wire::Bytes ping = ping_bytes(1, echo);
+      bytes.insert(bytes.end(), ping.begin(), ping.end());
+      return bytes;
+    });
+    ViewOptions options;
+    options.source = quiet(device.endpoint(), 1).source;
+    options.png = std::filesystem::path(testing::TempDir()) / "view_notices_test.png";
+    options.style = {200, *find_colour_map("gray"), true};
+    options.live = live;
+    options.pings = live ? 1 : 0;
+    testing::internal::CaptureStderr();
+    const Result<void> done = view(options);
+    EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("sonarctl: message of the device: water in the housing"));
+    EXPECT_TRUE(done) << done.error().text;
+    std::filesystem::remove(options.png);
+  }
+}
+
+TEST(Record, RefusesSettingsBeforeItReplacesAFile) {
+  FakeDevice device(0, [](std::uint32_t, const oculus::FireSettings&) { return wire::Bytes{}; });
+  RecordOptions options;
+  options.source = quiet(device.endpoint(), 1).source;
+  options.source.wanted.settings.mode = 2;
+  options.status = false;
+  options.raw = std::filesystem::path(testing::TempDir()) / "record_settings_test.raw";
+  std::ofstream(options.raw) << "kept";
+  const Result<void> done = record(options);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().kind, ErrorKind::usage);
+  EXPECT_THAT(done.error().text, HasSubstr("an Oculus has modes 1 and 2"));
+  EXPECT_EQ(std::filesystem::file_size(options.raw), 4u);
+  std::filesystem::remove(options.raw);
 }
 
 TEST(View, TellsAnotherServiceFromASonarInStandby) {

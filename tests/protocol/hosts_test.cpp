@@ -252,6 +252,20 @@ TEST_P(Hosts, RefuseWhatTheyDoNotHave) {
   }
 }
 
+TEST_P(Hosts, PutTheSonarInStandbyOrSayThatItHasNone) {
+  Wanted standby;
+  standby.settings.rate_hz = 0;
+  const auto host = GetParam().host(standby);
+  if (!host) {
+    EXPECT_EQ(host.error().kind, ErrorKind::usage);
+    return;
+  }
+  Talk talk(GetParam(), standby, 0, model_of(GetParam()));
+  talk.run(3);
+  EXPECT_EQ(talk.settings.rate_hz, 0);
+  EXPECT_THAT(talk.pings, testing::IsEmpty());
+}
+
 TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
   Wanted nothing;
   nothing.as_it_is = true;
