@@ -21,7 +21,7 @@ namespace sonar::protocol {
 
 /// The settings that a user wants. Unset values: as the sonar has them, or as a usual driver sends them.
 struct Wanted {
-  bool as_it_is = false;                         // send no settings and request no pings
+  bool as_it_is = false;                         // send no settings; request pings only of a make whose pings each take a request
   bool stamped = false;                          // prefer messages that state when a ping was fired
   SettingsOverride settings;                     // the same for every make
   std::map<std::string, std::string> more = {};  // settings of one make: name of sonarctl's option without dashes, and value
