@@ -40,6 +40,9 @@ class Recipes(unittest.TestCase):
             folder = pathlib.Path(name)
             for log, data in logs().items():
                 (folder / log).write_bytes(data)
+            (folder / "rosbag2_2026_05_04").mkdir()
+            made.db3(folder / "rosbag2_2026_05_04/part_0.db3",
+                     [("/odom", "nav_msgs/msg/Odometry", [(100 + i, made.odometry(i)) for i in range(4)])])
             for recipe in recipes:
                 with self.subTest(recipe):
                     typed = recipe.replace("ADDRESS", daemon.address).replace("python3 -m", f"'{sys.executable}' -B -m")
