@@ -17,6 +17,7 @@
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "protocol/blueview/frames.hpp"
+#include "tests/clients/bound_socket.hpp"
 
 namespace sonar::clients::blueview_commands_test {
 namespace {
@@ -27,15 +28,7 @@ using testing::HasSubstr;
 const std::string address = "127.0.0.2";
 
 Socket listening(std::uint16_t port) {
-  Socket socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  const int yes = 1;
-  ::setsockopt(socket.fd(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  sockaddr_in at{};
-  at.sin_family = AF_INET;
-  at.sin_port = htons(port);
-  ::inet_pton(AF_INET, address.c_str(), &at.sin_addr);
-  // The cast is the sockets interface's own.
-  EXPECT_EQ(::bind(socket.fd(), reinterpret_cast<sockaddr*>(&at), sizeof at), 0);
+  Socket socket = bound_socket(address, SOCK_STREAM, port);
   ::listen(socket.fd(), 4);
   return socket;
 }

@@ -16,6 +16,7 @@
 #include "protocol/oculus/host.hpp"
 #include "protocol/oculus/messages.hpp"
 #include "protocol/ping/messages.hpp"
+#include "tests/clients/bound_socket.hpp"
 
 namespace sonar::clients::search_test {
 namespace {
@@ -25,18 +26,7 @@ using testing::HasSubstr;
 
 const std::string address = "127.0.0.9";
 
-Socket bound(int type, std::uint16_t port) {
-  Socket socket(::socket(AF_INET, type | SOCK_CLOEXEC, 0));
-  const int yes = 1;
-  ::setsockopt(socket.fd(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  sockaddr_in at{};
-  at.sin_family = AF_INET;
-  at.sin_port = htons(port);
-  ::inet_pton(AF_INET, address.c_str(), &at.sin_addr);
-  // The cast is the sockets interface's own.
-  EXPECT_EQ(::bind(socket.fd(), reinterpret_cast<sockaddr*>(&at), sizeof at), 0);
-  return socket;
-}
+Socket bound(int type, std::uint16_t port) { return bound_socket(address, type, port); }
 
 /// Runs `serve` for each connection until the end of the test.
 class Server {

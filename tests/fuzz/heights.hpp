@@ -5,6 +5,7 @@
 
 #include "core/scene/shapes/terrain.hpp"
 #include "tests/fuzz/byte_script.hpp"
+#include "tests/fuzz/memory_file.hpp"
 
 namespace sonar::fuzz {
 
@@ -30,6 +31,19 @@ inline void check(const HeightGrid& grid) {
   if (!made) return require(!made.error().text.empty());
   require(is_finite(made->centre_m));
   check(made->mesh);
+}
+
+/// Whatever the bytes, a reader of files gives a sound grid or a sentence that starts with the file's name.
+template <class Read>
+void check_grid_reader(const std::uint8_t* data, std::size_t size, Read&& read) {
+  static const MemoryFile file;
+  file.fill({data, size});
+  const Result<HeightGrid> grid = read(file.path());
+  if (grid) {
+    check(*grid);
+  } else {
+    require(grid.error().text.starts_with(file.path().string() + ": "));
+  }
 }
 
 }  // namespace sonar::fuzz

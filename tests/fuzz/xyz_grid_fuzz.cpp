@@ -1,16 +1,7 @@
-// Lines of points as a grid: whatever the bytes, the answer is a sound grid or a sentence that starts with the file's name.
+// Lines of points as a grid of heights.
 #include "tests/fuzz/heights.hpp"
-#include "tests/fuzz/memory_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace sonar;
-  static const fuzz::MemoryFile file;
-  file.fill({data, size});
-  const auto grid = read_xyz_heights(file.path(), {});
-  if (grid) {
-    fuzz::check(*grid);
-  } else {
-    fuzz::require(grid.error().text.starts_with(file.path().string() + ": "));
-  }
+  sonar::fuzz::check_grid_reader(data, size, [](const auto& file) { return sonar::read_xyz_heights(file, {}); });
   return 0;
 }

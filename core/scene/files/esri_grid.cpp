@@ -117,9 +117,7 @@ Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const He
   }
   if (!words.next().empty()) return bad("more heights than ncols x nrows");
 
-  const auto row_at = [&](std::size_t row) { return raw.z.begin() + static_cast<std::ptrdiff_t>(row * columns); };
-  for (std::size_t row = 0; row < rows / 2; ++row)  // the file starts in the north, the grid in the south
-    std::swap_ranges(row_at(row), row_at(row + 1), row_at(rows - 1 - row));
+  raw.turn_rows(columns);                          // the file starts in the north, the grid in the south
   const double first = header->centred ? 0 : 0.5;  // a corner is half a cell from the first height
   for (std::size_t i = 0; i < columns; ++i) raw.x.push_back(header->x + (static_cast<double>(i) + first) * header->cell_x);
   for (std::size_t j = 0; j < rows; ++j) raw.y.push_back(header->y + (static_cast<double>(j) + first) * header->cell_y);

@@ -135,11 +135,7 @@ class GeoTiffReader {
     for (std::uint32_t i = 0; i < picture_.columns; ++i) raw_.x.push_back(place->x + i * place->step_x);
     for (std::uint32_t j = 0; j < picture_.rows; ++j)
       raw_.y.push_back(place->y + (north_first ? picture_.rows - 1 - j : j) * place->step_y);
-    if (north_first) {
-      const auto row_at = [&](std::size_t row) { return raw_.z.begin() + static_cast<std::ptrdiff_t>(row * picture_.columns); };
-      for (std::size_t row = 0; row < picture_.rows / 2; ++row)
-        std::swap_ranges(row_at(row), row_at(row + 1), row_at(picture_.rows - 1 - row));
-    }
+    if (north_first) raw_.turn_rows(picture_.columns);
     raw_.fill_values = values_.fill_values();
     return finish_heights(std::move(raw_), scaled());
   }

@@ -138,6 +138,12 @@ std::optional<float> HeightValues::height_of(double value) {
   return none;
 }
 
+void RawHeights::turn_rows(std::size_t columns) {
+  const std::size_t rows = z.size() / columns;
+  const auto row_at = [&](std::size_t row) { return z.begin() + static_cast<std::ptrdiff_t>(row * columns); };
+  for (std::size_t row = 0; row < rows / 2; ++row) std::swap_ranges(row_at(row), row_at(row + 1), row_at(rows - 1 - row));
+}
+
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) {
   HeightGrid grid;
   take_out_fills(raw, grid.notes);

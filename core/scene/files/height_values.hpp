@@ -35,6 +35,9 @@ struct RawHeights {
   std::vector<float> z = {};            // [y][x], NaN: no data
   std::optional<bool> geographic = {};  // coordinates in degrees, if the file says
   std::size_t fill_values = 0;          // undeclared ones beyond every height, which are NaN already
+
+  /// The other row first: files that begin in the north have their rows turned so. `columns`: of `z`.
+  void turn_rows(std::size_t columns);
 };
 
 /// Scale, holes, and the origin of degrees. Errors lack the file's name.
