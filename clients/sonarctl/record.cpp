@@ -75,13 +75,14 @@ Result<Steering> ask_sonard(const ControlOptions& options, const Endpoint& devic
 class Recorder {
  public:
   Recorder(const RecordOptions& options, Socket socket, std::optional<Socket> status, std::optional<Steering> steering,
-           RecordFiles& files, std::uint32_t device_ip)
+           RecordFiles& files, std::uint32_t device_ip, std::optional<wire::Bytes> fire)
       : options_(options),
         socket_(std::move(socket)),
         status_(std::move(status)),
         steering_(std::move(steering)),
         files_(files),
-        device_ip_(device_ip) {}
+        device_ip_(device_ip),
+        fire_(std::move(fire)) {}
 
   Result<void> run() {
     if (Result<void> asked = ask(); !asked) return asked;
@@ -118,12 +119,9 @@ class Recorder {
   }
 
   Result<void> ask() {
-    if (options_.source.wanted.as_it_is) return {};
-    const auto asked = oculus::fire_from(options_.source.wanted);
-    if (!asked) return tl::unexpected(asked.error());
-    const wire::Bytes fire = oculus::make_fire(*asked);
-    if (Result<void> sent = write_all(socket_, fire); !sent) return sent;
-    return files_.write({stamps_.now(), Origin::client, Carrier::stream, fire});
+    if (!fire_) return {};
+    if (Result<void> sent = write_all(socket_, *fire_); !sent) return sent;
+    return files_.write({stamps_.now(), Origin::client, Carrier::stream, *fire_});
   }
 
   Result<void> store(std::span<const std::byte> bytes) {
@@ -181,6 +179,7 @@ class Recorder {
   std::optional<Steering> steering_;
   RecordFiles& files_;
   std::uint32_t device_ip_;
+  std::optional<wire::Bytes> fire_;  // the settings to ask for; none are sent without it
   std::optional<std::uint16_t> device_id_;
   recording::MessageSplitter splitter_{Origin::device};
   Stamps stamps_;
@@ -198,8 +197,12 @@ void report(const RecordFiles& files, double seconds) {
 }
 
 Result<void> record_device(const RecordOptions& options) {
-  if (!options.source.wanted.as_it_is)
-    if (const auto asked = oculus::fire_from(options.source.wanted); !asked) return tl::unexpected(asked.error());
+  std::optional<wire::Bytes> fire;
+  if (!options.source.wanted.as_it_is) {
+    const auto asked = oculus::fire_from(options.source.wanted);
+    if (!asked) return tl::unexpected(asked.error());
+    fire = oculus::make_fire(*asked);
+  }
   const Result<Endpoint> device = find_device(options.source, true);
   if (!device) return tl::unexpected(device.error());
   std::optional<Steering> steering;
@@ -221,7 +224,8 @@ Result<void> record_device(const RecordOptions& options) {
   if (!files) return tl::unexpected(files.error());
   std::printf("connected to %s\n", text_from(*device).c_str());
   std::fflush(stdout);
-  Recorder recorder(options, std::move(*socket), std::move(status), std::move(steering), *files, conversation.device.address);
+  Recorder recorder(options, std::move(*socket), std::move(status), std::move(steering), *files, conversation.device.address,
+                    std::move(fire));
   const Result<void> ran = recorder.run();
   const double took_s = recorder.seconds();
   const Result<void> closed = files->close();

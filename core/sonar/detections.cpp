@@ -175,7 +175,7 @@ std::optional<Found> by_amplitude(const Fan& fan, const Levels& level, const std
   const double azimuth = fan.middle_rad(direction);
   const auto near = range_between(before.point, after.point, azimuth);
   if (!near) return {};
-  double most = 0, sum = 0, moment = 0, least = 0;
+  double most = 0, sum = 0, moment = 0;
   const int first = fan.first_beam(direction), end = fan.first_beam(direction + 1);
   for (int row = 0; row < level.rows; ++row) {
     const double range = settings.range_of_row(row);
@@ -186,8 +186,7 @@ std::optional<Found> by_amplitude(const Fan& fan, const Levels& level, const std
     sum += std::sqrt(power);
     moment += std::sqrt(power) * range;
   }
-  for (int b = first; b < end; ++b)
-    least = b == first ? least_db[static_cast<std::size_t>(b)] : std::max(least, least_db[static_cast<std::size_t>(b)]);
+  const double least = *std::max_element(least_db.begin() + first, least_db.begin() + end);
   const double level_db = most > 0 ? 10 * std::log10(most) : -1e9;
   if (level_db < std::max(least, std::min(before.level_db, after.level_db) - fill_db)) return {};
   return Found{{azimuth, moment / sum}, level_db};
@@ -204,7 +203,7 @@ std::vector<Detection> detect_points(const Ping& ping, int directions, double ab
   for (int b = 0; b < level.beams; ++b) least_db.push_back(level.median_of(b) + above_db);
   const double reach_m = 2 * std::max(static_cast<double>(settings.pulse_width_m), settings.range_bin_m);
   std::vector<std::optional<Found>> found = loudest_peaks(fan, level, least_db, reach_m);
-  // A floor has no holes: what lies between two points is filled whole, or is not a floor.
+  // A floor has no holes: the directions between two points are filled if all of them can be.
   for (int d = 1; d < directions; ++d) {
     int end = d;
     while (end < directions && !found[static_cast<std::size_t>(end)]) ++end;
