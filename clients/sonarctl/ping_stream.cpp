@@ -28,14 +28,14 @@ constexpr auto connect_patience = 2000ms;      // for streams, before other kind
 constexpr int receive_buffer_bytes = 4 << 20;  // a few pings
 constexpr const char* is_sonard_there = ". Is sonard running there? Its banner names the address of each sonar";
 
-/// What a host knows as time.
+/// The time that a host is given.
 Time now() { return Time(std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch())); }
 
 milliseconds left_until(Clock::time_point deadline) {
   return std::max(0ms, std::chrono::ceil<milliseconds>(deadline - Clock::now()));
 }
 
-/// Of both ends; the socket API requires the casts.
+/// The address of either end; the socket API requires the casts.
 sockaddr_in own_address(const Socket& socket) {
   sockaddr_in at{};
   socklen_t size = sizeof at;

@@ -24,7 +24,7 @@ class NoiseTable {
   void set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The table that add() reads: noise_table_samples complex values (core/pipeline/arithmetic/noise_place.hpp).
   const std::vector<float>& shaped() const { return *shaped_; }
-  /// Of its draws, but for those `counted` already, which other tables share.
+  /// Size of its draws without those in `counted`, which other tables share.
   std::size_t bytes(std::set<const void*>& counted) const;
 
  private:

@@ -14,7 +14,7 @@
 
 namespace sonar {
 
-/// What one model with one set of settings needs from ping to ping.
+/// The tables that one model needs with one set of settings, from ping to ping.
 struct PreparedSettings {
   std::shared_ptr<const SonarModel> model;
   PingPlan plan;

@@ -85,7 +85,7 @@ class WaterlinkedHost final : public protocol::Host {
 
   HostActions on_open(std::span<const std::uint16_t>, Time) override { return {ask("GET", "/udp", "")}; }
 
-  /// First whom the images go to: multicast is switched on when the output is disabled. Then the settings, one by one.
+  /// Sets the receiver of the images first: multicast is switched on when the output is disabled. Then the settings, one by one.
   HostActions on_reply(const protocol::ResourceReply& reply, Time) override {
     const auto fail = [](ErrorKind kind, std::string text) { return HostActions{Error{kind, std::move(text)}}; };
     if (!std::exchange(knows_output_, true)) {

@@ -249,7 +249,7 @@ class SonarChecks {
         less_to_compute);
   }
 
-  /// What keeps pings from the drivers that are connected, as the daemon sees it. One without a ping is a failure.
+  /// Judges the connected drivers by the status of the daemon. One without a ping is a failure.
   void check_drivers() {
     if (!sonar_.reported) return;
     const v1::DaemonStatus now = without_us();

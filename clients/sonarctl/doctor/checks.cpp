@@ -58,7 +58,7 @@ std::vector<Finding> run_checks(const Facts& facts) {
   return findings;
 }
 
-/// Of the sonars that were examined, whatever their makes.
+/// The ports of the examined sonars, whatever their makes.
 void check_ports(const Facts& facts, std::vector<Finding>& findings) {
   const KernelPorts& ports = facts.kernel_ports;
   if (!ports.known) return;
