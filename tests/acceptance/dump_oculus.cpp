@@ -9,7 +9,7 @@
 #include "protocol/oculus/decode.hpp"
 #include "tests/protocol/oculus/json_of.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 using Json = nlohmann::json;
@@ -86,10 +86,10 @@ void dump_status(const wire::Bytes& bytes) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests
 
 int main(int count, char** arguments) {
-  using namespace sonar::oculus::testing;
+  using namespace sonar::oculus::tests;
   const std::string what = count == 3 ? arguments[1] : "";
   const auto dump = what == "device" ? dump_device : what == "client" ? dump_client : what == "status" ? dump_status : nullptr;
   const auto bytes = dump != nullptr ? bytes_of_file(arguments[2]) : std::nullopt;

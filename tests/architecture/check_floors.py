@@ -101,6 +101,7 @@ FORBIDDEN = [
     ("mutex", r"daemon/|protocol/", None, r"\bstd::(mutex|shared_mutex|recursive_mutex|condition_variable)\b",
      "work crosses threads by value and asio::post"),
     ("global random", r"core/", None, r"\bstd::(mt19937|random_device|default_random_engine)|\bs?rand\s*\(", "random numbers are counter-based, core/base/random.hpp"),
+    ("test namespace", r"tests/", None, r"\bnamespace\s+(\w+::)*testing\b(?!_)", "it hides GoogleTest's from files compiled together: name it tests"),
     ("quiet grep", r"", None, r"\| *gr" + r"ep -\w*q", "it ends before its input does, and under pipefail the pipe then fails: test \"$(command)\" instead"),
     ("mark", r"", None, r"\b(TO" + r"DO|FIX" + r"ME|X" + r"XX)\b", "finish it, or write an issue"),
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),

@@ -78,6 +78,7 @@ class Planted(unittest.TestCase):
                 ("daemon/a.cpp", "std::mutex guard;", "mutex"),
                 ("core/scene/a.cpp", "std::mt19937 engine;", "global random"),
                 ("daemon/a.cpp", "int x;  // TO" + "DO later", "mark"),
+                ("tests/a_test.cpp", "namespace sonar::test" + "ing {\n}\n", "test namespace"),
                 ("a.sh", "list | gr" + "ep -iq word", "quiet grep"),
                 (PAGE, "run it in " + SLASH + "ho" + "me/me/sonard", "machine path"),
                 ("tests/daemon/a.cpp", 'open("' + SLASH + "t" + 'mp/x");', "machine path")]:

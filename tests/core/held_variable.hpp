@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-namespace sonar::testing {
+namespace sonar::tests {
 
 class HeldVariable {
  public:
@@ -27,4 +27,4 @@ class HeldVariable {
   std::optional<std::string> was_;
 };
 
-}  // namespace sonar::testing
+}  // namespace sonar::tests

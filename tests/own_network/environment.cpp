@@ -7,7 +7,7 @@ namespace {
 
 class OwnNetwork final : public testing::Environment {
  public:
-  void SetUp() override { sonar::testing::enter_own_network(); }
+  void SetUp() override { sonar::tests::enter_own_network(); }
 };
 
 [[maybe_unused]] const testing::Environment* const added = testing::AddGlobalTestEnvironment(new OwnNetwork);

@@ -10,7 +10,7 @@ int main(int count, char** arguments) {
     std::fputs("usage: in_own_network PROGRAM [ARGUMENTS...]\n", stderr);
     return 64;
   }
-  sonar::testing::enter_own_network();
+  sonar::tests::enter_own_network();
   execvp(arguments[1], arguments + 1);
   std::perror(arguments[1]);
   return 69;

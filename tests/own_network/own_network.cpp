@@ -19,7 +19,7 @@
 #include <filesystem>
 #include <string>
 
-namespace sonar::testing {
+namespace sonar::tests {
 namespace {
 
 bool write_to(const char* path, const std::string& text) {
@@ -86,4 +86,4 @@ void enter_own_network() {
   setenv(entered, "1", 1);
 }
 
-}  // namespace sonar::testing
+}  // namespace sonar::tests

@@ -2,11 +2,11 @@
 // time do not meet.
 #pragma once
 
-namespace sonar::testing {
+namespace sonar::tests {
 
 /// Moves the process into a new network namespace with its loopback interface up. User and file permissions stay as they are.
 /// Where the kernel forbids it the process waits until no other one of these runs, and says so on standard error. Call it before
 /// threads are started. Does nothing when SONARD_OWN_NETWORK is set, which it sets: child processes share the network.
 void enter_own_network();
 
-}  // namespace sonar::testing
+}  // namespace sonar::tests

@@ -104,7 +104,7 @@ TEST(Fields, OfAnOculusPingOfEitherVersion) {
 }
 
 TEST(Fields, OfAnOculusStatus) {
-  protocol::DeviceState state = oculus::testing::device();
+  protocol::DeviceState state = oculus::tests::device();
   state.water.temperature_c = 12.25;
   state.connected_client = {10, 0, 0, 7};
   const wire::Bytes status = oculus::make_status(state);
@@ -126,7 +126,7 @@ TEST(Fields, OfAnOculusStatus) {
   const auto bytes = [&](FieldName name) {
     return bytes_at(status, *protocol::vendors().front()->field(Part::beacon, name, status));
   };
-  using oculus::testing::hex;
+  using oculus::tests::hex;
   EXPECT_EQ(bytes(FieldName::firmware), hex("00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 00 00 00 00 01 00 00 00 00"));
   EXPECT_EQ(bytes(FieldName::address), hex("C0 A8 01 02"));
   EXPECT_EQ(bytes(FieldName::netmask), hex("FF FF FF 00"));
@@ -186,7 +186,7 @@ TEST(Fields, OfABlueViewPing) {
       {FieldName::image_size, static_cast<double>(image->second)}};
   expect_fields(blueview::vendor(), Part::ping, message, expected, {FieldName::magic});
   EXPECT_EQ(bytes_at(message, *blueview::vendor().field(Part::ping, FieldName::magic, message)),
-            oculus::testing::hex("42 56 45 31"));
+            oculus::tests::hex("42 56 45 31"));
   EXPECT_TRUE(blueview::vendor().field(Part::ping, FieldName::rows, {}));
   EXPECT_FALSE(blueview::vendor().field(Part::beacon, FieldName::magic, {}));
 }

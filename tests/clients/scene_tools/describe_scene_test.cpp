@@ -31,7 +31,7 @@ sea_surface: {size_m: [20, 20]}
 )";
 
 struct Files : ::testing::Test {
-  sonar::testing::TemporaryFiles files;
+  sonar::tests::TemporaryFiles files;
   Result<SceneDescription> describe(std::string_view text) { return describe_scene(files.write("s.yaml", text)); }
   Remarks remarks(std::string_view text) {
     const auto scene = describe(text);

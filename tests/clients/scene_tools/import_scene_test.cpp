@@ -21,7 +21,7 @@ constexpr const char* triangle =
     "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 2 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
 
 struct ImportScene : ::testing::Test {
-  sonar::testing::TemporaryFiles files;
+  sonar::tests::TemporaryFiles files;
   ImportOptions options;
 
   ImportScene() {
@@ -41,7 +41,7 @@ struct ImportScene : ::testing::Test {
     const auto done = run(world);
     return done ? "no error" : done.error().text;
   }
-  std::string text() { return sonar::testing::TemporaryFiles::read(options.out); }
+  std::string text() { return sonar::tests::TemporaryFiles::read(options.out); }
   std::shared_ptr<const Scene> scene() {
     auto loaded = load_scene(options.out);
     EXPECT_TRUE(loaded) << loaded.error().text << "\n" << text();

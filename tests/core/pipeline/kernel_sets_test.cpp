@@ -136,7 +136,7 @@ TEST(KernelSets, AFixedFanOfAnyNumberOfRaysIsTraced) {
   for (int rays = 1; rays <= 18; ++rays) {
     std::vector<float> first;
     for (const char* isa : {"sse2", "avx2", ""}) {
-      const testing::HeldVariable held("SONARD_EMBREE_ISA", isa);
+      const tests::HeldVariable held("SONARD_EMBREE_ISA", isa);
       Sounding s(scene, oculus_high(), default_rows(10, 200), {.threads = 1, .engine = {}});
       s.request.switches.fixed_fan = rays;
       const std::vector<float> now = s.ping_from({0, 0, 2}, {0, 0.25, 0}).pressure_upa;
@@ -158,13 +158,13 @@ TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
                                     {"avx2", SimdLevel::avx2},
                                     {"avx512", SimdLevel::avx512},
                                     {"neon", SimdLevel::neon}}) {
-    const testing::HeldVariable held("SONARD_SIMD", name);
+    const tests::HeldVariable held("SONARD_SIMD", name);
     EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(level)) << name;
     EXPECT_EQ(&simd::kernels_for(SimdLevel::portable), &simd::portable_kernels) << "what was asked for by itself stays";
   }
-  const testing::HeldVariable none("SONARD_SIMD", "");
+  const tests::HeldVariable none("SONARD_SIMD", "");
   EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(SimdLevel::avx512)) << "the best there is";
-  const testing::HeldVariable unknown("SONARD_SIMD", "avx1024");
+  const tests::HeldVariable unknown("SONARD_SIMD", "avx1024");
   EXPECT_THROW(simd::kernels_for(SimdLevel::automatic), std::runtime_error);
 }
 

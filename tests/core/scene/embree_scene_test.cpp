@@ -14,11 +14,11 @@
 namespace sonar {
 namespace {
 
-using testing::brute_force;
-using testing::Draw;
-using testing::Hit;
-using testing::set_ray;
-using testing::soup;
+using tests::brute_force;
+using tests::Draw;
+using tests::Hit;
+using tests::set_ray;
+using tests::soup;
 
 // Casts `packets` packets from around the origin and judges every lane.
 void compare(const Scene& scene, const RayScene& rays, std::span<const Pose> bodies, Draw& draw, int packets, double far_m,
@@ -177,7 +177,7 @@ class TracerWidth : public ::testing::TestWithParam<const char*> {
 #endif
     return 4;
   }
-  testing::HeldVariable isa_{"SONARD_EMBREE_ISA", GetParam()};
+  tests::HeldVariable isa_{"SONARD_EMBREE_ISA", GetParam()};
 };
 
 TEST_P(TracerWidth, AgreesWithBruteForce) {
@@ -236,7 +236,7 @@ INSTANTIATE_TEST_SUITE_P(Isa, TracerWidth, ::testing::Values("sse2", "sse4.2", "
 });
 
 TEST(RayScene, RefusesAnUnknownInstructionSet) {
-  const testing::HeldVariable isa("SONARD_EMBREE_ISA", "avx3");
+  const tests::HeldVariable isa("SONARD_EMBREE_ISA", "avx3");
   try {
     const RayScene rays(std::make_shared<Scene>(), 1);
     ADD_FAILURE() << "accepted";

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace sonar::testing {
+namespace sonar::tests {
 
 struct HostileMesh {
   std::string name, bytes;
@@ -98,4 +98,4 @@ inline std::vector<HostileMesh> hostile_meshes() {
   };
 }
 
-}  // namespace sonar::testing
+}  // namespace sonar::tests

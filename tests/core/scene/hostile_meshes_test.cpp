@@ -41,11 +41,11 @@ class HostileMeshes : public ::testing::Test {
     const auto mesh = load_mesh({.file = files_.write(name, bytes)});
     return mesh ? "accepted" : mesh.error().text;
   }
-  testing::TemporaryFiles files_;
+  tests::TemporaryFiles files_;
 };
 
 TEST_F(HostileMeshes, AreRefusedAndTheProgramGoesOn) {
-  for (const auto& mesh : testing::hostile_meshes()) {
+  for (const auto& mesh : tests::hostile_meshes()) {
     if (sanitized && mesh.words == "MiB of memory") continue;  // the sanitizer itself ends the importer
     const std::string text = refusal(mesh.name, mesh.bytes);
     EXPECT_THAT(text, StartsWith(mesh.name + ": "));
@@ -58,7 +58,7 @@ TEST_F(HostileMeshes, AreRefusedAndTheProgramGoesOn) {
 TEST_F(HostileMeshes, FilesThatAMeshNamesCountByTheirSize) {
   const auto large = files_.write("large.bin", "");
   std::filesystem::resize_file(large, 3'600'000'000);
-  EXPECT_THAT(refusal("large.gltf", testing::gltf_with_buffer("large.bin")),
+  EXPECT_THAT(refusal("large.gltf", tests::gltf_with_buffer("large.bin")),
               HasSubstr("large.gltf: is larger than 2 GiB with the files that it names; simplify it"));
 }
 
@@ -70,7 +70,7 @@ TEST_F(HostileMeshes, FilesBesideAMeshAndInTheFolderOfItsSceneAreRead) {
   files_.write("scene/buffers/other.bin", corners);
   files_.write("outside.bin", corners);
   const auto load = [&](const std::string& uri, std::optional<std::filesystem::path> folder) {
-    const auto mesh = load_mesh({.file = files_.write("scene/meshes/a.gltf", testing::gltf_with_buffer(uri)), .folder = folder});
+    const auto mesh = load_mesh({.file = files_.write("scene/meshes/a.gltf", tests::gltf_with_buffer(uri)), .folder = folder});
     return mesh ? "accepted" : mesh.error().text;
   };
   EXPECT_EQ(load("beside.bin", {}), "accepted");

@@ -17,9 +17,9 @@
 namespace sonar::load_mesh_test {
 namespace {
 
-using testing::expect_sound;
 using ::testing::HasSubstr;
-using testing::TemporaryFiles;
+using tests::expect_sound;
+using tests::TemporaryFiles;
 
 // A wedge 2 long in x, 1 wide in y, 3 high in z.
 const std::string obj = "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 3\nusemtl steel\nf 1 3 2\nf 1 2 4\nusemtl wood\nf 1 4 3\nf 2 3 4\n";
@@ -222,8 +222,8 @@ TEST_F(LoadMesh, MaterialsKeepTheirNamesAndTriangles) {
 }
 
 TEST_F(LoadMesh, VolumesKeepTheirSign) {
-  EXPECT_NEAR(testing::volume(good("a.obj", obj).centred.mesh), 1, 1e-6);
-  EXPECT_NEAR(testing::volume(good("a.glb", glb()).centred.mesh), 1, 1e-6);
+  EXPECT_NEAR(tests::volume(good("a.obj", obj).centred.mesh), 1, 1e-6);
+  EXPECT_NEAR(tests::volume(good("a.glb", glb()).centred.mesh), 1, 1e-6);
 }
 
 TEST_F(LoadMesh, FarOffsetsMoveIntoTheCentre) {

@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-using testing::TemporaryFiles;
+using tests::TemporaryFiles;
 
 std::string refusal(const std::string& text, const std::filesystem::path& folder = ".") {
   const auto scene = parse_scene(text, "s.yaml", folder);
@@ -47,7 +47,7 @@ sea_surface: {size_m: [50, 60], lambert_db: -35}
   ASSERT_EQ(scene->objects.size(), 10u);
   EXPECT_EQ(scene->objects[1].name, "box 2");
   for (const Object& o : scene->objects) {
-    testing::expect_sound(*o.mesh);
+    tests::expect_sound(*o.mesh);
     for (const std::uint16_t m : o.mesh->material) ASSERT_LT(m, scene->materials.size());
   }
   ASSERT_EQ(scene->point_targets.size(), 1u);
@@ -301,7 +301,7 @@ sea_surface: {size_m: [9, 9]}
       EXPECT_THAT(scene.error().text, StartsWith("s.yaml:"));
       return;
     }
-    for (const Object& o : (*scene)->objects) testing::expect_sound(*o.mesh);
+    for (const Object& o : (*scene)->objects) tests::expect_sound(*o.mesh);
   };
   for (std::size_t n = 0; n < good.size(); n += 5) check(good.substr(0, n));
   for (std::uint32_t i = 0; i < 1200; ++i) {

@@ -7,7 +7,7 @@
 
 #include "core/scene/scene.hpp"
 
-namespace sonar::testing {
+namespace sonar::tests {
 
 inline void expect_sound(const Mesh& mesh) {
   ASSERT_FALSE(mesh.triangles.empty());
@@ -51,4 +51,4 @@ inline void expect_closed(const Mesh& mesh) {
   }
 }
 
-}  // namespace sonar::testing
+}  // namespace sonar::tests

@@ -9,10 +9,10 @@
 namespace sonar {
 namespace {
 
-using testing::area;
-using testing::expect_closed;
-using testing::expect_sound;
-using testing::volume;
+using tests::area;
+using tests::expect_closed;
+using tests::expect_sound;
+using tests::volume;
 
 void expect_solid(const Mesh& mesh, double true_volume, double tolerance) {
   expect_sound(mesh);

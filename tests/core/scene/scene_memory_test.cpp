@@ -45,7 +45,7 @@ class SceneMemory : public ::testing::Test {
 
 TEST_F(SceneMemory, OfAMillionTrianglesInBinaryStl) {
   constexpr std::size_t edge = 708, count = 2 * (edge - 1) * (edge - 1);
-  const testing::TemporaryFiles files;
+  const tests::TemporaryFiles files;
   std::string bytes(80, '\0');
   const auto triangles = static_cast<std::uint32_t>(count);
   bytes.append(reinterpret_cast<const char*>(&triangles), 4);

@@ -11,7 +11,7 @@
 #include "core/scene/ray_scene.hpp"
 #include "core/scene/scene.hpp"
 
-namespace sonar::testing {
+namespace sonar::tests {
 
 class Draw {  // a stream of uniform numbers, for tests only
  public:
@@ -85,4 +85,4 @@ inline void set_ray(RayPacket& rays, int lane, Vec3d from_in_origin, Vec3d along
   rays.far[lane] = static_cast<float>(far_m);
 }
 
-}  // namespace sonar::testing
+}  // namespace sonar::tests

@@ -24,7 +24,7 @@ std::pair<std::string, float> look(const RayScene& rays, Vec3d from, double azim
   const double a = rad_from_deg(azimuth_deg), e = rad_from_deg(elevation_deg);
   RayPacket packet{};
   for (int i = 0; i < 16; ++i) {
-    testing::set_ray(packet, i, from - rays.origin(), {std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e)}, 100);
+    tests::set_ray(packet, i, from - rays.origin(), {std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e)}, 100);
   }
   rays.trace(packet, 1, true);
   if (packet.object[0] == RayPacket::miss) return {"nothing", 0.0f};

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace sonar::testing {
+namespace sonar::tests {
 
 class TemporaryFiles {
  public:
@@ -40,4 +40,4 @@ class TemporaryFiles {
   std::filesystem::path folder_;
 };
 
-}  // namespace sonar::testing
+}  // namespace sonar::tests

@@ -19,9 +19,9 @@
 namespace sonar::terrain_test {
 namespace {
 
-using testing::expect_sound;
 using ::testing::HasSubstr;
-using testing::TemporaryFiles;
+using tests::expect_sound;
+using tests::TemporaryFiles;
 
 TEST(Noise, IsSmoothBoundedAndDrawnFromItsSeed) {
   double sum = 0, most = 0, step = 0;

@@ -10,7 +10,7 @@
 #include "protocol/aris/messages.hpp"
 #include "protocol/aris/settings.hpp"
 
-namespace sonar::aris::testing {
+namespace sonar::aris::tests {
 
 inline Time at_s(double s) { return Time{} + nanoseconds_from(1.7e9 + s); }
 
@@ -49,4 +49,4 @@ inline Command set_receiver(std::uint32_t port, const std::string& ip = "") {
   return command;
 }
 
-}  // namespace sonar::aris::testing
+}  // namespace sonar::aris::tests

@@ -49,7 +49,7 @@ TEST(ArisCapture, HeaderIsReadAsDescribed) {
                       Frequency::high,
                       true,
                       24};
-    const auto state = testing::device("aris-1200");
+    const auto state = tests::device("aris-1200");
     EXPECT_EQ(judge(a, product_of(*state.model), false).refusal, "") << "the device's own settings are valid";
     EXPECT_NEAR(h.window_length_m, a.samples_per_beam * a.sample_period_us * 1e-6 * 1435.93 / 2, 0.25);
   }

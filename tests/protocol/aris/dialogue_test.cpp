@@ -12,16 +12,15 @@ namespace {
 using ::testing::HasSubstr;
 
 struct Talk {
-  explicit Talk(const char* profile = "aris-3000", protocol::OptionValues options = {})
-      : state(testing::device(profile, options)) {
+  explicit Talk(const char* profile = "aris-3000", protocol::OptionValues options = {}) : state(tests::device(profile, options)) {
     state.last_ping = 17;
     state.settings = vendor().initial_settings(state).vendor_settings;
     state.connected_client = {10, 0, 0, 7};
-    dialogue = vendor().converse(vendor().ports().front(), state, testing::at_s(0));
+    dialogue = vendor().converse(vendor().ports().front(), state, tests::at_s(0));
   }
   /// Obeys what it asks for, as the daemon does.
   void say(const Bytes& bytes, double at = 0) {
-    const protocol::Reaction reaction = dialogue->on_bytes(bytes, testing::at_s(at));
+    const protocol::Reaction reaction = dialogue->on_bytes(bytes, tests::at_s(at));
     EXPECT_TRUE(reaction.replies.empty()) << "the device never answers";
     for (const protocol::Event& event : reaction.events) {
       if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
@@ -46,7 +45,7 @@ struct Talk {
 
   protocol::DeviceState state;
   std::unique_ptr<protocol::Dialogue> dialogue;
-  PingSettings settings = vendor().initial_settings(testing::device()).settings;
+  PingSettings settings = vendor().initial_settings(tests::device()).settings;
   bool late = false;  // changes of settings wait for apply_next()
   std::deque<protocol::ChangeSettings> changes;
   std::vector<protocol::Endpoint> receivers;
@@ -57,12 +56,12 @@ struct Talk {
 TEST(ArisDialogue, FramesFlowOnceReceiverAndValidSettingsAreThere) {
   for (const bool receiver_first : {true, false}) {
     Talk talk;
-    if (receiver_first) talk.say(testing::set_receiver(56444));
+    if (receiver_first) talk.say(tests::set_receiver(56444));
     EXPECT_EQ(talk.settings.rate_hz, 0);
-    talk.say(testing::set_acoustics(testing::acoustics()));
+    talk.say(tests::set_acoustics(tests::acoustics()));
     if (!receiver_first) {
       EXPECT_EQ(talk.settings.rate_hz, 0);
-      talk.say(testing::set_receiver(56444));
+      talk.say(tests::set_receiver(56444));
     }
     EXPECT_EQ(talk.settings.rate_hz, 12);
     ASSERT_EQ(talk.receivers.size(), 1u);
@@ -70,7 +69,7 @@ TEST(ArisDialogue, FramesFlowOnceReceiverAndValidSettingsAreThere) {
     EXPECT_EQ(talk.held().first_ping, 17u);
     EXPECT_EQ(talk.held().applied, 1u);
     EXPECT_EQ(talk.settings.beam_count, 128);
-    talk.say(testing::set_receiver(1, "0.0.0.0"));
+    talk.say(tests::set_receiver(1, "0.0.0.0"));
     EXPECT_EQ(talk.settings.rate_hz, 0);
     EXPECT_TRUE(talk.receivers.empty());
   }
@@ -86,8 +85,8 @@ Command set_salinity(std::uint32_t psu) {
 TEST(ArisDialogue, CommandsAddUpWhileAFaultHoldsThemBack) {
   Talk talk;
   talk.late = true;
-  talk.say(testing::set_receiver(56444));
-  talk.say(testing::set_acoustics(testing::acoustics()));
+  talk.say(tests::set_receiver(56444));
+  talk.say(tests::set_acoustics(tests::acoustics()));
   talk.apply_next();
   talk.say(set_salinity(15));
   while (!talk.changes.empty()) talk.apply_next();
@@ -100,16 +99,16 @@ TEST(ArisDialogue, CommandsAddUpWhileAFaultHoldsThemBack) {
   talk.say(set_salinity(0));
   EXPECT_EQ(talk.held().acoustics.gain_db, 0) << "of the override, not of the last command";
   talk.state.settings = vendor().initial_settings(talk.state).vendor_settings;
-  talk.say(testing::set_acoustics(testing::acoustics()));
+  talk.say(tests::set_acoustics(tests::acoustics()));
   EXPECT_EQ(talk.settings.rate_hz, 12) << "the receiver belongs to the connection";
 }
 
 TEST(ArisDialogue, AFurtherControllerNeitherRenumbersNorStopsTheFrames) {
   Talk talk;
-  talk.say(testing::set_receiver(56444));
-  talk.say(testing::set_acoustics(testing::acoustics()));
+  talk.say(tests::set_receiver(56444));
+  talk.say(tests::set_acoustics(tests::acoustics()));
   talk.state.last_ping = 30;
-  const auto first = std::exchange(talk.dialogue, vendor().converse(vendor().ports().front(), talk.state, testing::at_s(0)));
+  const auto first = std::exchange(talk.dialogue, vendor().converse(vendor().ports().front(), talk.state, tests::at_s(0)));
   talk.say(set_salinity(0));
   EXPECT_EQ(talk.held().first_ping, 17u);
   EXPECT_EQ(talk.settings.rate_hz, 12);
@@ -117,21 +116,21 @@ TEST(ArisDialogue, AFurtherControllerNeitherRenumbersNorStopsTheFrames) {
 
 TEST(ArisDialogue, RefusedReceiversStartNothing) {
   Talk talk;
-  talk.say(testing::set_receiver(0));
-  talk.say(testing::set_receiver(5, "nowhere"));
-  talk.say(testing::set_acoustics(testing::acoustics()));
+  talk.say(tests::set_receiver(0));
+  talk.say(tests::set_receiver(5, "nowhere"));
+  talk.say(tests::set_acoustics(tests::acoustics()));
   EXPECT_EQ(talk.settings.rate_hz, 0);
 }
 
 TEST(ArisDialogue, RefusedSettingsChangeNothingButTheCookie) {
   Talk talk;
-  talk.say(testing::set_receiver(56444, "239.0.0.42"));
+  talk.say(tests::set_receiver(56444, "239.0.0.42"));
   EXPECT_EQ(talk.receivers.at(0), (protocol::Endpoint{{239, 0, 0, 42}, 56444}));
-  talk.say(testing::set_acoustics(testing::acoustics(1)));
+  talk.say(tests::set_acoustics(tests::acoustics(1)));
   const PingSettings before = talk.settings;
-  Acoustics bad = testing::acoustics(2);
+  Acoustics bad = tests::acoustics(2);
   bad.ping_mode = 1;
-  talk.say(testing::set_acoustics(bad));
+  talk.say(tests::set_acoustics(bad));
   EXPECT_EQ(talk.settings, before);
   EXPECT_EQ(talk.held().invalid, 2u);
   EXPECT_EQ(talk.held().applied, 1u);
@@ -140,9 +139,9 @@ TEST(ArisDialogue, RefusedSettingsChangeNothingButTheCookie) {
 
 TEST(ArisDialogue, SalinityFocusClockAndLens) {
   Talk talk("aris-1800");
-  talk.say(testing::set_acoustics({1, 12, 1000, 1360, 5720, 4, 6, 3, true, Frequency::high, true, 18}));
+  talk.say(tests::set_acoustics({1, 12, 1000, 1360, 5720, 4, 6, 3, true, Frequency::high, true, 18}));
   const float salt = talk.settings.device_sound_speed_mps;
-  talk.say(testing::hex("00000004 08 04 32 00"));
+  talk.say(tests::hex("00000004 08 04 32 00"));
   EXPECT_EQ(talk.held().salinity, 0u);
   EXPECT_LT(talk.settings.device_sound_speed_mps, salt - 30);
   Command command;
@@ -156,7 +155,7 @@ TEST(ArisDialogue, SalinityFocusClockAndLens) {
   command.focus = Focus{0, 5};
   talk.say(command, 3);
   EXPECT_EQ(talk.held().focus_to, 100u);
-  EXPECT_EQ(talk.held().focus_set_at, testing::at_s(3));
+  EXPECT_EQ(talk.held().focus_set_at, tests::at_s(3));
   command = {};
   command.type = CommandType::set_telephoto;
   command.telephoto = Choice{1};
@@ -165,7 +164,7 @@ TEST(ArisDialogue, SalinityFocusClockAndLens) {
   command = {};
   command.date_time = DateTime{"2014-Jan-31 23:58:15"};
   talk.say(command, 10);
-  EXPECT_EQ(testing::at_s(10) + talk.held().clock_offset, Time(std::chrono::seconds(1391212695)));
+  EXPECT_EQ(tests::at_s(10) + talk.held().clock_offset, Time(std::chrono::seconds(1391212695)));
 }
 
 TEST(ArisDialogue, DatesThatAreNone) {
@@ -176,24 +175,24 @@ TEST(ArisDialogue, DatesThatAreNone) {
 
 TEST(ArisDialogue, JunkIsReportedAndALyingLengthEndsIt) {
   Talk talk;
-  talk.say(testing::hex("00000002 FF FF 00000005 08 0E 82 01 00"));
+  talk.say(tests::hex("00000002 FF FF 00000005 08 0E 82 01 00"));
   EXPECT_EQ(talk.notices.size(), 1u);
   EXPECT_EQ(talk.closed, "");
-  talk.say(testing::hex("00000002 08 28"));
+  talk.say(tests::hex("00000002 08 28"));
   EXPECT_THAT(talk.notices.back(), HasSubstr("type 40"));
-  talk.say(testing::set_receiver(0));
-  talk.say(testing::set_receiver(5, "nowhere"));
+  talk.say(tests::set_receiver(0));
+  talk.say(tests::set_receiver(5, "nowhere"));
   EXPECT_EQ(talk.notices.size(), 4u);
   EXPECT_TRUE(talk.receivers.empty());
-  talk.say(testing::hex("7FFFFFFF"));
+  talk.say(tests::hex("7FFFFFFF"));
   EXPECT_THAT(talk.closed, HasSubstr("longer than 4096"));
 }
 
 TEST(ArisDialogue, OptionsOfReceiversAndSilence) {
   Talk talk("aris-3000", {{"receivers", "controller"}, {"silence_s", "5"}});
-  talk.say(testing::set_receiver(5, "10.0.0.8"));
+  talk.say(tests::set_receiver(5, "10.0.0.8"));
   EXPECT_TRUE(talk.receivers.empty());
-  talk.say(testing::set_receiver(5, "10.0.0.7"));
+  talk.say(tests::set_receiver(5, "10.0.0.7"));
   EXPECT_EQ(talk.receivers.size(), 1u);
   EXPECT_EQ(talk.dialogue->longest_silence(), std::chrono::milliseconds(5000));
   EXPECT_EQ(Talk().dialogue->longest_silence(), std::chrono::milliseconds(10000));

@@ -12,7 +12,7 @@ TEST(ArisOrder, ChannelsOfTheFirstPing) {
   Bytes picture(48);
   for (std::size_t beam = 0; beam < 48; ++beam) picture[beam] = static_cast<std::byte>(beam);
   const Bytes raw = raw_from_picture(picture, 1, 3);
-  EXPECT_EQ(Bytes(raw.begin(), raw.begin() + 16), testing::hex("1E 06 2A 12 18 00 24 0C 21 09 2D 15 1B 03 27 0F"));
+  EXPECT_EQ(Bytes(raw.begin(), raw.begin() + 16), tests::hex("1E 06 2A 12 18 00 24 0C 21 09 2D 15 1B 03 27 0F"));
   EXPECT_EQ(raw[16], std::byte{31}) << "channel 0 of the second ping";
 }
 
@@ -32,7 +32,7 @@ Ping ping_of(const protocol::DeviceState& device, const Settings& settings, std:
   ping.request.settings = ping_settings(settings, device);
   ping.request.vendor_settings = std::make_shared<HeldSettings>(settings);
   ping.request.number = PingNumber(number);
-  ping.request.fired_at = testing::at_s(0.5);
+  ping.request.fired_at = tests::at_s(0.5);
   ping.request.water = device.water;
   ping.request.sonar_in_world.position_m = {0, 0, -10};
   const PingSettings& s = ping.request.settings;
@@ -42,12 +42,12 @@ Ping ping_of(const protocol::DeviceState& device, const Settings& settings, std:
 }
 
 TEST(ArisFrame, HeaderFieldsAreAtTheVendorsOffsets) {
-  auto state = testing::device();
+  auto state = tests::device();
   Settings s = initial_settings(state);
   s.first_ping = 40;
   s.clock_offset = std::chrono::seconds(100);
   s.telephoto = true;  // a 3000 has no such lens
-  apply(s, testing::acoustics(9), state);
+  apply(s, tests::acoustics(9), state);
   const auto datagrams = vendor().datagrams(vendor().ports()[2], ping_of(state, s, 42), state);
   FramePart part;
   ASSERT_TRUE(protobuf::read(datagrams.at(0), part));
@@ -94,9 +94,9 @@ TEST(ArisFrame, HeaderFieldsAreAtTheVendorsOffsets) {
 
 TEST(ArisFrame, IsPutTogetherFromPartsInAnyOrder) {
   for (const char* reordered : {"false", "true"}) {
-    auto state = testing::device("aris-3000", {{"reordered", reordered}});
+    auto state = tests::device("aris-3000", {{"reordered", reordered}});
     Settings s = initial_settings(state);
-    apply(s, testing::acoustics(), state);
+    apply(s, tests::acoustics(), state);
     auto datagrams = vendor().datagrams(vendor().ports()[2], ping_of(state, s, 1), state);
     std::rotate(datagrams.begin(), datagrams.begin() + 5, datagrams.end());
     datagrams.insert(datagrams.begin() + 3, datagrams[2]);
@@ -115,9 +115,9 @@ TEST(ArisFrame, IsPutTogetherFromPartsInAnyOrder) {
 }
 
 TEST(ArisFrame, LacksAPart) {
-  const auto state = testing::device();
+  const auto state = tests::device();
   Settings s = initial_settings(state);
-  apply(s, testing::acoustics(), state);
+  apply(s, tests::acoustics(), state);
   FrameAssembler assembler;
   auto datagrams = vendor().datagrams(vendor().ports()[2], ping_of(state, s, 1), state);
   datagrams.erase(datagrams.begin() + 4);
@@ -127,14 +127,14 @@ TEST(ArisFrame, LacksAPart) {
     whole += assembler.add(datagram) ? 1 : 0;
   EXPECT_EQ(whole, 1);
   EXPECT_EQ(assembler.incomplete(), 1u);
-  EXPECT_FALSE(assembler.add(testing::hex("08 01 10 FF FF FF FF 07"))) << "a size that no frame has";
+  EXPECT_FALSE(assembler.add(tests::hex("08 01 10 FF FF FF FF 07"))) << "a size that no frame has";
   EXPECT_FALSE(assembler.add({}));
 }
 
 TEST(ArisFrame, FieldsAndRegionsOfTheFirstPart) {
-  const auto state = testing::device();
+  const auto state = tests::device();
   Settings s = initial_settings(state);
-  apply(s, testing::acoustics(), state);
+  apply(s, tests::acoustics(), state);
   const Bytes first = vendor().datagrams(vendor().ports()[2], ping_of(state, s, 1), state).at(0);
   const auto rows = vendor().field(protocol::Part::ping, protocol::FieldName::rows, first);
   ASSERT_TRUE(rows);
@@ -152,9 +152,9 @@ TEST(ArisFrame, FieldsAndRegionsOfTheFirstPart) {
 }
 
 TEST(ArisFrame, OlderFirmwareAndLongerDatagramsAreOptions) {
-  const auto state = testing::device("aris-3000", {{"header_bytes", "700"}, {"datagram_bytes", "9000"}});
+  const auto state = tests::device("aris-3000", {{"header_bytes", "700"}, {"datagram_bytes", "9000"}});
   Settings s = initial_settings(state);
-  apply(s, testing::acoustics(9), state);
+  apply(s, tests::acoustics(9), state);
   const Ping ping = ping_of(state, s, 1);
   FrameAssembler assembler;
   std::optional<DecodedFrame> frame;
@@ -174,10 +174,10 @@ TEST(ArisFrame, OlderFirmwareAndLongerDatagramsAreOptions) {
 }
 
 TEST(ArisFrame, OfATelephotoLens) {
-  const auto state = testing::device("aris-1800");
+  const auto state = tests::device("aris-1800");
   Settings s = initial_settings(state);
   s.telephoto = true;
-  Acoustics a = testing::acoustics(9);
+  Acoustics a = tests::acoustics(9);
   a.ping_mode = 3;
   a.cycle_us = 6000;
   a.frame_rate_hz = 8;

@@ -4,7 +4,7 @@
 namespace sonar::aris {
 namespace {
 
-using testing::hex;
+using tests::hex;
 
 TEST(ArisCommands, AreReadAsTheVendorsProgramsWriteThem) {
   CommandFramer framer;
@@ -26,7 +26,7 @@ TEST(ArisCommands, AreReadAsTheVendorsProgramsWriteThem) {
 }
 
 TEST(ArisCommands, ArriveInPiecesOfAnySize) {
-  const Bytes bytes = framed(testing::set_acoustics(testing::acoustics(77)));
+  const Bytes bytes = framed(tests::set_acoustics(tests::acoustics(77)));
   CommandFramer framer;
   for (std::size_t i = 0; i + 1 < bytes.size(); ++i) {
     framer.append(BytesView(bytes).subspan(i, 1));
@@ -36,7 +36,7 @@ TEST(ArisCommands, ArriveInPiecesOfAnySize) {
   Command command;
   const auto message = framer.next();
   ASSERT_TRUE(message && protobuf::read(*message, command));
-  EXPECT_EQ(command.acoustics, testing::acoustics(77));
+  EXPECT_EQ(command.acoustics, tests::acoustics(77));
 }
 
 TEST(ArisCommands, ZerosMayBeLeftOut) {
@@ -67,7 +67,7 @@ TEST(ArisCommands, LengthsThatLieAndCutMessages) {
 }
 
 TEST(ArisBeacon, SaysItsZeros) {
-  protocol::DeviceState state = testing::device("aris-1800");
+  protocol::DeviceState state = tests::device("aris-1800");
   const Bytes free = make_beacon(state);
   EXPECT_LE(free.size(), 256u);
   // serial 7001, system type 0, version 2.8.8711, connection state 0, capability KA, Ethernet, 30, 70, 60, no diver, no variants
@@ -83,7 +83,7 @@ TEST(ArisBeacon, SaysItsZeros) {
                                         {"aris-1800", SystemType::aris_1800},
                                         {"aris-3000", SystemType::aris_3000}}) {
     Availability a;
-    ASSERT_TRUE(protobuf::read(make_beacon(testing::device(profile)), a));
+    ASSERT_TRUE(protobuf::read(make_beacon(tests::device(profile)), a));
     EXPECT_EQ(a.system, system);
   }
 }

@@ -24,7 +24,7 @@ TEST(ArisSettings, HighestFrameRatesOfTheVendorsOwnTable) {
     a.cycle_us = shortest_cycle_us(a);
     EXPECT_NEAR(highest_frame_rate_hz(product(row.profile), a, std::nullopt), row.expected_hz, 0.05) << row.profile << row.period;
   }
-  EXPECT_LT(highest_frame_rate_hz(product("aris-3000"), testing::acoustics(), 500), 13) << "with a delay between packets";
+  EXPECT_LT(highest_frame_rate_hz(product("aris-3000"), tests::acoustics(), 500), 13) << "with a delay between packets";
 }
 
 TEST(ArisSettings, SettingsOfTheVendorsSampleProgramAreValidAsTheyAre) {
@@ -40,7 +40,7 @@ TEST(ArisSettings, SettingsOfTheVendorsSampleProgramAreValidAsTheyAre) {
 
 TEST(ArisSettings, WhatIsOutOfRangeIsRefusedByName) {
   const auto why = [](auto change, const char* profile = "aris-3000") {
-    Acoustics a = testing::acoustics();
+    Acoustics a = tests::acoustics();
     change(a);
     return judge(a, product(profile), true).refusal;
   };
@@ -66,7 +66,7 @@ TEST(ArisSettings, CycleOfTheVendorsLibraryIsAcceptedWhenLenient) {
 }
 
 TEST(ArisSettings, PulseAndRateAreConstrained) {
-  Acoustics a = testing::acoustics();
+  Acoustics a = tests::acoustics();
   a.frame_rate_hz = 15, a.pulse_us = 20;
   Verdict verdict = judge(a, product("aris-3000"), true);
   EXPECT_TRUE(verdict.constrained);
@@ -83,17 +83,17 @@ TEST(ArisSettings, PulseAndRateAreConstrained) {
 }
 
 TEST(ArisSettings, CookiesOfEachKind) {
-  const auto state = testing::device();
+  const auto state = tests::device();
   Settings s = initial_settings(state);
-  apply(s, testing::acoustics(3), state);
+  apply(s, tests::acoustics(3), state);
   EXPECT_EQ(s.applied, 3u);
-  Acoustics bad = testing::acoustics(4);
+  Acoustics bad = tests::acoustics(4);
   bad.frame_rate_hz = 0;
   apply(s, bad, state);
   EXPECT_EQ(s.invalid, 4u);
   EXPECT_EQ(s.applied, 3u);
   EXPECT_EQ(s.acoustics.frame_rate_hz, 12) << "the old settings stay";
-  Acoustics bright = testing::acoustics(5);
+  Acoustics bright = tests::acoustics(5);
   bright.pulse_us = 60;
   apply(s, bright, state);
   EXPECT_EQ(s.constrained, 5u);
@@ -101,7 +101,7 @@ TEST(ArisSettings, CookiesOfEachKind) {
 }
 
 TEST(ArisSettings, SamplesLieWhereDelayPeriodAndSoundSpeedPutThem) {
-  auto state = testing::device();
+  auto state = tests::device();
   state.water = {9, 0, 8, 0};
   Settings s = initial_settings(state);
   s.salinity = 0;
@@ -119,15 +119,15 @@ TEST(ArisSettings, SamplesLieWhereDelayPeriodAndSoundSpeedPutThem) {
 
 TEST(ArisSettings, FocusMovesAtTheSpeedOfItsMotor) {
   Settings s;
-  s.focus_from = 200, s.focus_to = 700, s.focus_set_at = testing::at_s(1);
-  EXPECT_EQ(focus_at(s, testing::at_s(1.25)).position, 450u);
-  EXPECT_TRUE(focus_at(s, testing::at_s(1.25)).moves);
-  EXPECT_EQ(focus_at(s, testing::at_s(1.6)).position, 700u);
-  EXPECT_FALSE(focus_at(s, testing::at_s(1.6)).moves);
+  s.focus_from = 200, s.focus_to = 700, s.focus_set_at = tests::at_s(1);
+  EXPECT_EQ(focus_at(s, tests::at_s(1.25)).position, 450u);
+  EXPECT_TRUE(focus_at(s, tests::at_s(1.25)).moves);
+  EXPECT_EQ(focus_at(s, tests::at_s(1.6)).position, 700u);
+  EXPECT_FALSE(focus_at(s, tests::at_s(1.6)).moves);
 }
 
 TEST(ArisOverride, IsWhatAControllerWouldHaveSet) {
-  const auto state = testing::device();
+  const auto state = tests::device();
   const auto change = [&](const protocol::SettingsOverride& wanted) { return vendor().apply_override(wanted, state); };
   const auto far = change({12, 5, 50, {}, {}});
   ASSERT_TRUE(far) << far.error().text;

@@ -7,7 +7,7 @@
 #include "core/sonar/gain_assist.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 /// The capture lies in the folder itself or in oculus/ below it.
@@ -131,4 +131,4 @@ TEST_F(Capture, SamplesSaturateAt254) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

@@ -1,7 +1,7 @@
 // The driver-side decoder: broken pings are told apart in sentences, hostile ones never read or allocate beyond themselves.
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 using ::testing::Contains;
@@ -195,4 +195,4 @@ TEST(Status, Bit7IsAnOption) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

@@ -2,7 +2,7 @@
 #include "core/base/random.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 using protocol::ChangeSettings;
@@ -365,4 +365,4 @@ TEST(Dialogue, JunkGivesFewNoticesAndNoReplies) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

@@ -6,7 +6,7 @@
 #include "protocol/oculus/options.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 using Rows = std::vector<wire::Namer::Row>;
@@ -125,4 +125,4 @@ TEST(ProtocolPage, NamesEveryFileWithSomethingUnknown) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

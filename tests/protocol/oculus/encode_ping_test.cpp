@@ -2,7 +2,7 @@
 #include "protocol/oculus/models.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 using ::testing::IsEmpty;
@@ -197,4 +197,4 @@ TEST(Bearings, PortIsNegative) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

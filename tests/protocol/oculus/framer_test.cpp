@@ -4,7 +4,7 @@
 #include "core/base/random.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 Bytes header_bytes(int type, int version, std::uint32_t payload) {
@@ -116,4 +116,4 @@ TEST(Framer, NeverKeepsMoreThanAMessage) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

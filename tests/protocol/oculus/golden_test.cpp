@@ -6,7 +6,7 @@
 #include "tests/protocol/oculus/json_of.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing::golden_test {
+namespace sonar::oculus::tests::golden_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -102,4 +102,4 @@ TEST(Golden, WholePings) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing::golden_test
+}  // namespace sonar::oculus::tests::golden_test

@@ -9,7 +9,7 @@
 
 #include "protocol/oculus/messages.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 
 class ToJson : public wire::Visitor<ToJson> {
  public:
@@ -48,4 +48,4 @@ nlohmann::json json_of(const M& message) {
   return visit.object;
 }
 
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

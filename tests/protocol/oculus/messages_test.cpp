@@ -1,7 +1,7 @@
 // Every message against bytes typed field by field from the published layouts, in both directions.
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 // Source 7892 = 0x1ED4, as the captured device; ENS's defaults: mode 2, 10 Hz, 255 Mbit/s, gamma 127, flags 0x0D, 2.54 m, 50 %.
@@ -237,4 +237,4 @@ TEST(Messages, LogByHand) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

@@ -4,7 +4,7 @@
 #include "protocol/oculus/models.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 struct Expected {
@@ -108,4 +108,4 @@ TEST(Models, AllAreUsable) {
 }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

@@ -20,7 +20,7 @@
 #include "protocol/oculus/settings.hpp"
 #include "protocol/vendor.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 
 using wire::Bytes;
 using wire::BytesView;
@@ -128,4 +128,4 @@ std::vector<T> events_of(const protocol::Reaction& reaction) {
   return found;
 }
 
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

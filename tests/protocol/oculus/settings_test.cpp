@@ -6,7 +6,7 @@
 #include "core/sonar/water.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
-namespace sonar::oculus::testing {
+namespace sonar::oculus::tests {
 namespace {
 
 using ::testing::ElementsAre;
@@ -262,4 +262,4 @@ TEST(Settle, AbsurdRowRatesStayUsable) {
 TEST(Settle, NetworkTrigger) { EXPECT_TRUE(settings_of(fire(0, 1, PingRate::hz10, 0xC9, 5, 50), device()).triggered); }
 
 }  // namespace
-}  // namespace sonar::oculus::testing
+}  // namespace sonar::oculus::tests

@@ -14,7 +14,7 @@
 namespace sonar::ping {
 namespace {
 
-using namespace testing;
+using namespace tests;
 using namespace sonar::test;
 
 struct Scanner {

@@ -8,7 +8,7 @@
 namespace sonar::ping {
 namespace {
 
-using namespace testing;
+using namespace tests;
 
 TEST(PingFrames, ArePublishedBytes) {
   EXPECT_EQ(general(Id::protocol_version), hex("42 52 02 00 06 00 00 00 05 00 A1 00"));

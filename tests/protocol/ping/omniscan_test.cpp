@@ -9,7 +9,7 @@
 namespace sonar::ping::omniscan {
 namespace {
 
-using namespace testing;
+using namespace tests;
 
 Bytes pings(OsPingParams p = {.enable = 1}) { return framed_message(Id::os_ping_params, 0, p); }
 

@@ -8,7 +8,7 @@
 namespace sonar::ping::ping360 {
 namespace {
 
-using namespace testing;
+using namespace tests;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 

@@ -9,7 +9,7 @@
 #include "protocol/ping/messages.hpp"
 #include "protocol/vendor.hpp"
 
-namespace sonar::ping::testing {
+namespace sonar::ping::tests {
 
 inline Time at_s(double s) { return Time{} + nanoseconds_from(1.7e9 + s); }
 
@@ -114,4 +114,4 @@ struct Talk {
   std::string closed;
 };
 
-}  // namespace sonar::ping::testing
+}  // namespace sonar::ping::tests

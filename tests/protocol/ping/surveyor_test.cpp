@@ -9,7 +9,7 @@
 namespace sonar::ping::surveyor {
 namespace {
 
-using namespace testing;
+using namespace tests;
 
 Bytes pings(PingParameters p = {.end_mm = 5000, .enable = 1}) { return framed_message(Id::set_ping_parameters, 0, p); }
 

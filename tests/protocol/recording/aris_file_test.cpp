@@ -23,7 +23,7 @@ std::vector<Bytes> datagrams(std::int32_t index, std::uint32_t samples) {
 
 Result<void> write(RecordingWriter& writer, const std::vector<Bytes>& parts) {
   for (const Bytes& part : parts)
-    if (auto r = writer.write({testing::start, Origin::device, Carrier::datagram, part}); !r) return r;
+    if (auto r = writer.write({tests::start, Origin::device, Carrier::datagram, part}); !r) return r;
   return {};
 }
 
@@ -42,7 +42,7 @@ TEST(ArisFile, HoldsWholeFramesInTheVendorsLayout) {
   parts.pop_back();
   ASSERT_TRUE(write(*writer, parts));
   ASSERT_TRUE(write(*writer, datagrams(3, 200)));
-  ASSERT_TRUE(writer->write({testing::start, Origin::device, Carrier::stream, Bytes(50)}));
+  ASSERT_TRUE(writer->write({tests::start, Origin::device, Carrier::stream, Bytes(50)}));
   const auto changed = write(*writer, datagrams(4, 300));
   ASSERT_FALSE(changed);
   EXPECT_THAT(changed.error().text, ::testing::HasSubstr("settings have changed"));

@@ -3,7 +3,7 @@
 #include "protocol/recording/pcap/tcp_stream.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
-namespace sonar::recording::testing {
+namespace sonar::recording::tests {
 namespace {
 
 using ::testing::HasSubstr;
@@ -331,4 +331,4 @@ TEST(WrittenCaptures, SegmentsAndSequenceNumbers) {
 }
 
 }  // namespace
-}  // namespace sonar::recording::testing
+}  // namespace sonar::recording::tests

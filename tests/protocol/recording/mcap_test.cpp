@@ -7,7 +7,7 @@
 #include "protocol/recording/zlib.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
-namespace sonar::recording::testing {
+namespace sonar::recording::tests {
 namespace {
 
 using nlohmann::json;
@@ -239,4 +239,4 @@ TEST(Mcap, OneOfSeveralSonars) {
 }
 
 }  // namespace
-}  // namespace sonar::recording::testing
+}  // namespace sonar::recording::tests

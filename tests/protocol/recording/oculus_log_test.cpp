@@ -4,7 +4,7 @@
 #include "protocol/recording/zlib.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
-namespace sonar::recording::testing {
+namespace sonar::recording::tests {
 namespace {
 
 using ::testing::HasSubstr;
@@ -148,4 +148,4 @@ TEST(Inflate, StopsAtTheLimit) {
 }
 
 }  // namespace
-}  // namespace sonar::recording::testing
+}  // namespace sonar::recording::tests

@@ -32,7 +32,7 @@ Bytes short_log() {
   Bytes file;
   const auto writer = write_ping_log(sink_into(file));
   const Bytes sent = ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{12, 1.5f});
-  EXPECT_TRUE(writer->write({testing::start, Origin::device, Carrier::stream, sent}));
+  EXPECT_TRUE(writer->write({tests::start, Origin::device, Carrier::stream, sent}));
   EXPECT_TRUE(writer->close());
   return file;
 }

@@ -13,9 +13,9 @@ TEST(PingLog, HoldsTheFramesBehindOneThatDescribesThem) {
   Bytes file;
   const auto writer = write_ping_log(sink_into(file));
   const Bytes sent = ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{12, 1.5f});
-  for (int i = 0; i < 2; ++i) ASSERT_TRUE(writer->write({testing::start, Origin::device, Carrier::stream, sent}));
-  ASSERT_TRUE(writer->write({testing::start, Origin::device, Carrier::datagram, Bytes(7)}));
-  ASSERT_TRUE(writer->write({testing::start, Origin::client, Carrier::stream, Bytes(7)}));
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(writer->write({tests::start, Origin::device, Carrier::stream, sent}));
+  ASSERT_TRUE(writer->write({tests::start, Origin::device, Carrier::datagram, Bytes(7)}));
+  ASSERT_TRUE(writer->write({tests::start, Origin::client, Carrier::stream, Bytes(7)}));
   ASSERT_TRUE(writer->close());
   ping::Framer framer(65535);
   framer.append(file);
@@ -38,7 +38,7 @@ Bytes log_of(std::uint32_t pings) {
     attitude.power_up_ms = 5000 + 100 * i;
     for (const Bytes& frame : {ping::framed_message(ping::Id::attitude_report, 0, attitude),
                                ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{12, 1.5f})})
-      EXPECT_TRUE(writer->write({testing::start, Origin::device, Carrier::stream, frame}));
+      EXPECT_TRUE(writer->write({tests::start, Origin::device, Carrier::stream, frame}));
   }
   EXPECT_TRUE(writer->close());
   return file;

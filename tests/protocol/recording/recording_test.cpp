@@ -3,7 +3,7 @@
 #include "tests/protocol/recording/recording_testing.hpp"
 #include "tests/small_disk.hpp"
 
-namespace sonar::recording::testing {
+namespace sonar::recording::tests {
 namespace {
 
 using ::testing::HasSubstr;
@@ -178,4 +178,4 @@ TEST(Recording, KeepsTheCapturedPings) {
 }
 
 }  // namespace
-}  // namespace sonar::recording::testing
+}  // namespace sonar::recording::tests

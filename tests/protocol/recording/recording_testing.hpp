@@ -17,7 +17,7 @@
 #include "protocol/recording/raw_dump.hpp"
 #include "protocol/recording/recording.hpp"
 
-namespace sonar::recording::testing {
+namespace sonar::recording::tests {
 
 inline const Time start = Time(std::chrono::nanoseconds(1'700'000'000'123'456'789));
 inline Time after_ms(int ms) { return start + std::chrono::milliseconds(ms); }
@@ -151,4 +151,4 @@ class TemporaryFile {
   std::filesystem::path path_;
 };
 
-}  // namespace sonar::recording::testing
+}  // namespace sonar::recording::tests

@@ -1,7 +1,7 @@
 // The splitter loses no byte that is not part of a broken message, however the stream is cut.
 #include "tests/protocol/recording/recording_testing.hpp"
 
-namespace sonar::recording::testing {
+namespace sonar::recording::tests {
 namespace {
 
 std::vector<Bytes> drain(MessageSplitter& splitter) {
@@ -76,4 +76,4 @@ TEST(MessageSplitter, ClientsMayLeaveTheirPayloadSizeOut) {
 }
 
 }  // namespace
-}  // namespace sonar::recording::testing
+}  // namespace sonar::recording::tests

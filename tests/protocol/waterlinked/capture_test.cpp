@@ -8,7 +8,7 @@
 #include "protocol/waterlinked/rip.hpp"
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"
 
-namespace sonar::waterlinked::testing {
+namespace sonar::waterlinked::tests {
 namespace {
 
 std::vector<Bytes> captured() {
@@ -48,4 +48,4 @@ TEST(WaterLinkedCapture, ContentIsMadeAgainByteByByte) {
 }
 
 }  // namespace
-}  // namespace sonar::waterlinked::testing
+}  // namespace sonar::waterlinked::tests

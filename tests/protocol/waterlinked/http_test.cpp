@@ -1,7 +1,7 @@
 // The HTTP API: every path, what is refused, releases, what settings mean.
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"
 
-namespace sonar::waterlinked::testing {
+namespace sonar::waterlinked::tests {
 namespace {
 
 constexpr const char* readable[] = {"/about",
@@ -167,4 +167,4 @@ TEST(WaterLinkedOverride, IsWhatAClientWouldHavePosted) {
 }
 
 }  // namespace
-}  // namespace sonar::waterlinked::testing
+}  // namespace sonar::waterlinked::tests

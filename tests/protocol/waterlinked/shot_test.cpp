@@ -5,7 +5,7 @@
 #include "protocol/waterlinked/rip.hpp"
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"
 
-namespace sonar::waterlinked::testing {
+namespace sonar::waterlinked::tests {
 namespace {
 
 /// Pixel i has range i and strength 30 + i.
@@ -121,4 +121,4 @@ TEST(WaterLinkedShot, ImuSamplesGoOnFromTheShotBefore) {
 }
 
 }  // namespace
-}  // namespace sonar::waterlinked::testing
+}  // namespace sonar::waterlinked::tests

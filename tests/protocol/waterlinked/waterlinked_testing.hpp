@@ -10,7 +10,7 @@
 #include "protocol/waterlinked/settings.hpp"
 #include "protocol/waterlinked/waterlinked.hpp"
 
-namespace sonar::waterlinked::testing {
+namespace sonar::waterlinked::tests {
 
 using Json = nlohmann::json;
 
@@ -61,4 +61,4 @@ class Unit {
   std::vector<protocol::Endpoint> receivers;
 };
 
-}  // namespace sonar::waterlinked::testing
+}  // namespace sonar::waterlinked::tests
