@@ -1,42 +1,18 @@
 #include "core/pipeline/range_image.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 #include "core/base/random.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
-#include "core/pipeline/arithmetic/scattering.hpp"
-#include "core/pipeline/scattering_law.hpp"
+#include "core/pipeline/range_returns.hpp"
 #include "core/sonar/water.hpp"
 
 namespace sonar {
 namespace {
 
-constexpr double reach = 1.1;            // in beam widths: the pattern is -14 dB there, and 0 beyond
-constexpr double longest_half_m = 0.5;   // of the ranges of one ray's patch, at grazing incidence
-constexpr double speckle_cell_m = 0.02;  // surfaces keep their speckle as long as a beam's centre stays within such a cell
-constexpr double least_blur = 0.5;       // of a range cell: half the length of the shortest echo
-
-/// What one ray met, or a point target: an echo spread evenly over range_m -+ half_m in the device's metres.
-struct Return {
-  double range_m = 0, half_m = 0, power = 0;  // power [uPa^2] in a beam that looks there; 0 = nothing
-  ComplexNormal speckle{1, 0};
-  std::uint32_t object = BeamTruth::nothing;
-};
-struct PointReturn : Return {
-  double azimuth_rad = 0, elevation_rad = 0;
-};
-
-/// The share of an even spread that lies in cell k of width `cell`.
-double share(const Return& r, double cell, std::ptrdiff_t k) {
-  const double from = std::max(r.range_m - r.half_m, static_cast<double>(k) * cell);
-  const double to = std::min(r.range_m + r.half_m, static_cast<double>(k + 1) * cell);
-  return to > from ? (to - from) / (2 * r.half_m) : 0;
-}
-
+constexpr double reach = 1.1;  // in beam widths: the pattern is -14 dB there, and 0 beyond
 /// Two-way power pattern: a Gaussian of this -3 dB width.
 double pattern(double angle_rad, double width_rad) {
   const double x = angle_rad / width_rad;
@@ -52,23 +28,14 @@ class Profile {
     first_ = size();
     last_ = 0;
   }
-  void add(const Return& r, double weight) {
-    const double from = std::max(0.0, r.range_m - r.half_m) / cell_, to = (r.range_m + r.half_m) / cell_;
-    const auto a = static_cast<std::ptrdiff_t>(from), b = static_cast<std::ptrdiff_t>(to);
-    if (b + 2 > size()) return;  // beyond the picture
-    const double power = r.power * weight, density = power / (to - from);
-    first_ = std::min(first_, a);
-    last_ = std::max(last_, b);
-    if (a == b) {
-      step(a, power);
-      step(a + 1, -power);
-      return;
-    }
-    const double of_first = density * (static_cast<double>(a + 1) - from), of_last = density * (to - static_cast<double>(b));
-    step(a, of_first);
-    step(a + 1, density - of_first);
-    step(b, of_last - density);
-    step(b + 1, -of_last);
+  void add(const RangeReturn& r, double weight) {
+    if (r.last + 2 > size()) return;  // beyond the picture
+    first_ = std::min<std::ptrdiff_t>(first_, r.first);
+    last_ = std::max<std::ptrdiff_t>(last_, r.last);
+    at(r.first) += weight * r.of_first;
+    at(r.first + 1) += weight * (r.of_each - r.of_first);
+    at(r.last) += weight * (r.of_last - r.of_each);
+    at(r.last + 1) -= weight * r.of_last;
   }
   /// Turns steps into powers.
   void finish() {
@@ -79,6 +46,11 @@ class Profile {
   std::ptrdiff_t first() const { return first_; }
   std::ptrdiff_t last() const { return last_; }
   double power(std::ptrdiff_t k) const { return k < first_ || k > last_ ? 0 : steps_[static_cast<std::size_t>(k)]; }
+  /// From one cell to another, both among those that have power; of equal ones the first.
+  std::ptrdiff_t strongest(std::ptrdiff_t from, std::ptrdiff_t to) const {
+    const auto begin = steps_.begin();
+    return std::max_element(begin + from, begin + to + 1) - begin;
+  }
   /// Centre of the cells around k that have at least half its power [m].
   double centre_m(std::ptrdiff_t k) const {
     const double half = power(k) / 2;
@@ -98,7 +70,6 @@ class Profile {
  private:
   std::ptrdiff_t size() const { return static_cast<std::ptrdiff_t>(steps_.size()); }
   double& at(std::ptrdiff_t k) { return steps_[static_cast<std::size_t>(k)]; }
-  void step(std::ptrdiff_t k, double by) { at(k) += by; }
   double cell_;
   std::vector<double> steps_;
   std::ptrdiff_t first_ = 0, last_ = 0;
@@ -107,22 +78,17 @@ class Profile {
 class RangeImager {
  public:
   RangeImager(const RayScene& scene, const PingRequest& request, const RangeImageSettings& wanted)
-      : scene_(scene),
-        request_(request),
+      : request_(request),
         wanted_(wanted),
         settings_(request.settings),
         mode_(request.model->modes[static_cast<std::size_t>(settings_.mode)]),
         grid_(request),
         cell_m_(static_cast<double>(settings_.pulse_width_m)),
-        world_from_sonar_(rotation_from(request.sonar_in_world.orientation)),
-        origin_(to_float(request.sonar_in_world.position_m - scene.origin())) {
-    const double depth_m = depth_from_z(request.sonar_in_world.position_m.z), hz = static_cast<double>(mode_.centre_hz);
-    const double true_mps = true_sound_speed_mps(request.water, depth_m);
-    device_per_true_ = static_cast<double>(settings_.device_sound_speed_mps) / true_mps;
-    absorption_np_ = nepers_from_db(absorption_db_per_m(request.water, depth_m, hz));
-    source_ = power_from_db(static_cast<double>(mode_.source_level_db));
-    for (const Material& material : scene.scene().materials) laws_.push_back(make_law(material, hz, true_mps, false));
-    cells_ = static_cast<std::size_t>(std::ceil((settings_.range_m + longest_half_m) / cell_m_)) + 2;
+        returns_(scene, request, cell_m_) {
+    const double true_mps = true_sound_speed_mps(request.water, depth_from_z(request.sonar_in_world.position_m.z));
+    cells_ = static_cast<std::size_t>(std::ceil((settings_.range_m + longest_return_half_m) / cell_m_)) + 2;
+    first_wanted_ = static_cast<std::ptrdiff_t>(std::ceil(settings_.range_start_m / cell_m_ - 0.5));
+    last_wanted_ = static_cast<std::ptrdiff_t>(std::floor(settings_.range_m / cell_m_ - 0.5));
     FrequencyMode beam = mode_;  // the level of the noise is that of one beam
     beam.pattern.elevation_width_rad = static_cast<float>(wanted.beam_height_rad);
     const double rms = noise_rms_upa(beam, true_mps / (2 * cell_m_));
@@ -133,19 +99,19 @@ class RangeImager {
       column_weight_.push_back(pattern(d * grid_.column_step_rad(), static_cast<double>(mode_.pattern.azimuth_width_rad)));
     for (int d = -row_reach_; d <= row_reach_; ++d)
       row_weight_.push_back(pattern(d * grid_.row_step_rad(), wanted.beam_height_rad));
-    returns_.resize(static_cast<std::size_t>(grid_.columns) * static_cast<std::size_t>(grid_.rows));
   }
 
   Ping run(Parallel& pool) {
     Ping ping;
     ping.request = request_;
     for (int c = 0; c < grid_.columns; ++c) ping.beam_azimuth_rad.push_back(static_cast<float>(grid_.azimuth_rad(c)));
-    ping.samples.resize(4 * returns_.size());
-    if (request_.switches.keep_pressure) ping.pressure_upa.resize(returns_.size());
     const auto rows = static_cast<std::size_t>(grid_.rows);
+    const std::size_t pixels = rows * static_cast<std::size_t>(grid_.columns);
+    ping.samples.resize(4 * pixels);
+    if (request_.switches.keep_pressure) ping.pressure_upa.resize(pixels);
     if (!request_.blank) {
-      pool.for_each(rows, [&](std::size_t row, int) { trace(static_cast<int>(row)); });
-      find_points();
+      returns_.trace(pool);
+      points_ = returns_.of_points();
     }
     std::vector<Profile> profiles(static_cast<std::size_t>(pool.threads()), Profile(cell_m_, cells_));
     pool.for_each(rows, [&](std::size_t row, int worker) {
@@ -167,94 +133,22 @@ class RangeImager {
   struct Reported {
     double power = 0, range_m = 0;  // [uPa^2], the device's metres
   };
-  Return& at(int column, int row) {
-    return returns_[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid_.columns) + static_cast<std::size_t>(column)];
-  }
-
-  void trace(int row) {
-    const double elevation = grid_.elevation_rad(row), ce = std::cos(elevation), se = std::sin(elevation);
-    for (int from = 0; from < grid_.columns; from += RayPacket::size) {
-      const int lanes = std::min(RayPacket::size, grid_.columns - from);
-      RayPacket p{};
-      std::array<Vec3d, RayPacket::size> along;  // of the ray, sonar axes
-      for (int i = 0; i < lanes; ++i) {
-        const auto lane = static_cast<std::size_t>(i);
-        const double azimuth = grid_.azimuth_rad(from + i);
-        along[lane] = {ce * std::cos(azimuth), ce * std::sin(azimuth), se};
-        const Vec3 d = to_float(world_from_sonar_ * along[lane]);
-        p.origin_x[lane] = origin_.x, p.origin_y[lane] = origin_.y, p.origin_z[lane] = origin_.z;
-        p.direction_x[lane] = d.x, p.direction_y[lane] = d.y, p.direction_z[lane] = d.z;
-        p.far[lane] = static_cast<float>(settings_.range_m / device_per_true_);
-      }
-      scene_.trace(p, lanes == RayPacket::size ? 0xFFFFu : (1u << lanes) - 1u, true);
-      for (int i = 0; i < lanes; ++i)
-        if (p.object[i] != RayPacket::miss) at(from + i, row) = met(p, i, along[static_cast<std::size_t>(i)], ce);
+  /// Calls f(return, power weight) for all that a beam receives from ranges of which `wanted` of the return says so.
+  template <class Wanted, class F>
+  void for_each_return(int column, int row, Wanted wanted, F f) {
+    const int first = std::max(column - column_reach_, 0), last = std::min(column + column_reach_, grid_.columns - 1);
+    for (int r = std::max(row - row_reach_, 0); r <= std::min(row + row_reach_, grid_.rows - 1); ++r) {
+      const double of_row = row_weight_[static_cast<std::size_t>(r - row + row_reach_)];
+      const double* of_column = column_weight_.data() + column_reach_ - column;
+      for (int c = first; c <= last; ++c)
+        for (const RangeReturn& met : returns_.of(c, r))
+          if (wanted(met)) f(met, of_row * of_column[c]);
     }
-  }
-
-  Return met(const RayPacket& p, int lane, Vec3d along, double cosine_elevation) const {
-    const auto i = static_cast<std::size_t>(lane);
-    const Vec3d normal = transposed(world_from_sonar_) * to_double({p.normal_x[i], p.normal_y[i], p.normal_z[i]});
-    const double size = length(normal), range_m = static_cast<double>(p.far[i]);
-    if (!(size > 0)) return {};
-    const double toward = dot(normal, along) / size, cosine = std::abs(toward);
-    const Mesh& mesh = *scene_.scene().objects[p.object[i]].mesh;
-    const LawTable& law = laws_[mesh.material[p.triangle[i]]];
-    const double root = static_cast<double>(law.root_strength(static_cast<float>(cosine)));
-    const double width = grid_.column_step_rad() * cosine_elevation, height = grid_.row_step_rad();
-    const double area_m2 = footprint_area_m2(cosine, range_m, width * height);
-    const double loss = two_way_transmission(range_m, absorption_np_);
-    // How the range changes over the patch of the ray: dr = -r (n . d') / (n . d) along both axes of the grid.
-    const double level = std::hypot(along.x, along.y);
-    const Vec3d to_port{-along.y / level, along.x / level, 0};
-    const Vec3d up{-along.z * along.x / level, -along.z * along.y / level, level};
-    const double slope = std::abs(dot(normal, to_port)) * width + std::abs(dot(normal, up)) * height;
-    const double spread = range_m * slope / size / std::max(cosine, cosine_floor) / 2;
-    Return r;
-    r.range_m = range_m * device_per_true_;
-    r.half_m = std::min(spread + least_blur * cell_m_, longest_half_m);
-    r.power = source_ * loss * loss * root * root * area_m2;
-    const auto cell = [](float origin, float direction, float far) {
-      return static_cast<std::uint32_t>(
-          static_cast<std::int32_t>(std::floor(static_cast<double>(origin + direction * far) / speckle_cell_m)));
-    };
-    const Random4 bits =
-        philox(cell(p.origin_x[i], p.direction_x[i], p.far[i]), cell(p.origin_y[i], p.direction_y[i], p.far[i]),
-               cell(p.origin_z[i], p.direction_z[i], p.far[i]) ^ p.object[i] << 16, key_of(request_.seed, Domain::range_speckle));
-    r.speckle = complex_normal(bits.v[0], bits.v[1]);
-    r.object = p.object[i];
-    return r;
-  }
-
-  void find_points() {
-    for (const PointTarget& point : scene_.scene().point_targets) {
-      const Vec3d place = scene_.scene().in_world(point, request_.bodies_in_world);
-      const Vec3d from_sonar = transposed(world_from_sonar_) * (place - request_.sonar_in_world.position_m);
-      const double range_m = length(from_sonar), loss = two_way_transmission(range_m, absorption_np_);
-      if (!(loss > 0) || is_occluded(scene_, request_.sonar_in_world.position_m, place)) continue;
-      PointReturn r;
-      r.range_m = range_m * device_per_true_;
-      r.half_m = least_blur * cell_m_;
-      r.power = source_ * loss * loss * power_from_db(static_cast<double>(point.target_strength_db));
-      r.azimuth_rad = std::atan2(from_sonar.y, from_sonar.x);
-      r.elevation_rad = std::atan2(from_sonar.z, std::hypot(from_sonar.x, from_sonar.y));
-      points_.push_back(r);
-    }
-  }
-
-  /// Calls f(return, power weight) for all that a beam receives.
-  template <class F>
-  void for_each_return(int column, int row, F f) {
-    for (int r = std::max(row - row_reach_, 0); r <= std::min(row + row_reach_, grid_.rows - 1); ++r)
-      for (int c = std::max(column - column_reach_, 0); c <= std::min(column + column_reach_, grid_.columns - 1); ++c)
-        if (const Return& met = at(c, r); met.power > 0)
-          f(met, row_weight_[static_cast<std::size_t>(r - row + row_reach_)] *
-                     column_weight_[static_cast<std::size_t>(c - column + column_reach_)]);
     for (const PointReturn& point : points_) {
       const double weight =
           pattern(point.azimuth_rad - grid_.azimuth_rad(column), static_cast<double>(mode_.pattern.azimuth_width_rad)) *
           pattern(point.elevation_rad - grid_.elevation_rad(row), wanted_.beam_height_rad);
-      if (weight > 0) f(point, weight);
+      if (weight > 0 && wanted(point)) f(point, weight);
     }
   }
 
@@ -272,22 +166,23 @@ class RangeImager {
 
   /// The cell within the ranges wanted that is reported; nothing in it is loud enough: the strongest all the same.
   std::ptrdiff_t chosen(const Profile& profile) const {
-    std::ptrdiff_t best = profile.first();
-    bool any = false;
-    for (std::ptrdiff_t k = profile.first(); k <= profile.last(); ++k) {
-      if (center_of(k) < settings_.range_start_m || center_of(k) > settings_.range_m) continue;
-      if (!any || profile.power(k) > profile.power(best)) best = k, any = true;
-      const bool is_peak = profile.power(k) >= profile.power(k + 1) && profile.power(k) > profile.power(k - 1);
-      if (wanted_.nearest && is_peak && is_detected(profile.power(k), center_of(k))) return k;
-    }
-    return best;
+    const std::ptrdiff_t from = std::max(profile.first(), first_wanted_), to = std::min(profile.last(), last_wanted_);
+    if (from > to) return profile.first();
+    if (wanted_.nearest)
+      for (std::ptrdiff_t k = from; k <= to; ++k)
+        if (profile.power(k) >= profile.power(k + 1) && profile.power(k) > profile.power(k - 1) &&
+            is_detected(profile.power(k), center_of(k)))
+          return k;
+    return profile.strongest(from, to);
   }
 
   Reported pixel(int column, int row, std::uint32_t index, Profile& profile) {
     const Random4 bits =
         philox(static_cast<std::uint32_t>(request_.number), request_.sonar_id, index, key_of(request_.seed, Domain::range_noise));
     profile.clear();
-    for_each_return(column, row, [&](const Return& r, double weight) { profile.add(r, weight); });
+    for_each_return(
+        column, row, [](const RangeReturn&) { return true; },
+        [&](const RangeReturn& r, double weight) { profile.add(r, weight); });
     profile.finish();
     double power = 0, range_m = 0;
     if (!profile.empty()) {
@@ -297,8 +192,9 @@ class RangeImager {
       if (!request_.switches.expected_power) {
         // Rays are shared by neighbouring beams, and so is their speckle.
         double re = 0, im = 0;
-        for_each_return(column, row, [&](const Return& r, double weight) {
-          const double amplitude = std::sqrt(r.power * weight * share(r, cell_m_, k));
+        const auto is_in_cell = [k](const RangeReturn& r) { return r.first <= k && r.last >= k; };
+        for_each_return(column, row, is_in_cell, [&](const RangeReturn& r, double weight) {
+          const double amplitude = std::sqrt(r.power_in(k) * weight);
           re += amplitude * static_cast<double>(r.speckle.re);
           im += amplitude * static_cast<double>(r.speckle.im);
         });
@@ -332,33 +228,30 @@ class RangeImager {
   }
 
   /// Of each column the nearest that its rays met.
-  std::vector<BeamTruth> truth() {
+  std::vector<BeamTruth> truth() const {
     std::vector<BeamTruth> nearest(static_cast<std::size_t>(grid_.columns));
     for (int column = 0; column < grid_.columns; ++column)
-      for (int row = 0; row < grid_.rows; ++row) {
-        const Return& r = at(column, row);
-        BeamTruth& beam = nearest[static_cast<std::size_t>(column)];
-        const auto range_m = static_cast<float>(r.range_m / device_per_true_);
-        if (r.power > 0 && (beam.range_m == 0 || range_m < beam.range_m)) beam = {range_m, r.object};
-      }
+      for (int row = 0; row < grid_.rows; ++row)
+        for (const RangeReturn& r : returns_.of(column, row)) {
+          BeamTruth& beam = nearest[static_cast<std::size_t>(column)];
+          const auto range_m = static_cast<float>(r.range_m / returns_.device_per_true());
+          if (beam.range_m == 0 || range_m < beam.range_m) beam = {range_m, r.object};
+        }
     return nearest;
   }
 
-  const RayScene& scene_;
   const PingRequest& request_;
   const RangeImageSettings& wanted_;
   const PingSettings& settings_;
   const FrequencyMode& mode_;
   RangeImageGrid grid_;
   double cell_m_;
-  Rotation world_from_sonar_;
-  Vec3 origin_;
-  double device_per_true_ = 1, absorption_np_ = 0, source_ = 1, noise_power_ = 0;
+  RangeReturns returns_;
+  double noise_power_ = 0;
   std::size_t cells_ = 0;
-  std::vector<LawTable> laws_;
+  std::ptrdiff_t first_wanted_ = 0, last_wanted_ = 0;  // cells whose centres lie within the ranges set
   int column_reach_ = 0, row_reach_ = 0;
   std::vector<double> column_weight_, row_weight_;
-  std::vector<Return> returns_;  // [rows][columns]
   std::vector<PointReturn> points_;
 };
 

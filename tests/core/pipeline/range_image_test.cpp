@@ -6,8 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <string>
 
 #include "core/base/units.hpp"
+#include "core/scene/shapes/primitives.hpp"
+#include "core/sonar/water.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 
@@ -117,6 +121,71 @@ TEST(RangeImage, SphereIsWhereItIs) {
   EXPECT_NEAR(s.grid().azimuth_rad(column), std::atan2(centre.y, centre.x), rad_from_deg(0.3));
   EXPECT_NEAR(s.grid().elevation_rad(row), std::atan2(centre.z, std::hypot(centre.x, centre.y)), rad_from_deg(0.4));
   EXPECT_NEAR(s.range_m(static_cast<int>(std::lround(column)), static_cast<int>(std::lround(row))), length(centre) - 0.5, 0.02);
+}
+
+/// The power that all beams receive of an upright, level or oblique pole straight ahead, from 16 places of the sonar within a
+/// beam's cell of the grid, against Lambert's law summed over the pole's surface.
+struct Pole {
+  double radius_m = 0, length_m = 0, turn_rad = 0, range_m = 0;
+};
+constexpr double pole_lambert_db = -8;
+
+/// [uPa^2], on the axis of a beam.
+double power_of(const Pole& pole, const PingRequest& request) {
+  constexpr int along = 200, around = 200;
+  const double alpha_db = absorption_db_per_m(request.water, 0, 1.2e6);
+  double sum = 0;
+  for (int i = 0; i < along; ++i)
+    for (int j = 0; j < around; ++j) {
+      const double t = ((i + 0.5) / along - 0.5) * pole.length_m, angle = ((j + 0.5) / around - 0.5) * std::numbers::pi;
+      // The normal turns from the sonar's side; in the plane across the range `t` is along the pole.
+      const Vec3d place{pole.range_m - pole.radius_m * std::cos(angle), pole.radius_m * std::sin(angle), t};
+      const double r = length(place), cosine = dot(Vec3d{std::cos(angle), -std::sin(angle), 0}, place) / r;
+      if (cosine > 0) sum += cosine * cosine * std::pow(r, -4) * std::pow(10, -2 * alpha_db * r / 10);
+    }
+  const double area_m2 = std::numbers::pi * pole.radius_m * pole.length_m / (along * around);
+  return std::pow(10, (200 + pole_lambert_db) / 10) * area_m2 * sum;
+}
+
+TEST(RangeImage, HearsThinPolesWhereverTheyAre) {
+  const auto weights = [](double step_rad) {  // of the beams about a place, each -3 dB at half of 1.5 degrees
+    double sum = 0;
+    for (int n = -20; n <= 20; ++n) {
+      const double x = n * step_rad / rad_from_deg(1.5);
+      if (std::abs(x) < 1.1) sum += std::exp2(-4 * x * x);
+    }
+    return sum;
+  };
+  for (const double range_m : {2.5, 4.5, 8.5, 12.5})  // the middles of cells
+    for (const double diameter_m : {0.005, 0.02, 0.1})
+      for (const double turn_rad : {0.0, std::numbers::pi / 2, 0.6}) {
+        const Pole pole{diameter_m / 2, std::min(2.0, 0.4 * range_m), turn_rad, range_m};
+        const Quatd turn{std::cos(turn_rad / 2), std::sin(turn_rad / 2), 0, 0};
+        RangeImageSounding s(
+            SceneMaker()
+                .add(make_cylinder(pole.radius_m, pole.length_m, 48, Caps::none), pole_lambert_db, {range_m, 0, 0}, turn)
+                .make());
+        s.request().switches.expected_power = s.request().switches.keep_pressure = true;
+        s.request().settings.pulse_width_m = 1;  // the whole pole in one cell
+        s.wanted->least_strength = 0;
+        const double expected =
+            power_of(pole, s.request()) * weights(s.grid().column_step_rad()) * weights(s.grid().row_step_rad());
+        double least_db = 1e9, most_db = -1e9, sum = 0;
+        constexpr int places = 16;
+        for (int n = 0; n < places; ++n) {
+          const double part = (n + 0.5) / places;
+          s.request().sonar_in_world.position_m = {0, range_m * part * s.grid().column_step_rad(),
+                                                   range_m * part * s.grid().row_step_rad()};
+          double heard = 0;
+          for (const float p : s.ping().pressure_upa) heard += std::pow(static_cast<double>(p), 2);
+          const double off_db = 10 * std::log10(heard / expected);
+          least_db = std::min(least_db, off_db), most_db = std::max(most_db, off_db), sum += heard / expected;
+        }
+        SCOPED_TRACE(std::to_string(diameter_m) + " m thick at " + std::to_string(range_m) + " m, turned by " +
+                     std::to_string(turn_rad));
+        EXPECT_LT(most_db - least_db, 1);
+        EXPECT_NEAR(10 * std::log10(sum / places), 0, 0.5);
+      }
 }
 
 TEST(RangeImage, LeftIsTheFirstColumnAndUpTheLastRow) {

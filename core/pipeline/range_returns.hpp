@@ -1,0 +1,110 @@
+// What the rays of a range image meet (core/pipeline/range_image.hpp): each cell of the grid of beams is seen by one ray along
+// its middle and a few round it, and by many where things are thinner than it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/geometry.hpp"
+#include "core/base/parallel.hpp"
+#include "core/base/random.hpp"
+#include "core/pipeline/scattering_law.hpp"
+#include "core/scene/ray_scene.hpp"
+#include "core/sonar/range_image.hpp"
+
+namespace sonar {
+
+/// An echo that a beam hears from one direction, spread evenly over range_m -+ half_m in the device's metres.
+struct RangeReturn {
+  double range_m = 0, half_m = 0, power = 0;  // power [uPa^2] in a beam that looks there; 0 = nothing
+  ComplexNormal speckle{1, 0};
+  std::uint32_t object = BeamTruth::nothing;
+  // The same by range cells: from `first` to `last`, the power in the first, in each between, and in the last when it is another.
+  std::int32_t first = 0, last = 0;
+  double of_first = 0, of_each = 0, of_last = 0;
+  // Of the patch of surface: cosine of the incidence, how far its ranges are from range_m, how many of the cell's rays met it.
+  double cosine = 0, spread_m = 0;
+  int rays = 0;
+
+  void share_among_cells(double cell_m);
+  /// In a cell from `first` to `last`.
+  double power_in(std::ptrdiff_t cell) const { return cell == first ? of_first : cell == last ? of_last : of_each; }
+};
+
+struct PointReturn : RangeReturn {
+  double azimuth_rad = 0, elevation_rad = 0;
+};
+
+constexpr double longest_return_half_m = 0.5;  // of the ranges of one ray's patch, at grazing incidence
+
+class RangeReturns {
+ public:
+  /// `cell_m`: width of a range cell. Bodies must have been placed.
+  RangeReturns(const RayScene& scene, const PingRequest& request, double cell_m);
+
+  /// The same on any number of threads.
+  void trace(Parallel& pool);
+  /// Of a cell of the grid; nothing before trace().
+  std::span<const RangeReturn> of(int column, int row) const {
+    const Row& of_row = rows_[static_cast<std::size_t>(row)];
+    if (of_row.begin.empty()) return {};
+    const std::size_t* begin = of_row.begin.data() + column;
+    return {of_row.returns.data() + begin[0], begin[1] - begin[0]};
+  }
+  /// Of the point targets that are not hidden.
+  std::vector<PointReturn> of_points() const;
+  double device_per_true() const { return device_per_true_; }  // ranges
+
+ private:
+  struct Angle {
+    double cosine, sine;
+  };
+  /// A row of the grid: the returns of its cells, side by side.
+  struct Row {
+    std::vector<RangeReturn> returns;
+    std::vector<std::size_t> begin;  // of each column, and the end
+  };
+  struct Cell {
+    int column = 0, row = 0;
+    bool operator==(const Cell&) const = default;
+  };
+  /// So many rays across a cell and up, evenly spread over it.
+  struct Lattice {
+    int across = 1, up = 1;
+  };
+
+  void trace(int row);
+  void trace_middles(int row, std::vector<RangeReturn>& middles) const;
+  void aim_around(int column, int row, Lattice lattice, int first_ray, int rays, RayPacket& p, int first_lane) const;
+  void compare_around(RangeReturn& middle, const RayPacket& p, int first_lane, std::vector<RangeReturn>& to) const;
+  void aim(RayPacket& p, int lane, Vec3 direction) const;
+  RangeReturn met(const RayPacket& p, int lane, Lattice lattice) const;  // without speckle
+  ComplexNormal speckle_of(const RayPacket& p, int lane) const;
+  void add(const RangeReturn& r, const RayPacket& p, int lane, std::vector<RangeReturn>& to, std::size_t first) const;
+  void look_closer(Parallel& pool);
+  std::vector<Cell> thin_cells(std::vector<std::uint8_t>& is_thin) const;  // by object
+  std::vector<Cell> crossed_cells(Parallel& pool) const;
+  Vec3d direction(int column, int row) const;  // of a beam, sonar axes
+  std::size_t index(Cell cell) const {
+    return static_cast<std::size_t>(cell.row) * static_cast<std::size_t>(grid_.columns) + static_cast<std::size_t>(cell.column);
+  }
+  template <class F>
+  void for_each_neighbour(Cell cell, F f) const;
+  template <class F>
+  void for_each_hit(Cell cell, Lattice lattice, F f) const;  // f(packet, lane)
+
+  const RayScene& scene_;
+  const PingRequest& request_;
+  RangeImageGrid grid_;
+  double cell_m_;
+  Rotation world_from_sonar_;
+  Vec3 origin_;
+  double device_per_true_ = 1, absorption_np_ = 0, source_ = 1;
+  std::vector<LawTable> laws_;
+  std::vector<Angle> azimuth_, elevation_;  // of the columns and rows
+  std::vector<Row> rows_;
+};
+
+}  // namespace sonar
