@@ -1,22 +1,14 @@
 """The ROS 2 bridge without ROS: frames, the line it sends, the status it reads, and its package files."""
 import ast
-import importlib
 import json
 import math
-import socket
-import sys
-import types
 import unittest
 import xml.etree.ElementTree
-from unittest import mock
 
-from common import ROOT
+from ros_stand_ins import BRIDGE
 
-BRIDGE = ROOT / "clients/ros2_bridge"
-sys.path.insert(0, str(BRIDGE))
-from sonard_bridge import conversions as c  # noqa: E402
-
-from sonard_client.rotations import quaternion_from_rpy  # noqa: E402
+from sonard_bridge import conversions as c
+from sonard_client.rotations import quaternion_from_rpy
 
 HALF = math.sqrt(0.5)
 
@@ -96,65 +88,8 @@ class Lines(unittest.TestCase):
         for name in ("", "buoy", "none"):
             self.assertIsNone(c.vehicle_in(status, name))
         self.assertIsNone(c.vehicle_in({}, ""))
-
-
-def stubs(parameters):
-    """Stub modules with the names that the node imports from ROS; they do not check ROS itself."""
-    class Node:
-        def __init__(self, name):
-            self.logged, self.subscribed = [], []
-
-        def declare_parameter(self, name, default):
-            return types.SimpleNamespace(value=parameters.get(name, default))
-
-        def create_subscription(self, kind, topic, call, qos):
-            self.subscribed.append((topic, call))
-
-        def get_logger(self):
-            def log(text, **_):
-                self.logged.append(text)
-            return types.SimpleNamespace(info=log, warning=log)
-
-    made = {"rclpy": {}, "rclpy.node": {"Node": Node}, "rclpy.qos": {"qos_profile_sensor_data": 5},
-            "geometry_msgs": {}, "geometry_msgs.msg": {"PoseStamped": object},
-            "nav_msgs": {}, "nav_msgs.msg": {"Odometry": object},
-            "tf2_ros": {"Buffer": object, "TransformException": Exception, "TransformListener": object}}
-    modules = {name: types.ModuleType(name) for name in made}
-    for name, content in made.items():
-        vars(modules[name]).update(content)
-    return modules
-
-
-class TheNode(unittest.TestCase):
-    def bridge(self, **parameters):
-        with mock.patch.dict(sys.modules, stubs(parameters)):
-            sys.modules.pop("sonard_bridge.node", None)
-            node = importlib.import_module("sonard_bridge.node").Bridge()
-        self.addCleanup(node.socket.close)
-        return node
-
-    def test_odometry_becomes_a_datagram(self):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
-            there.bind(("127.0.0.1", 0))
-            there.settimeout(10)
-            node = self.bridge(odometry="/odom", sonard="127.0.0.1:%d" % there.getsockname()[1], vehicle="rov")
-            ((topic, call),) = node.subscribed
-            self.assertEqual(topic, "/odom")
-            of = types.SimpleNamespace
-            header = of(stamp=of(sec=3, nanosec=500000000))
-            pose = of(position=of(x=1.0, y=2.0, z=-3.0), orientation=of(x=0.0, y=0.0, z=HALF, w=HALF))
-            call(of(header=header, pose=of(pose=pose), twist=of(twist=of(linear=of(x=1.0, y=0.0, z=0.0)))))
-            line = json.loads(there.recv(4096))
-            self.assertEqual((line["position"], line["timestamp"], line["vehicle"]), ([1, 2, -3], 3.5, "rov"))
-            self.assertAlmostEqual(line["velocity"][1], 1)
-            pose.orientation.w = 0.0
-            call(of(header=header, pose=of(pose=pose), twist=of(twist=of(linear=of(x=1.0, y=0.0, z=0.0)))))
-            self.assertIn("left out: orientation", node.logged[-1])
-
-    def test_one_source_is_needed(self):
-        for parameters in ({}, {"odometry": "/a", "pose": "/b"}, {"tf_parent": "map"}, {"tf_child": "base_link"}):
-            with self.subTest(**parameters), self.assertRaisesRegex(ValueError, "set one of"):
-                self.bridge(**parameters)
+        for status, ns in (({"now_ns": "7500000000"}, 7500000000), ({"now_ns": 3}, 3), ({}, 0), ({"now_ns": "x"}, 0)):
+            self.assertEqual(c.stamp_ns(status), ns)
 
 
 class Package(unittest.TestCase):

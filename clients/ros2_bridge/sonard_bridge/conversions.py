@@ -108,6 +108,12 @@ def vehicle_in(status: Dict[str, Any], name: str) -> "Optional[Tuple[Vector3, Qu
     return position, (float(turn.get("w", 0)), float(turn.get("x", 0)), float(turn.get("y", 0)), float(turn.get("z", 0)))
 
 
+def stamp_ns(status: Dict[str, Any]) -> int:
+    """The daemon's time of a status; 0 where it states none."""
+    stated = status.get("now_ns", 0)
+    return int(stated) if isinstance(stated, int) or (isinstance(stated, str) and stated.isdigit()) else 0
+
+
 def endpoint(text: str, port: int) -> Tuple[str, int]:
     """host or host:port"""
     host, colon, number = text.partition(":")

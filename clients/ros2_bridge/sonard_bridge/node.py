@@ -1,9 +1,8 @@
-"""The node: one source of poses in, to sonard by UDP; and, if wished, the pose that sonard uses as a topic."""
+"""The node: one source of poses in, to sonard by UDP; and, if wished, the pose that sonard uses as a topic. The executor's thread
+sends poses and waits for nothing; what is requested of sonard arrives in a thread of its own."""
 from __future__ import annotations
 
-import json
 import socket
-import urllib.request
 
 import rclpy
 from geometry_msgs.msg import PoseStamped
@@ -12,9 +11,14 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from tf2_ros import Buffer, TransformException, TransformListener
 
-from .conversions import Unusable, endpoint, json_line, stamp_s, vehicle_in, wxyz, xyzw
+from .conversions import Unusable, endpoint, json_line, stamp_ns, stamp_s, vehicle_in, wxyz, xyzw
+from .polling import StatusPoll
 
 JSON_PORT, HTTP_PORT = 14771, 8088
+
+
+def set_stamp(stamp, ns: int) -> None:
+    stamp.sec, stamp.nanosec = divmod(ns, 10**9)
 
 
 class Bridge(Node):
@@ -32,7 +36,9 @@ class Bridge(Node):
         sources = [name for name in ("odometry", "pose", "tf_child") if text[name]]
         if len(sources) != 1 or bool(text["tf_parent"]) != bool(text["tf_child"]):
             raise ValueError("set one of the parameters odometry, pose, or tf_parent with tf_child")
+        self.helpers = []  # threads
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setblocking(False)
         self.socket.connect(endpoint(text["sonard"], JSON_PORT))
         if text["odometry"]:
             self.create_subscription(Odometry, text["odometry"], self.on_odometry, qos_profile_sensor_data)
@@ -45,11 +51,34 @@ class Bridge(Node):
             self.listener = TransformListener(self.buffer, self)
             self.create_timer(1 / tf_rate_hz, self.on_tf)
         if truth_rate_hz > 0:
-            host, port = endpoint(text["http"], HTTP_PORT)
-            self.status_url = f"http://{host}:{port}/api/v1/status"
             self.truth = self.create_publisher(PoseStamped, text["truth"], 10)
-            self.create_timer(1 / truth_rate_hz, self.on_truth)
+            self.helpers.append(StatusPoll(endpoint(text["http"], HTTP_PORT), truth_rate_hz, self.while_running(self.on_status),
+                                           self.warn))
+        for helper in self.helpers:
+            helper.start()
         self.get_logger().info(f"poses from {text[sources[0]]} to sonard at {text['sonard']}")
+
+    def close(self) -> None:
+        for helper in self.helpers:
+            helper.stop()
+        for helper in self.helpers:
+            if helper.is_alive():
+                helper.join(2.0)
+        self.socket.close()
+
+    def warn(self, text: str) -> None:
+        if self.context.ok():
+            self.get_logger().warning(text, throttle_duration_sec=5.0)
+
+    def while_running(self, call):
+        """For a helper's thread, which may publish while the context ends."""
+        def guarded(*arguments):
+            try:
+                call(*arguments)
+            except Exception:  # rclpy's own classes differ between releases
+                if self.context.ok():
+                    raise
+        return guarded
 
     def send(self, header, position, orientation, velocity=None) -> None:
         stamp = stamp_s(header.stamp.sec, header.stamp.nanosec) if self.use_stamps else None
@@ -58,9 +87,11 @@ class Bridge(Node):
                                        wxyz((orientation.x, orientation.y, orientation.z, orientation.w)), stamp, self.vehicle,
                                        None if velocity is None else (velocity.x, velocity.y, velocity.z)))
         except Unusable as error:
-            self.get_logger().warning(f"left out: {error}", throttle_duration_sec=5.0)
+            self.warn(f"left out: {error}")
+        except BlockingIOError:
+            pass  # the next pose is newer
         except OSError as error:
-            self.get_logger().warning(f"sonard does not listen: {error}", throttle_duration_sec=5.0)
+            self.warn(f"sonard does not listen: {error}")
 
     def on_odometry(self, message: Odometry) -> None:
         self.send(message.header, message.pose.pose.position, message.pose.pose.orientation, message.twist.twist.linear)
@@ -72,26 +103,21 @@ class Bridge(Node):
         try:
             found = self.buffer.lookup_transform(*self.frames, rclpy.time.Time())
         except TransformException as error:
-            self.get_logger().warning(f"no transform yet: {error}", throttle_duration_sec=5.0)
+            self.warn(f"no transform yet: {error}")
             return
         stamp = found.header.stamp.sec, found.header.stamp.nanosec
         if stamp != self.last_tf:  # the newest one, once
             self.last_tf = stamp
             self.send(found.header, found.transform.translation, found.transform.rotation)
 
-    def on_truth(self) -> None:
-        try:
-            with urllib.request.urlopen(self.status_url, timeout=1.0) as answer:
-                found = vehicle_in(json.load(answer), self.vehicle)
-        except (OSError, ValueError) as error:
-            self.get_logger().warning(f"no status of sonard: {error}", throttle_duration_sec=5.0)
-            return
+    def on_status(self, status) -> None:
+        found = vehicle_in(status, self.vehicle)
         if found is None:
-            self.get_logger().warning("sonard's status has no such vehicle; set the parameter vehicle", throttle_duration_sec=5.0)
+            self.warn("sonard's status has no such vehicle; set the parameter vehicle")
             return
         message = PoseStamped()
         message.header.frame_id = "world"
-        message.header.stamp = self.get_clock().now().to_msg()
+        set_stamp(message.header.stamp, stamp_ns(status))
         p, q = message.pose.position, message.pose.orientation
         p.x, p.y, p.z = found[0]
         q.x, q.y, q.z, q.w = xyzw(found[1])
@@ -106,5 +132,6 @@ def main() -> None:
     except KeyboardInterrupt:
         node.get_logger().info("ends")
     finally:
+        node.close()
         node.destroy_node()
         rclpy.try_shutdown()
