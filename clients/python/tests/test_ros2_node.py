@@ -28,6 +28,11 @@ def odometry(**given):
     return of(header=stamped.header, pose=of(pose=stamped.pose), twist=of(twist=of(linear=of(x=1.0, y=0.0, z=0.0))))
 
 
+def transform(sec, nanosec):
+    stamped = pose(sec, nanosec)
+    return Message(header=stamped.header, transform=Message(translation=stamped.pose.position, rotation=stamped.pose.orientation))
+
+
 class SlowServer:
     """Answers the status when it may; counts requests and answers, and keeps the last request's header."""
 
@@ -142,6 +147,31 @@ class Poses(WithNode):
             ros.subscribed["/odom"](odometry())
             return [text for text in ros.logged if "does not listen" in text]
         self.wait_for(refused)
+
+
+class Transforms(WithNode):
+    def test_a_transform_is_sent_when_it_is_new(self):
+        ros = self.bridge(tf_parent="map", tf_child="base_link", tf_rate_hz=20.0)
+        (period_s, tick), = ros.timers
+        self.assertEqual(period_s, 0.05)
+        tick()
+        self.assertIn("no transform yet", ros.logged[-1])
+        for nanosec in (1, 1, 2):
+            ros.transform = lambda nanosec=nanosec: transform(5, nanosec)
+            tick()
+        self.assertEqual([self.line()["timestamp"] for _ in range(2)], [5.000000001, 5.000000002])
+
+    def test_a_static_one_is_kept_fresh(self):
+        ros = self.bridge(tf_parent="map", tf_child="base_link")
+        (_, tick), = ros.timers
+        ros.transform = lambda: transform(0, 0)
+        for ns in (4_000_000_000, 4_020_000_000):
+            ros.now_ns = ns
+            tick()
+            self.assertEqual(self.line()["timestamp"], ns / 1e9)
+        ros.now_ns = 0  # simulation time that has not begun
+        tick()
+        self.assertNotIn("timestamp", self.line())
 
 
 class Sources(unittest.TestCase):

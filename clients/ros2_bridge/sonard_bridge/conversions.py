@@ -1,8 +1,8 @@
 """Between ROS and sonard, without ROS: frames, the pose as a line of JSON, and what the daemon says of its vehicles.
 
 sonard's world is ENU and its body FLU, as ROS has both by REP 103: poses pass as they are, but ROS writes quaternions x, y, z, w
-and sonard w, x, y, z. Images of marine_acoustic_msgs are in a frame of their own: z ahead in the middle of the fan, x up, so y to
-starboard.
+and sonard w, x, y, z. oculus_sonar_driver's images (marine_acoustic_msgs) are in a frame of their own: z ahead in the middle of
+the fan, y to port, so x down.
 """
 from __future__ import annotations
 
@@ -59,21 +59,16 @@ def enu_flu_from_ned_frd(q: Quaternion) -> Quaternion:
 
 
 def flu_from_image(v: Sequence[float]) -> Vector3:
-    """From the frame of marine_acoustic_msgs' images to sonard's sonar frame (x ahead, y to port, z up)."""
-    return v[2], -v[1], v[0]
+    """From the frame of oculus_sonar_driver's images to sonard's sonar frame (x ahead, y to port, z up)."""
+    return v[2], v[1], -v[0]
 
 
 def image_from_flu(v: Sequence[float]) -> Vector3:
-    return v[2], -v[1], v[0]
-
-
-def beam_direction(azimuth_rad: float) -> Vector3:
-    """Of a beam, azimuth positive to port, in the frame of marine_acoustic_msgs."""
-    return image_from_flu((math.cos(azimuth_rad), math.sin(azimuth_rad), 0.0))
+    return -v[2], v[1], v[0]
 
 
 # The image frame in the sonar's: a static transform from the sonar's FLU frame to its image frame has this rotation, x, y, z, w.
-IMAGE_IN_FLU_XYZW = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+IMAGE_IN_FLU_XYZW = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 
 
 def json_line(position: Sequence[float], orientation: Quaternion, stamp_s: Optional[float] = None, vehicle: str = "",

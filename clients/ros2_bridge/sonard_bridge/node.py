@@ -106,9 +106,12 @@ class Bridge(Node):
             self.warn(f"no transform yet: {error}")
             return
         stamp = found.header.stamp.sec, found.header.stamp.nanosec
-        if stamp != self.last_tf:  # the newest one, once
-            self.last_tf = stamp
-            self.send(found.header, found.transform.translation, found.transform.rotation)
+        if stamp == (0, 0):  # static transforms alone have no time: one of now, so that the vehicle does not become stale
+            set_stamp(found.header.stamp, self.get_clock().now().nanoseconds)
+        elif stamp == self.last_tf:  # the newest one, once
+            return
+        self.last_tf = stamp
+        self.send(found.header, found.transform.translation, found.transform.rotation)
 
     def on_status(self, status) -> None:
         found = vehicle_in(status, self.vehicle)
