@@ -1,7 +1,9 @@
 """The ROS 2 bridge without ROS: frames, the line it sends, the status it reads, and its package files."""
 import ast
+import importlib
 import json
 import math
+import sys
 import unittest
 import xml.etree.ElementTree
 
@@ -77,8 +79,9 @@ class Lines(unittest.TestCase):
     def test_endpoints(self):
         self.assertEqual(c.endpoint("10.0.0.1", 7), ("10.0.0.1", 7))
         self.assertEqual(c.endpoint("10.0.0.1:9", 7), ("10.0.0.1", 9))
-        with self.assertRaises(ValueError):
-            c.endpoint("10.0.0.1:x", 7)
+        for wrong in ("10.0.0.1:x", "10.0.0.1:", "10.0.0.1:0", "10.0.0.1:65536", ":9", "", "10.0.0.1:²"):
+            with self.subTest(wrong), self.assertRaises(ValueError):
+                c.endpoint(wrong, 7)
 
     def test_a_vehicle_in_the_status(self):
         status = {"vehicles": [{"name": "rov", "position": {"x": 1, "z": -3}, "orientation": {"w": 1}}, {"name": "buoy"}]}
@@ -91,18 +94,35 @@ class Lines(unittest.TestCase):
 
 
 class Package(unittest.TestCase):
+    MODULES = {"tf2_ros": "tf2_ros_py"}  # of packages whose name is another
+
     def test_files_are_complete(self):
         package = xml.etree.ElementTree.parse(BRIDGE / "package.xml").getroot()
+        setup = (BRIDGE / "setup.py").read_text(encoding="utf-8")
         self.assertEqual(package.findtext("name"), "sonard_bridge")
         self.assertTrue((BRIDGE / "resource" / package.findtext("name")).exists())
-        for name in ("setup.py", "launch/bridge.launch.py", "sonard_bridge/node.py"):
-            ast.parse((BRIDGE / name).read_text(encoding="utf-8"), name)
-        self.assertIn(f'version="{package.findtext("version")}"', (BRIDGE / "setup.py").read_text(encoding="utf-8"))
+        self.assertIn(f'version="{package.findtext("version")}"', setup)
+        for file in (BRIDGE / "launch").iterdir():
+            self.assertIn(f'"launch/{file.name}"', setup)
 
-    def test_imports_of_the_node_exist(self):
-        tree = ast.parse((BRIDGE / "sonard_bridge/node.py").read_text(encoding="utf-8"))
-        (taken,) = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module == "conversions"]
-        self.assertEqual([a.name for a in taken.names if not hasattr(c, a.name)], [])
+    def test_every_import_is_a_dependency_and_every_dependency_is_imported(self):
+        package = xml.etree.ElementTree.parse(BRIDGE / "package.xml").getroot()
+        imported = set()
+        for file in (*BRIDGE.glob("sonard_bridge/*.py"), *BRIDGE.glob("launch/*.py")):
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+                if isinstance(node, ast.Import):
+                    imported |= {alias.name.split(".")[0] for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                    imported.add(node.module.split(".")[0])
+        foreign = {self.MODULES.get(name, name) for name in imported if name not in sys.stdlib_module_names | {"sonard_bridge"}}
+        self.assertEqual(foreign, {depend.text for depend in package.iter("exec_depend")})
+
+    def test_names_that_modules_import_of_each_other_exist(self):
+        for file in BRIDGE.glob("sonard_bridge/*.py"):
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+                if isinstance(node, ast.ImportFrom) and node.level == 1 and node.module:
+                    module = importlib.import_module("sonard_bridge." + node.module)
+                    self.assertEqual([a.name for a in node.names if not hasattr(module, a.name)], [], file.name)
 
 
 if __name__ == "__main__":

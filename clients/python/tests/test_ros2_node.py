@@ -1,16 +1,22 @@
-"""The node of the ROS 2 bridge with stand-ins for ROS: poses, whatever else is slow."""
+"""The node of the ROS 2 bridge and its launch files, with stand-ins for ROS: poses, whatever else is slow; parameters; the end."""
 import contextlib
 import http.server
+import importlib.util
+import io
 import json
 import math
+import pathlib
 import socket
+import sys
+import tempfile
 import threading
 import unittest
 from unittest import mock
 
-from ros_stand_ins import Message, Ros
+from ros_stand_ins import BRIDGE, ExternalShutdown, Message, Ros, launch_modules
 
 from sonard_bridge import polling
+from sonard_bridge.parameters import PARAMETERS, BadParameter, checked
 
 HALF = math.sqrt(0.5)
 PATIENCE_S = 60
@@ -151,7 +157,7 @@ class Poses(WithNode):
 
 class Transforms(WithNode):
     def test_a_transform_is_sent_when_it_is_new(self):
-        ros = self.bridge(tf_parent="map", tf_child="base_link", tf_rate_hz=20.0)
+        ros = self.bridge(tf_parent="map", tf_child="base_link", tf_rate_hz=20)
         (period_s, tick), = ros.timers
         self.assertEqual(period_s, 0.05)
         tick()
@@ -174,11 +180,123 @@ class Transforms(WithNode):
         self.assertNotIn("timestamp", self.line())
 
 
-class Sources(unittest.TestCase):
-    def test_one_is_needed(self):
-        for parameters in ({}, {"odometry": "/a", "pose": "/b"}, {"tf_parent": "map"}, {"tf_child": "base_link"}):
-            with self.subTest(**parameters), Ros(**parameters).module() as node, self.assertRaisesRegex(ValueError, "set one of"):
-                node.Bridge()
+class Token(WithNode):
+    def test_it_is_shown(self):
+        server = self.server()
+        server.token = "0123456789abcdef"
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "token"
+            file.write_text(server.token + "\n", encoding="utf-8")
+            ros = self.bridge(odometry="/odom", truth_rate_hz=100.0, http=server.at, token_file=str(file))
+        self.wait_for(lambda: ros.published["~/vehicle_pose"])
+
+    def test_that_one_is_missing_is_said(self):
+        server = self.server()
+        server.token = "0123456789abcdef"
+        ros = self.bridge(odometry="/odom", truth_rate_hz=100.0, http=server.at)
+        self.wait_for(lambda: any("set the parameter token_file" in text for text in ros.logged))
+
+
+class Parameters(unittest.TestCase):
+    @staticmethod
+    def given(**parameters):
+        return {**{p.name: p.default for p in PARAMETERS}, **parameters}
+
+    def test_values_that_yaml_typed(self):
+        values = checked(self.given(odometry="/odom", vehicle=1, tf_rate_hz=50, truth_rate_hz="1e1", http="10.0.0.1"))
+        self.assertEqual((values["vehicle"], values["tf_rate_hz"], values["truth_rate_hz"]), ("1", 50.0, 10.0))
+        self.assertEqual((values["sonard"], values["http"]), (("127.0.0.1", 14771), ("10.0.0.1", 8088)))
+        self.assertTrue(checked(self.given(truth_rate_hz=5)))  # no source is needed for what sonard knows
+
+    def test_wrong_ones_are_named(self):
+        for name, parameters in (("odometry", {}), ("pose", {"odometry": "/a", "pose": "/b"}), ("tf_child", {"tf_parent": "map"}),
+                                 ("tf_parent", {"tf_child": "base_link"}), ("vehicle", {"vehicle": True}),
+                                 ("vehicle", {"vehicle": 1e3}),
+                                 ("tf_rate_hz", {"tf_rate_hz": 0.0}), ("tf_rate_hz", {"tf_rate_hz": "fast"}),
+                                 ("tf_rate_hz", {"tf_rate_hz": True}), ("truth_rate_hz", {"truth_rate_hz": -1}),
+                                 ("truth_rate_hz", {"truth_rate_hz": math.inf}),
+                                 ("use_stamps", {"use_stamps": "yes"}), ("sonard", {"sonard": "127.0.0.1:x"}),
+                                 ("http", {"http": "127.0.0.1:99999"}), ("token_file", {"token_file": "/nowhere/token"})):
+            source = {} if name in ("odometry", "pose", "tf_child", "tf_parent") else {"odometry": "/odom"}
+            full = self.given(**source, **parameters)
+            with self.subTest(**parameters), self.assertRaisesRegex(BadParameter, f"^parameter {name}: .") as raised:
+                checked(full)
+            self.assertEqual(raised.exception.name, name)
+
+    def test_the_readme_has_a_line_for_each(self):
+        text = (BRIDGE / "README.md").read_text(encoding="utf-8")
+        self.assertEqual([p.name for p in PARAMETERS if f"`{p.name}`" not in text], [])
+
+
+class TheEnd(unittest.TestCase):
+    def end(self, spin=None, **parameters):
+        ros = Ros(**parameters)
+        def default(node):
+            raise ExternalShutdown
+        ros.spin = spin or default
+        errors = io.StringIO()
+        with ros.module() as module, contextlib.redirect_stderr(errors):
+            code = module.main()
+        self.assertEqual(ros.shut_down, 1)
+        return code, errors.getvalue()
+
+    def test_signals_end_it_without_a_word(self):
+        def interrupt(node):
+            raise KeyboardInterrupt
+        for spin in (None, interrupt):
+            self.assertEqual(self.end(spin, odometry="/odom"), (0, ""))
+
+    def test_a_wrong_parameter_is_one_sentence(self):
+        for parameters, words in (({}, "parameter odometry: nothing to do"),
+                                  ({"odometry": "/odom", "tf_rate_hz": 0.0}, "parameter tf_rate_hz: 0 is not"),
+                                  ({"odometry": "/odom", "sonard": "no-such-host.invalid"}, "parameter sonard: no-such-host")):
+            with self.subTest(**parameters):
+                code, errors = self.end(**parameters)
+                self.assertEqual((code, errors.count("\n")), (2, 1))
+                self.assertIn(words, errors)
+                self.assertNotIn("Traceback", errors)
+
+    def test_parameters_cannot_be_set_later(self):
+        ros = Ros(odometry="/odom")
+        with ros.module() as module:
+            module.Bridge().close()
+        self.assertEqual(list(ros.declared), [p.name for p in PARAMETERS])
+        for _, descriptor in ros.declared.values():
+            self.assertTrue(descriptor.read_only and descriptor.dynamic_typing and descriptor.description)
+
+
+class Launch(unittest.TestCase):
+    def setUp(self):
+        patch = mock.patch.dict(sys.modules, launch_modules())
+        patch.start()
+        self.addCleanup(patch.stop)
+        sys.modules.pop("sonard_bridge.launching", None)
+        self.addCleanup(sys.modules.pop, "sonard_bridge.launching", None)
+
+    @staticmethod
+    def description(name):
+        spec = importlib.util.spec_from_file_location("described", BRIDGE / "launch" / name)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module.generate_launch_description().arguments[0]
+
+    @staticmethod
+    def of(kind, actions):
+        return [action for action in actions if type(action).__name__ == kind]
+
+    def test_every_parameter_is_an_argument_and_texts_stay_text(self):
+        actions = self.description("bridge.launch.py")
+        declared = {a.arguments[0]: a.named for a in self.of("DeclareLaunchArgument", actions)}
+        self.assertEqual(list(declared), [p.name for p in PARAMETERS] + ["use_sim_time", "namespace"])
+        self.assertEqual((declared["use_stamps"]["default_value"], declared["tf_rate_hz"]["default_value"]), ("true", "50.0"))
+        node, = self.of("Node", actions)
+        (given,) = node.named["parameters"]
+        self.assertEqual(set(given), {p.name for p in PARAMETERS} | {"use_sim_time"})
+        for parameter in PARAMETERS:
+            value = given[parameter.name]
+            is_text = isinstance(parameter.default, str)
+            self.assertEqual(type(value).__name__, "ParameterValue" if is_text else "LaunchConfiguration", parameter.name)
+            self.assertEqual(value.named, {"value_type": str} if is_text else {}, parameter.name)
 
 
 if __name__ == "__main__":

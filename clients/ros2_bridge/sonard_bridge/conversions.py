@@ -1,4 +1,4 @@
-"""Between ROS and sonard, without ROS: frames, the pose as a line of JSON, and what the daemon says of its vehicles.
+"""Between ROS and sonard, without ROS: frames, the pose as a line of JSON, and the daemon's status.
 
 sonard's world is ENU and its body FLU, as ROS has both by REP 103: poses pass as they are, but ROS writes quaternions x, y, z, w
 and sonard w, x, y, z. oculus_sonar_driver's images (marine_acoustic_msgs) are in a frame of their own: z ahead in the middle of
@@ -112,6 +112,6 @@ def stamp_ns(status: Dict[str, Any]) -> int:
 def endpoint(text: str, port: int) -> Tuple[str, int]:
     """host or host:port"""
     host, colon, number = text.partition(":")
-    if colon and not number.isdigit():
+    if not host or (colon and not (number.isascii() and number.isdigit() and 0 < int(number) < 65536)):
         raise ValueError(f"{text!r} is not host:port")
     return host, int(number) if colon else port

@@ -1,20 +1,23 @@
-"""The node: one source of poses in, to sonard by UDP; and, if wished, the pose that sonard uses as a topic. The executor's thread
-sends poses and waits for nothing; what is requested of sonard arrives in a thread of its own."""
+"""The node: one source of poses in, to sonard by UDP; and, if wished, the pose that sonard uses as a topic. The executor's
+thread sends poses and waits for nothing; what is requested of sonard arrives in a thread of its own."""
 from __future__ import annotations
 
 import socket
+import sys
+from typing import Optional, Tuple
 
 import rclpy
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from tf2_ros import Buffer, TransformException, TransformListener
 
-from .conversions import Unusable, endpoint, json_line, stamp_ns, stamp_s, vehicle_in, wxyz, xyzw
+from .conversions import Unusable, json_line, stamp_ns, stamp_s, vehicle_in, wxyz, xyzw
+from .parameters import PARAMETERS, BadParameter, checked
 from .polling import StatusPoll
-
-JSON_PORT, HTTP_PORT = 14771, 8088
 
 
 def set_stamp(stamp, ns: int) -> None:
@@ -22,41 +25,42 @@ def set_stamp(stamp, ns: int) -> None:
 
 
 class Bridge(Node):
-    """Exactly one of the parameters odometry, pose, and the pair tf_parent and tf_child says where poses come from."""
+    """One of the parameters odometry, pose, and the pair tf_parent and tf_child says where poses come from."""
 
     def __init__(self) -> None:
         super().__init__("sonard_bridge")
-        text = {name: str(self.declare_parameter(name, default).value) for name, default in
-                (("odometry", ""), ("pose", ""), ("tf_parent", ""), ("tf_child", ""), ("vehicle", ""),
-                 ("sonard", f"127.0.0.1:{JSON_PORT}"), ("http", f"127.0.0.1:{HTTP_PORT}"), ("truth", "~/vehicle_pose"))}
-        self.vehicle = text["vehicle"]
-        self.use_stamps = bool(self.declare_parameter("use_stamps", True).value)
-        tf_rate_hz = float(self.declare_parameter("tf_rate_hz", 50.0).value)
-        truth_rate_hz = float(self.declare_parameter("truth_rate_hz", 0.0).value)
-        sources = [name for name in ("odometry", "pose", "tf_child") if text[name]]
-        if len(sources) != 1 or bool(text["tf_parent"]) != bool(text["tf_child"]):
-            raise ValueError("set one of the parameters odometry, pose, or tf_parent with tf_child")
+        given = {p.name: self.declare_parameter(p.name, p.default, ParameterDescriptor(description=p.meaning, read_only=True,
+                                                                                      dynamic_typing=True)).value
+                 for p in PARAMETERS}
+        self.settings = wanted = checked(given)
+        self.vehicle, self.use_stamps = wanted["vehicle"], wanted["use_stamps"]
         self.helpers = []  # threads
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setblocking(False)
-        self.socket.connect(endpoint(text["sonard"], JSON_PORT))
-        if text["odometry"]:
-            self.create_subscription(Odometry, text["odometry"], self.on_odometry, qos_profile_sensor_data)
-        elif text["pose"]:
-            self.create_subscription(PoseStamped, text["pose"], self.on_pose, qos_profile_sensor_data)
-        else:
-            self.frames = text["tf_parent"], text["tf_child"]
-            self.last_tf = None
+        try:
+            self.socket.connect(wanted["sonard"])
+        except OSError as error:
+            self.socket.close()
+            raise BadParameter("sonard", f"{wanted['sonard'][0]} is not an address: {error.strerror or error}") from None
+        if wanted["odometry"]:
+            self.create_subscription(Odometry, wanted["odometry"], self.on_odometry, qos_profile_sensor_data)
+        elif wanted["pose"]:
+            self.create_subscription(PoseStamped, wanted["pose"], self.on_pose, qos_profile_sensor_data)
+        elif wanted["tf_child"]:
+            self.frames = wanted["tf_parent"], wanted["tf_child"]
+            self.last_tf: Optional[Tuple[int, int]] = None
             self.buffer = Buffer()
             self.listener = TransformListener(self.buffer, self)
-            self.create_timer(1 / tf_rate_hz, self.on_tf)
-        if truth_rate_hz > 0:
-            self.truth = self.create_publisher(PoseStamped, text["truth"], 10)
-            self.helpers.append(StatusPoll(endpoint(text["http"], HTTP_PORT), truth_rate_hz, self.while_running(self.on_status),
-                                           self.warn))
+            self.create_timer(1 / wanted["tf_rate_hz"], self.on_tf)
+        source = wanted["odometry"] or wanted["pose"] or wanted["tf_child"]
+        if wanted["truth_rate_hz"]:
+            self.truth = self.create_publisher(PoseStamped, wanted["truth"], 10)
+            self.helpers.append(StatusPoll(wanted["http"], wanted["token"], wanted["truth_rate_hz"],
+                                           self.while_running(self.on_status), self.warn))
         for helper in self.helpers:
             helper.start()
-        self.get_logger().info(f"poses from {text[sources[0]]} to sonard at {text['sonard']}")
+        to = "{}:{}".format(*wanted["sonard"])
+        self.get_logger().info(f"poses from {source} to sonard at {to}" if source else "no poses are sent: no source is set")
 
     def close(self) -> None:
         for helper in self.helpers:
@@ -79,6 +83,8 @@ class Bridge(Node):
                 if self.context.ok():
                     raise
         return guarded
+
+    # ---- poses to sonard
 
     def send(self, header, position, orientation, velocity=None) -> None:
         stamp = stamp_s(header.stamp.sec, header.stamp.nanosec) if self.use_stamps else None
@@ -113,6 +119,8 @@ class Bridge(Node):
         self.last_tf = stamp
         self.send(found.header, found.transform.translation, found.transform.rotation)
 
+    # ---- what sonard knows, as topics
+
     def on_status(self, status) -> None:
         found = vehicle_in(status, self.vehicle)
         if found is None:
@@ -127,14 +135,20 @@ class Bridge(Node):
         self.truth.publish(message)
 
 
-def main() -> None:
+def main() -> int:
     rclpy.init()
-    node = Bridge()
+    node = None
     try:
+        node = Bridge()
         rclpy.spin(node)
-    except KeyboardInterrupt:
-        node.get_logger().info("ends")
+    except BadParameter as error:
+        print(f"sonard_bridge: {error}", file=sys.stderr)
+        return 2
+    except (KeyboardInterrupt, ExternalShutdownException):  # Ctrl-C; SIGTERM, as systemd and containers send it
+        pass
     finally:
-        node.close()
-        node.destroy_node()
+        if node is not None:
+            node.close()
+            node.destroy_node()
         rclpy.try_shutdown()
+    return 0
