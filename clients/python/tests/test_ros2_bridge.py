@@ -1,8 +1,9 @@
-"""The ROS 2 bridge without ROS: frames, the line it sends, the status it reads, and its package files."""
+"""The ROS 2 bridge without ROS: frames, the line it sends, what it reads of sonard, and its package files."""
 import ast
-import importlib
+import importlib.util
 import json
 import math
+import struct
 import sys
 import unittest
 import xml.etree.ElementTree
@@ -10,6 +11,7 @@ import xml.etree.ElementTree
 from ros_stand_ins import BRIDGE
 
 from sonard_bridge import conversions as c
+from sonard_bridge import live_view as v
 from sonard_client.rotations import quaternion_from_rpy
 
 HALF = math.sqrt(0.5)

@@ -16,6 +16,7 @@ from unittest import mock
 from ros_stand_ins import BRIDGE, ExternalShutdown, Message, Ros, launch_modules
 
 from sonard_bridge import polling
+from sonard_bridge.live_view import Transform
 from sonard_bridge.parameters import PARAMETERS, BadParameter, checked
 
 HALF = math.sqrt(0.5)
@@ -180,6 +181,39 @@ class Transforms(WithNode):
         self.assertNotIn("timestamp", self.line())
 
 
+class Mounts(WithNode):
+    def mount(self, child="front", parent="rov", x=0.3, turn=(1.0, 0.0, 0.0, 0.0)):
+        return Transform(2_500_000_000, parent, child, (x, 0.0, 0.0), turn)
+
+    def bridge(self, **parameters):
+        with mock.patch("sonard_bridge.live_view.LiveView.run"):
+            return super().bridge(tf_static=True, **parameters)
+
+    def test_they_are_sent_once_and_again_when_one_changes(self):
+        ros = self.bridge()
+        world = Transform(0, "world", "rov", (9.0, 9.0, 9.0), (1.0, 0.0, 0.0, 0.0))
+        for x in (0.3, 0.3 + 1e-9, 0.3):
+            ros.node.on_mounts([world, self.mount(x=x), self.mount("left")])
+        self.assertEqual(len(ros.static), 1)
+        (front, left), = ros.static
+        self.assertEqual((front.header.frame_id, front.child_frame_id, left.child_frame_id), ("rov", "front", "left"))
+        self.assertEqual((front.transform.translation.x, front.transform.rotation.w, front.transform.rotation.x), (0.3, 1, 0))
+        self.assertEqual((front.header.stamp.sec, front.header.stamp.nanosec), (2, 500000000))
+        ros.node.on_mounts([world, self.mount(turn=(HALF, 0.0, HALF, 0.0)), self.mount("left")])
+        self.assertEqual([m.child_frame_id for m in ros.static[1]], ["front", "left"])  # all: latched is the last message alone
+        self.assertEqual(ros.static[1][0].transform.rotation.y, HALF)
+
+    def test_their_parent(self):
+        both = [self.mount(), self.mount("mast", "boat")]
+        for parameters, wanted in (({"base_frame": "base_link"}, {"front": "rov", "mast": "boat"}),
+                                   ({"base_frame": "base_link", "vehicle": "rov"}, {"front": "base_link"}),
+                                   ({"tf_parent": "map", "tf_child": "hull", "vehicle": "boat"}, {"mast": "hull"})):
+            with self.subTest(parameters):
+                ros = self.bridge(**parameters)
+                ros.node.on_mounts(both)
+                self.assertEqual({m.child_frame_id: m.header.frame_id for m in ros.static[0]}, wanted)
+
+
 class Token(WithNode):
     def test_it_is_shown(self):
         server = self.server()
@@ -206,7 +240,7 @@ class Parameters(unittest.TestCase):
         values = checked(self.given(odometry="/odom", vehicle=1, tf_rate_hz=50, truth_rate_hz="1e1", http="10.0.0.1"))
         self.assertEqual((values["vehicle"], values["tf_rate_hz"], values["truth_rate_hz"]), ("1", 50.0, 10.0))
         self.assertEqual((values["sonard"], values["http"]), (("127.0.0.1", 14771), ("10.0.0.1", 8088)))
-        self.assertTrue(checked(self.given(truth_rate_hz=5)))  # no source is needed for what sonard knows
+        self.assertTrue(checked(self.given(tf_static=True)))  # no source is needed for what sonard knows
 
     def test_wrong_ones_are_named(self):
         for name, parameters in (("odometry", {}), ("pose", {"odometry": "/a", "pose": "/b"}), ("tf_child", {"tf_parent": "map"}),
@@ -214,7 +248,7 @@ class Parameters(unittest.TestCase):
                                  ("vehicle", {"vehicle": 1e3}),
                                  ("tf_rate_hz", {"tf_rate_hz": 0.0}), ("tf_rate_hz", {"tf_rate_hz": "fast"}),
                                  ("tf_rate_hz", {"tf_rate_hz": True}), ("truth_rate_hz", {"truth_rate_hz": -1}),
-                                 ("truth_rate_hz", {"truth_rate_hz": math.inf}),
+                                 ("truth_rate_hz", {"truth_rate_hz": math.inf}), ("cloud_threshold", {"cloud_threshold": 2}),
                                  ("use_stamps", {"use_stamps": "yes"}), ("sonard", {"sonard": "127.0.0.1:x"}),
                                  ("http", {"http": "127.0.0.1:99999"}), ("token_file", {"token_file": "/nowhere/token"})):
             source = {} if name in ("odometry", "pose", "tf_child", "tf_parent") else {"odometry": "/odom"}
@@ -297,6 +331,29 @@ class Launch(unittest.TestCase):
             is_text = isinstance(parameter.default, str)
             self.assertEqual(type(value).__name__, "ParameterValue" if is_text else "LaunchConfiguration", parameter.name)
             self.assertEqual(value.named, {"value_type": str} if is_text else {}, parameter.name)
+
+    def started(self, **given):
+        actions = self.description("sonard.launch.py")
+        names = {a.arguments[0]: a.named["default_value"] for a in self.of("DeclareLaunchArgument", actions)}
+        start, = self.of("OpaqueFunction", actions)
+        return start.named["function"]({**names, **given})
+
+    def test_the_bridge_and_the_driver_wait_for_sonard(self):
+        handler, sonard = self.started(config="dive.yaml", options="--clock stepped", driver="ros2 launch 'my driver' x.py")
+        self.assertEqual(sonard.named["cmd"], ["sonard", "run", "dive.yaml", "--clock", "stepped"])
+        self.assertEqual(type(sonard.named["on_exit"]).__name__, "Shutdown")
+        hear = handler.arguments[0].named
+        self.assertIs(hear["target_action"], sonard)
+        self.assertEqual(hear["on_stdout"](Message(text=b"sonard 0.1.0\nrea")), [])
+        bridge, driver = hear["on_stdout"](Message(text=b"dy in 0.21 s."))
+        self.assertEqual(type(bridge).__name__, "Node")
+        self.assertEqual(driver.named["cmd"], ["ros2", "launch", "my driver", "x.py"])
+        self.assertEqual(hear["on_stderr"](Message(text=b"ready in 1 s.")), [])  # once
+
+    def test_the_demo_without_a_driver(self):
+        handler, sonard = self.started()
+        self.assertEqual(sonard.named["cmd"], ["sonard", "run", "--demo"])
+        self.assertEqual(len(handler.arguments[0].named["on_stdout"](Message(text=b"ready in 1 s."))), 1)
 
 
 if __name__ == "__main__":

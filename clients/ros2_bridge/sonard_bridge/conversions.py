@@ -1,4 +1,4 @@
-"""Between ROS and sonard, without ROS: frames, the pose as a line of JSON, and the daemon's status.
+"""Between ROS and sonard, without ROS: frames, the pose as a line of JSON, the daemon's status, and beams as a laser scan.
 
 sonard's world is ENU and its body FLU, as ROS has both by REP 103: poses pass as they are, but ROS writes quaternions x, y, z, w
 and sonard w, x, y, z. oculus_sonar_driver's images (marine_acoustic_msgs) are in a frame of their own: z ahead in the middle of
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any, Dict, Optional, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 Vector3 = Tuple[float, float, float]
 Quaternion = Tuple[float, float, float, float]  # w, x, y, z
@@ -115,3 +115,32 @@ def endpoint(text: str, port: int) -> Tuple[str, int]:
     if not host or (colon and not (number.isascii() and number.isdigit() and 0 < int(number) < 65536)):
         raise ValueError(f"{text!r} is not host:port")
     return host, int(number) if colon else port
+
+
+def name_in_topic(sonar: str) -> str:
+    """A sonar's name as part of a topic: letters, digits and underscores, no digit first."""
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in sonar)
+    return "_" + name if name[:1].isdigit() else name
+
+
+class Scan(NamedTuple):
+    """Ranges at even angles, positive to port, from starboard to port, as sensor_msgs/LaserScan has them. inf: nothing is hit."""
+    first_rad: float
+    step_rad: float
+    range_m: List[float]
+
+
+def scan_of(azimuth_rad: Sequence[float], range_m: Sequence[float]) -> Scan:
+    """Each angle takes what the nearest beam hits. Beams fall from port to starboard; a range of 0 is no hit."""
+    if not 2 <= len(azimuth_rad) == len(range_m):
+        raise Unusable(f"{len(range_m)} ranges of {len(azimuth_rad)} beams are not a scan")
+    beams = sorted(zip(azimuth_rad, range_m))
+    first, last = beams[0][0], beams[-1][0]
+    step = (last - first) / (len(beams) - 1)
+    ranges, at = [], 0
+    for i in range(len(beams)):
+        angle = first + i * step
+        while at + 1 < len(beams) and abs(beams[at + 1][0] - angle) <= abs(beams[at][0] - angle):
+            at += 1
+        ranges.append(beams[at][1] or math.inf)
+    return Scan(first, step, ranges)

@@ -1,4 +1,4 @@
-"""What launch files have in common: an argument for each parameter, and the node."""
+"""What both launch files have in common: an argument for each parameter, and the node."""
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node

@@ -1,27 +1,38 @@
-"""The node: one source of poses in, to sonard by UDP; and, if wished, the pose that sonard uses as a topic. The executor's
-thread sends poses and waits for nothing; what is requested of sonard arrives in a thread of its own."""
+"""The node: one source of poses in, to sonard by UDP; and, if wished, what sonard knows as topics. The executor's thread sends
+poses and waits for nothing; what is requested of sonard arrives in threads of its own."""
 from __future__ import annotations
 
+import array
 import socket
 import sys
-from typing import Optional, Tuple
+from typing import Dict, Optional, Tuple
 
 import rclpy
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from tf2_ros import Buffer, TransformException, TransformListener
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan, PointCloud2, PointField
+from tf2_ros import Buffer, StaticTransformBroadcaster, TransformException, TransformListener
 
-from .conversions import Unusable, json_line, stamp_ns, stamp_s, vehicle_in, wxyz, xyzw
+from . import live_view
+from .conversions import Unusable, json_line, name_in_topic, scan_of, stamp_ns, stamp_s, vehicle_in, wxyz, xyzw
 from .parameters import PARAMETERS, BadParameter, checked
 from .polling import StatusPoll
+
+SAME = 1e-6  # of a mount: metres, and parts of a quaternion
 
 
 def set_stamp(stamp, ns: int) -> None:
     stamp.sec, stamp.nanosec = divmod(ns, 10**9)
+
+
+def is_same(a: live_view.Transform, b: live_view.Transform) -> bool:
+    return a.parent == b.parent and all(
+        abs(x - y) <= SAME for x, y in zip((*a.position, *a.orientation), (*b.position, *b.orientation)))
 
 
 class Bridge(Node):
@@ -57,6 +68,8 @@ class Bridge(Node):
             self.truth = self.create_publisher(PoseStamped, wanted["truth"], 10)
             self.helpers.append(StatusPoll(wanted["http"], wanted["token"], wanted["truth_rate_hz"],
                                            self.while_running(self.on_status), self.warn))
+        if any(wanted[name] for name in ("tf_static", "clouds", "scans", "clock")):
+            self.look()
         for helper in self.helpers:
             helper.start()
         to = "{}:{}".format(*wanted["sonard"])
@@ -133,6 +146,92 @@ class Bridge(Node):
         p.x, p.y, p.z = found[0]
         q.x, q.y, q.z, q.w = xyzw(found[1])
         self.truth.publish(message)
+
+    def look(self) -> None:
+        wanted = self.settings
+        self.mounts: Dict[str, live_view.Transform] = {}
+        self.of_sonars = {}  # publishers, by topic
+        self.last_clock_ns = -1
+        if wanted["tf_static"]:
+            self.static = StaticTransformBroadcaster(self)  # latched: late listeners get the last one
+        if wanted["clock"]:
+            self.clock_topic = self.create_publisher(Clock, "/clock", 10)
+        endings = [ending for name, ending in (("clouds", "/cloud"), ("scans", "/truth")) if wanted[name]]
+        self.view = live_view.LiveView(wanted["http"], wanted["token"],
+                                       lambda topic: topic == "/tf" or any(topic.endswith(ending) for ending in endings),
+                                       self.while_running(self.on_view), self.warn,
+                                       wanted["cloud_threshold"] if wanted["clouds"] else None)
+        self.helpers.append(self.view)
+
+    def on_view(self, topic: str, ns: int, payload: bytes) -> None:
+        """In the view's thread."""
+        if self.settings["clock"]:
+            self.on_time(ns)
+        if topic == "/tf" and self.settings["tf_static"]:
+            self.on_mounts(live_view.transforms(payload))
+        elif topic.endswith("/cloud"):
+            self.on_cloud(topic, live_view.cloud(payload))
+        elif topic.endswith("/truth"):
+            self.on_truth(topic, live_view.truth(payload))
+
+    def on_time(self, ns: int) -> None:
+        if self.view.clock not in ("stepped", "lockstep"):
+            self.warn(f"no /clock: sonard's clock is {self.view.clock or 'not known'}, not stepped or lockstep")
+        elif ns != self.last_clock_ns:
+            self.last_clock_ns = ns
+            message = Clock()
+            set_stamp(message.clock, ns)
+            self.clock_topic.publish(message)
+
+    def on_mounts(self, transforms) -> None:
+        now = {t.child: t for t in transforms if t.parent != "world" and self.vehicle in ("", t.parent)}
+        if now.keys() == self.mounts.keys() and all(is_same(now[name], self.mounts[name]) for name in now):
+            return
+        self.mounts = now
+        base = self.settings["base_frame"] or self.settings["tf_child"]
+        base = base if len({t.parent for t in now.values()}) == 1 else ""
+        messages = []
+        for t in now.values():
+            message = TransformStamped()
+            set_stamp(message.header.stamp, t.stamp_ns)
+            message.header.frame_id = base or t.parent
+            message.child_frame_id = t.child
+            place, turn = message.transform.translation, message.transform.rotation
+            place.x, place.y, place.z = t.position
+            turn.x, turn.y, turn.z, turn.w = xyzw(t.orientation)
+            messages.append(message)
+        self.static.sendTransform(messages)
+
+    def publisher_of(self, kind, topic: str, ending: str):
+        name = f"~/{name_in_topic(topic.split('/')[1])}/{ending}"
+        if name not in self.of_sonars:
+            self.of_sonars[name] = self.create_publisher(kind, name, 5)
+        return self.of_sonars[name]
+
+    def on_cloud(self, topic: str, cloud: live_view.Cloud) -> None:
+        message = PointCloud2()
+        set_stamp(message.header.stamp, cloud.stamp_ns)
+        message.header.frame_id = cloud.frame
+        message.height, message.width = 1, len(cloud.data) // cloud.stride
+        message.fields = [PointField(name=name, offset=offset, datatype=kind, count=1) for name, offset, kind in cloud.columns]
+        message.is_bigendian, message.is_dense = False, True
+        message.point_step, message.row_step = cloud.stride, cloud.stride * message.width
+        message.data = array.array("B", cloud.data[:message.row_step])
+        self.publisher_of(PointCloud2, topic, "cloud").publish(message)
+
+    def on_truth(self, topic: str, truth: live_view.Truth) -> None:
+        try:
+            scan = scan_of(truth.azimuth_rad, truth.range_m)
+        except Unusable:
+            return  # of one beam
+        message = LaserScan()
+        set_stamp(message.header.stamp, truth.stamp_ns)
+        message.header.frame_id = topic.split("/")[1]
+        message.angle_min, message.angle_increment = scan.first_rad, scan.step_rad
+        message.angle_max = scan.first_rad + scan.step_rad * (len(scan.range_m) - 1)
+        message.range_min, message.range_max = truth.nearest_m, truth.furthest_m
+        message.ranges = scan.range_m
+        self.publisher_of(LaserScan, topic, "scan").publish(message)
 
 
 def main() -> int:

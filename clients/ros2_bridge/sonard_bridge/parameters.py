@@ -38,6 +38,12 @@ PARAMETERS: Tuple[Parameter, ...] = (
     Parameter("token_file", "", "file with the secret of control.token_file"),
     Parameter("truth", "~/vehicle_pose", "topic of the pose that sonard uses, geometry_msgs/PoseStamped"),
     Parameter("truth_rate_hz", 0.0, "its rate; 0: it is not published"),
+    Parameter("tf_static", False, "publish where the sonars are mounted"),
+    Parameter("base_frame", "", "frame that they are mounted on; empty: tf_child, else the vehicle's name"),
+    Parameter("clouds", False, "publish ~/SONAR/cloud, sensor_msgs/PointCloud2"),
+    Parameter("cloud_threshold", 0.35, "of samples in clouds, part of the full scale; 0: all returns"),
+    Parameter("scans", False, "publish ~/SONAR/scan, sensor_msgs/LaserScan: the true range of the first hit of each beam"),
+    Parameter("clock", False, "publish /clock, of a sonard whose clock is stepped or lockstep"),
 )
 
 
@@ -67,10 +73,12 @@ def checked(given: Dict[str, Any]) -> Dict[str, Any]:
         raise BadParameter("tf_child" if values["tf_parent"] else "tf_parent", "is missing: a transform has two frames")
     if len(sources) > 1:
         raise BadParameter(sources[1], f"{sources[0]} is set too; {ONE_SOURCE}")
-    if not sources and not values["truth_rate_hz"]:
+    wants_anything = values["truth_rate_hz"] or any(values[name] for name in ("tf_static", "clouds", "scans", "clock"))
+    if not sources and not wants_anything:
         raise BadParameter("odometry", "nothing to do; " + ONE_SOURCE)
     for name, lowest, highest, takes in (("tf_rate_hz", 0.01, 1000, "from 0.01 to 1000"),
-                                         ("truth_rate_hz", 0, 100, "from 0 to 100")):
+                                         ("truth_rate_hz", 0, 100, "from 0 to 100"),
+                                         ("cloud_threshold", 0, 1, "from 0 to 1")):
         if not lowest <= values[name] <= highest:
             raise BadParameter(name, f"{values[name]:g} is not {takes}")
     for name, port in (("sonard", JSON_PORT), ("http", HTTP_PORT)):
