@@ -8,6 +8,7 @@ import sys
 import unittest
 import xml.etree.ElementTree
 
+from common import ROOT
 from ros_stand_ins import BRIDGE
 
 from sonard_bridge import conversions as c
@@ -53,11 +54,53 @@ class Frames(unittest.TestCase):
             self.assert_close(c.image_from_flu(c.flu_from_image(v)), v)
             self.assert_close(c.rotate(c.wxyz(c.IMAGE_IN_FLU_XYZW), v), c.flu_from_image(v))
 
-    def test_the_readme_gives_the_same_rotation(self):
-        text = (BRIDGE / "README.md").read_text(encoding="utf-8")
-        given = [float(text.split(f"--q{axis} ")[1].split()[0]) for axis in "xyzw"]
-        for got, wanted in zip(given, c.IMAGE_IN_FLU_XYZW):
+    def test_the_manual_gives_the_same_rotations(self):
+        text = (ROOT / "docs/ros2.md").read_text(encoding="utf-8")
+        image, clouds = ([float(part.split(f"--q{axis} ")[1].split()[0]) for axis in "xyzw"]
+                         for part in text.split("static_transform_publisher")[1:3])
+        for got, wanted in zip(image, c.IMAGE_IN_FLU_XYZW):
             self.assertAlmostEqual(got, wanted, places=7)
+        self.assert_close(c.rotate(c.wxyz(clouds), (2, -1.64, 0.5)), c.flu_from_frd((2, -1.64, 0.5)))
+
+
+class Scans(unittest.TestCase):
+    def test_even_angles_from_starboard_to_port(self):
+        scan = c.scan_of([0.6, 0.1, 0.0, -0.6], [6, 0, 5, 4])
+        self.assertAlmostEqual(scan.first_rad, -0.6)
+        self.assertAlmostEqual(scan.step_rad, 0.4)
+        self.assertEqual(scan.range_m, [4, 5, math.inf, 6])  # -0.6, -0.2, 0.2, 0.6
+        for azimuths, ranges in (([0.0], [1]), ([], []), ([0.1, 0.0], [1])):
+            with self.assertRaises(c.Unusable):
+                c.scan_of(azimuths, ranges)
+
+    def test_names_in_topics(self):
+        self.assertEqual([c.name_in_topic(name) for name in ("front", "3d-15", "bug über")], ["front", "_3d_15", "bug__ber"])
+
+
+class ViewMessages(unittest.TestCase):
+    """Bytes by the rules of protobuf's encoding: field number times 8 plus type, then the value."""
+
+    def test_a_transform(self):
+        turn = bytes([0x11]) + struct.pack("<d", -0.5) + bytes([0x21]) + struct.pack("<d", 0.5)  # y, w; x and z are 0
+        body = (b"\x0a\x05\x08\x03\x10\xac\x02" + b"\x12\x03rov" + b"\x1a\x05front" +
+                b"\x22\x09\x19" + struct.pack("<d", 2.5) + bytes([0x2a, len(turn)]) + turn)
+        one, = v.transforms(bytes([0x0a, len(body)]) + body)
+        self.assertEqual(one, v.Transform(3_000_000_300, "rov", "front", (0, 0, 2.5), (0.5, 0, -0.5, 0)))
+        for end in range(1, len(body)):
+            with self.subTest(end=end), self.assertRaises(ValueError):
+                v.transforms(bytes([0x0a, len(body)]) + body[:end])
+
+    def test_a_cloud(self):
+        field = b"\x0a\x01x" + b"\x15\x04\x00\x00\x00" + b"\x18\x07"
+        cloud = v.cloud(b"\x12\x05front" + b"\x25\x10\x00\x00\x00" + bytes([0x2a, len(field)]) + field + b"\x32\x02ab")
+        self.assertEqual(cloud, v.Cloud(0, "front", 16, [("x", 4, 7)], b"ab"))
+        with self.assertRaises(ValueError):
+            v.cloud(b"")
+
+    def test_truth(self):
+        floats = struct.pack("<2f", 0.5, -0.5)
+        truth = v.truth(b"\x1a\x08" + floats + b"\x22\x08" + floats + b"\x31" + struct.pack("<d", 7.5))
+        self.assertEqual(truth, v.Truth(0, [0.5, -0.5], [0.5, -0.5], 0, 7.5))
 
 
 class Lines(unittest.TestCase):
