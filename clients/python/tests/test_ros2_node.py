@@ -214,6 +214,20 @@ class Mounts(WithNode):
                 self.assertEqual({m.child_frame_id: m.header.frame_id for m in ros.static[0]}, wanted)
 
 
+class TheClock(WithNode):
+    def test_stamps_of_messages_do_not_turn_it_back(self):
+        with mock.patch("sonard_bridge.live_view.LiveView.run"):
+            ros = self.bridge(clock=True)
+        ros.node.view.clock = "stepped"
+        for topic, ns in (("", 5), ("/tf", 3), ("/tf", 7), ("", 7), ("", 1)):  # the last one: sonard began anew
+            ros.node.on_view(topic, ns, b"")
+        self.assertEqual([m.clock.nanosec for m in ros.published["/clock"]], [5, 7, 1])
+        ros.node.view.clock = "follow"
+        ros.node.on_view("", 9, b"")
+        self.assertEqual(len(ros.published["/clock"]), 3)
+        self.assertIn("sonard's clock is follow", ros.logged[-1])
+
+
 class Token(WithNode):
     def test_it_is_shown(self):
         server = self.server()

@@ -165,7 +165,7 @@ class Bridge(Node):
 
     def on_view(self, topic: str, ns: int, payload: bytes) -> None:
         """In the view's thread."""
-        if self.settings["clock"]:
+        if self.settings["clock"] and (topic == "" or ns > self.last_clock_ns):  # stamps of pings are older than the time
             self.on_time(ns)
         if topic == "/tf" and self.settings["tf_static"]:
             self.on_mounts(live_view.transforms(payload))
