@@ -125,6 +125,13 @@ class Poses(WithNode):
         call(odometry(w=0.0))
         self.assertIn("left out: orientation", ros.logged[-1])
 
+    def test_warnings_of_one_kind_do_not_hide_others(self):
+        ros = self.bridge(odometry="/odom")
+        for x in (math.nan, math.inf, math.nan):
+            ros.subscribed["/odom"](odometry(x=x))
+            ros.node.warn("no status of sonard: timed out")
+        self.assertEqual([text.partition(":")[0] for text in ros.logged[1:]], ["left out", "no status of sonard"])
+
     def test_a_slow_answer_starves_no_pose(self):
         server = self.server(may_answer=False)
         with mock.patch.object(polling, "LIMIT_S", PATIENCE_S):

@@ -3,8 +3,10 @@ poses and waits for nothing; what is requested of sonard arrives in threads of i
 from __future__ import annotations
 
 import array
+import math
 import socket
 import sys
+import time
 from typing import Dict, Optional, Tuple
 
 import rclpy
@@ -46,6 +48,7 @@ class Bridge(Node):
         self.settings = wanted = checked(given)
         self.vehicle, self.use_stamps = wanted["vehicle"], wanted["use_stamps"]
         self.helpers = []  # threads
+        self.warned: Dict[str, float] = {}  # when, by kind
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setblocking(False)
         try:
@@ -84,8 +87,11 @@ class Bridge(Node):
         self.socket.close()
 
     def warn(self, text: str) -> None:
-        if self.context.ok():
-            self.get_logger().warning(text, throttle_duration_sec=5.0)
+        """One in 5 s of those that begin alike, up to the first colon."""
+        kind, now = text.partition(":")[0], time.monotonic()
+        if self.context.ok() and now - self.warned.get(kind, -math.inf) >= 5:
+            self.warned[kind] = now
+            self.get_logger().warning(text)
 
     def while_running(self, call):
         """For a helper's thread, which may publish while the context ends."""
