@@ -7,10 +7,10 @@ setup(
     packages=["sonard_bridge"],
     data_files=[("share/ament_index/resource_index/packages", ["resource/sonard_bridge"]),
                 ("share/sonard_bridge", ["package.xml"]),
-                ("share/sonard_bridge/launch", ["launch/bridge.launch.py"])],
+                ("share/sonard_bridge/launch", ["launch/bridge.launch.py", "launch/sonard.launch.py"])],
     install_requires=["setuptools"],
     zip_safe=True,
-    description="Poses of a ROS 2 system to sonard, and the pose sonard uses back",
+    description="Poses of a ROS 2 system to sonard, and what sonard knows as topics",
     license="Apache-2.0",
     entry_points={"console_scripts": ["bridge = sonard_bridge.node:main"]},
 )

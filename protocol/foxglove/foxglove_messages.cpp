@@ -275,6 +275,18 @@ Bytes geometry(const Ping& ping, std::uint32_t number) {
   return bytes_of(message);
 }
 
+Bytes truth(const Ping& ping) {
+  const PingSettings& s = ping.request.settings;
+  v1::PingTruth message;
+  fill(*message.mutable_timestamp(), ping.request.fired_at);
+  message.set_number(static_cast<std::uint32_t>(ping.request.number));
+  message.mutable_azimuth_rad()->Add(ping.beam_azimuth_rad.begin(), ping.beam_azimuth_rad.end());
+  for (const BeamTruth& beam : ping.truth) message.add_range_m(beam.object == BeamTruth::nothing ? 0.0f : beam.range_m);
+  message.set_range_start_m(s.range_start_m);
+  message.set_range_end_m(s.range_m);
+  return bytes_of(message);
+}
+
 Bytes findings(std::span<const doctor::Finding> all) {
   v1::Findings message;
   for (const doctor::Finding& finding : all) {

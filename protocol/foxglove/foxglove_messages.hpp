@@ -82,6 +82,8 @@ Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> point
 
 /// sonar.v1.PingGeometry. `number` = 0: to compare geometries of different pings.
 Bytes geometry(const Ping& ping, std::uint32_t number);
+/// sonar.v1.PingTruth of a ping that was made with SimulationSwitches::keep_truth.
+Bytes truth(const Ping& ping);
 /// sonar.v1.Findings.
 Bytes findings(std::span<const doctor::Finding> all);
 }  // namespace sonar::foxglove

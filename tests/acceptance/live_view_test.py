@@ -2,6 +2,7 @@
 import contextlib
 import hashlib
 import json
+import math
 import pathlib
 import re
 import signal
@@ -130,7 +131,7 @@ class Channels(unittest.TestCase):
             viewer.greeted()
             topics = {channel["topic"] for channel in viewer.channels.values()}
             self.assertEqual(topics, {"/tf", "/scene", "/swath", "/log", "/status", "/faults", "/doctor",
-                                      *(f"/front/{name}" for name in ("image", "geometry", "ping", "figures", "fan", "cloud"))})
+                                      *(f"/front/{name}" for name in ("image", "geometry", "ping", "figures", "fan", "cloud", "truth"))})
             viewer.subscribe(*sorted(topics))
             pings = {}
 
@@ -182,6 +183,23 @@ class Channels(unittest.TestCase):
             scene = viewer.first_of("/scene")
             model = scene["entities"][0]["models"][0]
             self.assertEqual(struct.unpack_from("<4sII", model["data"]), (b"glTF", 2, len(model["data"])))
+
+    def test_truth_is_made_while_it_is_looked_at(self):
+        with Sonard(scene="l-targets.yaml", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}", arguments=["--clock", "stepped"]) as daemon, \
+                Viewer(daemon.address) as viewer, Client(daemon.address) as client:
+            viewer.greeted().subscribe("/front/truth")
+            viewer.say(op="getParameters", parameterNames=[], id="subscribed")  # answered after it
+            viewer.wait_for(lambda kind, value: kind == "word" and value.get("id") == "subscribed")
+            client.send(fire_message())
+            client.ping()
+            truth = viewer.first_of("/front/truth")
+            self.assertEqual(len(truth["range_m"]), len(truth["azimuth_rad"]))
+            self.assertEqual(truth["azimuth_rad"], sorted(truth["azimuth_rad"], reverse=True))
+            def at(deg):
+                return min(zip(truth["azimuth_rad"], truth["range_m"]), key=lambda beam: abs(beam[0] - math.radians(deg)))[1]
+            self.assertAlmostEqual(at(20), 3.9, delta=0.03)  # A, to port
+            self.assertEqual(at(-20), 0)
+            self.assertGreater(truth["range_end_m"], 0)
 
     def test_who_comes_after_all_have_left_gets_geometry_too(self):
         with Sonard() as daemon, Client(daemon.address) as client:

@@ -119,6 +119,52 @@ TEST(Doctor, WarnsOfPortsThatOthersMayTake) {
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("ephemeral")));
 }
 
+Facts facts_of(const char* make, const std::string& host) {
+  Facts facts;
+  facts.sonars.push_back(healthy_sonar(host));
+  SonarFacts& sonar = facts.sonars.front();
+  for (const protocol::Make& one : protocol::makes())
+    if (one.name() == make) sonar.make = &one;
+  EXPECT_EQ(sonar.make->name(), make);
+  sonar.at.port = sonar.make->ports.front().number;
+  sonar.on_this_host = false;
+  return facts;
+}
+
+TEST(Doctor, NamesWhatOtherNetworksDoNotPass) {
+  const auto behind_a_router = [](const char* make) {
+    Facts facts = facts_of(make, "192.0.2.7");
+    facts.sonars[0].in_our_network = false;
+    return facts;
+  };
+  expect(line(behind_a_router("oculus"), "network"), Level::warn,
+         "192.0.2.7 is in another network: broadcasts and multicasts may not pass (its status to udp 52102)",
+         "name the driver's computer in status_to");
+  expect(line(behind_a_router("aris"), "network"), Level::warn, "(its status to udp 56124)", "status_to");
+  expect(line(behind_a_router("waterlinked"), "network"), Level::warn, "(pings to 224.0.0.96:4747)",
+         "its own address instead of the group");
+  expect(line(behind_a_router("blueview"), "network"), Level::warn, "(searches at udp 14751)",
+         "give the driver the address 192.0.2.7");
+  expect(line(behind_a_router("ping360"), "network"), Level::warn, "(searches at udp 30303)", "the address 192.0.2.7");
+  for (const char* of_unicast : {"surveyor240", "omniscan450"})
+    EXPECT_THAT(text_from(run_checks(behind_a_router(of_unicast))), Not(HasSubstr("another network")));
+  Facts facts = behind_a_router("oculus");
+  facts.status.received.push_back(received("192.0.2.7"));  // it does pass
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("another network")));
+}
+
+TEST(Doctor, KnowsMachinesWhoseNetworkIsTheirOwn) {
+  Facts facts = facts_of("oculus", "172.17.0.2");
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("may not pass")));
+  facts.machine = Machine::wsl2;
+  expect(line(facts, "network"), Level::ok, "172.17.0.2 is reached by way of this WSL2 machine", "status_to");
+  facts.status.received.push_back(received("172.17.0.2"));  // here, not outside
+  facts.machine = Machine::container;
+  expect(line(facts, "network"), Level::ok, "by way of this container", "status_to");
+  facts.sonars[0].at.host = "127.0.0.2";  // for drivers here
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("may not pass")));
+}
+
 TEST(Doctor, KnowsWhyNoStatusComes) {
   Facts facts = healthy();
   facts.status.received.clear();

@@ -1,22 +1,19 @@
-"""The ROS 2 bridge without ROS: frames, the line it sends, the status it reads, and its package files."""
+"""The ROS 2 bridge without ROS: frames, the line it sends, what it reads of sonard, and its package files."""
 import ast
-import importlib
+import importlib.util
 import json
 import math
-import socket
+import struct
 import sys
-import types
 import unittest
 import xml.etree.ElementTree
-from unittest import mock
 
 from common import ROOT
+from ros_stand_ins import BRIDGE
 
-BRIDGE = ROOT / "clients/ros2_bridge"
-sys.path.insert(0, str(BRIDGE))
-from sonard_bridge import conversions as c  # noqa: E402
-
-from sonard_client.rotations import quaternion_from_rpy  # noqa: E402
+from sonard_bridge import conversions as c
+from sonard_bridge import live_view as v
+from sonard_client.rotations import quaternion_from_rpy
 
 HALF = math.sqrt(0.5)
 
@@ -49,21 +46,61 @@ class Frames(unittest.TestCase):
             for v in ((1, 0, 0), (0, 1, 0), (0.3, -0.4, 2)):
                 self.assert_close(c.rotate(turned, c.flu_from_frd(v)), c.enu_from_ned(c.rotate(ned, v)))
 
-    def test_images_have_z_ahead_and_x_up(self):
+    def test_images_have_z_ahead_and_y_to_port(self):
         self.assert_close(c.flu_from_image((0, 0, 1)), (1, 0, 0))
-        self.assert_close(c.flu_from_image((1, 0, 0)), (0, 0, 1))
-        self.assert_close(c.flu_from_image((0, 1, 0)), (0, -1, 0))  # right-handed: y is starboard
+        self.assert_close(c.flu_from_image((0, 1, 0)), (0, 1, 0))
+        self.assert_close(c.flu_from_image((1, 0, 0)), (0, 0, -1))  # right-handed: x is down
         for v in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 2, 3)):
             self.assert_close(c.image_from_flu(c.flu_from_image(v)), v)
             self.assert_close(c.rotate(c.wxyz(c.IMAGE_IN_FLU_XYZW), v), c.flu_from_image(v))
-        self.assert_close(c.beam_direction(0), (0, 0, 1))
-        self.assertLess(c.beam_direction(0.3)[1], 0)  # to port
 
-    def test_the_readme_gives_the_same_rotation(self):
-        text = (BRIDGE / "README.md").read_text(encoding="utf-8")
-        given = [float(text.split(f"--q{axis} ")[1].split()[0]) for axis in "xyzw"]
-        for got, wanted in zip(given, c.IMAGE_IN_FLU_XYZW):
+    def test_the_manual_gives_the_same_rotations(self):
+        text = (ROOT / "docs/ros2.md").read_text(encoding="utf-8")
+        image, clouds = ([float(part.split(f"--q{axis} ")[1].split()[0]) for axis in "xyzw"]
+                         for part in text.split("static_transform_publisher")[1:3])
+        for got, wanted in zip(image, c.IMAGE_IN_FLU_XYZW):
             self.assertAlmostEqual(got, wanted, places=7)
+        self.assert_close(c.rotate(c.wxyz(clouds), (2, -1.64, 0.5)), c.flu_from_frd((2, -1.64, 0.5)))
+
+
+class Scans(unittest.TestCase):
+    def test_even_angles_from_starboard_to_port(self):
+        scan = c.scan_of([0.6, 0.1, 0.0, -0.6], [6, 0, 5, 4])
+        self.assertAlmostEqual(scan.first_rad, -0.6)
+        self.assertAlmostEqual(scan.step_rad, 0.4)
+        self.assertEqual(scan.range_m, [4, 5, math.inf, 6])  # -0.6, -0.2, 0.2, 0.6
+        for azimuths, ranges in (([0.0], [1]), ([], []), ([0.1, 0.0], [1])):
+            with self.assertRaises(c.Unusable):
+                c.scan_of(azimuths, ranges)
+
+    def test_names_in_topics(self):
+        self.assertEqual([c.name_in_topic(name) for name in ("front", "3d-15", "bug über")], ["front", "_3d_15", "bug__ber"])
+
+
+class ViewMessages(unittest.TestCase):
+    """Bytes by the rules of protobuf's encoding: field number times 8 plus type, then the value."""
+
+    def test_a_transform(self):
+        turn = bytes([0x11]) + struct.pack("<d", -0.5) + bytes([0x21]) + struct.pack("<d", 0.5)  # y, w; x and z are 0
+        body = (b"\x0a\x05\x08\x03\x10\xac\x02" + b"\x12\x03rov" + b"\x1a\x05front" +
+                b"\x22\x09\x19" + struct.pack("<d", 2.5) + bytes([0x2a, len(turn)]) + turn)
+        one, = v.transforms(bytes([0x0a, len(body)]) + body)
+        self.assertEqual(one, v.Transform(3_000_000_300, "rov", "front", (0, 0, 2.5), (0.5, 0, -0.5, 0)))
+        for end in range(1, len(body)):
+            with self.subTest(end=end), self.assertRaises(ValueError):
+                v.transforms(bytes([0x0a, len(body)]) + body[:end])
+
+    def test_a_cloud(self):
+        field = b"\x0a\x01x" + b"\x15\x04\x00\x00\x00" + b"\x18\x07"
+        cloud = v.cloud(b"\x12\x05front" + b"\x25\x10\x00\x00\x00" + bytes([0x2a, len(field)]) + field + b"\x32\x02ab")
+        self.assertEqual(cloud, v.Cloud(0, "front", 16, [("x", 4, 7)], b"ab"))
+        with self.assertRaises(ValueError):
+            v.cloud(b"")
+
+    def test_truth(self):
+        floats = struct.pack("<2f", 0.5, -0.5)
+        truth = v.truth(b"\x1a\x08" + floats + b"\x22\x08" + floats + b"\x31" + struct.pack("<d", 7.5))
+        self.assertEqual(truth, v.Truth(0, [0.5, -0.5], [0.5, -0.5], 0, 7.5))
 
 
 class Lines(unittest.TestCase):
@@ -87,8 +124,9 @@ class Lines(unittest.TestCase):
     def test_endpoints(self):
         self.assertEqual(c.endpoint("10.0.0.1", 7), ("10.0.0.1", 7))
         self.assertEqual(c.endpoint("10.0.0.1:9", 7), ("10.0.0.1", 9))
-        with self.assertRaises(ValueError):
-            c.endpoint("10.0.0.1:x", 7)
+        for wrong in ("10.0.0.1:x", "10.0.0.1:", "10.0.0.1:0", "10.0.0.1:65536", ":9", "", "10.0.0.1:²"):
+            with self.subTest(wrong), self.assertRaises(ValueError):
+                c.endpoint(wrong, 7)
 
     def test_a_vehicle_in_the_status(self):
         status = {"vehicles": [{"name": "rov", "position": {"x": 1, "z": -3}, "orientation": {"w": 1}}, {"name": "buoy"}]}
@@ -96,80 +134,40 @@ class Lines(unittest.TestCase):
         for name in ("", "buoy", "none"):
             self.assertIsNone(c.vehicle_in(status, name))
         self.assertIsNone(c.vehicle_in({}, ""))
-
-
-def stubs(parameters):
-    """Stub modules with the names that the node imports from ROS; they do not check ROS itself."""
-    class Node:
-        def __init__(self, name):
-            self.logged, self.subscribed = [], []
-
-        def declare_parameter(self, name, default):
-            return types.SimpleNamespace(value=parameters.get(name, default))
-
-        def create_subscription(self, kind, topic, call, qos):
-            self.subscribed.append((topic, call))
-
-        def get_logger(self):
-            def log(text, **_):
-                self.logged.append(text)
-            return types.SimpleNamespace(info=log, warning=log)
-
-    made = {"rclpy": {}, "rclpy.node": {"Node": Node}, "rclpy.qos": {"qos_profile_sensor_data": 5},
-            "geometry_msgs": {}, "geometry_msgs.msg": {"PoseStamped": object},
-            "nav_msgs": {}, "nav_msgs.msg": {"Odometry": object},
-            "tf2_ros": {"Buffer": object, "TransformException": Exception, "TransformListener": object}}
-    modules = {name: types.ModuleType(name) for name in made}
-    for name, content in made.items():
-        vars(modules[name]).update(content)
-    return modules
-
-
-class TheNode(unittest.TestCase):
-    def bridge(self, **parameters):
-        with mock.patch.dict(sys.modules, stubs(parameters)):
-            sys.modules.pop("sonard_bridge.node", None)
-            node = importlib.import_module("sonard_bridge.node").Bridge()
-        self.addCleanup(node.socket.close)
-        return node
-
-    def test_odometry_becomes_a_datagram(self):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
-            there.bind(("127.0.0.1", 0))
-            there.settimeout(10)
-            node = self.bridge(odometry="/odom", sonard="127.0.0.1:%d" % there.getsockname()[1], vehicle="rov")
-            ((topic, call),) = node.subscribed
-            self.assertEqual(topic, "/odom")
-            of = types.SimpleNamespace
-            header = of(stamp=of(sec=3, nanosec=500000000))
-            pose = of(position=of(x=1.0, y=2.0, z=-3.0), orientation=of(x=0.0, y=0.0, z=HALF, w=HALF))
-            call(of(header=header, pose=of(pose=pose), twist=of(twist=of(linear=of(x=1.0, y=0.0, z=0.0)))))
-            line = json.loads(there.recv(4096))
-            self.assertEqual((line["position"], line["timestamp"], line["vehicle"]), ([1, 2, -3], 3.5, "rov"))
-            self.assertAlmostEqual(line["velocity"][1], 1)
-            pose.orientation.w = 0.0
-            call(of(header=header, pose=of(pose=pose), twist=of(twist=of(linear=of(x=1.0, y=0.0, z=0.0)))))
-            self.assertIn("left out: orientation", node.logged[-1])
-
-    def test_one_source_is_needed(self):
-        for parameters in ({}, {"odometry": "/a", "pose": "/b"}, {"tf_parent": "map"}, {"tf_child": "base_link"}):
-            with self.subTest(**parameters), self.assertRaisesRegex(ValueError, "set one of"):
-                self.bridge(**parameters)
+        for status, ns in (({"now_ns": "7500000000"}, 7500000000), ({"now_ns": 3}, 3), ({}, 0), ({"now_ns": "x"}, 0)):
+            self.assertEqual(c.stamp_ns(status), ns)
 
 
 class Package(unittest.TestCase):
+    MODULES = {"tf2_ros": "tf2_ros_py"}  # of packages whose name is another
+
     def test_files_are_complete(self):
         package = xml.etree.ElementTree.parse(BRIDGE / "package.xml").getroot()
+        setup = (BRIDGE / "setup.py").read_text(encoding="utf-8")
         self.assertEqual(package.findtext("name"), "sonard_bridge")
         self.assertTrue((BRIDGE / "resource" / package.findtext("name")).exists())
-        for name in ("setup.py", "launch/bridge.launch.py", "sonard_bridge/node.py"):
-            ast.parse((BRIDGE / name).read_text(encoding="utf-8"), name)
-        self.assertIn(f'version="{package.findtext("version")}"', (BRIDGE / "setup.py").read_text(encoding="utf-8"))
+        self.assertIn(f'version="{package.findtext("version")}"', setup)
+        for file in (BRIDGE / "launch").iterdir():
+            self.assertIn(f'"launch/{file.name}"', setup)
 
-    def test_imports_of_the_node_exist(self):
-        tree = ast.parse((BRIDGE / "sonard_bridge/node.py").read_text(encoding="utf-8"))
-        (taken,) = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module == "conversions"]
-        self.assertEqual([a.name for a in taken.names if not hasattr(c, a.name)], [])
+    def test_every_import_is_a_dependency_and_every_dependency_is_imported(self):
+        package = xml.etree.ElementTree.parse(BRIDGE / "package.xml").getroot()
+        imported = set()
+        for file in (*BRIDGE.glob("sonard_bridge/*.py"), *BRIDGE.glob("launch/*.py")):
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+                if isinstance(node, ast.Import):
+                    imported |= {alias.name.split(".")[0] for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                    imported.add(node.module.split(".")[0])
+        foreign = {self.MODULES.get(name, name) for name in imported if name not in sys.stdlib_module_names | {"sonard_bridge"}}
+        self.assertEqual(foreign, {depend.text for depend in package.iter("exec_depend")})
+
+    def test_names_that_modules_import_of_each_other_exist(self):
+        for file in BRIDGE.glob("sonard_bridge/*.py"):
+            for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
+                if isinstance(node, ast.ImportFrom) and node.level == 1 and node.module:
+                    module = importlib.import_module("sonard_bridge." + node.module)
+                    self.assertEqual([a.name for a in node.names if not hasattr(module, a.name)], [], file.name)
 
 
 if __name__ == "__main__":

@@ -1,14 +1,14 @@
-"""Between ROS and sonard, without ROS: frames, the pose as a line of JSON, and what the daemon says of its vehicles.
+"""Between ROS and sonard, without ROS: frames, the pose as a line of JSON, the daemon's status, and beams as a laser scan.
 
 sonard's world is ENU and its body FLU, as ROS has both by REP 103: poses pass as they are, but ROS writes quaternions x, y, z, w
-and sonard w, x, y, z. Images of marine_acoustic_msgs are in a frame of their own: z ahead in the middle of the fan, x up, so y to
-starboard.
+and sonard w, x, y, z. oculus_sonar_driver's images (marine_acoustic_msgs) are in a frame of their own: z ahead in the middle of
+the fan, y to port, so x down.
 """
 from __future__ import annotations
 
 import json
 import math
-from typing import Any, Dict, Optional, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 Vector3 = Tuple[float, float, float]
 Quaternion = Tuple[float, float, float, float]  # w, x, y, z
@@ -59,21 +59,16 @@ def enu_flu_from_ned_frd(q: Quaternion) -> Quaternion:
 
 
 def flu_from_image(v: Sequence[float]) -> Vector3:
-    """From the frame of marine_acoustic_msgs' images to sonard's sonar frame (x ahead, y to port, z up)."""
-    return v[2], -v[1], v[0]
+    """From the frame of oculus_sonar_driver's images to sonard's sonar frame (x ahead, y to port, z up)."""
+    return v[2], v[1], -v[0]
 
 
 def image_from_flu(v: Sequence[float]) -> Vector3:
-    return v[2], -v[1], v[0]
-
-
-def beam_direction(azimuth_rad: float) -> Vector3:
-    """Of a beam, azimuth positive to port, in the frame of marine_acoustic_msgs."""
-    return image_from_flu((math.cos(azimuth_rad), math.sin(azimuth_rad), 0.0))
+    return -v[2], v[1], v[0]
 
 
 # The image frame in the sonar's: a static transform from the sonar's FLU frame to its image frame has this rotation, x, y, z, w.
-IMAGE_IN_FLU_XYZW = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+IMAGE_IN_FLU_XYZW = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 
 
 def json_line(position: Sequence[float], orientation: Quaternion, stamp_s: Optional[float] = None, vehicle: str = "",
@@ -108,9 +103,44 @@ def vehicle_in(status: Dict[str, Any], name: str) -> "Optional[Tuple[Vector3, Qu
     return position, (float(turn.get("w", 0)), float(turn.get("x", 0)), float(turn.get("y", 0)), float(turn.get("z", 0)))
 
 
+def stamp_ns(status: Dict[str, Any]) -> int:
+    """The daemon's time of a status; 0 where it states none."""
+    stated = status.get("now_ns", 0)
+    return int(stated) if isinstance(stated, int) or (isinstance(stated, str) and stated.isdigit()) else 0
+
+
 def endpoint(text: str, port: int) -> Tuple[str, int]:
     """host or host:port"""
     host, colon, number = text.partition(":")
-    if colon and not number.isdigit():
+    if not host or (colon and not (number.isascii() and number.isdigit() and 0 < int(number) < 65536)):
         raise ValueError(f"{text!r} is not host:port")
     return host, int(number) if colon else port
+
+
+def name_in_topic(sonar: str) -> str:
+    """A sonar's name as part of a topic: letters, digits and underscores, no digit first."""
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in sonar)
+    return "_" + name if name[:1].isdigit() else name
+
+
+class Scan(NamedTuple):
+    """Ranges at even angles, positive to port, from starboard to port, as sensor_msgs/LaserScan has them. inf: nothing is hit."""
+    first_rad: float
+    step_rad: float
+    range_m: List[float]
+
+
+def scan_of(azimuth_rad: Sequence[float], range_m: Sequence[float]) -> Scan:
+    """Each angle takes what the nearest beam hits. Beams fall from port to starboard; a range of 0 is no hit."""
+    if not 2 <= len(azimuth_rad) == len(range_m):
+        raise Unusable(f"{len(range_m)} ranges of {len(azimuth_rad)} beams are not a scan")
+    beams = sorted(zip(azimuth_rad, range_m))
+    first, last = beams[0][0], beams[-1][0]
+    step = (last - first) / (len(beams) - 1)
+    ranges, at = [], 0
+    for i in range(len(beams)):
+        angle = first + i * step
+        while at + 1 < len(beams) and abs(beams[at + 1][0] - angle) <= abs(beams[at][0] - angle):
+            at += 1
+        ranges.append(beams[at][1] or math.inf)
+    return Scan(first, step, ranges)

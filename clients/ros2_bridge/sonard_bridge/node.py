@@ -1,55 +1,109 @@
-"""The node: one source of poses in, to sonard by UDP; and, if wished, the pose that sonard uses as a topic."""
+"""The node: one source of poses in, to sonard by UDP; and, if wished, what sonard knows as topics. The executor's thread sends
+poses and waits for nothing; what is requested of sonard arrives in threads of its own."""
 from __future__ import annotations
 
-import json
+import array
+import math
 import socket
-import urllib.request
+import sys
+import time
+from typing import Dict, Optional, Tuple
 
 import rclpy
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from tf2_ros import Buffer, TransformException, TransformListener
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan, PointCloud2, PointField
+from tf2_ros import Buffer, StaticTransformBroadcaster, TransformException, TransformListener
 
-from .conversions import Unusable, endpoint, json_line, stamp_s, vehicle_in, wxyz, xyzw
+from . import live_view
+from .conversions import Unusable, json_line, name_in_topic, scan_of, stamp_ns, stamp_s, vehicle_in, wxyz, xyzw
+from .parameters import PARAMETERS, BadParameter, checked
+from .polling import StatusPoll
 
-JSON_PORT, HTTP_PORT = 14771, 8088
+SAME = 1e-6  # of a mount: metres, and parts of a quaternion
+
+
+def set_stamp(stamp, ns: int) -> None:
+    stamp.sec, stamp.nanosec = divmod(ns, 10**9)
+
+
+def is_same(a: live_view.Transform, b: live_view.Transform) -> bool:
+    return a.parent == b.parent and all(
+        abs(x - y) <= SAME for x, y in zip((*a.position, *a.orientation), (*b.position, *b.orientation)))
 
 
 class Bridge(Node):
-    """Exactly one of the parameters odometry, pose, and the pair tf_parent and tf_child says where poses come from."""
+    """One of the parameters odometry, pose, and the pair tf_parent and tf_child says where poses come from."""
 
     def __init__(self) -> None:
         super().__init__("sonard_bridge")
-        text = {name: str(self.declare_parameter(name, default).value) for name, default in
-                (("odometry", ""), ("pose", ""), ("tf_parent", ""), ("tf_child", ""), ("vehicle", ""),
-                 ("sonard", f"127.0.0.1:{JSON_PORT}"), ("http", f"127.0.0.1:{HTTP_PORT}"), ("truth", "~/vehicle_pose"))}
-        self.vehicle = text["vehicle"]
-        self.use_stamps = bool(self.declare_parameter("use_stamps", True).value)
-        tf_rate_hz = float(self.declare_parameter("tf_rate_hz", 50.0).value)
-        truth_rate_hz = float(self.declare_parameter("truth_rate_hz", 0.0).value)
-        sources = [name for name in ("odometry", "pose", "tf_child") if text[name]]
-        if len(sources) != 1 or bool(text["tf_parent"]) != bool(text["tf_child"]):
-            raise ValueError("set one of the parameters odometry, pose, or tf_parent with tf_child")
+        given = {p.name: self.declare_parameter(p.name, p.default, ParameterDescriptor(description=p.meaning, read_only=True,
+                                                                                      dynamic_typing=True)).value
+                 for p in PARAMETERS}
+        self.settings = wanted = checked(given)
+        self.vehicle, self.use_stamps = wanted["vehicle"], wanted["use_stamps"]
+        self.helpers = []  # threads
+        self.warned: Dict[str, float] = {}  # when, by kind
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.connect(endpoint(text["sonard"], JSON_PORT))
-        if text["odometry"]:
-            self.create_subscription(Odometry, text["odometry"], self.on_odometry, qos_profile_sensor_data)
-        elif text["pose"]:
-            self.create_subscription(PoseStamped, text["pose"], self.on_pose, qos_profile_sensor_data)
-        else:
-            self.frames = text["tf_parent"], text["tf_child"]
-            self.last_tf = None
+        self.socket.setblocking(False)
+        try:
+            self.socket.connect(wanted["sonard"])
+        except OSError as error:
+            self.socket.close()
+            raise BadParameter("sonard", f"{wanted['sonard'][0]} is not an address: {error.strerror or error}") from None
+        if wanted["odometry"]:
+            self.create_subscription(Odometry, wanted["odometry"], self.on_odometry, qos_profile_sensor_data)
+        elif wanted["pose"]:
+            self.create_subscription(PoseStamped, wanted["pose"], self.on_pose, qos_profile_sensor_data)
+        elif wanted["tf_child"]:
+            self.frames = wanted["tf_parent"], wanted["tf_child"]
+            self.last_tf: Optional[Tuple[int, int]] = None
             self.buffer = Buffer()
             self.listener = TransformListener(self.buffer, self)
-            self.create_timer(1 / tf_rate_hz, self.on_tf)
-        if truth_rate_hz > 0:
-            host, port = endpoint(text["http"], HTTP_PORT)
-            self.status_url = f"http://{host}:{port}/api/v1/status"
-            self.truth = self.create_publisher(PoseStamped, text["truth"], 10)
-            self.create_timer(1 / truth_rate_hz, self.on_truth)
-        self.get_logger().info(f"poses from {text[sources[0]]} to sonard at {text['sonard']}")
+            self.create_timer(1 / wanted["tf_rate_hz"], self.on_tf)
+        source = wanted["odometry"] or wanted["pose"] or wanted["tf_child"]
+        if wanted["truth_rate_hz"]:
+            self.truth = self.create_publisher(PoseStamped, wanted["truth"], 10)
+            self.helpers.append(StatusPoll(wanted["http"], wanted["token"], wanted["truth_rate_hz"],
+                                           self.while_running(self.on_status), self.warn))
+        if any(wanted[name] for name in ("tf_static", "clouds", "scans", "clock")):
+            self.look()
+        for helper in self.helpers:
+            helper.start()
+        to = "{}:{}".format(*wanted["sonard"])
+        self.get_logger().info(f"poses from {source} to sonard at {to}" if source else "no poses are sent: no source is set")
+
+    def close(self) -> None:
+        for helper in self.helpers:
+            helper.stop()
+        for helper in self.helpers:
+            if helper.is_alive():
+                helper.join(2.0)
+        self.socket.close()
+
+    def warn(self, text: str) -> None:
+        """One in 5 s of those that begin alike, up to the first colon."""
+        kind, now = text.partition(":")[0], time.monotonic()
+        if self.context.ok() and now - self.warned.get(kind, -math.inf) >= 5:
+            self.warned[kind] = now
+            self.get_logger().warning(text)
+
+    def while_running(self, call):
+        """For a helper's thread, which may publish while the context ends."""
+        def guarded(*arguments):
+            try:
+                call(*arguments)
+            except Exception:  # rclpy's own classes differ between releases
+                if self.context.ok():
+                    raise
+        return guarded
+
+    # ---- poses to sonard
 
     def send(self, header, position, orientation, velocity=None) -> None:
         stamp = stamp_s(header.stamp.sec, header.stamp.nanosec) if self.use_stamps else None
@@ -58,9 +112,11 @@ class Bridge(Node):
                                        wxyz((orientation.x, orientation.y, orientation.z, orientation.w)), stamp, self.vehicle,
                                        None if velocity is None else (velocity.x, velocity.y, velocity.z)))
         except Unusable as error:
-            self.get_logger().warning(f"left out: {error}", throttle_duration_sec=5.0)
+            self.warn(f"left out: {error}")
+        except BlockingIOError:
+            pass  # the next pose is newer
         except OSError as error:
-            self.get_logger().warning(f"sonard does not listen: {error}", throttle_duration_sec=5.0)
+            self.warn(f"sonard does not listen: {error}")
 
     def on_odometry(self, message: Odometry) -> None:
         self.send(message.header, message.pose.pose.position, message.pose.pose.orientation, message.twist.twist.linear)
@@ -72,39 +128,132 @@ class Bridge(Node):
         try:
             found = self.buffer.lookup_transform(*self.frames, rclpy.time.Time())
         except TransformException as error:
-            self.get_logger().warning(f"no transform yet: {error}", throttle_duration_sec=5.0)
+            self.warn(f"no transform yet: {error}")
             return
         stamp = found.header.stamp.sec, found.header.stamp.nanosec
-        if stamp != self.last_tf:  # the newest one, once
-            self.last_tf = stamp
-            self.send(found.header, found.transform.translation, found.transform.rotation)
-
-    def on_truth(self) -> None:
-        try:
-            with urllib.request.urlopen(self.status_url, timeout=1.0) as answer:
-                found = vehicle_in(json.load(answer), self.vehicle)
-        except (OSError, ValueError) as error:
-            self.get_logger().warning(f"no status of sonard: {error}", throttle_duration_sec=5.0)
+        if stamp == (0, 0):  # static transforms alone have no time: one of now, so that the vehicle does not become stale
+            set_stamp(found.header.stamp, self.get_clock().now().nanoseconds)
+        elif stamp == self.last_tf:  # the newest one, once
             return
+        self.last_tf = stamp
+        self.send(found.header, found.transform.translation, found.transform.rotation)
+
+    # ---- what sonard knows, as topics
+
+    def on_status(self, status) -> None:
+        found = vehicle_in(status, self.vehicle)
         if found is None:
-            self.get_logger().warning("sonard's status has no such vehicle; set the parameter vehicle", throttle_duration_sec=5.0)
+            self.warn("sonard's status has no such vehicle; set the parameter vehicle")
             return
         message = PoseStamped()
         message.header.frame_id = "world"
-        message.header.stamp = self.get_clock().now().to_msg()
+        set_stamp(message.header.stamp, stamp_ns(status))
         p, q = message.pose.position, message.pose.orientation
         p.x, p.y, p.z = found[0]
         q.x, q.y, q.z, q.w = xyzw(found[1])
         self.truth.publish(message)
 
+    def look(self) -> None:
+        wanted = self.settings
+        self.mounts: Dict[str, live_view.Transform] = {}
+        self.of_sonars = {}  # publishers, by topic
+        self.last_clock_ns = -1
+        if wanted["tf_static"]:
+            self.static = StaticTransformBroadcaster(self)  # latched: late listeners get the last one
+        if wanted["clock"]:
+            self.clock_topic = self.create_publisher(Clock, "/clock", 10)
+        endings = [ending for name, ending in (("clouds", "/cloud"), ("scans", "/truth")) if wanted[name]]
+        self.view = live_view.LiveView(wanted["http"], wanted["token"],
+                                       lambda topic: topic == "/tf" or any(topic.endswith(ending) for ending in endings),
+                                       self.while_running(self.on_view), self.warn,
+                                       wanted["cloud_threshold"] if wanted["clouds"] else None)
+        self.helpers.append(self.view)
 
-def main() -> None:
+    def on_view(self, topic: str, ns: int, payload: bytes) -> None:
+        """In the view's thread."""
+        if self.settings["clock"] and (topic == "" or ns > self.last_clock_ns):  # stamps of pings are older than the time
+            self.on_time(ns)
+        if topic == "/tf" and self.settings["tf_static"]:
+            self.on_mounts(live_view.transforms(payload))
+        elif topic.endswith("/cloud"):
+            self.on_cloud(topic, live_view.cloud(payload))
+        elif topic.endswith("/truth"):
+            self.on_truth(topic, live_view.truth(payload))
+
+    def on_time(self, ns: int) -> None:
+        if self.view.clock not in ("stepped", "lockstep"):
+            self.warn(f"no /clock: sonard's clock is {self.view.clock or 'not known'}, not stepped or lockstep")
+        elif ns != self.last_clock_ns:
+            self.last_clock_ns = ns
+            message = Clock()
+            set_stamp(message.clock, ns)
+            self.clock_topic.publish(message)
+
+    def on_mounts(self, transforms) -> None:
+        now = {t.child: t for t in transforms if t.parent != "world" and self.vehicle in ("", t.parent)}
+        if now.keys() == self.mounts.keys() and all(is_same(now[name], self.mounts[name]) for name in now):
+            return
+        self.mounts = now
+        base = self.settings["base_frame"] or self.settings["tf_child"]
+        base = base if len({t.parent for t in now.values()}) == 1 else ""
+        messages = []
+        for t in now.values():
+            message = TransformStamped()
+            set_stamp(message.header.stamp, t.stamp_ns)
+            message.header.frame_id = base or t.parent
+            message.child_frame_id = t.child
+            place, turn = message.transform.translation, message.transform.rotation
+            place.x, place.y, place.z = t.position
+            turn.x, turn.y, turn.z, turn.w = xyzw(t.orientation)
+            messages.append(message)
+        self.static.sendTransform(messages)
+
+    def publisher_of(self, kind, topic: str, ending: str):
+        name = f"~/{name_in_topic(topic.split('/')[1])}/{ending}"
+        if name not in self.of_sonars:
+            self.of_sonars[name] = self.create_publisher(kind, name, 5)
+        return self.of_sonars[name]
+
+    def on_cloud(self, topic: str, cloud: live_view.Cloud) -> None:
+        message = PointCloud2()
+        set_stamp(message.header.stamp, cloud.stamp_ns)
+        message.header.frame_id = cloud.frame
+        message.height, message.width = 1, len(cloud.data) // cloud.stride
+        message.fields = [PointField(name=name, offset=offset, datatype=kind, count=1) for name, offset, kind in cloud.columns]
+        message.is_bigendian, message.is_dense = False, True
+        message.point_step, message.row_step = cloud.stride, cloud.stride * message.width
+        message.data = array.array("B", cloud.data[:message.row_step])
+        self.publisher_of(PointCloud2, topic, "cloud").publish(message)
+
+    def on_truth(self, topic: str, truth: live_view.Truth) -> None:
+        try:
+            scan = scan_of(truth.azimuth_rad, truth.range_m)
+        except Unusable:
+            return  # of one beam
+        message = LaserScan()
+        set_stamp(message.header.stamp, truth.stamp_ns)
+        message.header.frame_id = topic.split("/")[1]
+        message.angle_min, message.angle_increment = scan.first_rad, scan.step_rad
+        message.angle_max = scan.first_rad + scan.step_rad * (len(scan.range_m) - 1)
+        message.range_min, message.range_max = truth.nearest_m, truth.furthest_m
+        message.ranges = scan.range_m
+        self.publisher_of(LaserScan, topic, "scan").publish(message)
+
+
+def main() -> int:
     rclpy.init()
-    node = Bridge()
+    node = None
     try:
+        node = Bridge()
         rclpy.spin(node)
-    except KeyboardInterrupt:
-        node.get_logger().info("ends")
+    except BadParameter as error:
+        print(f"sonard_bridge: {error}", file=sys.stderr)
+        return 2
+    except (KeyboardInterrupt, ExternalShutdownException):  # Ctrl-C; SIGTERM, as systemd and containers send it
+        pass
     finally:
-        node.destroy_node()
+        if node is not None:
+            node.close()
+            node.destroy_node()
         rclpy.try_shutdown()
+    return 0

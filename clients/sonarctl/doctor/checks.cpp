@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/text/format.hpp"
+#include "core/text/ipv4.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -47,15 +48,51 @@ bool reserves(const std::string& list, int port) {
   return false;
 }
 
+bool has_come(const StatusFacts& status, const std::string& host) {
+  return std::any_of(status.received.begin(), status.received.end(),
+                     [&host](const ReceivedStatus& r) { return r.advertised == host || r.from == host; });
+}
+
 }  // namespace
 
 std::vector<Finding> run_checks(const Facts& facts) {
   std::vector<Finding> findings;
   for (const SonarFacts& sonar : facts.sonars) check_sonar(facts, sonar, findings);
   check_identities(facts.status, findings);
+  check_networks(facts, findings);
   check_daemon(facts, findings);
   check_ports(facts, findings);
   return findings;
+}
+
+/// What a make sends to all, and how a driver behind a router, a NAT or a bridge gets it: by the kinds of its ports.
+void check_networks(const Facts& facts, std::vector<Finding>& findings) {
+  using Kind = protocol::Port::Kind;
+  for (const SonarFacts& sonar : facts.sonars) {
+    if (!sonar.unresolved.empty() || sonar.at.host.starts_with("127.")) continue;
+    const bool is_routed = !sonar.on_this_host && !sonar.in_our_network;
+    if (!is_routed && facts.machine == Machine::ordinary) continue;
+    std::string lost, instead;
+    const auto add = [&](const std::string& what, const std::string& how) {
+      lost += (lost.empty() ? "" : ", ") + what, instead += (instead.empty() ? "" : "; ") + how;
+    };
+    for (const protocol::Port& port : sonar.make->device->ports()) {
+      const std::string number = std::to_string(port.number);
+      const bool passes = is_routed && has_come(facts.status, sonar.at.host);
+      if (port.kind == Kind::udp_beacon && !passes)
+        add("its status to udp " + number, "name the driver's computer in status_to of the sonar");
+      if (port.kind == Kind::udp_stream && port.group.port != 0)
+        add("pings to " + text::format_ipv4(port.group.ip) + ":" + std::to_string(port.group.port),
+            "let the driver request pings to its own address instead of the group");
+      if (port.kind == Kind::udp_answer) add("searches at udp " + number, "give the driver the address " + sonar.at.host);
+    }
+    if (lost.empty()) continue;
+    const char* const where = is_routed                        ? "in another network"
+                              : facts.machine == Machine::wsl2 ? "reached by way of this WSL2 machine"
+                                                               : "reached by way of this container";
+    findings.push_back({is_routed ? Level::warn : Level::ok, "network",
+                        sonar.at.host + " is " + where + ": broadcasts and multicasts may not pass (" + lost + ")", instead});
+  }
 }
 
 /// The ports of the examined sonars, whatever their makes.

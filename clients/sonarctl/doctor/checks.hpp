@@ -18,6 +18,7 @@ std::vector<Finding> run_checks(const Facts& facts);
 void check_sonar(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings);
 void check_daemon(const Facts& facts, std::vector<Finding>& findings);
 void check_ports(const Facts& facts, std::vector<Finding>& findings);
+void check_networks(const Facts& facts, std::vector<Finding>& findings);
 
 /// "ok    text" or "warn  text; cure"; lines end with a newline, the last is "5 checks, 0 errors, 1 warning".
 std::string text_from(const std::vector<Finding>& findings);

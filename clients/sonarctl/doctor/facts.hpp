@@ -64,6 +64,7 @@ struct SonarFacts {
   std::string name;        // from the control stream; empty = not known
   std::string unresolved;  // why its name has no address
   bool on_this_host = false;
+  bool in_our_network = true;                       // at an address that an interface reaches without a router
   bool out_of_time = false;                         // not examined, for lack of time
   std::vector<std::string> clients;                 // connected already, before us
   std::vector<PortHolder> listeners;                // of its port, on this computer
@@ -109,8 +110,12 @@ struct KernelPorts {
   std::string reserved;   // "52100,52102" or with ranges
 };
 
+/// The kind of machine doctor runs on, as far as networks in front of it pass no broadcast.
+enum class Machine { ordinary, wsl2, container };
+
 struct Facts {
   bool address_given = false;
+  Machine machine = Machine::ordinary;
   std::vector<SonarFacts> sonars;
   StatusFacts status;
   ControlFacts control;

@@ -49,6 +49,7 @@ class Gathering {
     listen_to_all();
     heads.receive_answers(facts_.heads, Steady::now());
     facts_.kernel_ports = kernel_ports();
+    facts_.machine = this_machine();
     return std::move(facts_);
   }
 
@@ -190,6 +191,7 @@ class Gathering {
     }
     sonar.at.host = *ip;
     sonar.on_this_host = is_on_this_host(*ip);
+    sonar.in_our_network = is_in_our_network(*ip);
     for (const SocketLine& socket : sockets) {
       const bool here = socket.local_host == *ip || socket.local_host == "0.0.0.0" || socket.local_host == "[::]";
       if (sonar.on_this_host && here && socket.state == listening && socket.local_port == sonar.at.port)

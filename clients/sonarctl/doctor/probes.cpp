@@ -11,6 +11,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 #include "clients/sonarctl/doctor/proc_net.hpp"
@@ -64,6 +65,24 @@ std::string line_of(const std::string& file) {
   return line;
 }
 
+/// Of that address, or of its network.
+bool has_interface(const std::string& ipv4, bool same_network) {
+  const auto asked = address_of({ipv4, 0});
+  ifaddrs* interfaces = nullptr;
+  if (!asked || ::getifaddrs(&interfaces) != 0) return false;
+  bool found = false;
+  for (const ifaddrs* i = interfaces; i != nullptr && !found; i = i->ifa_next) {
+    if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET) continue;
+    sockaddr_in address{}, mask{};
+    std::memcpy(&address, i->ifa_addr, sizeof address);
+    mask.sin_addr.s_addr = ~in_addr_t{0};
+    if (same_network && i->ifa_netmask != nullptr) std::memcpy(&mask, i->ifa_netmask, sizeof mask);
+    found = ((address.sin_addr.s_addr ^ asked->sin_addr.s_addr) & mask.sin_addr.s_addr) == 0;
+  }
+  ::freeifaddrs(interfaces);
+  return found;
+}
+
 }  // namespace
 
 std::chrono::milliseconds left_until(Steady::time_point deadline) {
@@ -87,20 +106,14 @@ Result<std::string> ipv4_of(const std::string& host) {
   return std::string(text);
 }
 
-bool is_on_this_host(const std::string& ipv4) {
-  if (ipv4.starts_with("127.")) return true;
-  const auto asked = address_of({ipv4, 0});
-  ifaddrs* interfaces = nullptr;
-  if (!asked || ::getifaddrs(&interfaces) != 0) return false;
-  bool found = false;
-  for (const ifaddrs* i = interfaces; i != nullptr && !found; i = i->ifa_next) {
-    if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET) continue;
-    sockaddr_in address{};
-    std::memcpy(&address, i->ifa_addr, sizeof address);
-    found = address.sin_addr.s_addr == asked->sin_addr.s_addr;
-  }
-  ::freeifaddrs(interfaces);
-  return found;
+bool is_on_this_host(const std::string& ipv4) { return ipv4.starts_with("127.") || has_interface(ipv4, false); }
+bool is_in_our_network(const std::string& ipv4) { return ipv4.starts_with("127.") || has_interface(ipv4, true); }
+
+Machine this_machine() {
+  if (line_of("/proc/sys/kernel/osrelease").find("WSL2") != std::string::npos) return Machine::wsl2;
+  std::error_code ec;
+  const bool is_container = std::filesystem::exists("/.dockerenv", ec) || std::filesystem::exists("/run/.containerenv", ec);
+  return is_container ? Machine::container : Machine::ordinary;
 }
 
 StatusListener::StatusListener(const Endpoint& on) {

@@ -17,6 +17,9 @@ std::chrono::milliseconds left_until(Steady::time_point deadline);
 Result<std::string> ipv4_of(const std::string& host);
 /// All of 127.0.0.0/8, and the addresses of the interfaces.
 bool is_on_this_host(const std::string& ipv4);
+/// At an address that an interface reaches without a router.
+bool is_in_our_network(const std::string& ipv4);
+Machine this_machine();
 
 /// Receives status messages and sorts them, also those that arrive during other queries.
 class StatusListener {

@@ -106,6 +106,8 @@ ViewPayloadPointer geometry_payload(const Ping& ping) {
   return view_payload(ping.request.fired_at, foxglove::geometry(ping, static_cast<std::uint32_t>(ping.request.number)));
 }
 
+ViewPayloadPointer truth_payload(const Ping& ping) { return view_payload(ping.request.fired_at, foxglove::truth(ping)); }
+
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping) {
   const PingSettings& s = ping.request.settings;
   const double half_height = static_cast<double>(ping.mode().pattern.elevation_width_rad) / 2;

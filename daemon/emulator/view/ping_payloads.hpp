@@ -19,6 +19,8 @@ using PingPointer = std::shared_ptr<const Ping>;
 // Stamped with the ping's firing; `sonar` is its frame.
 ViewPayloadPointer image_payload(const std::string& sonar, const PingPointer& ping);
 ViewPayloadPointer geometry_payload(const Ping& ping);
+/// Of a ping with ground truth.
+ViewPayloadPointer truth_payload(const Ping& ping);
 /// The edges of the volume that the beams cover, to the end of the range.
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);
 /// Gray, without rings.

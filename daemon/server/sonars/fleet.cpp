@@ -178,8 +178,9 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
 // ---- pings and clients, passed on to the simulator, recordings and events
 
 void Fleet::compute(const Device& of, PingRequest request, Simulator::Done done) {
-  request.switches.keep_truth = recordings_.wants_truth(of.config().name);
-  request.switches.keep_labels = recordings_.wants_labels(of.config().name);
+  const std::string& name = of.config().name;
+  request.switches.keep_truth = recordings_.wants_truth(name) || (tap_wants_truth_ && tap_wants_truth_(name));
+  request.switches.keep_labels = recordings_.wants_labels(name);
   computed_names_[of.sonar().index()] = recordings_.names();
   simulator_.submit(std::move(request), std::move(done));
 }

@@ -54,7 +54,12 @@ class Fleet final : public DeviceParent {
   const Device* find(const std::string& name) const { return const_cast<Fleet*>(this)->find(name); }
   /// `tap` gets each ping when it is queued to clients, as recordings do; empty = none.
   using PingTap = std::function<void(const Device& of, const PingQueued& ping)>;
-  void tap_pings(PingTap tap) { tap_ = std::move(tap); }
+  /// Whether the tap wants the ground truth of that sonar's next ping.
+  using WantsTruth = std::function<bool(const std::string& sonar)>;
+  void tap_pings(PingTap tap, WantsTruth wants_truth = {}) {
+    tap_ = std::move(tap);
+    tap_wants_truth_ = std::move(wants_truth);
+  }
   /// Of a Preview: neither drivers nor recordings hear of it.
   void compute_preview(PingRequest request, Simulator::Done done) { simulator_.submit(std::move(request), std::move(done)); }
   bool gone() const;  // after stop(): nothing is left
@@ -95,6 +100,7 @@ class Fleet final : public DeviceParent {
   Events& events_;
   Handlers handlers_;
   PingTap tap_;
+  WantsTruth tap_wants_truth_;
   std::map<std::uint32_t, std::shared_ptr<const SceneNames>> computed_names_;  // by index: of the scene its ping is computed in
   std::list<Device> devices_;                                                  // in the configuration's order
   std::list<Retired> retired_;

@@ -77,7 +77,8 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
   if (!no_playback.empty()) viewer.say_status(foxglove::StatusLevel::warning, no_playback);
   if (const auto watch = watches_.find(viewer.playback()); watch != watches_.end())
     viewer.say_frame(foxglove::playback_frame(watch->second.state(of_.clock.now())));
-  of_.fleet.tap_pings([this](const Device& of, const PingQueued& queued) { on_ping(of, queued); });
+  of_.fleet.tap_pings([this](const Device& of, const PingQueued& queued) { on_ping(of, queued); },
+                      [this](const std::string& sonar) { return wants_truth(sonar); });
   of_.log.info("viewer connected", {{"from", viewer.who()}, {"steers", viewer.may_steer() ? "yes" : "no"}});
   arm();
 }
@@ -208,6 +209,11 @@ ViewFeed::SonarView* ViewFeed::find(const std::string& name) {
   return found == sonars_.end() ? nullptr : &*found;
 }
 
+bool ViewFeed::wants_truth(const std::string& sonar) {
+  const SonarView* const found = find(sonar);
+  return found != nullptr && wanted(found->truth);
+}
+
 /// Sonars come and go with the configuration.
 void ViewFeed::sync_sonars() {
   const auto& devices = of_.fleet.devices();
@@ -228,6 +234,7 @@ void ViewFeed::sync_sonars() {
     sonar.fan.channel = add_channel("/" + name + "/fan", "foxglove.RawImage", ChannelKind::picture, fan_hz);
     sonar.cloud.channel = add_channel("/" + name + "/cloud", "foxglove.PointCloud", ChannelKind::picture, cloud_hz);
     sonar.cloud.threshold = "/" + name + "/view/cloud_threshold";
+    sonar.truth = add_channel("/" + name + "/truth", "sonar.v1.PingTruth", ChannelKind::last_value, image_hz);
     sonar.figures = add_channel("/" + name + "/figures", "", ChannelKind::event, ping_hz);
     channels_.at(sonar.figures).advertised.encoding = "cdr";
     channels_.at(sonar.figures).advertised.schema = foxglove::figures_schema();
@@ -242,8 +249,8 @@ void ViewFeed::sync_sonars() {
 }
 
 void ViewFeed::remove(const SonarView& sonar) {
-  const std::vector<std::uint32_t> gone{sonar.image,   sonar.geometry,    sonar.ping,
-                                        sonar.figures, sonar.fan.channel, sonar.cloud.channel};
+  const std::vector<std::uint32_t> gone{sonar.image, sonar.geometry,    sonar.ping,         sonar.figures,
+                                        sonar.truth, sonar.fan.channel, sonar.cloud.channel};
   for (const std::uint32_t id : gone) channels_.erase(id);
   session_ = session_.substr(0, session_.find('-')) + "-" + std::to_string(++sessions_);
   each([&](ViewConnection& c) {

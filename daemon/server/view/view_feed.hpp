@@ -78,7 +78,7 @@ class ViewFeed final : public ViewerHost {
   };
   struct SonarView {
     std::string name;
-    std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0;
+    std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0, truth = 0;
     Slow fan{}, cloud{};
     std::shared_ptr<const Ping> last = nullptr;
     ViewPayloadPointer picture = nullptr;           // of last, once it was wanted
@@ -103,6 +103,7 @@ class ViewFeed final : public ViewerHost {
   std::uint32_t add_channel(const std::string& topic, const std::string& schema, ViewChannel::Kind kind, double most_hz = 0);
   void remove(const SonarView& sonar);
   SonarView* find(const std::string& name);
+  bool wants_truth(const std::string& sonar);
   bool wanted(std::uint32_t channel) const;
   std::weak_ptr<ViewConnection> connection_of(const Viewer& viewer) const;
   void offer(std::uint32_t channel, const ViewPayloadPointer& payload);

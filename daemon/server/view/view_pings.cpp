@@ -26,6 +26,7 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   offer(sonar->image, sonar->picture);
   if (wanted(sonar->ping)) offer(sonar->ping, ping_payload(of, queued));
   if (wanted(sonar->figures)) offer(sonar->figures, figures_payload(of, queued));
+  if (wanted(sonar->truth) && !ping.truth.empty()) offer(sonar->truth, truth_payload(ping));
   if (wanted(tf_)) offer(tf_, places());
   if (wanted(swath_)) {
     const PingSettings& s = ping.request.settings;

@@ -156,6 +156,24 @@ TEST(FoxgloveMessages, CloudsAndGeometry) {
   EXPECT_EQ(shape["azimuth_rad"], R"([0.5, 0.0, -0.5])"_json);
 }
 
+TEST(FoxgloveMessages, TheTruthOfEachBeam) {
+  const auto ping = ping_of(8);
+  ping->request.fired_at = at;
+  ping->request.number = PingNumber{7};
+  ping->request.settings.range_m = 12;
+  ping->truth = {{3.5f, 2}, {}, {4.25f, 0}};  // the second beam hits nothing
+  const json read = read_back("sonar.v1.PingTruth", truth(*ping));
+  EXPECT_EQ(read["timestamp"], "1970-01-01T00:00:01.500Z");
+  EXPECT_EQ(read["number"], 7);
+  EXPECT_EQ(read["azimuth_rad"], R"([0.5, 0.0, -0.5])"_json);
+  EXPECT_EQ(read["range_m"], R"([3.5, 0.0, 4.25])"_json);
+  EXPECT_EQ(read["range_end_m"], 12.0);
+  const auto later = [](Time was) { return was + std::chrono::hours(1); };
+  const Bytes shifted = with_stamps({1, "/x", "protobuf", {"sonar.v1.PingTruth", "protobuf", ""}}, truth(*ping), later);
+  ping->request.fired_at = later(at);
+  EXPECT_EQ(shifted, truth(*ping));
+}
+
 TEST(FoxgloveMessages, StampsMayBeOthers) {
   const auto later = [](Time was) { return was + std::chrono::hours(1); };
   const auto of = [](const char* schema) { return Channel{1, "/x", "protobuf", {schema, "protobuf", ""}}; };

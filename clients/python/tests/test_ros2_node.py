@@ -1,0 +1,381 @@
+"""The node of the ROS 2 bridge and its launch files, with stand-ins for ROS: poses, whatever else is slow; parameters; the end."""
+import contextlib
+import http.server
+import importlib.util
+import io
+import json
+import math
+import pathlib
+import socket
+import sys
+import tempfile
+import threading
+import unittest
+from unittest import mock
+
+from ros_stand_ins import BRIDGE, ExternalShutdown, Message, Ros, launch_modules
+
+from sonard_bridge import polling
+from sonard_bridge.live_view import Transform
+from sonard_bridge.parameters import PARAMETERS, BadParameter, checked
+
+HALF = math.sqrt(0.5)
+PATIENCE_S = 60
+STATUS = {"now_ns": "7500000000", "vehicles": [{"name": "rov", "position": {"x": 1, "z": -3}, "orientation": {"w": 1}}]}
+
+
+def pose(sec=3, nanosec=500000000, x=1.0, w=HALF):
+    of = Message
+    return of(header=of(stamp=of(sec=sec, nanosec=nanosec)),
+              pose=of(position=of(x=x, y=2.0, z=-3.0), orientation=of(x=0.0, y=0.0, z=HALF, w=w)))
+
+
+def odometry(**given):
+    of, stamped = Message, pose(**given)
+    return of(header=stamped.header, pose=of(pose=stamped.pose), twist=of(twist=of(linear=of(x=1.0, y=0.0, z=0.0))))
+
+
+def transform(sec, nanosec):
+    stamped = pose(sec, nanosec)
+    return Message(header=stamped.header, transform=Message(translation=stamped.pose.position, rotation=stamped.pose.orientation))
+
+
+class SlowServer:
+    """Answers the status when it may; counts requests and answers, and keeps the last request's header."""
+
+    def __init__(self, may_answer=True):
+        outer = self
+        self.may_answer, self.asked, self.answered = threading.Event(), threading.Semaphore(0), 0
+        self.requests, self.header, self.token = 0, {}, ""
+        if may_answer:
+            self.may_answer.set()
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_GET(self):
+                outer.requests += 1
+                outer.header = dict(self.headers)
+                outer.asked.release()
+                outer.may_answer.wait(PATIENCE_S)
+                is_allowed = not outer.token or self.headers.get("Authorization") == "Bearer " + outer.token
+                body = json.dumps(STATUS if is_allowed else {}).encode()
+                with contextlib.suppress(OSError):
+                    self.send_response(200 if is_allowed else 401)
+                    self.send_header("Content-Length", str(len(body)))
+                    self.end_headers()
+                    self.wfile.write(body)
+                    outer.answered += 1
+
+            def log_message(self, *_):
+                pass
+
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.at = "127.0.0.1:%d" % self.server.server_port
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+
+    def close(self):
+        self.may_answer.set()
+        self.server.shutdown()
+        self.server.server_close()
+
+
+class WithNode(unittest.TestCase):
+    def setUp(self):
+        self.there = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.addCleanup(self.there.close)
+        self.there.bind(("127.0.0.1", 0))
+        self.there.settimeout(PATIENCE_S)
+
+    def bridge(self, **parameters):
+        """The surroundings of a node that sends its poses here."""
+        ros = Ros(**{"sonard": "127.0.0.1:%d" % self.there.getsockname()[1], **parameters})
+        module = ros.module()
+        node_module = module.__enter__()
+        self.addCleanup(module.__exit__, None, None, None)
+        ros.node = node_module.Bridge()
+        self.addCleanup(ros.node.close)
+        return ros
+
+    def server(self, **given):
+        server = SlowServer(**given)
+        self.addCleanup(server.close)
+        return server
+
+    def line(self):
+        return json.loads(self.there.recv(4096))
+
+    @staticmethod
+    def wait_for(found):
+        """What found() gives once it is something."""
+        for _ in range(100 * PATIENCE_S):
+            if found():
+                return found()
+            threading.Event().wait(0.01)
+        raise AssertionError("did not come")
+
+
+class Poses(WithNode):
+    def test_odometry_becomes_a_datagram(self):
+        ros = self.bridge(odometry="/odom", vehicle="rov")
+        (topic, call), = ros.subscribed.items()
+        self.assertEqual(topic, "/odom")
+        call(odometry())
+        line = self.line()
+        self.assertEqual((line["position"], line["timestamp"], line["vehicle"]), ([1, 2, -3], 3.5, "rov"))
+        self.assertAlmostEqual(line["velocity"][1], 1)
+        call(odometry(w=0.0))
+        self.assertIn("left out: orientation", ros.logged[-1])
+
+    def test_warnings_of_one_kind_do_not_hide_others(self):
+        ros = self.bridge(odometry="/odom")
+        for x in (math.nan, math.inf, math.nan):
+            ros.subscribed["/odom"](odometry(x=x))
+            ros.node.warn("no status of sonard: timed out")
+        self.assertEqual([text.partition(":")[0] for text in ros.logged[1:]], ["left out", "no status of sonard"])
+
+    def test_a_slow_answer_starves_no_pose(self):
+        server = self.server(may_answer=False)
+        with mock.patch.object(polling, "LIMIT_S", PATIENCE_S):
+            ros = self.bridge(odometry="/odom", truth_rate_hz=100.0, http=server.at)
+            self.assertTrue(server.asked.acquire(timeout=PATIENCE_S))
+            for i in range(600):  # as the executor does it: everything in one thread
+                for _, call in ros.timers:
+                    call()
+                ros.subscribed["/odom"](odometry(x=float(i)))
+                self.assertEqual(self.line()["position"][0], i)
+            self.assertEqual((server.requests, server.answered), (1, 0))
+            server.may_answer.set()
+            truth = self.wait_for(lambda: ros.published["~/vehicle_pose"])[0]
+        self.assertEqual((truth.pose.position.x, truth.pose.position.z, truth.pose.orientation.w), (1, -3, 1))
+        self.assertEqual((truth.header.frame_id, truth.header.stamp.sec, truth.header.stamp.nanosec), ("world", 7, 500000000))
+
+    def test_a_request_without_an_answer_ends(self):
+        server = self.server(may_answer=False)
+        with mock.patch.object(polling, "LIMIT_S", 0.05):
+            ros = self.bridge(odometry="/odom", truth_rate_hz=50.0, http=server.at)
+            self.wait_for(lambda: any("no status of sonard" in text for text in ros.logged))
+            self.wait_for(lambda: server.requests >= 3)
+
+    def test_a_closed_port_is_said(self):
+        ros = self.bridge(odometry="/odom", sonard="127.0.0.1:9")
+        def refused():
+            ros.subscribed["/odom"](odometry())
+            return [text for text in ros.logged if "does not listen" in text]
+        self.wait_for(refused)
+
+
+class Transforms(WithNode):
+    def test_a_transform_is_sent_when_it_is_new(self):
+        ros = self.bridge(tf_parent="map", tf_child="base_link", tf_rate_hz=20)
+        (period_s, tick), = ros.timers
+        self.assertEqual(period_s, 0.05)
+        tick()
+        self.assertIn("no transform yet", ros.logged[-1])
+        for nanosec in (1, 1, 2):
+            ros.transform = lambda nanosec=nanosec: transform(5, nanosec)
+            tick()
+        self.assertEqual([self.line()["timestamp"] for _ in range(2)], [5.000000001, 5.000000002])
+
+    def test_a_static_one_is_kept_fresh(self):
+        ros = self.bridge(tf_parent="map", tf_child="base_link")
+        (_, tick), = ros.timers
+        ros.transform = lambda: transform(0, 0)
+        for ns in (4_000_000_000, 4_020_000_000):
+            ros.now_ns = ns
+            tick()
+            self.assertEqual(self.line()["timestamp"], ns / 1e9)
+        ros.now_ns = 0  # simulation time that has not begun
+        tick()
+        self.assertNotIn("timestamp", self.line())
+
+
+class Mounts(WithNode):
+    def mount(self, child="front", parent="rov", x=0.3, turn=(1.0, 0.0, 0.0, 0.0)):
+        return Transform(2_500_000_000, parent, child, (x, 0.0, 0.0), turn)
+
+    def bridge(self, **parameters):
+        with mock.patch("sonard_bridge.live_view.LiveView.run"):
+            return super().bridge(tf_static=True, **parameters)
+
+    def test_they_are_sent_once_and_again_when_one_changes(self):
+        ros = self.bridge()
+        world = Transform(0, "world", "rov", (9.0, 9.0, 9.0), (1.0, 0.0, 0.0, 0.0))
+        for x in (0.3, 0.3 + 1e-9, 0.3):
+            ros.node.on_mounts([world, self.mount(x=x), self.mount("left")])
+        self.assertEqual(len(ros.static), 1)
+        (front, left), = ros.static
+        self.assertEqual((front.header.frame_id, front.child_frame_id, left.child_frame_id), ("rov", "front", "left"))
+        self.assertEqual((front.transform.translation.x, front.transform.rotation.w, front.transform.rotation.x), (0.3, 1, 0))
+        self.assertEqual((front.header.stamp.sec, front.header.stamp.nanosec), (2, 500000000))
+        ros.node.on_mounts([world, self.mount(turn=(HALF, 0.0, HALF, 0.0)), self.mount("left")])
+        self.assertEqual([m.child_frame_id for m in ros.static[1]], ["front", "left"])  # all: latched is the last message alone
+        self.assertEqual(ros.static[1][0].transform.rotation.y, HALF)
+
+    def test_their_parent(self):
+        both = [self.mount(), self.mount("mast", "boat")]
+        for parameters, wanted in (({"base_frame": "base_link"}, {"front": "rov", "mast": "boat"}),
+                                   ({"base_frame": "base_link", "vehicle": "rov"}, {"front": "base_link"}),
+                                   ({"tf_parent": "map", "tf_child": "hull", "vehicle": "boat"}, {"mast": "hull"})):
+            with self.subTest(parameters):
+                ros = self.bridge(**parameters)
+                ros.node.on_mounts(both)
+                self.assertEqual({m.child_frame_id: m.header.frame_id for m in ros.static[0]}, wanted)
+
+
+class TheClock(WithNode):
+    def test_stamps_of_messages_do_not_turn_it_back(self):
+        with mock.patch("sonard_bridge.live_view.LiveView.run"):
+            ros = self.bridge(clock=True)
+        ros.node.view.clock = "stepped"
+        for topic, ns in (("", 5), ("/tf", 3), ("/tf", 7), ("", 7), ("", 1)):  # the last one: sonard began anew
+            ros.node.on_view(topic, ns, b"")
+        self.assertEqual([m.clock.nanosec for m in ros.published["/clock"]], [5, 7, 1])
+        ros.node.view.clock = "follow"
+        ros.node.on_view("", 9, b"")
+        self.assertEqual(len(ros.published["/clock"]), 3)
+        self.assertIn("sonard's clock is follow", ros.logged[-1])
+
+
+class Token(WithNode):
+    def test_it_is_shown(self):
+        server = self.server()
+        server.token = "0123456789abcdef"
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "token"
+            file.write_text(server.token + "\n", encoding="utf-8")
+            ros = self.bridge(odometry="/odom", truth_rate_hz=100.0, http=server.at, token_file=str(file))
+        self.wait_for(lambda: ros.published["~/vehicle_pose"])
+
+    def test_that_one_is_missing_is_said(self):
+        server = self.server()
+        server.token = "0123456789abcdef"
+        ros = self.bridge(odometry="/odom", truth_rate_hz=100.0, http=server.at)
+        self.wait_for(lambda: any("set the parameter token_file" in text for text in ros.logged))
+
+
+class Parameters(unittest.TestCase):
+    @staticmethod
+    def given(**parameters):
+        return {**{p.name: p.default for p in PARAMETERS}, **parameters}
+
+    def test_values_that_yaml_typed(self):
+        values = checked(self.given(odometry="/odom", vehicle=1, tf_rate_hz=50, truth_rate_hz="1e1", http="10.0.0.1"))
+        self.assertEqual((values["vehicle"], values["tf_rate_hz"], values["truth_rate_hz"]), ("1", 50.0, 10.0))
+        self.assertEqual((values["sonard"], values["http"]), (("127.0.0.1", 14771), ("10.0.0.1", 8088)))
+        self.assertTrue(checked(self.given(tf_static=True)))  # no source is needed for what sonard knows
+
+    def test_wrong_ones_are_named(self):
+        for name, parameters in (("odometry", {}), ("pose", {"odometry": "/a", "pose": "/b"}), ("tf_child", {"tf_parent": "map"}),
+                                 ("tf_parent", {"tf_child": "base_link"}), ("vehicle", {"vehicle": True}),
+                                 ("vehicle", {"vehicle": 1e3}),
+                                 ("tf_rate_hz", {"tf_rate_hz": 0.0}), ("tf_rate_hz", {"tf_rate_hz": "fast"}),
+                                 ("tf_rate_hz", {"tf_rate_hz": True}), ("truth_rate_hz", {"truth_rate_hz": -1}),
+                                 ("truth_rate_hz", {"truth_rate_hz": math.inf}), ("cloud_threshold", {"cloud_threshold": 2}),
+                                 ("use_stamps", {"use_stamps": "yes"}), ("sonard", {"sonard": "127.0.0.1:x"}),
+                                 ("http", {"http": "127.0.0.1:99999"}), ("token_file", {"token_file": "/nowhere/token"})):
+            source = {} if name in ("odometry", "pose", "tf_child", "tf_parent") else {"odometry": "/odom"}
+            full = self.given(**source, **parameters)
+            with self.subTest(**parameters), self.assertRaisesRegex(BadParameter, f"^parameter {name}: .") as raised:
+                checked(full)
+            self.assertEqual(raised.exception.name, name)
+
+    def test_the_readme_has_a_line_for_each(self):
+        text = (BRIDGE / "README.md").read_text(encoding="utf-8")
+        self.assertEqual([p.name for p in PARAMETERS if f"`{p.name}`" not in text], [])
+
+
+class TheEnd(unittest.TestCase):
+    def end(self, spin=None, **parameters):
+        ros = Ros(**parameters)
+        def default(node):
+            raise ExternalShutdown
+        ros.spin = spin or default
+        errors = io.StringIO()
+        with ros.module() as module, contextlib.redirect_stderr(errors):
+            code = module.main()
+        self.assertEqual(ros.shut_down, 1)
+        return code, errors.getvalue()
+
+    def test_signals_end_it_without_a_word(self):
+        def interrupt(node):
+            raise KeyboardInterrupt
+        for spin in (None, interrupt):
+            self.assertEqual(self.end(spin, odometry="/odom"), (0, ""))
+
+    def test_a_wrong_parameter_is_one_sentence(self):
+        for parameters, words in (({}, "parameter odometry: nothing to do"),
+                                  ({"odometry": "/odom", "tf_rate_hz": 0.0}, "parameter tf_rate_hz: 0 is not"),
+                                  ({"odometry": "/odom", "sonard": "no-such-host.invalid"}, "parameter sonard: no-such-host")):
+            with self.subTest(**parameters):
+                code, errors = self.end(**parameters)
+                self.assertEqual((code, errors.count("\n")), (2, 1))
+                self.assertIn(words, errors)
+                self.assertNotIn("Traceback", errors)
+
+    def test_parameters_cannot_be_set_later(self):
+        ros = Ros(odometry="/odom")
+        with ros.module() as module:
+            module.Bridge().close()
+        self.assertEqual(list(ros.declared), [p.name for p in PARAMETERS])
+        for _, descriptor in ros.declared.values():
+            self.assertTrue(descriptor.read_only and descriptor.dynamic_typing and descriptor.description)
+
+
+class Launch(unittest.TestCase):
+    def setUp(self):
+        patch = mock.patch.dict(sys.modules, launch_modules())
+        patch.start()
+        self.addCleanup(patch.stop)
+        sys.modules.pop("sonard_bridge.launching", None)
+        self.addCleanup(sys.modules.pop, "sonard_bridge.launching", None)
+
+    @staticmethod
+    def description(name):
+        spec = importlib.util.spec_from_file_location("described", BRIDGE / "launch" / name)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module.generate_launch_description().arguments[0]
+
+    @staticmethod
+    def of(kind, actions):
+        return [action for action in actions if type(action).__name__ == kind]
+
+    def test_every_parameter_is_an_argument_and_texts_stay_text(self):
+        actions = self.description("bridge.launch.py")
+        declared = {a.arguments[0]: a.named for a in self.of("DeclareLaunchArgument", actions)}
+        self.assertEqual(list(declared), [p.name for p in PARAMETERS] + ["use_sim_time", "namespace"])
+        self.assertEqual((declared["use_stamps"]["default_value"], declared["tf_rate_hz"]["default_value"]), ("true", "50.0"))
+        node, = self.of("Node", actions)
+        (given,) = node.named["parameters"]
+        self.assertEqual(set(given), {p.name for p in PARAMETERS} | {"use_sim_time"})
+        for parameter in PARAMETERS:
+            value = given[parameter.name]
+            is_text = isinstance(parameter.default, str)
+            self.assertEqual(type(value).__name__, "ParameterValue" if is_text else "LaunchConfiguration", parameter.name)
+            self.assertEqual(value.named, {"value_type": str} if is_text else {}, parameter.name)
+
+    def started(self, **given):
+        actions = self.description("sonard.launch.py")
+        names = {a.arguments[0]: a.named["default_value"] for a in self.of("DeclareLaunchArgument", actions)}
+        start, = self.of("OpaqueFunction", actions)
+        return start.named["function"]({**names, **given})
+
+    def test_the_bridge_and_the_driver_wait_for_sonard(self):
+        handler, sonard = self.started(config="dive.yaml", options="--clock stepped", driver="ros2 launch 'my driver' x.py")
+        self.assertEqual(sonard.named["cmd"], ["sonard", "run", "dive.yaml", "--clock", "stepped"])
+        self.assertEqual(type(sonard.named["on_exit"]).__name__, "Shutdown")
+        hear = handler.arguments[0].named
+        self.assertIs(hear["target_action"], sonard)
+        self.assertEqual(hear["on_stdout"](Message(text=b"sonard 0.1.0\nrea")), [])
+        bridge, driver = hear["on_stdout"](Message(text=b"dy in 0.21 s."))
+        self.assertEqual(type(bridge).__name__, "Node")
+        self.assertEqual(driver.named["cmd"], ["ros2", "launch", "my driver", "x.py"])
+        self.assertEqual(hear["on_stderr"](Message(text=b"ready in 1 s.")), [])  # once
+
+    def test_the_demo_without_a_driver(self):
+        handler, sonard = self.started()
+        self.assertEqual(sonard.named["cmd"], ["sonard", "run", "--demo"])
+        self.assertEqual(len(handler.arguments[0].named["on_stdout"](Message(text=b"ready in 1 s."))), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,121 @@
+"""The ROS 2 bridge as a process with a real rclpy, where that is installed: poses, mounts, the end, and the launch files."""
+import importlib.util
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from common import SONARD, config
+from ros_stand_ins import BRIDGE
+
+from sonard_client import Control, Daemon
+
+PATIENCE_S = 60
+HAS_ROS = importlib.util.find_spec("rclpy") is not None
+if not HAS_ROS:
+    print("rclpy is not installed: the ROS 2 bridge is tested with stand-ins for ROS alone", file=sys.stderr)
+ENVIRONMENT = {**os.environ, "PYTHONPATH": f"{BRIDGE}:{os.environ.get('PYTHONPATH', '')}"}
+ARGUMENTS = ("import sys, launch.launch_description_sources as sources\n"
+             "description = sources.get_launch_description_from_python_launch_file(sys.argv[1])\n"
+             "print([argument.name for argument in description.get_launch_arguments()])")
+MAIN = "import sys; from sonard_bridge.node import main; sys.exit(main())"
+
+
+@unittest.skipUnless(HAS_ROS, "rclpy is not installed")
+class WithRos(unittest.TestCase):
+    def start(self, *parameters):
+        log = tempfile.TemporaryFile()
+        self.addCleanup(log.close)
+        given = [word for parameter in parameters for word in ("-p", parameter)]
+        process = subprocess.Popen([sys.executable, "-B", "-c", MAIN, "--ros-args", *given], env=ENVIRONMENT, stdout=log, stderr=log)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+
+        def said():
+            log.seek(0)
+            return log.read().decode()
+        return process, said
+
+    def setUp(self):
+        import rclpy
+        rclpy.init()
+        self.addCleanup(rclpy.try_shutdown)
+        self.rclpy, self.node = rclpy, rclpy.create_node("test")
+        self.addCleanup(self.node.destroy_node)
+
+    def spin_until(self, found):
+        for _ in range(20 * PATIENCE_S):
+            if found():
+                return found()
+            self.rclpy.spin_once(self.node, timeout_sec=0.05)
+        raise AssertionError("did not come")
+
+    def test_odometry_reaches_sonard_and_signals_end_the_node(self):
+        from nav_msgs.msg import Odometry
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
+            there.bind(("127.0.0.1", 0))
+            there.setblocking(False)
+            for end in (signal.SIGTERM, signal.SIGINT):
+                process, said = self.start("odometry:=/odom", "sonard:=127.0.0.1:%d" % there.getsockname()[1], "vehicle:=1",
+                                           "tf_rate_hz:=50")
+                publisher = self.node.create_publisher(Odometry, "/odom", 10)
+                message = Odometry()
+                message.header.stamp.sec = 3
+                message.pose.pose.position.x, message.pose.pose.orientation.w = 1.5, 1.0
+
+                def arrived():
+                    publisher.publish(message)
+                    try:
+                        return there.recv(4096)
+                    except BlockingIOError:
+                        return None
+                line = json.loads(self.spin_until(arrived))
+                self.assertEqual((line["position"], line["timestamp"], line["vehicle"]), ([1.5, 0, 0], 3, "1"))
+                process.send_signal(end)
+                self.assertEqual(process.wait(PATIENCE_S), 0, said())
+                self.assertNotIn("Traceback", said())
+                self.assertNotIn("rosout", said())
+
+    def test_wrong_parameters_are_one_sentence(self):
+        for parameters, name in (((), "odometry"), (("odometry:=/odom", "tf_rate_hz:=0.0"), "tf_rate_hz"),
+                                 (("odometry:=/odom", "vehicle:=true"), "vehicle")):
+            process, said = self.start(*parameters)
+            self.assertEqual(process.wait(PATIENCE_S), 2, said())
+            self.assertIn(f"sonard_bridge: parameter {name}: ", said())
+            self.assertNotIn("Traceback", said())
+
+    def test_topics_of_sonard(self):
+        from geometry_msgs.msg import PoseStamped
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+        from rosgraph_msgs.msg import Clock
+        from tf2_msgs.msg import TFMessage
+        with Daemon(config(), str(SONARD), arguments=("--clock", "lockstep")) as daemon:
+            process, said = self.start("truth_rate_hz:=20", "tf_static:=true", "clock:=true", f"http:={daemon.address}:8088",
+                                       f"sonard:={daemon.address}:14771")
+            found = {}
+            self.node.create_subscription(PoseStamped, "/sonard_bridge/vehicle_pose", lambda m: found.update(pose=m), 10)
+            self.node.create_subscription(Clock, "/clock", lambda m: found.update(clock=m), 10)
+            self.spin_until(lambda: "pose" in found)
+            Control(daemon.address).step(0.25)
+            self.spin_until(lambda: found.get("clock") and found["clock"].clock.nanosec == 250_000_000)
+            late = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # it was sent long ago
+            self.node.create_subscription(TFMessage, "/tf_static", lambda m: found.update(mounts=m), late)
+            mounts = self.spin_until(lambda: found.get("mounts"))
+            self.assertEqual([(t.header.frame_id, t.child_frame_id) for t in mounts.transforms], [("rov", "front")])
+            self.assertIsNone(process.poll(), said())
+
+    def test_launch_files(self):
+        for file in ("bridge.launch.py", "sonard.launch.py"):
+            ran = subprocess.run([sys.executable, "-B", "-c", ARGUMENTS, str(BRIDGE / "launch" / file)], env=ENVIRONMENT,
+                                 capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            for name in ("odometry", "truth_rate_hz", "use_sim_time", "namespace"):
+                self.assertIn(f"'{name}'", ran.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
