@@ -1,5 +1,5 @@
 """How sonard ends, comes back and bears what its surroundings do to it: signals, kill -9, full disks, closed outputs, being frozen.
-What is measured is kept for docs/reliability.md where SONARD_RELIABILITY names a folder. Times are asserted with room for a busy
+What is measured is kept for the table of reliability where SONARD_RELIABILITY names a folder. Times are asserted with room for a busy
 machine; the record says whether the promise itself was kept."""
 import contextlib
 import fcntl

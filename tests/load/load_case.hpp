@@ -25,7 +25,7 @@ inline constexpr bool memory_is_ours = true;
 
 using text::format;
 
-/// Says it and, in the full length, keeps it for docs/reliability.md.
+/// Prints the figure and, in the full length, keeps it for the table of reliability.
 inline void keep(const std::string& item, const std::string& figure, const std::string& bound, bool passed) {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   std::printf("  %-18s %s (%s)\n", item.c_str(), figure.c_str(), bound.c_str());
