@@ -21,7 +21,7 @@ for packages in "${test_packages[*]}" "${browser_packages[*]}"; do
 done
 if [ -n "$long" ]; then  # tests that measure what reliability_table.py shows leave it there
   export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
-  rm -f "$SONARD_RELIABILITY"/*.json  # what is not measured now is told as "not run"
+  rm -f "$SONARD_RELIABILITY"/*.json  # items not measured now are shown as "not run"
 fi
 # Most tests that take long wait: for sockets, pictures or a time to pass. Two a processor use it better than one.
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"

@@ -20,7 +20,7 @@ constexpr double longest_half_m = 0.5;   // of the ranges of one ray's patch, at
 constexpr double speckle_cell_m = 0.02;  // surfaces keep their speckle as long as a beam's centre stays within such a cell
 constexpr double least_blur = 0.5;       // of a range cell: half the length of the shortest echo
 
-/// What one ray met, or a point target: an echo spread evenly over range_m -+ half_m in the device's metres.
+/// Hit of one ray, or a point target: an echo spread evenly over range_m -+ half_m in the device's metres.
 struct Return {
   double range_m = 0, half_m = 0, power = 0;  // power [uPa^2] in a beam that looks there; 0 = nothing
   ComplexNormal speckle{1, 0};
@@ -163,7 +163,7 @@ class RangeImager {
   }
 
  private:
-  /// What a pixel shows before it is quantised; power 0 = no return.
+  /// Value of a pixel before it is quantised; power 0 = no return.
   struct Reported {
     double power = 0, range_m = 0;  // [uPa^2], the device's metres
   };
@@ -331,7 +331,7 @@ class RangeImager {
             held(r.range_m / wanted_.range_unit_m, RangePixel::most_range)};
   }
 
-  /// Of each column the nearest that its rays met.
+  /// The nearest hit of each column's rays.
   std::vector<BeamTruth> truth() {
     std::vector<BeamTruth> nearest(static_cast<std::size_t>(grid_.columns));
     for (int column = 0; column < grid_.columns; ++column)

@@ -20,7 +20,7 @@
 
 namespace sonar {
 
-/// What a fault has the sonar do, at once.
+/// Immediate effects of a fault on the sonar.
 struct SetListening {
   bool on = true;
 };
@@ -103,7 +103,7 @@ class Faults {
     std::size_t collect = 0;
   };
   Hold hold(const Connection& to, std::uint32_t ping, Time now);
-  /// Of the rate that holds; 0 = no pings.
+  /// Factor of the present rate; 0 = no pings.
   double rate_factor() const;
 
   // ---- clients

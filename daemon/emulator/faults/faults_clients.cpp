@@ -1,4 +1,4 @@
-// What faults do about clients: which of them they are for, who is admitted, what becomes of requests.
+// Faults of clients: whom they concern, admission, the outcome of requests.
 #include "daemon/emulator/faults/faults.hpp"
 
 namespace sonar {

@@ -132,7 +132,7 @@ class Sonar {
   bool busy() const { return busy_; }
   bool wants_pings() const;
   DeviceFigures figures() const;
-  /// Of those: pings that at least one client has got, and pings that were made.
+  /// Pings that at least one client received, and pings that were made.
   std::uint64_t served() const { return figures_.served; }
   std::uint64_t pings() const { return figures_.pings; }
   /// A ping as a client would get it now, with a number and noise that no client's ping has: nothing of the sonar changes. None

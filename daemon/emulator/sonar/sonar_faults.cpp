@@ -1,4 +1,4 @@
-// What faults have an emulated sonar do (daemon/emulator/faults).
+// Effects of faults on an emulated sonar (daemon/emulator/faults).
 #include <algorithm>
 
 #include "daemon/emulator/sonar/sonar.hpp"

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t most_connections = 32;
 constexpr std::size_t most_lines_of_a_datagram = 64;
-constexpr std::size_t work_of_a_turn = 4096;            // bytes; then others have theirs
+constexpr std::size_t work_of_a_turn = 4096;            // bytes processed before yielding
 constexpr std::size_t least_work = 64;                  // bytes that cost as much as a read, or a line, does beside its own
 constexpr int most_not_json = 8;                        // lines in a row that begin as JSON objects and are none
 constexpr std::size_t dropped_per_s = 256u << 20;       // reading away costs little, but not nothing
@@ -234,7 +234,7 @@ asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& 
   co_return Rested::leaves_much;
 }
 
-/// Nothing of it acts later than now, and hanging up again and again gains nothing; but its last word counts.
+/// Applies the last waiting pose of a closed connection, and none of the others, so that reconnecting gains nothing.
 void PoseServer::take_newest(Connection& c) {
   std::optional<control::LineParser::Line> newest;
   std::array<std::byte, work_of_a_turn> buffer;
@@ -246,7 +246,7 @@ void PoseServer::take_newest(Connection& c) {
   if (newest) on_line(*newest, c.sender);
 }
 
-/// Of what waits in the kernel, the newest stays: 0.1 s of the allowed rate, however late we are. True: the rest was dropped.
+/// Keeps the newest bytes that wait in the kernel, 0.1 s of the allowed rate. True: the rest was dropped.
 bool PoseServer::drop_backlog(Connection& c) {
   int waiting = 0;
   if (::ioctl(c.socket.native_handle(), FIONREAD, &waiting) != 0 || waiting <= 0) return false;

@@ -28,11 +28,11 @@ class DatagramPort {
   void answer_with(Answer answer) { answer_ = std::move(answer); }
   /// A host whose port is closed is named when its computer says so, to what was sent there. Before start().
   void tell_of_closed_ports(std::function<void(Endpoint host)> tell) { closed_ = std::move(tell); }
-  /// What arrives at the broadcast address, too. One that cannot be bound is left out.
+  /// Receives broadcasts, too. An address that cannot be bound is left out.
   void hear_broadcasts(const SonarConfig& sonar);
   void start();
   void stop();
-  /// Of the sonar's own address, to send from.
+  /// Socket of the sonar's own address, to send from.
   udp::socket& socket() { return sockets_.front().socket; }
   std::uint16_t number() const { return number_; }
 

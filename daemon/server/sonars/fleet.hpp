@@ -55,7 +55,7 @@ class Fleet final : public DeviceParent {
   /// `tap` gets each ping when it is queued to clients, as recordings do; empty = none.
   using PingTap = std::function<void(const Device& of, const PingQueued& ping)>;
   void tap_pings(PingTap tap) { tap_ = std::move(tap); }
-  /// Of a Preview: neither drivers nor recordings hear of it.
+  /// Computes a ping of a Preview: drivers and recordings get none of it.
   void compute_preview(PingRequest request, Simulator::Done done) { simulator_.submit(std::move(request), std::move(done)); }
   bool gone() const;  // after stop(): nothing is left
   std::uint64_t served() const;

@@ -1,4 +1,4 @@
-// What strangers may cost: places of the whole daemon, bytes a second, and accounts that balance whatever they do.
+// Limits of untrusted clients: slots of the whole daemon, bytes a second, and accounts that balance whatever they do.
 #include <gmock/gmock.h>
 
 #include <fcntl.h>

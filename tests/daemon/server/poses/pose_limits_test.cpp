@@ -1,4 +1,4 @@
-// What senders of poses by TCP may cost: bytes a second, turns, places, and the connection when they speak something else.
+// Limits of senders of poses by TCP: bytes a second, turns, slots, and the connection when they speak another protocol.
 #include <gmock/gmock.h>
 
 #include <list>
