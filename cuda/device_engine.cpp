@@ -118,7 +118,7 @@ class DeviceEngine final : public PingEngine {
     }
     wanted_.erase(begin, end);
     if (!each_.empty()) statistics_ = each_.back();
-    tell_as_asked(call.asked, pings);
+    restore_requested_pose(call.asked, pings);
     return pings;
   }
 

@@ -205,7 +205,7 @@ class Undisturbed(unittest.TestCase):
 
     @staticmethod
     def provoke_log_lines(address):
-        """A dozen clients too many are turned away, with a line of the log each until its limit."""
+        """A dozen clients too many are refused, with a line of the log each until its limit."""
         for _ in range(12):
             try:
                 with socket.create_connection((address, 52100), timeout=20) as visitor:

@@ -147,7 +147,7 @@ asio::awaitable<void> ReplayServer::accept() {
     client->name = peer.address().to_string() + ":" + std::to_string(peer.port());
     if (client_) {
       ++figures_.turned_away;
-      log_limited(log_, turned_away_limit_, LogLevel::info, "client turned away: another one is being served",
+      log_limited(log_, turned_away_limit_, LogLevel::info, "client refused: another one is being served",
                   {{"client", client->name}});
       continue;  // closes it
     }

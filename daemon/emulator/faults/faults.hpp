@@ -110,11 +110,12 @@ class Faults {
   enum class Admission { as_configured, wait, take_over, turn_away, reset };
   Admission admission() const;
   void on_served(const Connection& client, Time now);
-  enum class Request { apply, ignore, end, reset };
+  enum class RequestVerdict { apply, ignore, end, reset };
   /// A client requested settings. `change` may be limited. `ignore`: the sonar does not apply it (it may come back as an order).
-  Request on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state, Time now);
+  RequestVerdict on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
+                            Time now);
   /// A client sent bytes, whatever they are.
-  Request on_bytes(const std::string& who, Time now);
+  RequestVerdict on_bytes(const std::string& who, Time now);
 
   // ---- status messages
   void alter_beacons(std::vector<protocol::Bytes>& beacons, Time now);

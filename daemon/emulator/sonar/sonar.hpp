@@ -158,13 +158,13 @@ class Sonar {
   void set_receivers(const Source& from, protocol::SetReceivers wanted, Time now);
   void update_pacer(Time now);
   // Faults (sonar_faults.cpp).
-  void obey_faults(Time now, Actions& actions);
-  void obey(const FaultOrder& order, Time now, Actions& actions);
+  void apply_fault_orders(Time now, Actions& actions);
+  void apply(const FaultOrder& order, Time now, Actions& actions);
   void deliver(Connection& to, Outbox::Message ping, Time now, Actions& actions);
   void release_held(Connection& to, Time now, bool all, Actions& actions);
   void serve_waiting(Time now, Actions& actions);
   void change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions);
-  void end_by_fault(Connection& connection, Faults::Request fate, Actions& actions);
+  void end_by_fault(Connection& connection, Faults::RequestVerdict verdict, Actions& actions);
   void serve(Connection& connection, Time now, Actions& actions);
   /// An exception is a mistake in sonard: it may cost this connection, never the others.
   template <class Call>

@@ -44,7 +44,7 @@ class Admission {
   /// The next one of a listener without places of ours, whose descriptor is none of the spare ones. Nothing: likewise.
   asio::awaitable<std::optional<tcp::socket>> next_visitor(tcp::acceptor& acceptor, Purpose purpose);
 
-  /// Connected now: clients, those who wait and those being turned away.
+  /// Connected now: clients, waiting ones and those being refused.
   std::uint64_t now() const { return *count_; }
   std::uint64_t refused_for_places() const { return for_places_; }
   std::uint64_t refused_for_descriptors() const { return for_descriptors_; }

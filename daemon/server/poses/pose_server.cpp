@@ -98,15 +98,15 @@ void PoseServer::stop() {
 
 // ---- what arrives
 
-PoseServer::Heard PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
+PoseServer::LineKind PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
   if (line.too_long) {
     intake_.refuse("line is longer than 4096 bytes", sender);
-    return Heard::no_json;
+    return LineKind::not_json;
   }
   const auto sample = control::parse_json_pose(line.text);
-  if (sample) return intake_.take(*sample, sender).empty() ? Heard::pose : Heard::object;
+  if (sample) return intake_.take(*sample, sender).empty() ? LineKind::pose : LineKind::other_object;
   intake_.refuse(sample.error().text, sender);
-  return control::is_json_object(line.text) ? Heard::object : Heard::no_json;
+  return control::is_json_object(line.text) ? LineKind::other_object : LineKind::not_json;
 }
 
 void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from) {
@@ -155,7 +155,7 @@ void PoseServer::admit(tcp::socket socket) {
   connections_.forget_if([](Connection& c) { return has_left(c.socket); });
   const auto say_evicted = [this](const Connection& evicted) {
     log_limited(log_, notices_, LogLevel::info,
-                "pose connection closed: without a pose, or beyond the limits, for longest, and its place was needed",
+                "pose connection closed to make room: without a pose, or beyond its limit, for longest",
                 {{"from", evicted.sender.id}});
   };
   if (admission_.is_drivers(socket)) connections_.evict(sender.source, say_evicted);
@@ -199,15 +199,15 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
     const auto line = c.lines.next();
     if (!line && c.lines.may_become_object()) return Turn::over;
     if (!line) intake_.refuse(no_json, c.sender);
-    const Heard heard = line ? on_line(*line, c.sender) : Heard::no_json;
-    c.not_json = heard == Heard::no_json ? c.not_json + 1 : 0;
-    if (c.not_json == most_not_json || (heard == Heard::no_json && !(line && line->begins_object))) {
+    const LineKind kind = line ? on_line(*line, c.sender) : LineKind::not_json;
+    c.not_json = kind == LineKind::not_json ? c.not_json + 1 : 0;
+    if (c.not_json == most_not_json || (kind == LineKind::not_json && !(line && line->begins_object))) {
       log_limited(log_, notices_, LogLevel::warning, std::string("pose connection closed: ") + no_json, {{"from", c.sender.id}});
       return Turn::end;
     }
     taken += line->text.size() + least_work;
     work.bytes += least_work;
-    work.has_pose |= heard == Heard::pose;
+    work.has_pose |= kind == LineKind::pose;
   }
   return Turn::not_over;
 }

@@ -53,7 +53,7 @@ Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port, bo
   return {};
 }
 
-void DatagramPort::hear_broadcasts(const SonarConfig& sonar) {
+void DatagramPort::receive_broadcasts(const SonarConfig& sonar) {
   if (sonar.bind_ip == Ipv4{}) return;
   for (const Ipv4& broadcast : {broadcast_of(sonar), Ipv4{255, 255, 255, 255}}) {
     if (broadcast == sonar.bind_ip) continue;

@@ -129,7 +129,7 @@ TEST_F(DeviceActions, TurnAwayByReset) {
   device.perform({TurnAway{2, true}});
   EXPECT_FALSE(waits.read_to_end());
   EXPECT_TRUE(waits.was_reset);
-  EXPECT_THAT(log_text, HasSubstr("client turned away: reset"));
+  EXPECT_THAT(log_text, HasSubstr("client refused: reset"));
 }
 
 TEST_F(DeviceActions, AClientThatIsNotReadFillsItsWindowAndLosesNothing) {
