@@ -162,7 +162,7 @@ SONAR_HD inline void refocus(const PingView& p, std::uint32_t i) {
   to[0] = s.re;
   to[1] = s.im;
 }
-/// And back.
+/// Sample `i` from `mixed`, blended, back into the beams.
 SONAR_HD inline void blend(const PingView& p, std::uint32_t i) {
   const auto j = static_cast<std::int32_t>(i / static_cast<std::uint32_t>(p.samples));
   const auto n = static_cast<std::int32_t>(i % static_cast<std::uint32_t>(p.samples));

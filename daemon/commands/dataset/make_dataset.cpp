@@ -283,7 +283,7 @@ class Folder final : public DatasetFolder {
     return coco->commit();
   }
 
-  /// Writes pings that have more than one beam; false if there are none.
+  /// Writes a sheet of the pings that have more than one beam; false if there are none.
   Result<bool> write_contact_sheet() {
     constexpr int across = 4, width_px = 240, gap_px = 4;
     const std::uint64_t count = std::min<std::uint64_t>(job_.pings, 12);

@@ -204,7 +204,7 @@ PingNumber Sonar::next_number() {
   return PingNumber(state_.last_ping = ++ping_number_);
 }
 
-/// But for its number.
+/// The request without its number.
 PingRequest Sonar::request_at(Time at) const {
   const Config& config = around_.config;
   const bool stale = around_.world.is_stale(config_.vehicle, at);

@@ -49,7 +49,7 @@ class Sonar {
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
   /// The next message to write, whole; empty when there is none or one is being written.
   Outbox::Message next_message(ConnectionId id, Time now);
-  /// So many bytes of it were taken; after the last one on_written().
+  /// Reports `bytes` of it as sent; after the last one on_written() follows.
   void on_sent(ConnectionId id, std::size_t bytes);
   void on_written(ConnectionId id, const Outbox::Message& message, Time now);
   /// The message of a stream that was taken last had no receiver left, or none of its datagrams could be sent.

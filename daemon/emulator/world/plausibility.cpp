@@ -65,7 +65,7 @@ Location judge_location(Vec3d sonar_m, const Surroundings& around) {
   return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Location::far_away : Location::fine;
 }
 
-/// Place of the first sonar of a carrier that is implausible.
+/// The first implausible place of a carrier's sonar.
 std::optional<Vec3d> doubtful_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
   for (const Pose& mount : carrier.mounts)
     if (const Vec3d at_m = compose(vehicle_in_world, mount).position_m; judge_location(at_m, around) != Location::fine)

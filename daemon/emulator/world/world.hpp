@@ -34,7 +34,7 @@ struct BodyStart {
   motion::Plan plan{};  // followed until the first accepted pose
 };
 
-/// Who sent a pose. A different `id` starts a new history; a different `source` is worth a log line.
+/// Sender of a pose. A different `id` starts a new history; a different `source` is worth a log line.
 struct Sender {
   std::string id;      // "json udp 127.0.0.1:40123"
   std::string source;  // "json 127.0.0.1"

@@ -47,7 +47,7 @@ bool is_closed_port(msghdr& message) {
 Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port, bool shared) {
   number_ = port;
   Socket& own = sockets_.emplace_back(io_);
-  // Else the system refuses broadcasts: it alone knows all addresses that are such.
+  // With `groups` broadcasts are enabled: only the system knows all broadcast addresses.
   if (auto r = bind_udp(own.socket, {sonar.bind_ip, port}, !sonar.groups.empty(), shared); !r) return r;
   send_multicast_from(own.socket, sonar.bind_ip);
   return {};

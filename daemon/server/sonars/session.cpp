@@ -252,7 +252,7 @@ asio::awaitable<void> Session::watch() {
   }
 }
 
-/// Not one whose bytes wait to be read: this process may have been stopped for a while.
+/// A client with unread bytes is not silent: this process may have been stopped for a while.
 bool Session::is_silent(Steady::time_point now) const {
   const auto longest = parent_.longest_silence(setup_.id);
   error_code ec;
