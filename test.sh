@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs the tests. usage: ./test.sh [--long] [ctest arguments...]
 #   --long   afterwards the loads, full fuzzing and all sanitizers (tests/tools/long_checks.sh), hours: before a release;
-#            docs/reliability.md is written anew from what this run measured; what misses its bound or was not run fails
+#            the table of it is in build/reliability; what misses its bound or was not run fails
 # Tests that read recordings of real devices take their folder from SONARD_CAPTURES and are skipped without it.
 set -u -o pipefail
 cd "$(dirname "$0")" || exit 70
@@ -21,7 +21,7 @@ for packages in "${test_packages[*]}" "${browser_packages[*]}"; do
 done
 if [ -n "$long" ]; then  # tests that measure what reliability_table.py shows leave it there
   export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
-  rm -f "$SONARD_RELIABILITY"/*.json  # what is not measured now is told as "not run"
+  rm -f "$SONARD_RELIABILITY"/*.json  # items not measured now are shown as "not run"
 fi
 # Most tests that take long wait: for sockets, pictures or a time to pass. Two a processor use it better than one.
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"
@@ -38,7 +38,8 @@ if [ -n "$long" ]; then
   tests/tools/long_checks.sh || status=1
   strict=()
   [ ${#partial[@]} -gt 0 ] || strict=(--strict)  # some tests only: rows are missing
-  python3 tests/reliability/reliability_table.py "$SONARD_RELIABILITY" "${strict[@]}" >docs/reliability.md || status=1
+  python3 tests/reliability/reliability_table.py "$SONARD_RELIABILITY" "${strict[@]}" >"${SONARD_RELIABILITY}/reliability.md" || status=1
+  echo "the table: ${SONARD_RELIABILITY}/reliability.md"
   echo "tests: $([ "$before_long" -eq 0 ] && echo passed || echo "FAILED, see above")"
 fi
 exit $status

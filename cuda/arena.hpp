@@ -31,7 +31,7 @@ class Arena {
     T* host = nullptr;    // null on Where::device
     std::size_t count = 0;
   };
-  /// Not initialised; of nothing, null.
+  /// Allocates without initialising; null for a count of 0.
   template <class T>
   Slice<T> allocate(std::size_t count) {
     static_assert(std::is_trivially_copyable_v<T>);

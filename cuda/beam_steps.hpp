@@ -66,7 +66,7 @@ SONAR_HD inline void add_pulses(const PingView& p, std::uint32_t j, std::int32_t
   }
 }
 
-/// What channels share, at sample `n` of beam `j`.
+/// Adds the noise that channels share, at sample `n` of beam `j`.
 SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
   if (p.shared_noise == nullptr || n >= p.shared_samples) return;
   const bool noise = p.has_noise != 0;
@@ -162,7 +162,7 @@ SONAR_HD inline void refocus(const PingView& p, std::uint32_t i) {
   to[0] = s.re;
   to[1] = s.im;
 }
-/// And back.
+/// Sample `i` from `mixed`, blended, back into the beams.
 SONAR_HD inline void blend(const PingView& p, std::uint32_t i) {
   const auto j = static_cast<std::int32_t>(i / static_cast<std::uint32_t>(p.samples));
   const auto n = static_cast<std::int32_t>(i % static_cast<std::uint32_t>(p.samples));

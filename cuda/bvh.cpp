@@ -21,7 +21,7 @@ void grow(Box& box, const Box& by) {
     box.high[k] = std::max(box.high[k], by.high[k]);
   }
 }
-/// Of a box; 0 for the empty one.
+/// Half the area of a box; 0 for the empty one.
 float half_area(const Box& b) {
   const float x = b.high[0] - b.low[0], y = b.high[1] - b.low[1], z = b.high[2] - b.low[2];
   return x < 0 ? 0 : x * y + y * z + z * x;
@@ -72,7 +72,7 @@ class Builder {
     return bvh_link({first, static_cast<std::uint32_t>(to - from)});
   }
 
-  /// Of [from, to), which is more than a leaf holds. Returns the node.
+  /// Splits [from, to), which is more than a leaf holds. Returns the node.
   std::int32_t split(std::size_t from, std::size_t to, int depth) {
     const auto node = static_cast<std::int32_t>(nodes_.size());
     nodes_.push_back({});

@@ -70,7 +70,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float along = cell_value(t, cell_normal_x, cell) * (qx + dx) + cell_value(t, cell_normal_y, cell) * (qy + dy) +
                       cell_value(t, cell_normal_z, cell) * (qz + dz);
   if (!(along * t.turned_away <= 0)) return false;
-  // What lies behind another object's facet, followed from the ray's place in the column to the cell's.
+  // The plane of another object's facet, followed from the ray's place in the column to the cell's.
   const float* slope = p.depth_slope + map_at;
   const auto differs = [&](std::int32_t i) {
     const auto in_map = static_cast<std::int32_t>(bits_of(map[i])), in_slope = static_cast<std::int32_t>(bits_of(slope[i]));

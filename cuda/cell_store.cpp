@@ -54,7 +54,7 @@ const CellStore::Held* CellStore::held(const CellTile& t) const {
 }
 
 void CellStore::clear() {
-  // Nothing may use the tiles any more: the caller has waited for the device.
+  // The tiles are not in use: the caller has waited for the device.
   tiles_.clear();
   memory_.clear();
 }

@@ -92,7 +92,7 @@ class CudaMachine final : public Machine {
     check(module_.allocate(at_, &device, bytes));
     return device;
   }
-  // What fails while things are given back has failed before, and was reported then.
+  // An error here has occurred before, and was reported then.
   void release(void* device) override { static_cast<void>(module_.release(at_, device)); }
   void* allocate_host(std::size_t bytes) override {
     void* host = nullptr;

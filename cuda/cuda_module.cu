@@ -45,7 +45,7 @@ struct Opened {
 };
 Opened& opened(void* machine) { return *static_cast<Opened*>(machine); }
 
-/// What cudaStreamSynchronize does, but with an end.
+/// Like cudaStreamSynchronize, but with an end.
 cudaError_t wait_for_stream(Opened& m, cudaStream_t stream) {
   if (m.hung) return cudaErrorLaunchTimeout;
   const auto now = [] { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); };
@@ -177,7 +177,7 @@ cudaError_t launch_plainly(cudaStream_t stream, const GraphKey& what) {
 cudaGraphExec_t capture(cudaStream_t stream, const GraphKey& what) {
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t made = nullptr;
-  // Of this thread only: other engines may allocate on theirs meanwhile.
+  // Captures this thread only: other engines may allocate on theirs meanwhile.
   if (cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal) == cudaSuccess) {
     const cudaError_t launched = launch_plainly(stream, what);
     const cudaError_t ended = cudaStreamEndCapture(stream, &graph);
@@ -196,7 +196,7 @@ cudaError_t launch_by_graph(Opened& m, Lane& lane, const GraphKey& what) {
     if (const cudaError_t error = wait_for_stream(m, lane.stream)) return error;  // it may be at work
     cudaGraphExecDestroy(dropped);
   }
-  // What came before has been launched plainly: every kernel is loaded by then, which a capture must not do.
+  // Earlier launches were plain: every kernel is loaded by then, which a capture must not do.
   if (!entry.graph && entry.seen > 1) {
     entry.graph = capture(lane.stream, what);
     m.graphs_work = entry.graph != nullptr;

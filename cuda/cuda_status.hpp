@@ -1,4 +1,4 @@
-// What this build and this machine can do with CUDA, in a few words for the banner.
+// CUDA in this build and on this machine, in a few words for the banner.
 // Stands apart from cuda_engine.hpp so that the daemon's texts need no engine.
 #pragma once
 

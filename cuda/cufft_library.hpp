@@ -26,7 +26,7 @@ class CufftLibrary {
   using Handle = cufftHandle;
 
   CufftLibrary() {
-    // Of the version whose header this was compiled with; where the loader looks, and beside the toolkit's compiler.
+    // The version whose header this was compiled with, where the loader searches, and beside the toolkit's compiler.
     void* library = dlopen(SONAR_CUFFT_NAME(CUFFT_VER_MAJOR), RTLD_NOW | RTLD_LOCAL);
     if (!library) return;
     bool all = true;

@@ -118,7 +118,7 @@ class DeviceEngine final : public PingEngine {
     }
     wanted_.erase(begin, end);
     if (!each_.empty()) statistics_ = each_.back();
-    tell_as_asked(call.asked, pings);
+    restore_requested_pose(call.asked, pings);
     return pings;
   }
 
@@ -248,7 +248,7 @@ class DeviceEngine final : public PingEngine {
     return missing.empty() ? "" : without + " are computed by the CPU (" + missing + ")";
   }
   static CellFields fields_of(const PingRequest& request) { return {request.switches.texture, request.switches.grain}; }
-  /// What device and CPU share: the scene as this request finds it.
+  /// Places the scene of this request, for device and CPU.
   void place(const PingRequest& request) {
     if (!cells_ || !cells_->serves(request.seed, fields_of(request)))
       // Weights of cells are drawn from the seed: another seed needs other tiles.

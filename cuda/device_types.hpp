@@ -1,4 +1,4 @@
-// What lies in the device's memory: plain structs that the host fills and the kernel bodies read. C++17 and fixed-width members
+// Structs in the device's memory: plain, filled by the host and read by the kernel bodies. C++17 and fixed-width members
 // only; both sides are compiled from this file, and cuda_module.hpp checks that they agree on it.
 #pragma once
 
@@ -76,7 +76,7 @@ struct ColumnSine {
 struct BaseElevation {
   float angle_rad, cosine, sine;
 };
-/// What a beam or a column meets first; range 0 = nothing.
+/// First hit of a beam or a column; range 0 = none.
 struct FirstHit {
   float range_m;
   std::uint32_t object;

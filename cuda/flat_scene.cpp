@@ -33,7 +33,7 @@ void add_object(const Mesh& mesh, const Pose& placed, std::uint32_t object, std:
     std::copy_n(corners[mesh.triangles[t][0]].begin(), 3, flat.a);
     std::copy_n(corners[mesh.triangles[t][1]].begin(), 3, flat.b);
     std::copy_n(corners[mesh.triangles[t][2]].begin(), 3, flat.c);
-    // What a hit names: object and triangle as in the scene.
+    // Object and triangle that a hit names, as in the scene.
     flat.object = object;
     flat.triangle = static_cast<std::uint32_t>(t);
     triangles.push_back(flat);

@@ -43,7 +43,7 @@ class FlatScene {
   std::vector<FlatTriangle> triangles_;
 };
 
-/// What points into host memory: for tests and host loops.
+/// A view with pointers into host memory: for tests and host loops.
 TracerView host_view(const FlatScene& scene, const BodyPlaces& places);
 
 }  // namespace sonar::cuda

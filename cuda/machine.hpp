@@ -1,4 +1,4 @@
-// What the device engine needs of a device: memory, copies and the steps of a ping. Two of them: CUDA, in a module of its own
+// The device engine's interface to a device: memory, copies and the steps of a ping. Two of them: CUDA, in a module of its own
 // that is loaded when there is one (open_cuda_machine), and plain loops on the host, which run the same bodies (HostLoops).
 #pragma once
 
@@ -28,7 +28,7 @@ class Machine {
   virtual ~Machine() = default;
   virtual std::string name() const = 0;  // "NVIDIA H200, 139.8 GiB, compute 9.0"
 
-  /// Of the device's memory, free at this moment; other programs may take of it.
+  /// Free bytes of the device's memory at this moment; other programs may take some of it.
   virtual std::size_t free_bytes() const { return std::numeric_limits<std::size_t>::max(); }
   virtual void* allocate(std::size_t bytes) = 0;  // in the device's memory
   /// For tests: every piece that an arena hands out is an allocation of its own, of just its size.
@@ -50,7 +50,7 @@ class Machine {
   virtual void transform(int lane, double* values, int size, int rows, bool inverse) = 0;
   /// How long each step took in the timed launches since the last call; the lane must have been waited for.
   virtual StepSeconds step_seconds(int lane) = 0;
-  /// What is queued on `lane` from now on begins after what is queued on `earlier` already.
+  /// Work queued on `lane` from now on begins after the work queued on `earlier` before.
   virtual void order(int lane, int earlier) = 0;
   virtual void wait(int lane) = 0;
 };

@@ -1,4 +1,4 @@
-// What the device needs of a plan: the tables that follow from product, settings and seed, sent once and used by every ping that
+// The device's tables of a plan, which follow from product, settings and seed, sent once and used by every ping that
 // has them (core/pipeline/ping_plan.hpp).
 #pragma once
 

@@ -10,7 +10,7 @@
 
 namespace sonar::cuda {
 
-/// What the other steps count in.
+/// Clears the counters of the other steps.
 SONAR_HD inline void clear(const PingView& p, std::uint32_t i) {
   if (i < counters_a_ping) p.counters[i] = 0;
   if (i < p.chunks * static_cast<std::uint32_t>(p.sea.columns)) p.in_chunk[i] = 0;

@@ -1,4 +1,4 @@
-// What a batch has brought back from the device, as pings.
+// Pings from the results that a batch has copied back from the device.
 #pragma once
 
 #include "cuda/prepare_ping.hpp"

@@ -17,7 +17,7 @@ struct RayHit {
   Vec3 normal;  // geometric, world axes, any length, either side
 };
 
-/// What descending needs of a ray, made once. Directions of exactly 0 become tiny ones: no quotient is then undefined.
+/// Values of a ray for the descent, computed once. Directions of exactly 0 become tiny ones: no quotient is then undefined.
 struct Descent {
   float from[3], per[3];
   int upper[3];  // 1 where the ray enters boxes by their high side
@@ -111,7 +111,7 @@ struct TriangleTest {
     if (speed == 0) return;
     const float range_m = dot(normal, a) / speed;
     if (!(range_m >= 0 && range_m <= far_m)) return;
-    // Of two at the very same range always the same one, in whatever order they are met.
+    // From two hits at the very same range always the same one is chosen, in any order.
     if (range_m == hit.range_m && hit.object != no_object &&
         (t.object > hit.object || (t.object == hit.object && t.triangle >= hit.triangle)))
       return;

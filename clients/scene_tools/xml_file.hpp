@@ -66,7 +66,7 @@ inline constexpr std::size_t max_xml_bytes = std::size_t{16} << 20;
 Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const std::filesystem::path& path,
                                                  std::string short_name);
 
-/// What readers complain about: they go on after an error with zeros, the first error counts; what is not understood is listed.
+/// Errors and omissions of readers: they continue after an error with zeros, the first error counts; unread parts are listed.
 class Findings {
  public:
   void fail(const Place& at, const std::string& what);

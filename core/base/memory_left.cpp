@@ -35,7 +35,7 @@ struct Names {  // of the files of one version
 constexpr Names version_1{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file "};
 constexpr Names version_2{"memory.max", "memory.current", "inactive_file "};
 
-/// Of a group and those above it, as far as they can be seen from here.
+/// Memory left to a control group and those above it, as far as they can be seen from here.
 std::optional<std::uint64_t> left_of_groups(const path& mount, path group, const Names& names) {
   std::optional<std::uint64_t> least;
   for (group = group.relative_path();; group = group.parent_path()) {

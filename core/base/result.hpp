@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// What went wrong, in the sysexits classes the programs exit with.
+/// Kinds of errors, in the sysexits classes the programs exit with.
 enum class ErrorKind : int {
   usage = 64,     // arguments
   bad_data = 65,  // a scene, a mesh, a recording

@@ -31,7 +31,7 @@ struct ColourMap {
 
 std::span<const ColourMap> colour_maps();
 std::string colour_map_names();  // "gray, copper, ..."
-/// Or a sentence with the names there are.
+/// The colour map of that name; the error lists the names there are.
 Result<ColourMap> find_colour_map(std::string_view name);
 
 }  // namespace sonar

@@ -23,7 +23,7 @@ struct FanLayout {
   int width = 0, height = 0;
   double apex_x = 0, apex_y = 0, metres_per_pixel = 1;
 };
-/// Of an image that draw_fan does not refuse.
+/// Layout of the fan of an image that draw_fan does not refuse.
 FanLayout fan_layout(const PolarImage& image, const FanStyle& style);
 
 /// Refuses an image without rows or beams, with a bearing table that does not run from port to starboard, or a fan wider than

@@ -13,7 +13,7 @@ struct Corner {
 };
 using Outline = std::vector<Corner>;  // clockwise as seen, y downwards; corners where it turns
 
-/// Of every region of pixels joined by an edge, without its holes, of the pixels of [x0, x1) by [y0, y1) that `is_in` names; in
+/// Outlines of the regions of edge-joined pixels of [x0, x1) by [y0, y1) that `is_in` names, without holes, in
 /// the order of their first pixels, row by row.
 std::vector<Outline> outlines(int x0, int y0, int x1, int y1, const std::function<bool(int x, int y)>& is_in);
 

@@ -15,7 +15,7 @@ constexpr double norm_allowed = 0.01;  // of a quaternion, or of a row of a matr
 constexpr double farthest = 1e8;       // m, m/s, rad/s
 constexpr std::size_t longest_quoted = 40, longest_name = 64;
 
-/// Nothing, or what is wrong with a line.
+/// The fault of a line; empty for a valid one.
 using Complaint = std::optional<std::string>;
 
 Complaint not_a_number(std::string_view word, const char* what = "a number") {
@@ -33,10 +33,10 @@ std::optional<double> number(std::string_view word) {
   return v;
 }
 
-/// Of the parts, to hold all three against one bound.
+/// Largest absolute part, to hold all three against one bound.
 double largest(Vec3d v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
-/// Of a rotation matrix; by its largest part, so that nothing is divided by something small.
+/// Quaternion of a rotation matrix, by its largest part, so that no divisor is small.
 Quatd quat_from(const Rotation& r) {
   const auto& m = r.m;
   // 1 + trace is 4 w^2; else the largest diagonal part gives 4 x^2, 4 y^2 or 4 z^2, each at least 1.
@@ -49,7 +49,7 @@ Quatd quat_from(const Rotation& r) {
   return normalized({m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], 1 + m[2][2] - m[0][0] - m[1][1]});
 }
 
-/// Rows of length 1, at right angles, right-handed, within norm_allowed: a mirrored frame is none.
+/// Rows of length 1, at right angles, right-handed, within norm_allowed; mirrored frames are rejected.
 bool is_rotation(const Rotation& r) {
   const Vec3d a{r.m[0][0], r.m[0][1], r.m[0][2]}, b{r.m[1][0], r.m[1][1], r.m[1][2]}, c{r.m[2][0], r.m[2][1], r.m[2][2]};
   for (const Vec3d& row : {a, b, c})

@@ -41,7 +41,7 @@ class Columns {
   bool has_body() const { return has(body); }
   bool has_velocity() const { return has(vx); }
   bool has_angular_velocity() const { return has(wx); }
-  /// What is wrong with the line, or nothing. `words` are count() many.
+  /// Reads a line, or returns its fault. `words` are count() many.
   std::optional<std::string> refuse(const Words& words, Row& out) const;
 
  private:

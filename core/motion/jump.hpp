@@ -1,4 +1,4 @@
-// What of a motion is none: poses too far apart in too little time are a jump, not something that carries a sonar and shifts its
+// Detects jumps: pose changes too fast to be motion, which must not carry a sonar and shift its
 // echoes. The one rule for what is played, what is sent (daemon/world), and what is rendered.
 #pragma once
 

@@ -29,7 +29,7 @@ struct PlaybackRules {
   bool operator==(const PlaybackRules&) const = default;
 };
 
-/// What a body is to follow: a trajectory, how it is played, and where it is from.
+/// A trajectory that a body follows, how it is played, and where it is from.
 struct Plan {
   std::shared_ptr<const Trajectory> trajectory = {};  // null = nothing
   PlaybackRules rules = {};

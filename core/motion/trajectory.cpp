@@ -15,7 +15,7 @@ Trajectory::Trajectory(Points points, Ns duration)
   assert(points_.angular_velocities_radps.empty() || points_.angular_velocities_radps.size() == points_.times.size());
 }
 
-/// Of the way that ends at point `after`, u of it done.
+/// Motion on the way that ends at point `after`, at the share u of it.
 Motion Trajectory::between(std::size_t after, double u) const {
   const std::size_t before = after - 1;
   // Times of points rise: never divided by 0 s.

@@ -42,7 +42,7 @@ struct TrajectoryFile {
 /// A comment of the file says its frame: `# frame: NED_FRD`. Errors: name:line: what.
 Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::string& name, const ReadOptions& options);
 Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options);
-/// Of the body that is called so; with an empty name, of the only one. Errors name the bodies there are.
+/// Trajectory of the body of that name; with an empty name, of the only one. Errors name the bodies there are.
 Result<std::shared_ptr<const Trajectory>> trajectory_of(const TrajectoryFile& file, const std::string& name,
                                                         const std::string& body);
 

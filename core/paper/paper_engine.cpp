@@ -30,7 +30,7 @@ class ComparisonEngine {
     if (!prepared_ || !prepared_->serves(request)) prepared_ = std::make_unique<paper::Prepared>(request, sum_);
     statistics_ = {};
     Ping ping = paper::simulate(rays_, request, *prepared_, simd::kernels_for(options_.simd), pool_, options_.now_s, statistics_);
-    tell_as_asked({&asked, 1}, {&ping, 1});
+    restore_requested_pose({&asked, 1}, {&ping, 1});
     return ping;
   }
   const PingStatistics& statistics() const { return statistics_; }

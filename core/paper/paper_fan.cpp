@@ -21,7 +21,7 @@ std::vector<double> widths_of(const std::vector<double>& centres, double lone) {
 }
 
 void tabulate(PaperFan& fan) {
-  // What depends on the column alone, and on the row alone: a direction is made of the two.
+  // A direction is made of values of its column alone and of its row alone.
   for (const double azimuth : fan.azimuth_rad)
     fan.ahead.push_back(fan.perspective ? Vec3d{1, std::tan(azimuth), 0} : Vec3d{std::cos(azimuth), std::sin(azimuth), 0});
   for (int row = 0; row < fan.rows; ++row) {
@@ -38,7 +38,7 @@ PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
   PaperFan fan;
   fan.perspective = mode == Mode::raster;
   fan.rows = rays > 0 ? rays : fan.perspective ? default_raster_rows : default_rays;
-  // Of the half angle: the fan spans twice the quoted width, as in P25.
+  // Half of the fan's angle, which is twice the quoted width, as in P25.
   const double vertical = std::min(static_cast<double>(plan.mode.pattern.elevation_width_rad), widest_half_angle_rad);
   const double top = fan.perspective ? std::tan(vertical) : vertical;
   fan.row_step = 2 * top / fan.rows;

@@ -40,7 +40,7 @@ struct PaperFan {
 /// for 20), as the paper's own model does.
 PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays);
 
-/// What a ray met.
+/// The surface that a ray hit.
 struct PaperHit {
   int column = 0, row = 0;
   double range_m = 0;

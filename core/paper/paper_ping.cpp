@@ -258,7 +258,7 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
   // D(phi) = sinc(0.884 sin(phi) / width), one pattern of the quoted width (section 8).
   if (plan.mode.pattern.elevation_taper != Taper::unit)
     elevation_per_sine = width_constant / static_cast<double>(plan.mode.pattern.elevation_width_rad);
-  // Of a fan, a row has one elevation; on an image plane it depends on the column.
+  // In a fan a row has one elevation; on an image plane it depends on the column.
   for (int row = 0; row < fan.rows && !fan.perspective; ++row)
     pattern.push_back(elevation_pattern(*this, fan.elevation_rad(0, row)));
 }

@@ -12,7 +12,7 @@
 
 namespace sonar::paper {
 
-/// What one model with one set of settings needs from ping to ping.
+/// Values that one model with one set of settings keeps from ping to ping.
 struct Prepared {
   Prepared(const PingRequest& request, FrequencySum sum);
   bool serves(const PingRequest& request) const;
@@ -33,7 +33,7 @@ struct Prepared {
 /// D(phi) of an elevation.
 double elevation_pattern(const Prepared& prepared, double elevation_rad);
 
-/// What a scatterer of a known cross-section sends back; none, and false, when it lies outside the record.
+/// Adds the echo of a scatterer of a known cross-section; false when it lies outside the record.
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& prepared,
               const PingScalars& scalars, PaperEchoes& echoes);
 

@@ -19,7 +19,7 @@ double at_sine(const std::vector<float>& table, double sine, double top);
 class BeamMix {
  public:
   BeamMix() = default;
-  /// Nothing where beams are not even in the sine.
+  /// Empty where beams are not even in the sine.
   explicit BeamMix(const PingPlan& plan);
   bool blurs() const { return !turn_m_.empty(); }
   bool blends() const { return !own_.empty(); }

@@ -33,7 +33,7 @@ class CpuEngine final : public PingEngine, private Interruption {
       pings.push_back(run(request));
       if (!is_nested) each_.push_back(work_[0].statistics());
     }
-    tell_as_asked(requests, pings);
+    restore_requested_pose(requests, pings);
     return pings;
   }
 

@@ -14,7 +14,7 @@
 
 namespace sonar {
 
-/// What a ray met at one stage of its path. Ranges run along the whole path, unfolded where mirrors bend it.
+/// A ray's hit at one stage of its path. Ranges run along the whole path, unfolded where mirrors bend it.
 struct SurfaceHit {
   std::uint32_t object = RayPacket::miss;
   float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = nothing met
@@ -22,7 +22,7 @@ struct SurfaceHit {
   float offset = 0;                  // the facet's plane is normal . p = offset, p from the sonar's last image
   Vec3 direction;                    // unit, of that last path, in the same axes
 
-  /// Of a ray that has come `range_m` along the whole path; `forward`: x of the unit direction it left in.
+  /// Hit of a ray after `range_m` along the whole path; `forward`: x of the unit direction it left in.
   static SurfaceHit by(const RayPacket& rays, std::size_t lane, float range_m, float forward) {
     SurfaceHit surface;
     surface.object = rays.object[lane];

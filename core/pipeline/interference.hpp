@@ -25,7 +25,7 @@ class Leak {
   /// unknown: chosen. Share of its power that is new in every ping; in the captured M1200d pings 0.2 % in the first two rows,
   /// about a quarter in the next five.
   static constexpr double changing_share = 0.02;
-  // Of its amplitude: sqrt(1 - changing_share), sqrt(changing_share).
+  // Factors of its amplitude: sqrt(1 - changing_share), sqrt(changing_share).
   static constexpr double steady_part = 0.98994949366116653, changing_part = 0.14142135623730951;
   static_assert(steady_part * steady_part + changing_share > 1 - 1e-15 && steady_part * steady_part + changing_share < 1 + 1e-15);
   static_assert(changing_part * changing_part / changing_share > 1 - 1e-15 &&
@@ -60,7 +60,7 @@ struct ReceivedPulse {
 /// The pulses of the scene's other sonars that arrive during this ping: each sends at its own rate from a hashed moment on, its
 /// sound travels one way; a surface in between hides it.
 std::vector<ReceivedPulse> receive_other_sonars(const PingContext& context, const PingRequest& request);
-/// What a pulse is on the samples [from, to) in a beam that looks at it, as far as it reaches.
+/// Samples [from, to) of a pulse in a beam that points at it, as far as it reaches.
 SampledPulse tone_of(const ReceivedPulse& pulse, int from, int to);
 /// On top of the beams, through the receive pattern with all its side lobes. In expected power, its power.
 void add_pulses(std::span<const ReceivedPulse> pulses, const PingPlan& plan, BeamSignals& beams);

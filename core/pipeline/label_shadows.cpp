@@ -78,7 +78,7 @@ void LabelWork::find_dark(int column) {
   }
 }
 
-/// Of the main lobe at -3 dB, as a sine.
+/// Half width of the main lobe at -3 dB, as a sine.
 double LabelWork::half_width(std::size_t beam) const {
   const ReceivePattern& pattern = context_->plan.beam_pattern[beam];
   return pattern.unit ? 0 : 0.5 * width_factor(context_->plan.mode.pattern.azimuth_taper) / pattern.aperture_wavelengths;

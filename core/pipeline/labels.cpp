@@ -38,7 +38,7 @@ struct LabelWork::Point {
 
 namespace {
 
-/// Of a beam's side lobes, the farthest, with this share of its energy, are left out: a label's share is told to 1/255.
+/// The farthest side lobes of a beam, with this share of its energy, are left out: a label's share has steps of 1/255.
 constexpr double dropped_energy = 1e-3;
 
 /// |p|^2 at whole samples from the peak, as far as it is worth counting.
@@ -85,7 +85,7 @@ void LabelWork::keep_weights() {
   first_sine_ = plan.columns.first_sine, spacing_ = plan.columns.spacing;
 }
 
-/// Of the receiver, at a beam's output, whether or not it is added: what an echo must exceed.
+/// Finds the receiver's noise at a beam's output, added or not, which an echo must exceed.
 void LabelWork::find_noise() {
   const PingPlan& plan = context_->plan;
   noise_far_.assign(plan.beam_sine.size(), 0.0);

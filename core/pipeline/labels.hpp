@@ -27,7 +27,7 @@ class LabelWork {
   /// `context`, `tiles` and `by_group` must live until finish().
   void begin(const PingContext& context, const std::vector<PreparedTile>& tiles,
              const std::vector<std::vector<std::uint32_t>>& by_group, int group_columns);
-  /// What hides what in columns [first, last), which the fan has just traced. Any thread, each column once.
+  /// Notes occlusions in columns [first, last), which the fan has just traced. Any thread, each column once.
   void note_shadows(const FanScratch& fan, int first, int last);
   /// The energy of the group that begins at `group.first_column`, from its cells once more. Any thread, each group once.
   void add_cells(const simd::GroupView& group, Echoes& scratch);

@@ -1,4 +1,4 @@
-// What the steps that make echoes of a scene read: the scene as it stands, and what one ping makes of it.
+// Inputs of the steps that make echoes of a scene: the scene as it stands, and values of one ping.
 #pragma once
 
 #include <span>

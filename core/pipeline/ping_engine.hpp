@@ -78,9 +78,9 @@ class PingEngine {
   /// Engines that cannot be interrupted ignore it. Null = none; no ping may be under way.
   virtual void set_interruption(Interruption* interruption) { static_cast<void>(interruption); }
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
-  /// Of the last ping.
+  /// Statistics of the last ping.
   virtual PingStatistics statistics() const { return {}; }
-  /// Of every ping of the last run() or collect(), in its order.
+  /// Statistics of every ping of the last run() or collect(), in its order.
   virtual std::vector<PingStatistics> statistics_of_each() const { return {statistics()}; }
 
  private:

@@ -22,7 +22,7 @@
 
 namespace sonar {
 
-/// What the rays look at: angles about the array axis, and the tangent axis of the depth map.
+/// Directions of the rays: angles about the array axis, and the tangent axis of the depth map.
 struct Fan {
   double half_angle_rad = 0;  // of the main part; the fixed fan and paths by mirrors cover no more
   double reach_rad = 0;       // with the side lobes
@@ -123,7 +123,7 @@ struct PingPlan {
   /// The column that is traced for a column in the side lobes.
   int side_column(int k) const { return std::min(k - k % side_columns + side_columns / 2, columns.count - 1); }
   static constexpr int side_columns = 4;
-  /// What the fan and the levels of cells look at.
+  /// Sets the view of the fan and of the levels of cells.
   void aim(CellView& view) const;
   bool truncates() const { return switches.truncation && mode.receiver.truncates; }
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
@@ -132,7 +132,7 @@ struct PingPlan {
 /// The same for any number of threads.
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool);
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
-/// Of the centre frequency, at the sound speed that the device assumes [m].
+/// Wavelength of the centre frequency, at the sound speed that the device assumes [m].
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
 /// The client's gain alone, which may change with every ping.
 void set_gain(PingPlan& plan, float gain_db);

@@ -27,15 +27,14 @@ struct PingScalars {
   Rotation world_from_sonar;
   Vec3 position_in_scene;  // relative to RayScene::origin() [m]
 
-  // What the rays and the cells are seen from, and how that moves. An echo from range r bounced at r / c and came home at 2 r /
-  // c.
+  // Origin of rays and cells, and its motion. An echo from range r bounces at r / c and returns at 2 r / c.
   Pose seen_from;        // the sonar in the world half way through the ping; the pose of firing when it rests
   double seen_at_s = 0;  // after firing
   bool moves = false;
   Twist twist;
   double doppler_m_per_mps = 0;  // an echo that closes in by 1 m/s appears so much farther (docs/acoustics.md, section 4)
 
-  /// Of a place in the axes of `seen_from`.
+  /// Echo of a place in the axes of `seen_from`.
   EchoGeometry echo_geometry(Vec3d from_sonar_m) const;
   /// How many columns may lie between where a place was looked for and where its echo is received.
   int columns_turned(const PingPlan& plan) const;

@@ -129,7 +129,7 @@ class RangeImager {
   }
 
  private:
-  /// What a pixel shows before it is quantised; power 0 = no return.
+  /// Value of a pixel before it is quantised; power 0 = no return.
   struct Reported {
     double power = 0, range_m = 0;  // [uPa^2], the device's metres
   };
@@ -227,7 +227,7 @@ class RangeImager {
             held(r.range_m / wanted_.range_unit_m, RangePixel::most_range)};
   }
 
-  /// Of each column the nearest that its rays met.
+  /// The nearest hit of each column's rays.
   std::vector<BeamTruth> truth() const {
     std::vector<BeamTruth> nearest(static_cast<std::size_t>(grid_.columns));
     for (int column = 0; column < grid_.columns; ++column)

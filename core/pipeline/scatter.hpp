@@ -37,7 +37,7 @@ std::vector<float> turned_away_of(const Scene& scene, std::span<const Skin> skin
 void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles);
 
-/// Of columns [first, last); the map may hold more.
+/// View of columns [first, last); the map may hold more.
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen, int first, int last);
 
 /// For each group of `group_columns` columns, the tiles that reach into it, in order.

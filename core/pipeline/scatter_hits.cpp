@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-/// Of a ray of the fixed fan, sonar axes.
+/// Direction of a ray of the fixed fan, sonar axes.
 Vec3d direction_of_hit(const FanHit& hit, double sine, bool conical) {
   const ConicalDirection d{sine, static_cast<double>(hit.elevation_rad)};
   return conical ? sonar_from_conical(d) : sonar_from_flat(d);

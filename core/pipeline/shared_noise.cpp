@@ -20,13 +20,13 @@ constexpr double none_db = -150;
 /// what groups hear in the outer beams would go on, and is not in the recording at 1.75 m, 3.7 times that range.
 constexpr double margin = 3, fades_from = 2;
 
-/// Of a part, blocks of samples of a beam are left out that are nowhere louder than this share of the channels' own noise (30),
+/// A beam's blocks of samples of a part are left out if nowhere louder than this share of the channels' own noise (30),
 /// over the number of parts.
 constexpr double silent = 0.03;
 constexpr std::size_t block_samples = SharedNoiseTable::block_samples;
 
 constexpr int most_groups = 32;  // each has a table
-// Of a table's complex values, 1 GiB, and of its sums: some 10 s.
+// Limits of a table's complex values, 1 GiB, and of its sums: some 10 s.
 constexpr double most_values = 1 << 27, most_steps = 1e9;
 
 /// Mean over the beams of what they receive of the leak, re the sum of the channels' powers: where it is less, the beams point
@@ -159,7 +159,7 @@ std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& s
          "or in receiver.shared_noise a larger group or a sine outside the sector, or a leak that ends";
 }
 
-/// What is heard of the parts in a block of samples, in order.
+/// Audible parts in a block of samples, in order.
 struct SharedNoiseTable::Block {
   std::vector<std::size_t> at;  // part * beams + beam
   std::vector<float> heard;     // [at][2][block_samples]

@@ -15,17 +15,17 @@ namespace sonar {
 
 struct PingPlan;
 
-/// What is wrong with the numbers of channels, and of a group; empty if nothing is.
+/// The fault of the numbers of channels and of a group; empty for valid ones.
 std::string why_impossible(const SharedNoise& law);
 /// Why the table below would need too much memory or time; empty if it does not. Needs possible numbers of channels.
 std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
 
-/// What the beams make of them, a function of the plan alone.
+/// Weights of the beams for shared noise, a function of the plan alone.
 class SharedNoiseTable {
  public:
   static constexpr std::size_t block_samples = 32;  // kept or left out together
   SharedNoiseTable() = default;
-  /// Nothing where the receiver has none. Needs the plan's columns and the level of their noise.
+  /// Empty if the receiver has none. Needs the plan's columns and the level of their noise.
   SharedNoiseTable(const PingPlan& plan, Parallel& pool);
   bool is_audible() const { return samples_ > 0; }
   bool has_leak() const { return !leak_upa_.empty(); }
@@ -44,7 +44,7 @@ class SharedNoiseTable {
   const std::vector<float>& steady_upa() const { return steady_upa_; }
   const std::vector<float>& leak_upa() const { return leak_upa_; }
   double noise_power(std::size_t beam, std::size_t sample) const;  // [uPa^2]; 0 beyond the samples
-  /// What the channels of one ping share, [parts][2][samples], or its rms; without the noise, or without the leak.
+  /// Draws the shared part of one ping's channels, [parts][2][samples], or its rms; without the noise, or without the leak.
   void draw(const PingNoise& key, bool noise, bool leak, bool expected_power, std::vector<float>& shared) const;
   /// On top of the beams.
   void add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const;

@@ -1,4 +1,4 @@
-// What the stages of a ping hand to each other: columns, depth map, echoes, signals by column and by beam.
+// Values that the stages of a ping pass on: columns, depth map, echoes, signals by column and by beam.
 #pragma once
 
 #include <complex>
@@ -21,7 +21,7 @@ struct Columns {
   double sine(int column) const { return first_sine - column * spacing; }
 };
 
-/// What the rays saw, column by column: 1 / x (x = forward coordinate in the sonar's frame) against the tangent z / x. For flat
+/// Hits of the rays, column by column: 1 / x (x = forward coordinate in the sonar's frame) against the tangent z / x. For flat
 /// beams (conical off) the horizontal distance stands in for x.
 struct DepthMap {
   int first_column = 0, columns = 0, bins = 0;
@@ -29,7 +29,7 @@ struct DepthMap {
   std::vector<float> inverse_x;   // [columns][bins + 1], 0 = nothing was hit; its last bits are the surface_mark
   std::vector<float> per_column;  // [columns][bins + 1]: by how much it changes from column to column along the facet hit
 
-  /// Of columns [first, last), to be drawn.
+  /// Prepares columns [first, last), to be drawn.
   void shape(int first, int last, int bin_count) {
     first_column = first, columns = last - first, bins = bin_count;
     inverse_x.resize(static_cast<std::size_t>(columns) * static_cast<std::size_t>(bins + 1));
@@ -91,7 +91,7 @@ struct BeamSignals {
   std::ptrdiff_t stride = 0;  // floats from beam to beam
   std::vector<float> data;
 
-  /// Of samples [first, first + count), rows of whole vectors.
+  /// Prepares samples [first, first + count), rows of whole vectors.
   void shape(int beam_count, int first, int count);
   const float* beam(int j) const { return data.data() + j * stride; }
   float* beam(int j) { return data.data() + j * stride; }

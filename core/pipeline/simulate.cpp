@@ -207,7 +207,7 @@ void PingSimulation::find_echo_sources() {
   for (const TileInView& t : in_view) w_.statistics.cells += static_cast<std::size_t>(t.tile->count);
 }
 
-/// What comes by way of flat mirrors waits in columns of its own.
+/// Echoes by way of flat mirrors wait in columns of their own.
 void PingSimulation::find_multipath_echoes() {
   const MultipathCounts counts = simulate_multipath(context_, w_.multipath, points_);
   w_.statistics.rays += counts.rays;
@@ -267,7 +267,7 @@ void PingSimulation::scatter_hits_of(int first, int last, Workspace::Buffers::Pe
 }
 
 void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::PerWorker& mine, Stopwatch& watch) {
-  // What a moving sonar receives in a column it may have passed in another when it looked.
+  // A moving sonar may receive an echo in another column than that of the ray.
   const int beside = scalars_.columns_turned(plan_);
   const int map_first = std::max(first - beside, 0), map_last = std::min(last + beside, plan_.columns.count);
   mine.seen.shape(map_first, map_last, plan_.fan.bins);

@@ -13,7 +13,7 @@
 
 namespace sonar {
 
-/// What is kept from ping to ping: tables of the settings and buffers. One ping at a time.
+/// Values kept from ping to ping: tables of the settings and buffers. One ping at a time.
 class Workspace {
  public:
   explicit Workspace(double (*now_s)() = nullptr);  // a clock for the statistics

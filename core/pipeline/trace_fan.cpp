@@ -141,7 +141,7 @@ class FanTracer {
     }
   }
 
-  /// Of few columns, all elevations from `e` on: several elevations a packet.
+  /// Traces few columns, all elevations from `e` on: several elevations a packet.
   void trace_few(int e) {
     const int n = elevations(), end = n - plan_.fan.side_elevations, columns = last_ - first_;
     for (const int rows = RayPacket::size / columns; e < end; e += rows) {
@@ -218,8 +218,8 @@ class FanTracer {
     refinement.run(trace);
   }
 
-  /// Of the map from this column to the next, along the plane n . p = o of the facet that was hit: of 1 / x = (n_x + n_y u / (s
-  /// cos psi) + n_z tan psi) / o with s^2 = 1 - u^2; of flat beams 1 / h = (n_x s + n_y u + n_z tan psi) / o.
+  /// Slope of the map from this column to the next, along the plane n . p = o of the facet that was hit: of 1 / x = (n_x +
+  /// n_y u / (s cos psi) + n_z tan psi) / o with s^2 = 1 - u^2; of flat beams 1 / h = (n_x s + n_y u + n_z tan psi) / o.
   float per_column(const Sample& a, ColumnSine column) const {
     const SurfaceHit& hit = a.surface;
     if (hit.object == RayPacket::miss || hit.offset == 0) return 0;

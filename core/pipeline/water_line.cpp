@@ -44,7 +44,7 @@ std::span<const PingRequest> in_water(std::span<const PingRequest> requests, con
   return room;
 }
 
-void tell_as_asked(std::span<const PingRequest> requests, std::span<Ping> pings) {
+void restore_requested_pose(std::span<const PingRequest> requests, std::span<Ping> pings) {
   // The ping states the pose that was asked for, not the one it was computed with.
   for (std::size_t i = 0; i < pings.size(); ++i) {
     pings[i].request.sonar_in_world = requests[i].sonar_in_world;

@@ -21,6 +21,6 @@ bool is_in_air(const Pose& sonar_in_world, const Scene& scene);
 std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room);
 
 /// Puts the true poses of the sonars back into the pings of such requests; PingRequest::blank is left as it was computed.
-void tell_as_asked(std::span<const PingRequest> requests, std::span<Ping> pings);
+void restore_requested_pose(std::span<const PingRequest> requests, std::span<Ping> pings);
 
 }  // namespace sonar

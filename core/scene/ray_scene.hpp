@@ -1,4 +1,4 @@
-// What rays see: the scene's triangles behind a bounding-volume hierarchy (Embree, in embree_scene.cpp and nowhere else).
+// The scene for rays: its triangles behind a bounding-volume hierarchy (Embree, in embree_scene.cpp and nowhere else).
 // Static geometry is built once at high quality relative to `origin()`; moving bodies are instances, re-placed per ping. The seam
 // for another tracer is the linker: a program that defines the members of RayScene itself is linked without Embree's, as the
 // tests do that trace analytic primitives under the thread sanitizer (tests/core/pipeline/analytic_rays.cpp).
@@ -45,8 +45,8 @@ class RayScene {
   int rays_at_once() const;
   static std::string version();  // "Embree 3.13.5"
 
-  /// What stands still, and each body, is kept in a smaller form from so many triangles on: indices instead of copies of the
-  /// corners, some 65 bytes a triangle less. The hits are the same.
+  /// From this number of triangles on, the static part, and each body, is kept in a smaller form: indices instead of copies of
+  /// the corners, some 65 bytes a triangle less. The hits are the same.
   static constexpr std::size_t compact_from_triangles = 2'000'000;
 
  private:

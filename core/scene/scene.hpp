@@ -100,7 +100,7 @@ struct SeaSurface {
   bool operator==(const SeaSurface&) const = default;
 };
 
-/// What fills the water (docs/acoustics.md, section 3).
+/// Scatterers in the water (docs/acoustics.md, section 3).
 struct WaterColumn {
   float volume_db = -200;  // S_v, backscattering strength per cubic metre [dB re 1/m]; below -150 = none
   bool has_volume() const { return volume_db > -150; }

@@ -22,7 +22,7 @@ double percentile_of_full_scale(const Ping& ping, double share = assisted_share)
 /// `gamma`): a first-order approach to the gain that would have put it at assisted_level. `overload_db`: of a saturated picture.
 double next_gain_db(double gain_db, double level, double gamma, double passed_s, double overload_db = most_overload_db);
 
-/// What a device remembers. Starts from the client's gain, and again whenever the mode changes or the assist was off.
+/// State of a device's gain. Starts from the client's gain, and again whenever the mode changes or the assist was off.
 class GainAssist {
  public:
   /// The gain [dB] of a ping fired at `at`; the client's own when settings.gain_assist is off, or the samples

@@ -18,7 +18,7 @@
 
 namespace sonar {
 
-/// What makes scatterers of the scene (docs/acoustics.md, section 8).
+/// Models that make scatterers of the scene (docs/acoustics.md, section 8).
 enum class Mode {
   canonical,  // surface cells: the model of docs/acoustics.md
   paper,      // Choi 2025 as printed: a fixed fan of rays, a frequency sum, its own beamforming
@@ -121,7 +121,7 @@ struct PingRequest {
   Switches switches;
 };
 
-/// What a beam meets first: the nearest hit of the rays in its column within the -3 dB elevation width.
+/// First hit of a beam: the nearest of the rays in its column within the -3 dB elevation width.
 struct BeamTruth {
   static constexpr std::uint32_t nothing = 0xFFFFFFFFu;
   float range_m = 0;               // true range, 0 = nothing

@@ -1,5 +1,5 @@
-// What a client may change between two pings, in our terms. The vendor's law (protocol/<vendor>) fills the grid from its own
-// knobs.
+// Settings that a client may change between two pings, in our terms. The vendor's law (protocol/<vendor>) makes the grid from
+// the settings of its own protocol.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// What a sonar IS: the constants of a product, frequency mode by frequency mode. Filled by protocol/<vendor>/models.cpp.
+// The constants of a product, frequency mode by frequency mode. Filled by protocol/<vendor>/models.cpp.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ struct BeamPattern {
   ElevationWidthIs elevation_width_is = ElevationWidthIs::two_way;
 };
 
-/// What differs from beam to beam, as far as a recording shows it (docs/acoustics.md, sections 5 and 6). Tables at sines that are
+/// Differences between beams, as far as a recording shows them (docs/acoustics.md, sections 5 and 6). Tables at sines that are
 /// even over the sector, from its port edge to the other; empty = no difference.
 struct BeamProfile {
   std::vector<float> noise_db;       // receiver noise re (30), far from the sonar

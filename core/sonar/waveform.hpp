@@ -1,4 +1,4 @@
-// What the receiver's matched filter makes of one point echo: the pulse p(t), p(0) = 1. A constant of the product; its width
+// The matched filter's output for one point echo: the pulse p(t), p(0) = 1. A constant of the product; its width
 // follows the client's settings (PingSettings::pulse_width_m) unless it was measured (docs/acoustics.md, section 4).
 #pragma once
 

@@ -34,7 +34,7 @@ struct YamlNode;
 struct YamlTree;
 class Map;
 
-/// What numbers are accepted. Infinity only where `infinity` says so; NaN never.
+/// Accepted numbers. Infinity only where `infinity` says so; NaN never.
 struct Range {
   double min = -std::numeric_limits<double>::max();
   double max = std::numeric_limits<double>::max();

@@ -148,7 +148,7 @@ void add_farm_options(CLI::App& app, FarmCommand& farm) {
   collect.callback([&farm] { farm.what = FarmCommand::What::collect; });
 }
 
-/// What is missing or makes no sense together; empty = nothing.
+/// The missing or contradictory option; empty = none.
 std::string complaint(const RenderCommand& render) {
   const bool writes = render.report.empty() && !render.check_expectations;
   if (render.config.empty() && render.report.empty()) return "it needs a configuration or render file: sonard render FILE";
@@ -171,7 +171,7 @@ bool is_like_a_file(std::string_view word) {
   return word.find_first_of("./") != std::string_view::npos || std::filesystem::exists(word, ec);
 }
 
-/// What makes no sense together; empty = nothing.
+/// The contradictory options; empty = none.
 std::string complaint(const RunCommand& run) {
   const bool known = run.demo_of.empty() ||
                      std::any_of(std::begin(demos), std::end(demos), [&](const auto& demo) { return demo.first == run.demo_of; });

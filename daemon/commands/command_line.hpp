@@ -1,4 +1,4 @@
-// What the user typed, command by command. CLI11 is included by few .cpp files only: it is slow to compile.
+// The user's command line, command by command. CLI11 is included by few .cpp files only: it is slow to compile.
 #pragma once
 
 #include <cstdint>
@@ -72,7 +72,7 @@ using Command =
     std::variant<RunCommand, CheckCommand, RenderCommand, DatasetCommand, WorkerCommand, FarmCommand, ReplayCommand, Leave>;
 
 Command parse_command_line(int argc, char** argv);
-/// What was given on the command line, or stands for it in the environment, wins over the file.
+/// Options of the command line, or of the environment, override the file.
 Result<void> override_config(Config& config, const RunCommand& command);
 
 }  // namespace sonar

@@ -31,7 +31,7 @@ int report_error(const Error& error, bool json) {
   return exit_code(error.kind);
 }
 
-/// Of the standard library's threads, and of Boost's.
+/// Whether an exception of the standard library's threads, or of Boost's, means a lack of threads.
 bool is_short_of_threads(const std::exception& e) {
   if (const auto* error = dynamic_cast<const std::system_error*>(&e))
     return error->code() == std::errc::resource_unavailable_try_again;

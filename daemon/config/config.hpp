@@ -133,7 +133,7 @@ struct FaultConfig {
   bool operator==(const FaultConfig&) const = default;
 };
 inline constexpr int most_fixed_rays = 100000;  // a column
-/// What computes the pings (docs/cuda.md).
+/// Engines of pings (docs/cuda.md).
 enum class EngineDevice { cpu, cuda, automatic };
 inline constexpr std::array<std::string_view, 3> engine_device_names = {"cpu", "cuda", "auto"};
 
@@ -172,7 +172,7 @@ Result<Config> load_config(const std::filesystem::path& file);
 Result<Config> parse_config(std::string_view yaml, const std::string& name, const std::filesystem::path& directory);
 /// Checks that a lockstep or follow clock has a source that can advance it. Call after applying command-line options. config.
 Result<void> check_time_can_pass(const Config& config);
-/// What runs when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. Needs no files.
+/// Configuration when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. Needs no files.
 Result<Config> demo_config();
 
 /// Fills netmask and status_to from advertise_ip, unless the file gives them.

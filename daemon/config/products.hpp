@@ -1,4 +1,4 @@
-// What depends on the product of a sonar: the options that have an effect, and `sonard --profile`.
+// Properties of a sonar's product: the options that have an effect, and `sonard --profile`.
 #pragma once
 
 #include <string>

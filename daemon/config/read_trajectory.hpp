@@ -32,7 +32,7 @@ class TrajectoryFiles {
   Named read(const text::Node& file, const motion::ReadOptions& options);
   Named read(const TrajectoryKeys& keys);
 
-  /// What a body is to follow: `none`, a file, or a map of the keys above with `speed`, `loop` and `start_s`. `body` is who asks:
+  /// Reads a body's plan: `none`, a file, or a map of the keys above with `speed`, `loop` and `start_s`. `body` asks:
   /// the body taken from a file of several when none is named. With `orbits`, `orbit` is a word too, and sets it.
   motion::Plan read_plan(const text::Node& node, const std::string& body, bool* orbits = nullptr);
 

@@ -67,7 +67,7 @@ std::vector<std::string> scenes_in(const std::filesystem::path& folder) {
   return names;
 }
 
-/// Of these; the ending counts nothing, left out or another.
+/// The nearest of these names, whatever its ending.
 std::string nearest_of(const std::vector<std::string>& names, const std::filesystem::path& given) {
   std::vector<std::string> stems;
   for (const std::string& name : names) stems.push_back(std::filesystem::path(name).stem().string());

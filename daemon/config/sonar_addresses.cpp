@@ -89,7 +89,7 @@ void add_tcp_ports(std::vector<Listening>& all, const SonarConfig& sonar) {
     all.push_back({"observers.port of sonar \"" + sonar.name + "\"", {sonar.bind_ip, sonar.observer_port}, false, true});
 }
 
-/// What is moved must not be where the daemon of the same configuration that is not moved has something else.
+/// An offset daemon must not use an address or port of the daemon without an offset.
 Result<void> check_apart(const Config& moved, const Config& unmoved) {
   const std::string instead = " without an offset; give another number";
   for (const SonarConfig& a : moved.sonars)

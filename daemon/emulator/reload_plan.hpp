@@ -1,4 +1,4 @@
-// What becomes of running sonars when the configuration is read again. Pure.
+// Outcome of a reload for running sonars. Pure.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@ namespace sonar {
 
 /// untouched and moved: it keeps its clients; changed: it is replaced; removed: it stops.
 enum class Fate { untouched, moved, changed, removed };
-/// Of a sonar that runs as `running`, when `next` takes the place of `now`.
+/// Outcome for a sonar that runs as `running`, when `next` takes the place of `now`.
 Fate fate_of(const SonarConfig& running, const Config& now, const Config& next);
 
 /// Null when there is none.

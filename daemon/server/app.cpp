@@ -79,7 +79,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
   log_new_notes();
 }
 
-/// What of the configuration and the scene was probably not meant. Not before a reload has changed both.
+/// Logs probable mistakes in configuration and scene. Call after a reload has replaced both.
 void App::log_new_notes() {
   if (!std::exchange(notes_due_, false)) return;
   for (const Note& note : plausibility_.use(config_, *changes_.scene())) log_.warning(text_of(note));
@@ -115,7 +115,7 @@ int App::run() {
   return exit_code_;
 }
 
-/// What `systemctl status` shows.
+/// Status line for `systemctl status`.
 std::string App::status_line() const {
   std::string line = "Serving";
   for (const Device& d : devices())

@@ -1,4 +1,4 @@
-// The whole daemon, top down: the world, the pose listeners and one Device per sonar, run by one I/O thread until told to stop.
+// The whole daemon, top down: the world, the pose listeners and one Device per sonar, run by one I/O thread until it must stop.
 // main.cpp and the tests make one; the engine factory is the seam where tests put a fake one.
 #pragma once
 
@@ -41,7 +41,7 @@ struct AppOptions {
   /// How the configuration is read again, the command line's part included; any thread. Empty: there is none (the demo).
   std::function<Result<Config>()> read_config;
   LoadScene load_scene;
-  NotifyTarget service_manager;  // is told when we are ready, stop, and that we are alive
+  NotifyTarget service_manager;  // notified when we are ready, stop, and that we are alive
 };
 
 class App {

@@ -1,4 +1,4 @@
-// What happens in the daemon, published to clients that subscribe. I/O thread only.
+// Events of the daemon, published to clients that subscribe. I/O thread only.
 #pragma once
 
 #include <cstdint>

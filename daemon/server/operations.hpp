@@ -1,4 +1,4 @@
-// What a running daemon can be asked, for the servers of the control protocol: the App carries it out, the stream server and the
+// Operations of a running daemon, for the servers of the control protocol: the App carries them out, the stream server and the
 // HTTP server only translate. I/O thread only.
 #pragma once
 

@@ -17,7 +17,7 @@ class Reload {
   /// From the beginning of one reload to that of the next, however often it is asked for.
   static constexpr std::chrono::milliseconds pause{500};
 
-  /// What a reload consists of, in this order.
+  /// Steps of a reload, in this order.
   struct Steps {
     std::function<void()> begin;
     std::function<Result<Config>()> read_config;  // any thread; empty: there is no configuration file

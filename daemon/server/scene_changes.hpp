@@ -31,7 +31,7 @@ class SceneChanges {
     /// On the I/O thread, when the new scene is in use, or nothing was changed. Never after stop().
     std::function<void(const Result<void>& outcome)> done;
   };
-  /// A new scene is in use: told before its Change is done.
+  /// A new scene is in use: called before its Change is done.
   using InUse = std::function<void(const ScenePointer& scene)>;
   static constexpr std::size_t most_waiting = 64;
   /// While drivers are served: each engine costs them some of a ping.

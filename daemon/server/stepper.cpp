@@ -28,7 +28,7 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   // Before the ping that is due at the same moment.
   const bool converses = is_first(due.conversation, due.ping) || due.conversation == due.ping;
   const std::optional<Time> next = converses ? due.conversation : due.ping;
-  // What is said at this very moment needs no time to pass.
+  // A tick at this very moment needs no time to pass.
   const bool may_come = next && (*next <= bound.last_tick || (converses && *next <= clock_.now()));
   if (!may_come && bound.then) advance(*bound.then);
   const bool answered = time_.answer(next);

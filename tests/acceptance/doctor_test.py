@@ -118,7 +118,7 @@ class Doctor(unittest.TestCase):
             # The same without the control stream: the kernel and the status message know.
             _, findings, _ = doctor(daemon.address, *PATIENT, control_port=1)
             self.expect(findings, "ping", "ok", "is busy", "not connecting")
-            self.assertNotIn("turned away", daemon.log())
+            self.assertNotIn("client refused", daemon.log())
             # Connected all the same: this sonar has one place, and the driver keeps it.
             _, findings, _ = doctor(daemon.address, "--take", *PATIENT)
             self.expect(findings, "ping", "warn", "closed the connection without a byte", "clients.max")

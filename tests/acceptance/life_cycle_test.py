@@ -1,5 +1,5 @@
 """How sonard ends, comes back and bears what its surroundings do to it: signals, kill -9, full disks, closed outputs, being frozen.
-What is measured is kept for docs/reliability.md where SONARD_RELIABILITY names a folder. Times are asserted with room for a busy
+What is measured is kept for the table of reliability where SONARD_RELIABILITY names a folder. Times are asserted with room for a busy
 machine; the record says whether the promise itself was kept."""
 import contextlib
 import fcntl
@@ -205,7 +205,7 @@ class Undisturbed(unittest.TestCase):
 
     @staticmethod
     def provoke_log_lines(address):
-        """A dozen clients too many are turned away, with a line of the log each until its limit."""
+        """A dozen clients too many are refused, with a line of the log each until its limit."""
         for _ in range(12):
             try:
                 with socket.create_connection((address, 52100), timeout=20) as visitor:

@@ -1,7 +1,7 @@
 """SIGHUP as an operator sends it: the shipped daemon, its real engine, a configuration file that is edited.
 
 A client of a sonar that the edit does not touch sees every ping id once, none is missing; the scene it looks at changes under it.
-What is measured is kept for docs/reliability.md where SONARD_RELIABILITY names a folder.
+What is measured is kept for the table of reliability where SONARD_RELIABILITY names a folder.
 """
 import json
 import pathlib

@@ -112,6 +112,11 @@ TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", 
 PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
                       (?:,?\ section\ (?P<section>\d+(?:\.\d+)*)|,?\ (?P<number>\d+(?:\.\d+)*)|,\ "(?P<title>[^"\n]+)")?""", re.X)
 LONGEST_FILE = 400  # lines; tests may be longer
+# A comment is a sentence, or a noun phrase that names the thing: these beginnings are fragments, these words are of persons.
+FRAGMENT = re.compile(r"[ \t]*//+<?[ \t]*(Of|What|Nothing:)(?=[\s,])")
+PERSONS = re.compile(r"\b(to" + r"ld|no" + r"body|some" + r"body|who" + r"ever|ow" + r"ed)\b", re.I)
+# Rooms that still have some; a room leaves the list when it is clean.
+WITH_FRAGMENTS = ("protocol/", "clients/ros2_bridge/", "clients/sonarctl/", "clients/web/", "daemon/emulator/view/", "daemon/server/view/")
 
 
 def tracked_files(root):
@@ -176,6 +181,19 @@ def include_violations(name, code):
                 yield number, f'{floor} must not include "{header}" (floors of docs/architecture.md)'
 
 
+def wording_violations(name, text):
+    """The first line of a comment must not begin as a fragment; no line may have a word of PERSONS."""
+    if name.startswith(WITH_FRAGMENTS):
+        return
+    before = ""
+    for number, line in enumerate(comments_of(text).splitlines(), 1):
+        if not before.startswith("//") and (match := FRAGMENT.match(line)):
+            yield number, f'comment: begins with "{match[1]}"; write a sentence, or a noun phrase that names the thing'
+        if match := PERSONS.search(line):
+            yield number, f'comment: "{match[1]}"; name the event: sent, reported, logged, refused'
+        before = line.strip()
+
+
 def line_of(text, position):
     return text.count("\n", 0, position) + 1
 
@@ -192,7 +210,7 @@ def violations(root):
         is_code = path.suffix in CODE
         code = without_comments(text) if is_code else text
         if is_code:
-            for number, what in include_violations(name, code):
+            for number, what in [*include_violations(name, code), *wording_violations(name, text)]:
                 yield f"{name}:{number}: {what}"
             if path.suffix in {".hpp", ".cuh", ".h"} and not re.search(r"^#pragma once$", text, re.M):
                 yield f"{name}:1: header without #pragma once"

@@ -107,6 +107,17 @@ class Planted(unittest.TestCase):
                 self.assertTrue(found[0].startswith(f"{name}:1: page: "), found)
                 self.assertIn(words, found[0])
 
+    def test_comments_are_sentences(self):
+        for line, words in [("/// Of the last ping.", 'begins with "Of"'), ("  // What a ray met.", 'begins with "What"'),
+                            ("int x;\n/// Nothing: no such field.", 'begins with "Nothing:"'),
+                            ("int x;  // the log is to" + "ld", '"to' + 'ld"')]:
+            with self.subTest(line=line):
+                self.expect("core/base/a.cpp", line + "\n", line.count("\n") + 1, words)
+        self.assertEqual(found_in({
+            "core/base/a.cpp": "/// Statistics of the last ping.\n/// What follows continues a sentence.\nint Of = 1;\n",
+            "core/base/b.cpp": 'f("What to' + 'ld");\n// Whatever comes.\n// Nothing is lost.\n',
+            "protocol/a.cpp": "/// Of a ping.\n"}), [])
+
     def test_headers_and_sizes(self):
         found = found_in({"core/base/a.hpp": "int x;\n"})
         self.assertEqual(found, ["core/base/a.hpp:1: header without #pragma once"])

@@ -1,4 +1,4 @@
-// What `sonard_bench` can run: a model, its settings, and how the sonar moves over which scene.
+// Cases of `sonard_bench`: a model, its settings, and how the sonar moves over which scene.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// What the benchmark finds beside rates of warm pings: cold pings after a jump, moving objects, equal bytes, bins without energy.
+// Findings of the benchmark beside rates of warm pings: cold pings after a jump, moving objects, equal bytes, empty bins.
 // Each prints its line and returns what goes into the JSON.
 #pragma once
 

@@ -56,7 +56,7 @@ Result<ScenePointer> scene_of(const BenchScene& where, const BenchOptions& optio
   return *loaded;
 }
 
-/// What computes the case: a device only what it can.
+/// Options of the case: a device computes only cases that it can.
 BenchOptions options_for(const BenchCase& c, const BenchOptions& options) {
   BenchOptions own = options;
   if (options.engine.device == EngineDevice::cpu) return own;

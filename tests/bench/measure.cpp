@@ -23,7 +23,7 @@ double read_clock(clockid_t clock) {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-/// What the case asks for wins over the command line.
+/// The case overrides the command line.
 Config config_of(const BenchCase& c, const BenchOptions& options) {
   Config config;
   config.seed = options.seed;

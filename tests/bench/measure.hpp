@@ -73,7 +73,7 @@ class Pinger {
   double frame_s_ = 0;
 };
 
-/// What a row of the table says.
+/// Figures of a row of the table.
 struct Figures {
   std::string case_name, description, scene, engine;
   Switches switches;

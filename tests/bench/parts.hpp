@@ -1,4 +1,4 @@
-// What parts of the model need of a scene and a sonar to be heard at all, and typical figures for benchmarks of scenes and
+// Requirements of parts of the model to a scene and a sonar, and typical figures for benchmarks of scenes and
 // sonars that lack it: so that the cost of every part can be measured over every scene.
 #pragma once
 

@@ -11,7 +11,7 @@
 
 namespace sonar::bench {
 
-/// Of so many runs of `work`, the time that the quickest took of this thread.
+/// Least time of this thread in so many runs of `work`.
 template <class Work>
 double best_ms(int times, Work&& work) {
   double best = 1e9;

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Writes docs/benchmarks.md with its two pictures, and docs/benchmarks/tables.md, from results of `sonard_bench --json`.
+"""Writes docs/benchmarks.md with its two pictures, and the tables behind it, from results of `sonard_bench --json`.
 
-usage: write_benchmarks.py [--instruction-sets] BENCH.json [SET.json...] DOCS_FOLDER
+usage: write_benchmarks.py BENCH.json [SET.json...] DOCS_FOLDER TABLES_FOLDER
+       write_benchmarks.py --instruction-sets SET.json... TABLES_FOLDER
   BENCH.json  the whole run
   SET.json    rates with one instruction set, the best first: the chapter "Instruction sets"
   --instruction-sets  all files are SET.json: replaces that chapter of the tables and keeps everything else
@@ -28,7 +29,7 @@ GOALS = {
 }
 # Thread ms of the prototype's stages for P1 (2 processors with AVX-512), from which the goal was derived.
 FLOOR = {"trace": 2.9 + 0.44, "cull": 0.09, "scatter": 1.9, "synthesize": 1.4, "noise": 0.17, "couple": 0.42, "receive": 0.2}
-NAME, TABLES = "benchmarks", "benchmarks/tables"  # pages, below docs/
+NAME = "benchmarks"  # of both pages
 PAPER = [  # Choi 2025, Table 3: 512 beams, 10 m, RTX 2080 Ti and i9-9900K
     ("paper, 300 rays a beam, GPU", 0.3),
     ("paper, raster, 11 rays, GPU", 2.0),
@@ -271,7 +272,7 @@ def page(report, scene="local-search", other_rates=()):
     times = [f"{name}: {r['pings_per_second'] / PAPER[0][1]:.0f} times the paper's" for name, r in by_case_and_threads(report, scene)]
     lines = ["# Benchmarks", "",
              "Written by `tests/tools/benchmarks.sh` from results of `sonard_bench`. Stages, instruction sets, ratios of the hot loops and "
-             f"the values of the curves are in the [tables]({TABLES}.MD).".replace(".MD", ".md"), "",
+             "the values of the curves are in the tables that it leaves in the build folder.", "",
              "A ping is timed from pose to framed bytes: median of many, warm cells, default quality (noise, specular echoes, motion on). "
              f"The sonar moves at 0.9 m/s and up to 20 deg/s over rough sand of {results[0]['triangles'] if results else 0:,} triangles "
              f"(scene `{scene}`). Processor ms are those of all threads together. Other programs on the machine lengthen wall times, not "
@@ -293,7 +294,7 @@ def page(report, scene="local-search", other_rates=()):
 
 def tables(report, scene="local-search"):
     lines = ["# Benchmark tables", "",
-             "Written by `tests/tools/benchmarks.sh`, as is the [overview](../benchmarks.MD), which names the machine.".replace(".MD", ".md"),
+             "Written by `tests/tools/benchmarks.sh`, as is docs/benchmarks.md, which names the machine.",
              "", "## Published and measured rates", ""]
     rows = [[name, f"{rate:.1f}", ""] for name, rate in PAPER]
     rows += [[f"{name}: {r['description']}", f"{r['pings_per_second']:.1f}", f"{r['pings_per_second'] / PAPER[0][1]:.0f} times the paper's"]
@@ -326,8 +327,7 @@ def old(file):
     return file.read_text(encoding="utf-8") if file.exists() else ""
 
 
-def write(report, folder, sets=()):
-    file_of(folder, TABLES).parent.mkdir(parents=True, exist_ok=True)
+def write(report, folder, tables_folder, sets=()):
     scene = "local-search"
     entries = [(name, rate, False) for name, rate in PAPER]
     for case in GOALS:
@@ -339,8 +339,8 @@ def write(report, folder, sets=()):
     overview.write_text(page(report, scene, other_machines(old(overview), instruction_set(report["results"][0]))), encoding="utf-8")
     text = tables(report, scene)
     if sets:
-        text = with_sets(text, instruction_sets(sets, scene), old(file_of(folder, TABLES)))
-    file_of(folder, TABLES).write_text(text, encoding="utf-8")
+        text = with_sets(text, instruction_sets(sets, scene), old(file_of(tables_folder, NAME)))
+    file_of(tables_folder, NAME).write_text(text, encoding="utf-8")
     (folder / "benchmarks-rates.svg").write_text(bars(entries), encoding="utf-8")
     if report.get("curves"):
         (folder / "benchmarks-curves.svg").write_text(lines_of(report["curves"]), encoding="utf-8")
@@ -351,14 +351,15 @@ def main():
     sets_only = words[:1] == ["--instruction-sets"]
     if sets_only:
         words = words[1:]
-    if len(words) < 2:
+    folders = [Path(name) for name in words if not name.endswith(".json")]
+    reports = [json.loads(Path(name).read_text(encoding="utf-8")) for name in words if name.endswith(".json")]
+    if not reports or len(folders) != (1 if sets_only else 2):
         sys.exit(__doc__.strip())
-    reports, folder = [json.loads(Path(name).read_text(encoding="utf-8")) for name in words[:-1]], Path(words[-1])
     if sets_only:
-        file = file_of(folder, TABLES)
+        file = file_of(folders[0], NAME)
         file.write_text(with_sets(old(file), instruction_sets(reports), old(file)), encoding="utf-8")
     else:
-        write(reports[0], folder, reports[1:])
+        write(reports[0], *folders, reports[1:])
 
 
 if __name__ == "__main__":

@@ -51,9 +51,10 @@ class Page(unittest.TestCase):
                               "difference": 0.0, "holds": False}],
                   "curves": [{"name": "rows", "case": "P3a", "points": [{"x": 200, "median_ms": 3.0}, {"x": 400, "median_ms": 5.0}]}]}
         with TemporaryDirectory() as folder:
-            write_benchmarks.write(report, Path(folder))
-            page, tables = (write_benchmarks.file_of(Path(folder), name).read_text(encoding="utf-8")
-                            for name in (write_benchmarks.NAME, write_benchmarks.TABLES))
+            (Path(folder) / "tables").mkdir()
+            write_benchmarks.write(report, Path(folder), Path(folder) / "tables")
+            page, tables = (write_benchmarks.file_of(where, write_benchmarks.NAME).read_text(encoding="utf-8")
+                            for where in (Path(folder), Path(folder) / "tables"))
             for svg in ("benchmarks-rates.svg", "benchmarks-curves.svg"):
                 self.assertTrue(ElementTree.parse(Path(folder) / svg).getroot().tag.endswith("svg"))
         for words in ("p99 4.00 ms", "1 dropped | 40 %, no drop | 15 % | **missed** |", "**different bytes**",
@@ -92,9 +93,10 @@ class Page(unittest.TestCase):
         older = {"processor": "old", "date": "2026-01-02", "results": [result("P1", 2, 242)]}
         newer = {"processor": "new", "results": [dict(result("P1", 2, 140), engine="cpu, avx2, 2 threads, Embree")]}
         with TemporaryDirectory() as name:
-            folder = Path(name)
+            folder, tables = Path(name), Path(name) / "tables"
+            tables.mkdir()
             for report in (older, newer, newer):
-                write_benchmarks.write(report, folder)
+                write_benchmarks.write(report, folder, tables)
             page = write_benchmarks.file_of(folder, write_benchmarks.NAME).read_text(encoding="utf-8")
         self.assertEqual(page.count("### avx512: old, 2026-01-02\n"), 1)
         self.assertEqual(page.count("### avx2: new, "), 1)

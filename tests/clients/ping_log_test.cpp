@@ -1,4 +1,4 @@
-// What listen concludes from a stream: counts, gaps, rates and the verdict that decides its exit code.
+// Conclusions of `listen` from a stream: counts, gaps, rates and the verdict that decides its exit code.
 #include "clients/sonarctl/ping_log.hpp"
 
 #include <gmock/gmock.h>

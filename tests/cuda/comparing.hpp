@@ -16,7 +16,7 @@
 
 namespace sonar::test {
 
-/// What the engine of these tests runs on: host loops, or, in programs compiled for it, the device.
+/// Machine of these tests' engine: host loops, or, in programs compiled for it, the device.
 #ifdef SONAR_TEST_ON_DEVICE
 inline Result<std::unique_ptr<cuda::Machine>> test_machine() {
   setenv("SONARD_CUDA_MODULE", SONAR_TEST_ON_DEVICE, 0);  // the environment's first: a packed test lies elsewhere

@@ -36,7 +36,7 @@ using MachinePointer = std::unique_ptr<cuda::Machine>;
 std::vector<Ping> pings_of(MachinePointer machine, const std::shared_ptr<const Scene>& scene, const std::vector<PingRequest>& all,
                            cuda::DeviceEngineOptions options = {.batch = 3}) {
   Parallel pool(1);
-  // What a machine throws is no reason to go on with the CPU.
+  // An exception of a machine is no reason to continue with the CPU.
   options.cpu_after_failure = false;
   const auto engine = cuda::make_device_engine(scene, pool, {.simd = SimdLevel::portable}, std::move(machine), options);
   return engine->run(all);
@@ -116,7 +116,7 @@ TEST(DeferringDevice, FindsEverythingAsItWasQueued) {
     expect_same(there, pings_of(std::make_unique<DeferringMachine>(), scene, all, options));
 }
 
-// Of several sonars, in calls of every size, one after the other and submitted before the one before it is collected.
+// Pings of several sonars, in calls of every size, one after the other and submitted before the one before it is collected.
 class Grouped : public ::testing::TestWithParam<std::size_t> {};
 
 TEST_P(Grouped, MakesTheSameBytes) {

@@ -42,7 +42,7 @@ class PassingMachine : public cuda::Machine {
   std::unique_ptr<cuda::Machine> inner_ = cuda::make_host_loops(cuda::LoopOrder::backwards);
 };
 
-/// Nothing is done before a lane is waited for, and then no more than that lane needs. What is copied from is read only then: a
+/// Does no work before a lane is waited for, and then only what that lane needs. Sources of copies are read only then: a
 /// source that was changed or given back too early shows, and so does an order that was forgotten.
 class DeferringMachine final : public PassingMachine {
  public:

@@ -1,4 +1,4 @@
-// What a controller may send to an ARIS, in two pieces, and what may come as a part of a frame: no byte may crash the dialogue,
+// Bytes of a controller to an ARIS, in two pieces, and a part of a frame: no byte may crash the dialogue,
 // make it answer, or lead to settings that no ping can have.
 #include <cstddef>
 #include <cstdint>

@@ -1,4 +1,4 @@
-// What a host may send over the BlueView link, in two pieces: no byte may crash the dialogue or make it answer without bound.
+// Bytes of a host over the BlueView link, in two pieces: no byte may crash the dialogue or make it answer without bound.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

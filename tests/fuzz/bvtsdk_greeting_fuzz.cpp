@@ -1,4 +1,4 @@
-// What a sonar may answer to the BlueView libraries' greeting: the head of a frame, and the description that it carries. First
+// A sonar's answer to the BlueView libraries' greeting: the head of a frame, and the description that it carries. First
 // byte odd: a frame, else the bare description. What is accepted is written again as the same bytes.
 #include "clients/bvtsdk/core/description.hpp"
 #include "clients/bvtsdk/core/frame.hpp"

@@ -1,5 +1,5 @@
-// What a sonar may send to the BlueView libraries, and what lies in a recording: no byte may crash the decoders, and what they
-// accept makes images and range lists of sane size. The first byte chooses: a ping's payload, a recording (R), or a recording
+// Bytes of a sonar to the BlueView libraries, and of a recording: no byte may crash the decoders, and accepted pings
+// make images and range lists of sane size. The first byte chooses: a ping's payload, a recording (R), or a recording
 // whose checksums are put right first (r), so that what lies behind them is reached.
 #include <zlib.h>
 

@@ -16,7 +16,7 @@ using fuzz::require;
 
 void answer(std::span<const std::byte> message) {
   const auto request = control::decode_request(message);
-  // What is skipped without being decoded has no answer that a client could wait for.
+  // A message that is skipped without being decoded has no answer that a client could wait for.
   if (control::is_unasked_pose(message))
     require(request ? request->id == 0 && std::holds_alternative<control::PoseSample>(request->op) : request.error().id == 0);
   if (!request) {

@@ -1,4 +1,4 @@
-// What every grid of heights must be, read from any format, and that its mesh is sound.
+// Conditions of every grid of heights, read from any format, and that its mesh is sound.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What a sonar of any make sends to its host. The first byte chooses the make; then pieces: port, length in two bytes, bytes. At
+// Bytes of a sonar of any make to its host. The first byte chooses the make; then pieces: port, length in two bytes, bytes. At
 // a port of kind http a piece is the body of a reply.
 #include <cstdlib>
 

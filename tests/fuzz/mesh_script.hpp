@@ -1,4 +1,4 @@
-// What the fuzz targets of meshes share: coordinates out of a script of bytes, and what every cleaned mesh must be.
+// Common parts of the fuzz targets of meshes: coordinates out of a script of bytes, and conditions of every cleaned mesh.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What a device sends, through our driver-side decoder: first byte = length of the pieces, the rest is the stream.
+// Bytes of a device, through our driver-side decoder: first byte = length of the pieces, the rest is the stream.
 // Every sample, gain and bearing a decoded ping claims to have is read, so that a sanitizer sees one too many.
 #include <algorithm>
 #include <cstdlib>

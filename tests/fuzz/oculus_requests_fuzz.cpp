@@ -1,4 +1,4 @@
-// What a client sends, through a whole Dialogue: first byte = length of the pieces, the rest is the stream.
+// Bytes of a client, through a whole Dialogue: first byte = length of the pieces, the rest is the stream.
 // Stops when a setting leaves the model's limits, or when bytes turn into more of ours than they paid for.
 #include <algorithm>
 #include <cmath>

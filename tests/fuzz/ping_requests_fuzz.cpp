@@ -1,4 +1,4 @@
-// What a host may send to the devices of the ping protocol, in two pieces: no byte may crash a dialogue, be answered by much more
+// Bytes of a host to devices of the ping protocol, in two pieces: no byte may crash a dialogue, be answered by much more
 // than was sent, or lead to settings that no ping can have.
 #include <cstddef>
 #include <cstdint>

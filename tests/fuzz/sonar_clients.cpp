@@ -203,7 +203,7 @@ void SonarClients::write(std::size_t place, std::size_t bytes) {
   check();
 }
 
-/// Of every client: pings offered are written, dropped, waiting, or the one being written.
+/// Checks every client: pings offered are written, dropped, waiting, or the one being written.
 void SonarClients::check() const {
   for (const Connection& c : sonar_.connections().all()) {
     const Outbox& box = c.outbox;

@@ -13,12 +13,12 @@
 
 namespace sonar::fuzz {
 
-/// What a client receives, taken apart by the driver's side of its vendor: whole messages only, pings in rising order.
+/// Decodes a client's stream by the driver's side of its vendor: whole messages only, pings in rising order.
 class StreamReader {
  public:
   virtual ~StreamReader() = default;
   virtual void read(protocol::BytesView bytes) = 0;
-  /// Nothing of a message is left over.
+  /// Whether no part of a message is left over.
   virtual bool at_a_message_end() const = 0;
 };
 std::unique_ptr<StreamReader> oculus_reader();

@@ -1,4 +1,4 @@
-// What may be posted to a Sonar 3D-15, as a path, a line's end and a body, and what may come as a packet of images: no byte may
+// Posts to a Sonar 3D-15, as a path, a line's end and a body, and a packet of images: no byte may
 // crash it, or lead to settings that no ping can have.
 #include <algorithm>
 #include <cstddef>

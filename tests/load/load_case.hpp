@@ -1,4 +1,4 @@
-// What the load tests share: how long they run, and how their figures are kept.
+// Common parts of the load tests: how long they run, and how their figures are kept.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ inline constexpr bool memory_is_ours = true;
 
 using text::format;
 
-/// Says it and, in the full length, keeps it for docs/reliability.md.
+/// Prints the figure and, in the full length, keeps it for the table of reliability.
 inline void keep(const std::string& item, const std::string& figure, const std::string& bound, bool passed) {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   std::printf("  %-18s %s (%s)\n", item.c_str(), figure.c_str(), bound.c_str());
@@ -35,7 +35,7 @@ inline void keep(const std::string& item, const std::string& figure, const std::
   EXPECT_TRUE(test::record_reliability({item, figure, bound, passed, command}));
 }
 
-/// What must be true of every sonar when it has stopped, whatever its clients did.
+/// Accounts of every sonar must balance when it has stopped, whatever its clients did.
 inline void expect_accounts_balance(const DeviceFigures& f) {
   EXPECT_LE(f.pings + f.skipped_ticks, f.ticks);
   EXPECT_LE(f.ticks, f.pings + f.skipped_ticks + 1) << "a ping may be under way at the stop";

@@ -10,7 +10,7 @@ namespace sonar::load {
 
 inline constexpr std::size_t beams = 256, rows = 512, picture_bytes = beams * rows, pictures = 16;
 
-/// What the image of ping `number` is.
+/// Image of ping `number`.
 std::span<const std::byte> picture_of(std::uint32_t number);
 
 class PremadeEngine final : public PingEngine {

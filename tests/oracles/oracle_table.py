@@ -3,7 +3,7 @@
 
 usage: oracle_table.py FOLDER [--markdown] [--partial]
   FOLDER      what the environment variable SONARD_ORACLES named, build/<preset>/oracles after ctest
-  --markdown  a table for docs/validation/tables.md instead of one for the terminal
+  --markdown  a table for the validation tables instead of one for the terminal
   --partial   an oracle without figures is no fault: the run was asked for some tests only
 Exit status 1: an oracle is out of tolerance, or has no figures and no reason for that. 2: the folder cannot be read.
 """

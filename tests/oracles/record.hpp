@@ -7,7 +7,7 @@
 
 namespace sonar::test {
 
-/// Truths beyond the 46 of the table are recorded under this number, told apart by `what`.
+/// Truths beyond the 46 of the table are recorded under this number, distinguished by `what`.
 inline constexpr int no_number = 0;
 
 /// Fails the running test unless |measured - expected| <= tolerance, and appends the figures to the folder that the environment

@@ -200,7 +200,7 @@ TEST_P(Hosts, ReadTheSameHoweverAStreamIsSplit) {
   for (const std::size_t piece : {1u, 2u, 7u, 16u, 1000u}) EXPECT_EQ(pings_of(piece), whole) << piece;
 }
 
-/// What the device sent, cut off anywhere or damaged anywhere, to a host that has got everything before it.
+/// The device's bytes, cut off anywhere or damaged anywhere, to a host that has received all bytes before.
 TEST_P(Hosts, SurviveWhatIsCutOffOrDamaged) {
   Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), 0, model_of(GetParam()));
   talk.run(6);

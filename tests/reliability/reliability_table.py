@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Makes docs/reliability.md from the figures that tests recorded (tests/reliability/record.hpp and record.py).
+"""Makes the table of reliability from the figures that tests recorded (tests/reliability/record.hpp and record.py).
 
-usage: reliability_table.py FOLDER [--strict] > docs/reliability.md
+usage: reliability_table.py FOLDER [--strict] > PAGE
   FOLDER     what SONARD_RELIABILITY named: build/reliability after ./test.sh --long; what is measured by hand, with programs that
              are built elsewhere, is in by_hand/ beside this file (record.py writes it with SONARD_RELIABILITY=that folder)
   --strict   exit status 1 also when an item was not run; without it only when one missed its bound

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs the benchmarks and writes docs/benchmarks.md with its pictures, and docs/benchmarks/tables.md.
+# Runs the benchmarks and writes docs/benchmarks.md with its pictures, and the tables behind it into the build folder.
 # usage: tests/tools/benchmarks.sh [--instruction-sets] [BUILD_FOLDER]
 #   --instruction-sets  only that chapter of the tables: the rates with this processor's instruction sets and with lesser ones
 # Needs an otherwise idle machine and five to ten minutes. BUILD_FOLDER (default build/release) must hold a built sonard.
@@ -30,11 +30,11 @@ for level in "${levels[@]}"; do
     --case P1 --case P2 --case P3a --case P3b --case P3c --case P3d --case P4a --case P4b --json "${sets[-1]}"
 done
 if [ -n "$sets_only" ]; then
-  python3 tests/bench/write_benchmarks.py --instruction-sets "${sets[@]}" docs
+  python3 tests/bench/write_benchmarks.py --instruction-sets "${sets[@]}" "$build"
 else
   json=$build/benchmarks.json
   # A ratio that is missed (exit code 1) is in the page; anything else ends here.
   "$bench" --scene local-search "${each[@]}" --pings 200 --curves --json "$json" || [ $? -eq 1 ]
-  python3 tests/bench/write_benchmarks.py "$json" "${sets[@]}" docs
+  python3 tests/bench/write_benchmarks.py "$json" "${sets[@]}" docs "$build"
 fi
-echo "docs/benchmarks.md and docs/benchmarks/tables.md are written; results are in $build/benchmarks*.json"
+echo "docs/benchmarks.md is written; tables and results are in $build/benchmarks*"

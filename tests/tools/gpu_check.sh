@@ -3,8 +3,8 @@
 #   gpu_check.sh build [FOLDER, default build/gpu]      where the CUDA toolkit is: programs, module and tests
 #   gpu_check.sh pack [FOLDER] [ARCHIVE]                 all of it with the libraries it needs, default FOLDER/gpu_pack.tar.gz
 #   gpu_check.sh prove [ARCHIVE]                         that the pack runs in an empty root, with host loops for a device
-#   gpu_check.sh run [ARCHIVE] [PART...]                 on the machine with the device; leaves found.tar.gz and the page that
-#                                                        becomes docs/benchmarks-gpu.md in $OUT (default gpu-found)
+#   gpu_check.sh run [ARCHIVE] [PART...]                 on the machine with the device; leaves found.tar.gz and a page of
+#                                                        the measurements in $OUT (default gpu-found)
 # Parts: facts smoke check ceiling rates page (those by default), kernels sanitize soak memory. Each takes less than ten minutes;
 # `page` is made of what facts, check and rates have left. A part that fails does not end the others; exit 1 when one did, 77
 # without a device. GPU_CHECK_ARCHITECTURES=90 builds for compute 9.0 only; GPU_CHECK_REFERENCE_MS=30 is what a frame of the public
@@ -15,7 +15,7 @@ default_build=build/gpu
 device_tests="cuda_device_same_rays_test cuda_device_embree_rays_test"
 # What every Linux machine's loader brings itself and must not be mixed.
 c_library='/(ld-linux[^/]*|libc|libm|libdl|librt|libpthread|libresolv|libstdc\+\+|libgcc_s)\.so[.0-9]*$'
-page_file=docs/benchmarks-gpu.md
+page_name=benchmarks-gpu
 default_parts="facts smoke check ceiling rates page"
 
 do_build() {
@@ -160,7 +160,7 @@ rates() {
 
 page() {
   command -v python3 >/dev/null || { fail "no python3 here: write_gpu_benchmarks.py makes the page from the archive"; return; }
-  python3 -B "$pack/write_gpu_benchmarks.py" "$found" "$out/${page_file##*/}" || fail "the page"
+  python3 -B "$pack/write_gpu_benchmarks.py" "$found" "$out/${page_name}.md" || fail "the page"
 }
 
 # Time, instructions and divergence of each kernel.

@@ -1,4 +1,4 @@
-"""The oracles' table of a test run, for docs/validation/tables.md: a complete run, or the chapter states what is missing."""
+"""The oracles' table of a test run, for the validation tables: a complete run, or the chapter states what is missing."""
 
 import pathlib
 import subprocess

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Writes docs/validation/tables.md with its pictures, and its summary docs/validation.md: builds sonard, renders the experiments.
-# usage: tests/validation/validate.sh [--partial] [--only CHAPTER ...] | --summary
+# Writes tables and pictures of the validation into build/validation, and their summary docs/validation.md: builds sonard, renders
+# the experiments. usage: tests/validation/validate.sh [--partial] [--only CHAPTER ...] | --summary
 # Chapters: tank two-cylinders local-search differences coverage cost parts capture tell-apart oracles. Costs need an otherwise idle machine.
 # Takes under fifteen minutes on two cores; --summary rewrites the summary from the tables in a moment. The table of oracles is that
 # of the last ./test.sh, complete unless --partial is given; capture and tell-apart need SONARD_CAPTURES. Chapters without data are
-# kept.
+# kept; the summary is written when there are all.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh

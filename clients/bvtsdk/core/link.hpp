@@ -76,7 +76,7 @@ class Link {
   std::mutex send_mutex_;
   Deadline last_sent_;
 
-  // Of the reader alone.
+  // Used by the reader alone.
   Deadline last_received_;
   Bytes received_;
   std::thread reader_;  // last: it uses all of the above

@@ -1,4 +1,4 @@
-// What the small handles stand for: pings, images, range lists, navigation, generators, mappers, discovery agents.
+// Objects behind the small handles: pings, images, range lists, navigation, generators, mappers, discovery agents.
 // Sonars and heads have files of their own. The facades lock an object's mutex around each call on it.
 #pragma once
 

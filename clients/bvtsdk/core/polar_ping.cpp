@@ -28,7 +28,7 @@ void numbers_of(Nav& nav, const Visit& visit) {
 }
 constexpr std::uint16_t known_fields = 2 * nav_text - 1;
 
-/// What is wrong with the fixed fields; empty when nothing is.
+/// The fault of the fixed fields; empty when there is none.
 std::string complaint(const PolarPing& p) {
   if (!std::isfinite(p.time_s)) return "its time is not a number";
   if (!(p.start_m >= 0 && p.stop_m > p.start_m && p.stop_m <= 1e6f)) return "its ranges are not 0 <= start < stop";

@@ -23,7 +23,7 @@ class SampleGrid {
   SampleGrid& operator=(const SampleGrid&) = delete;
 
   const PolarGrid& view() const { return view_; }
-  /// Of a ping with a single beam or bin the view has two equal ones; with a single bin it is half as long.
+  /// Samples of the view. A single beam or bin appears twice; with a single bin the view is half as long.
   double pooled() const { return pooled_; }
 
  private:

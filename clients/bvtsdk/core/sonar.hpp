@@ -14,7 +14,7 @@ class Head : public Object {
  public:
   Head(std::shared_ptr<Source> source, const HeadDescription& description);
 
-  /// What was last applied, or held when the ping of a recording was made. Other hosts of the same sonar are not asked.
+  /// Settings last applied, or held when the ping of a recording was made. Other hosts of the same sonar are not asked.
   HeadDescription now;
   HeadImaging imaging;
   int transmit = 1, ping_interval_ms = 0, dynamic_power = 0, mount = 0;  // mount is kept and read back only

@@ -1,4 +1,4 @@
-// What every C function of the facades does around its one line of work: find the object behind the handle, lock it, write
+// The frame of every C function of the facades around its one line of work: find the object behind the handle, lock it, write
 // every out-parameter whatever happens, and let no exception out.
 #pragma once
 
@@ -94,7 +94,7 @@ H create() noexcept {
   return handle;
 }
 
-/// Nothing happens for null or a stale handle. Objects go with the last thread that still works on them.
+/// Null and stale handles have no effect. Objects go with the last thread that still works on them.
 template <class T>
 void destroy(const void* handle) noexcept {
   guarded([&]() -> int {

@@ -23,7 +23,7 @@ auto* row_of(Image& image, int row) {
 
 }  // namespace
 
-// What both kinds of image answer alike.
+// Functions that both kinds of image have.
 #define BVT_IMAGE(Class, Kind, Pixel)                                                                                  \
   void BVT##Class##_Destroy(BVT##Class self) { destroy<Kind>(self); }                                                  \
   BVT_GETTER(int, Class, GetHeight, Kind, o.image.height)                                                              \

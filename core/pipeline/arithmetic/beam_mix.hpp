@@ -1,4 +1,4 @@
-// What beams take of their neighbours: the blur of a focus that fits broadside only, and a fitted share of the next beams
+// Mixing of neighbouring beams: the blur of a focus that fits broadside only, and a fitted share of the next beams
 // (docs/acoustics.md, section 6). C++17-clean, standard library only.
 #pragma once
 

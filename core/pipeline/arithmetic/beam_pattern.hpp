@@ -102,7 +102,7 @@ SONAR_HD inline ReceivePattern receive_pattern(const BeamPattern& pattern) {
           aperture_in_wavelengths(pattern.azimuth_taper, static_cast<double>(pattern.azimuth_width_rad))};
 }
 
-/// Of beam `j`, which in a list may have a width of its own: in sine it spans 2 sin(w / 2) cos(azimuth).
+/// Pattern of beam `j`, which in a list may have a width of its own: in sine it spans 2 sin(w / 2) cos(azimuth).
 inline ReceivePattern receive_pattern(const FrequencyMode& mode, std::size_t j) {
   ReceivePattern pattern = receive_pattern(mode.pattern);
   if (!mode.has_own_widths()) return pattern;

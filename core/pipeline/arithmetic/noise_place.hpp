@@ -16,7 +16,7 @@ SONAR_HD constexpr std::uint32_t leak_sonar(std::uint32_t sonar) { return sonar 
 inline constexpr std::uint32_t every_ping = 0xFFFFFFFFu;
 /// The water's grains have these columns; the receiver's noise has the columns below.
 inline constexpr std::uint32_t first_volume_column = 1u << 24;
-/// And what groups of channels share has these, more than there are groups.
+/// Noise columns reserved for noise shared by groups of channels, more than there are groups.
 inline constexpr std::uint32_t first_shared_noise_column = first_volume_column - 4096;
 
 /// A random start and one of four quarter turns: the table's own pattern never stands still. `key`: Domain::noise_place.

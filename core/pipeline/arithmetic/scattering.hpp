@@ -1,4 +1,4 @@
-// What a scatterer sends back: Lambert cross-sections, spreading, absorption, carrier phase (docs/acoustics.md, section 3).
+// Echo of a scatterer: Lambert cross-sections, spreading, absorption, carrier phase (docs/acoustics.md, section 3).
 // Used by cells, by the fixed fan and by point targets. C++17-clean, standard library only.
 #pragma once
 

@@ -25,7 +25,7 @@ struct FlatMirror {
   double reflection = 0;
   double twice_kh_squared = 0;  // 2 (k h)^2, h = rms roughness
 
-  /// Of pressure, at a cosine of incidence: Rc exp(-2 k^2 h^2 cos^2): the specular echo's factor, off normal incidence.
+  /// Pressure reflectance at a cosine of incidence: Rc exp(-2 k^2 h^2 cos^2), the specular echo's factor, off normal incidence.
   double reflectance(double cosine) const { return reflection * std::exp(-twice_kh_squared * cosine * cosine); }
   double height_of(Vec3d p) const { return dot(normal, p) + height_m; }
 };

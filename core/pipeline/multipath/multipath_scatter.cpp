@@ -282,7 +282,7 @@ void MultipathScatterer::pair_up(const Cell& cell, float fade, std::vector<Echoe
     for (std::size_t j = 0; j <= i; ++j) {
       const Arrival &a = arrivals_[i], &b = arrivals_[j];
       if (i == 0 && direct_) continue;  // straight out and back is no ghost
-      // Nothing is scattered through a surface.
+      // A surface scatters to one side only.
       if (a.front != b.front) continue;
       // Shown at the range (r_i + r_j) / 2 and the bearing of the path back.
       const float sample = 0.5f * (a.range_m + b.range_m) * per_m - from + 0.5f * (a.sample_shift + b.sample_shift);

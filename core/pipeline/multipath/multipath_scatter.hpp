@@ -11,7 +11,7 @@
 
 namespace sonar {
 
-/// What the echoes of one ping via mirrors are made with.
+/// Inputs of one ping's echoes via mirrors.
 struct ImagePaths {
   std::vector<FlatMirror> mirrors;
   std::vector<Path> paths;  // those that own a part of the map; [0] is the straight one

@@ -1,4 +1,4 @@
-// What is visible via mirrors: the rays of a fan are followed through up to two flat mirrors. Every direction meets one
+// The view via mirrors: the rays of a fan are followed through up to two flat mirrors. Every direction meets one
 // chain of mirrors, so one map of directions serves all paths; multipath_scatter reads from it which places a path reaches.
 #pragma once
 

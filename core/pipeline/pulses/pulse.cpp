@@ -136,7 +136,7 @@ std::vector<std::complex<double>> Pulse::spectrum_s(const spectral::FrequencyGri
   return values;
 }
 
-/// What has no formula, from samples in time and in frequency.
+/// Computes the values without a formula, from samples in time and in frequency.
 void Pulse::integrate() {
   const double rate = shape_ == Shape::lfm ? 4 * scale_hz_ : scale_hz_;
   // tau_eff = integral of |p|^2 dt [s].

@@ -44,7 +44,7 @@ class FrequencySums {
   int count() const { return count_; }
   /// Values of the grid that the caller keeps, zero before the first add.
   int grid_points() const { return points_; }
-  /// What add and transform work with, for an engine that does the same elsewhere.
+  /// Tables of add and transform, for an engine that does the same elsewhere.
   struct Tables {
     int width, terms, padded;
     std::span<const double> polynomial;  // [terms][padded], highest power first: the kernel at each of `width` points

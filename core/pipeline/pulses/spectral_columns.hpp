@@ -26,7 +26,7 @@ class SpectralColumns {
   int period_samples() const { return period_; }
   int frequencies() const { return sums_.count(); }
   const spectral::FrequencySums& sums() const { return sums_; }
-  /// What every sum is multiplied with: the pulse's spectrum over the period.
+  /// Factor of every sum: the pulse's spectrum over the period.
   std::span<const spectral::Complex> response() const { return response_; }
   std::size_t bytes() const;  // about
 

@@ -8,7 +8,7 @@ struct Chunk {  // the cells of one stretch of a tile that are seen, packed
       weight_re[chunk + 16], weight_im[chunk + 16];
 };
 
-/// Of a tile: the ranges between which its cells count, by its level and by the record.
+/// Ranges between which a tile's cells count, by its level and by the record.
 struct RangeWindow {
   float from_m, to_m;
 };
@@ -86,7 +86,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
     const Lanes x = px0 + m00 * dx + m01 * dy + m02 * dz;
     const Lanes y = py0 + m10 * dx + m11 * dy + m12 * dz;
     const Lanes z = pz0 + m20 * dx + m21 * dy + m22 * dz;
-    // What elevations are measured against.
+    // Reference of elevations.
     const Lanes inverse_h = conical ? reciprocal(larger(x, all(1e-6f))) : inverse_root(larger(x * x + y * y, all(1e-12f)));
     const Lanes column = (g.first_edge_sine - y * (conical ? inverse_r : inverse_h)) * g.columns_per_sine;
     // Where the rays looked for it: the sonar may have turned since.

@@ -42,7 +42,7 @@ struct CodeScale {
   float half_gamma, factor, rounding, max_code;
 };
 
-/// What holds for all tiles of one column group.
+/// Values that hold for all tiles of one column group.
 struct GroupView {
   bool conical;  // cones about the array: u = y / r, t = z / x; else flat beams: u = y / h, t = z / h, h^2 = x^2 + y^2
   float first_edge_sine, columns_per_sine;  // column = (first_edge_sine - u) * columns_per_sine
@@ -119,7 +119,7 @@ struct Kernels {
   void (*spread)(const SpreadGrid&, const SpreadEchoes&, int count, double* grid);
   /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im). Reads and
   /// writes the aligned vectors that a pulse reaches into: two of 8 samples or three of 4, at most 16 samples from that of a
-  /// multiple of 8 at or before its first. Reads up to a whole vector of echoes past `count`, whatever they are.
+  /// multiple of 8 at or before its first. Reads up to a whole vector of echoes past `count`; their values are ignored.
   void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column,
                      int lead);
   /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.

@@ -91,7 +91,7 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
     for (int i = 0; i < n; i += lanes) {
       alignas(32) float part[lanes];
       alignas(32) std::int32_t row_at[lanes];
-      // What lies behind the last may be any number.
+      // Values behind the last may be any number.
       const LaneNumbers there = LaneNumbers{0, 1, 2, 3, 4, 5, 6, 7} < n - i;
       const Lanes sample = choose(there, load(e.sample + from + i), all(0)), whole = Lanes(_mm256_floor_ps(native(sample)));
       const Lanes position = (sample - whole) * steps;

@@ -63,7 +63,7 @@ inline Lanes inverse_root(Lanes x) {  // x > 0
   const Lanes guess = Lanes(_mm512_rsqrt14_ps(native(x)));
   return guess + 0.5f * guess * (1.0f - x * guess * guess);
 }
-// What the estimate left over made good: as good as a division, and as a root.
+// A Newton step corrects the estimate: as exact as a division, and as a root.
 inline Lanes quotient(Lanes a, Lanes b) {
   const Lanes inverse = reciprocal(b), q = a * inverse;
   return q + inverse * (a - q * b);

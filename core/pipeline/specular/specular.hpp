@@ -19,7 +19,7 @@ namespace sonar {
 /// (smooth_below_kh) and where less than a hundredth is left.
 double coherent_reflection(const Material& material, double wavelength_m);
 
-/// What is kept between pings: every mesh with smooth materials, prepared when it is first looked at.
+/// Values kept between pings: every mesh with smooth materials, prepared when it is first in view.
 class SpecularEchoes {
  public:
   /// Appends the specular echoes of the scene's surfaces, as far as rays find them in sight.

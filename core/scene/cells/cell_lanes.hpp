@@ -12,7 +12,7 @@ namespace sonar::cell_lanes {
 constexpr int side = 16, points = side * side;  // of a tile
 constexpr int block = 16, blocks = points / block;
 
-/// What the draws of a tile depend on, beside the cells' indices along u and v.
+/// Inputs of a tile's draws, beside the cells' indices along u and v.
 struct DrawKey {
   std::uint32_t patch, level, lo, hi;
 };

@@ -79,7 +79,7 @@ inline double height(const Facet& f, double xu, double xv) {
   return f.w[0] - (f.nu * (xu - f.u[0]) + f.nv * (xv - f.v[0])) / f.nw;
 }
 
-/// What every question to a facet about a cube asks for, worked out once.
+/// Bounds of a facet that all its tests against cubes use, computed once.
 struct FacetBounds {
   double low[3], high[3];  // along u, v, w
   double u[3], v[3], du[3], dv[3], edge_reach[3];

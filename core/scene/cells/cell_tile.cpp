@@ -15,7 +15,7 @@ namespace {
 
 using cell_lanes::side;
 
-/// What the cells of one facet share.
+/// Values that the cells of one facet share.
 struct FacetOfCells {
   std::int16_t normal[3];  // x, y, z, in CellTile::normal_unit
   double root_area;

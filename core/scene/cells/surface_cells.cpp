@@ -231,7 +231,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
   std::sort(missing.begin(), missing.end());
   missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
   build(missing, pool);
-  // Nothing of these views is forgotten.
+  // Tiles of these views stay in the cache.
   const std::uint64_t kept = kept_since_;
   kept_since_ = kept > 0 ? std::min(kept, first) : first;
   keep_within_budget();

@@ -39,7 +39,7 @@ struct CellTile {
   static constexpr float normal_unit = 1.0f / 32767.0f;
   enum Column { x, y, z, normal_x, normal_y, normal_z, weight_re, weight_im, columns };
   const std::int16_t* column(Column c) const { return data.get() + static_cast<std::ptrdiff_t>(c) * stride; }
-  /// Of a cell in the midst of the tile, from its centre: on the surface, which the centre need not be. Object axes.
+  /// Place of a cell in the middle of the tile, from the tile's centre, which need not be on the surface. Object axes.
   Vec3d middle_cell_m() const {
     const auto along = [this, unit = static_cast<double>(position_unit_m)](Column c) { return unit * column(c)[count / 2]; };
     return {along(x), along(y), along(z)};
@@ -57,7 +57,7 @@ struct DistanceSpan {
   double nearest_m = 0, farthest_m = 0;
 };
 
-/// What a ping looks at: outer bounds only, in the sonar's frame.
+/// Outer bounds of a ping's view, in the sonar's frame.
 struct CellView {
   Pose sonar_in_world;
   std::span<const Pose> bodies_in_world;
@@ -84,7 +84,7 @@ struct TileInView {
   bool in_side_lobes = false;  // for its cells there; those of the fan's main part are another tile's
 };
 
-/// What a view shows. Valid until the next call of in_view() or in_views().
+/// Cells of a view. Valid until the next call of in_view() or in_views().
 struct CellsInView {
   std::vector<TileInView> tiles;
   std::vector<Rotation> sonar_from_object;  // to the sonar's axes, per object
@@ -119,14 +119,14 @@ class SurfaceCells {
   /// Rotation from object to sonar axes of the last view of in_view(), per object.
   const Rotation& sonar_from_object(int object) const { return looked_.rotations[static_cast<std::size_t>(object)]; }
   std::span<const Rotation> sonar_from_objects() const { return looked_.rotations; }
-  /// Of every object's mesh; of objects that are not visible, no skin.
+  /// Skins of all objects' meshes; empty for objects that are not visible.
   std::span<const Skin> skins() const { return skins_; }
   /// Views so far.
   std::uint64_t views() const { return now_; }
   /// From now on nothing is forgotten of that view and later ones: others may be asked for while its tiles are in use. 0 = of
   /// none.
   void keep_since(std::uint64_t view) { kept_since_ = view; }
-  /// Of the tiles and of the tree that leads to them.
+  /// Bytes of the tiles and of the tree that leads to them.
   std::size_t cached_bytes() const { return cached_bytes_; }
   std::size_t built_last_time() const { return built_; }
 

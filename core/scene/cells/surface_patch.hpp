@@ -24,7 +24,7 @@ inline bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lat
 
 /// A cube of the lattice: the triangles that may own points in it, the tile of its level once wanted, the eight cubes inside.
 struct SurfaceCells::Node {
-  // What every visit asks comes first, side by side.
+  // Fields that every visit reads come first, side by side.
   TileAddress address;
   std::atomic<bool> divided = false;  // children are there for those who read true
   bool built = false, alone = false;  // alone: of SurfacePatch::raise, without cubes inside

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int quantiles = 256;
 constexpr double widest_normal = 5;
-constexpr double weakest = 1e-4;  // -40 dB; nearer to nothing a cell could not be told from an empty one
+constexpr double weakest = 1e-4;  // -40 dB; nearer to zero a cell would look like an empty one
 constexpr int remembered_along = 16, remembered_up = 8;
 
 struct IncompleteGamma {

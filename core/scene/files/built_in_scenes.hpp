@@ -9,7 +9,7 @@
 
 namespace sonar {
 
-/// What load_built_in_scene() knows.
+/// Names that load_built_in_scene() accepts.
 inline constexpr std::array<std::string_view, 2> built_in_scenes{"demo.yaml", "local-search.yaml"};
 constexpr bool is_built_in_scene(std::string_view name) {
   return std::find(built_in_scenes.begin(), built_in_scenes.end(), name) != built_in_scenes.end();

@@ -1,4 +1,4 @@
-// What files of heights with coordinates of their own have in common: cells without data, and degrees. Internal to their readers.
+// Common parts of readers of height grids with coordinates: cells without data, and degrees. Internal to these readers.
 #pragma once
 
 #include <optional>
@@ -43,7 +43,7 @@ struct RawHeights {
 /// Scale, holes, and the origin of degrees. Errors lack the file's name.
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 
-/// What the text of a coordinate system in a file beside says: degrees, metres, or nothing.
+/// Whether a .prj file beside the heights states degrees (true) or metres; nullopt if neither.
 std::optional<bool> geographic_by_prj(const std::filesystem::path& heights);
 
 }  // namespace sonar

@@ -19,14 +19,14 @@ struct ImportRequest {
 };
 
 std::vector<std::string> arguments_of(const ImportRequest& request);
-/// Nothing when they are of another version.
+/// The request; nullopt if it is of another version.
 std::optional<ImportRequest> request_from(const std::vector<std::string>& arguments);
 
 /// False when the file does not take it all. Nothing reads as an answer before it is whole.
 bool write_answer(int descriptor, const Result<LoadedMesh>& mesh);
 /// The same of an error, from a signal handler: no memory is taken.
 bool write_refusal(int descriptor, ErrorKind kind, std::string_view text);
-/// Nothing when there is no whole answer.
+/// The answer; nullopt if it is not complete.
 std::optional<Result<LoadedMesh>> read_answer(int descriptor);
 
 }  // namespace sonar

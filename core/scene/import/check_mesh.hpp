@@ -18,7 +18,7 @@ MeshFault check_ply(std::string_view head, std::uint64_t file_bytes);
 /// Text or binary (GLB), version 1 or 2.
 MeshFault check_gltf(std::string_view file);
 MeshFault check_collada(std::string_view file);
-/// What is wrong with the container of a GLB file, version 2; the importer says of all of it that it knows no such format.
+/// The fault in the container of a GLB file, version 2. The importer calls every such fault an unknown format.
 MeshFault glb_fault(std::string_view file);
 
 /// How many faces the header of a PLY file promises, and how many facets a text STL file begins.

@@ -20,7 +20,7 @@ class ImportFiles final : public Assimp::DefaultIOSystem {
   /// The mesh, where its folder has no links or dots left.
   const std::string& mesh() const { return mesh_; }
 
-  /// Of the faces that an OBJ file lists; nothing of other formats.
+  /// Number of triangles that an OBJ file lists; nullopt for other formats.
   std::optional<std::uint64_t> obj_triangles() const { return obj_triangles_; }
 
   bool Exists(const char* file) const override;

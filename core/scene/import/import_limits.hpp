@@ -1,4 +1,4 @@
-// What the program that imports meshes may take. When it comes to an end, so does the program, with a sentence as its answer.
+// Limits of the program that imports meshes. It ends at each of them, with a sentence as its answer.
 #pragma once
 
 #include <cstdint>

@@ -46,7 +46,7 @@ struct Candidate {
   Triangles triangles;
 };
 
-/// Collects coplanar triangles. Planes are told apart by rounded numbers; where one lies close to a rounding border, the
+/// Collects coplanar triangles. Planes are distinguished by rounded numbers; where one lies close to a rounding border, the
 /// neighbour's drawer is looked into as well.
 class FaceSorter {
  public:

@@ -44,7 +44,7 @@ class SpecularMesh {
     std::array<std::int32_t, 3> across{-1, -1, -1};  // the triangle beyond the edge opposite to that vertex; -1: the surface ends
     std::uint16_t material = 0;
   };
-  /// Of a tree over the curved triangles: a ball round the places, a cone round the normals.
+  /// Node of a tree over the curved triangles: a ball around the places, a cone around the normals.
   struct Node {
     Vec3 centre, axis;
     float radius = 0, angle_rad = 0;

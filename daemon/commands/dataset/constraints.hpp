@@ -1,4 +1,4 @@
-// What a drawn ping must fulfil, by geometry alone: no ray is traced, so occlusion is left to the labels.
+// Conditions of a drawn ping, by geometry alone: no ray is traced, so occlusion is left to the labels.
 #pragma once
 
 #include <set>

@@ -34,7 +34,7 @@ std::optional<std::size_t> flow_root(std::string_view text) {
   return at + 1;
 }
 
-/// The lines of the key `scene` of YAML in block style; empty when they cannot be told.
+/// The lines of the key `scene` of YAML in block style; empty when they cannot be found.
 std::string_view scene_lines(std::string_view text) {
   if (flow_root(text)) return {};
   std::size_t from = text.starts_with("scene:") ? 0 : text.find("\nscene:");

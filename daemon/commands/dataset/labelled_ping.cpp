@@ -39,7 +39,7 @@ json pixels_of(const PingLabels& labels, const Scene& scene) {
   return by_class;
 }
 
-/// What each beam met first, by the numbers of the labels: 0 where it met nothing.
+/// Numbers the first hit of each beam as the labels do: 0 for none.
 void number_as_instances(json& truth) {
   json instance = json::array();
   for (const json& object : truth["object"]) instance.push_back(object.is_null() ? 0U : object.get<std::uint32_t>() + 1);

@@ -235,7 +235,7 @@ class Folder final : public DatasetFolder {
     return o_.parts == 1 && std::find(own_names.begin(), own_names.end(), name) != own_names.end();
   }
 
-  /// What is beside a shard says of its pings.
+  /// Reads the file beside a shard that describes its pings.
   Result<json> read_part(std::uint64_t shard) const {
     json part = read_json(part_file(o_.out, shard));
     if (part.is_object() && part.contains("images") && part.contains("pixels")) return part;
@@ -283,7 +283,7 @@ class Folder final : public DatasetFolder {
     return coco->commit();
   }
 
-  /// Of pings that have more than one beam; false without any.
+  /// Writes a sheet of the pings that have more than one beam; false if there are none.
   Result<bool> write_contact_sheet() {
     constexpr int across = 4, width_px = 240, gap_px = 4;
     const std::uint64_t count = std::min<std::uint64_t>(job_.pings, 12);

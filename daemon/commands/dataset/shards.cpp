@@ -36,7 +36,7 @@ tl::unexpected<Error> cannot_write(const path& file, int why) {
                                     "; make room or choose another --out: finished shards are kept, run the same command again");
 }
 
-/// Of POSIX.1-1988 (ustar): a regular file, readable by all, of 1970.
+/// Header by POSIX.1-1988 (ustar): a regular file, readable by all, of 1970.
 std::array<char, tar_block> tar_header(std::string_view name, std::size_t size) {
   std::array<char, tar_block> h{};
   const auto put = [&](std::size_t at, std::string_view text) { std::memcpy(h.data() + at, text.data(), text.size()); };

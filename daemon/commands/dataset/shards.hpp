@@ -71,7 +71,7 @@ class ShardWriter {
 /// A small file in one step.
 Result<void> write_durably(const std::filesystem::path& file, std::string_view text);
 
-/// Of a whole file, in hexadecimal.
+/// Digest of a whole file, in hexadecimal.
 Result<std::string> digest_of_file(const std::filesystem::path& file);
 
 }  // namespace sonar::dataset

@@ -1,5 +1,5 @@
-// What a data set varies from ping to ping: named draws, each a function of (seed, ping, attempt, name) alone, so that a ping is
-// the same whether or not the others were made (docs/datasets.md).
+// Variations of a data set from ping to ping: named draws, each a function of (seed, ping, attempt, name) alone, so that a ping
+// is the same whether or not the others were made (docs/datasets.md).
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct Variation {
   std::vector<std::string> words;  // choice, list: as written
 };
 
-/// What one ping drew: words as they are put into the file, and those that are numbers for formulas.
+/// Draws of one ping: words as they are put into the file, and those that are numbers for formulas.
 struct Draws {
   std::map<std::string, std::string> words;
   render::Values numbers;
@@ -32,7 +32,7 @@ struct Draws {
 /// `vary:` of a job; what is wrong with it the document's finish() tells.
 std::vector<Variation> read_variations(const text::Node& node);
 
-/// Of a ping, from 1; attempts count from 0.
+/// Draws for a ping, from 1; attempts count from 0.
 Draws draw(const std::vector<Variation>& variations, Seed seed, std::uint64_t ping, std::uint32_t attempt);
 /// In (0, 1), of the same kind: for decisions that have a name.
 double draw_uniform(Seed seed, std::uint64_t ping, std::uint32_t attempt, std::string_view name);

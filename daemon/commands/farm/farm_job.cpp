@@ -19,7 +19,7 @@ using nlohmann::json;
 using std::filesystem::path;
 
 constexpr std::size_t most_in_bucket = std::size_t{8} << 20;
-constexpr std::size_t piece_bytes = std::size_t{512} << 10;  // a server takes messages of 1 MiB unless it is told otherwise
+constexpr std::size_t piece_bytes = std::size_t{512} << 10;  // a server accepts messages of 1 MiB by default
 
 constexpr std::chrono::milliseconds least_patience{100}, most_patience = std::chrono::hours(24);
 

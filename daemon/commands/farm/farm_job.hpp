@@ -47,7 +47,7 @@ Result<std::filesystem::path> receive_files(const FarmJob& record, const std::fi
 /// The job in the file that receive_files() gave. bad_data: it is of another size than the record.
 Result<dataset::DatasetJob> load_files(const FarmJob& record, const std::filesystem::path& file);
 
-/// Nothing when this program makes the same bytes as the one that submitted, else a sentence.
+/// Empty when this program makes the same bytes as the one that submitted, else a sentence.
 std::string why_unfit(const FarmJob& record);
 
 }  // namespace sonar::farm

@@ -218,7 +218,7 @@ class NatsQueue final : public Queue {
   void announce(const std::string& subject, const std::string& words) {
     natsConnection_PublishString(connection_.get(), subject.c_str(), words.c_str());
   }
-  /// What has no answer is at the server, in case the program ends now.
+  /// Sends waiting messages to the server, in case the program ends now.
   void flush() { natsConnection_FlushTimeout(connection_.get(), patience_ms); }
 
  private:
@@ -247,7 +247,7 @@ class NatsQueue final : public Queue {
     while (s == NATS_OK) {
       Owned<kvEntry, kvEntry_Destroy> entry;
       s = into(entry, [&](auto** e) { return kvWatcher_Next(e, watcher.get(), listing_ms); });
-      if (s != NATS_OK || !entry) break;  // no entry: all that was there has been told
+      if (s != NATS_OK || !entry) break;  // no entry: the end of the list
       if (kvEntry_Operation(entry.get()) == kvOp_Put)
         found.insert(kvEntry_Key(entry.get()));
       else

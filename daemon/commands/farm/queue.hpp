@@ -71,7 +71,7 @@ class Queue {
   /// False: it is in the queue already.
   virtual Result<bool> publish(const std::string& job, std::uint64_t shard) = 0;
   virtual Result<Waiting> waiting(const std::string& job) = 0;
-  /// Nothing: none has come within `wait`. The task outlives no queue.
+  /// The next task; empty if none came within `wait`. The task must not outlive the queue.
   virtual Result<std::unique_ptr<Task>> take(const std::string& job, std::chrono::milliseconds wait) = 0;
 };
 

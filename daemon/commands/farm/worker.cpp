@@ -78,7 +78,7 @@ class Worker {
     rest_ = std::min(2 * rest_, most_rest);
   }
 
-  /// Of those with work, the one submitted first; nothing without any.
+  /// The job with work that was submitted first; empty if none has work.
   Result<std::optional<FarmJob>> next_job() {
     const auto ids = queue_.keys(job_table);
     if (!ids) return tl::make_unexpected(ids.error());

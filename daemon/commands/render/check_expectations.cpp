@@ -12,7 +12,7 @@
 namespace sonar::render {
 namespace {
 
-/// What formulas may use beside the sweep: docs/render.md lists them.
+/// Names that formulas may use beside the sweep: docs/render.md lists them.
 Values known_values(const RenderJob& job, const PingRequest& request) {
   const FrequencyMode& mode = job.mode();
   const PingSettings& s = job.settings;

@@ -1,4 +1,4 @@
-// What labels say in words: the instances of a scene, and where each of a ping's is, in COCO's form (docs/datasets.md).
+// Labels in words: the instances of a scene, and the place of each in a ping, in COCO's form (docs/datasets.md).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

@@ -46,7 +46,7 @@ class Picture {
   }
 
   double mean_power() const { return sum_of_power() / static_cast<double>(rows_.size() * beams_.size()); }
-  /// Of one beam, in the mean.
+  /// Mean energy of one beam.
   double energy() const { return sum_of_power() * row_s() / static_cast<double>(beams_.size()); }
 
   /// The sum of E|s|^2 over rows and beams counts every echo theta_eff tau_eff times.

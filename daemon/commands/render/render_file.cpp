@@ -131,7 +131,7 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   return job;
 }
 
-/// What each step of the sweep sets, and what `let` makes of it; one step without a sweep.
+/// Values that each step of the sweep sets and `let` adds; one step without a sweep.
 Result<std::vector<Values>> read_steps(const text::Document& document) {
   Map root = document.root();
   std::vector<Values> steps(1);

@@ -70,7 +70,7 @@ World world_of(const RenderJob& job);
 /// Everything a ping of the job depends on. `world` = world_of(job).
 PingRequest make_request(const RenderJob& job, const World& world, PingNumber number, Time at);
 
-/// Of the sonar at time 0 [m], before there is a scene.
+/// Depth of the sonar at time 0 [m], before there is a scene.
 double first_depth_m(const RenderJob& job);
 /// The settings that the sonar, which has a vendor, starts with at that depth.
 PingSettings device_settings(const RenderJob& job);

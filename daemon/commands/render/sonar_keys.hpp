@@ -12,7 +12,7 @@ namespace sonar::render {
 
 void read_model(text::Map keys, FrequencyMode& mode);
 
-/// Of a sonar with that model. `own_grid`: the settings come from no device; rows then follow the pulse, two samples to its
+/// Keys of a sonar with that model. `own_grid`: the settings come from no device; rows then follow the pulse, two samples to its
 /// b (docs/acoustics.md, section 4), unless they are given.
 void read_ping(text::Map keys, const SonarModel& model, bool own_grid, PingSettings& settings);
 /// `mode:` of a ping, a name or a number from 1; `fallback` counts from 0.

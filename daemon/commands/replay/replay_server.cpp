@@ -117,7 +117,7 @@ void ReplayServer::stop() {
   });
 }
 
-/// Nothing is left that would keep io.run() going.
+/// Ends all work that would keep io.run() going.
 void ReplayServer::end() {
   over_ = true;
   error_code ec;
@@ -147,7 +147,7 @@ asio::awaitable<void> ReplayServer::accept() {
     client->name = peer.address().to_string() + ":" + std::to_string(peer.port());
     if (client_) {
       ++figures_.turned_away;
-      log_limited(log_, turned_away_limit_, LogLevel::info, "client turned away: another one is being served",
+      log_limited(log_, turned_away_limit_, LogLevel::info, "client refused: another one is being served",
                   {{"client", client->name}});
       continue;  // closes it
     }
@@ -250,7 +250,7 @@ asio::awaitable<void> ReplayServer::send_datagram(ClientPointer client, const pr
   }
 }
 
-/// Of the stream, which one coroutine writes.
+/// Sends the replies of the stream, which one coroutine writes.
 asio::awaitable<void> ReplayServer::send_replies(ClientPointer client) {
   error_code ec;
   while (!client->replies.empty() && !ec) {
@@ -259,7 +259,7 @@ asio::awaitable<void> ReplayServer::send_replies(ClientPointer client) {
   }
 }
 
-/// What a host says decides where frames go, and from when on.
+/// Requests of a host decide where frames go, and from when on.
 void ReplayServer::obey(Client& client, protocol::BytesView bytes) {
   client.heard = Steady::now();
   const protocol::Reaction reaction = client.dialogue->on_bytes(bytes, {});
@@ -294,7 +294,7 @@ void ReplayServer::end_if_silent() {
   if (limit && Steady::now() - client_->heard > *limit) client_->socket.close(ec);
 }
 
-/// What a client says changes nothing; it is read so that the client can go on saying it.
+/// A client's bytes have no effect; they are read so that the client can continue to send.
 asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
   std::array<std::byte, 4096> ignored;
   HttpDetector http;

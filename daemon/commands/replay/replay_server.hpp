@@ -54,7 +54,7 @@ class ReplayServer {
     Ipv4 ip{};
     std::string name;
     bool gone = false;
-    // Of a sonar that is asked for pings:
+    // For a sonar that sends pings on request:
     std::unique_ptr<protocol::Dialogue> dialogue;
     protocol::Bytes replies;  // not yet sent
     std::vector<udp::endpoint> receivers;
@@ -98,7 +98,7 @@ class ReplayServer {
   asio::signal_set signals_;
   LimitConfig limits_;
   Admission admission_{limits_, log_};
-  std::unique_ptr<SonarHttp> http_;  // of a device that is told over HTTP; then nothing else listens
+  std::unique_ptr<SonarHttp> http_;  // of a device with settings over HTTP; then nothing else listens
   ClientPointer client_;
   LogLimiter turned_away_limit_, unsent_limit_;
   Figures figures_;

@@ -1,4 +1,4 @@
-// What sonard says when it is ready and when it ends: a few lines on stderr, in plain words.
+// Lines that sonard prints on stderr when it is ready and when it ends.
 #pragma once
 
 #include <string>

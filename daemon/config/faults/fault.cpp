@@ -38,7 +38,7 @@ std::optional<double> number_from(std::string_view text) {
   return text::parse_decimal(text);
 }
 
-/// Of one record: errors begin with its name.
+/// Checks one record: errors begin with its name.
 class Check {
  public:
   Check(const FaultRecord& record, bool manual) : record_(record), manual_(manual) {}

@@ -17,7 +17,7 @@
 
 namespace sonar {
 
-/// What a fault waits for.
+/// Events that a fault can wait for.
 enum class Occasion { connect, config, status, disconnect };
 inline constexpr std::array<std::string_view, 4> occasion_names = {"connect", "config", "status", "disconnect"};
 

@@ -19,7 +19,7 @@ enum class FaultStage { payload, device, time, framing, stream, link, clients, s
 inline constexpr std::array<std::string_view, 9> fault_stage_names = {"payload", "device",  "time",   "framing",  "stream",
                                                                       "link",    "clients", "status", "datagrams"};
 
-/// What the engine does for a kind (daemon/emulator/faults/).
+/// Effects of kinds in the engine (daemon/emulator/faults/).
 enum class FaultEffect {
   // link and clients
   close_ports,

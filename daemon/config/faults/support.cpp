@@ -10,8 +10,8 @@ namespace {
 using E = FaultEffect;
 using S = FaultStage;
 
-/// Of a sonar whose pings travel as datagrams alone: what changes the first of them, or no ping; in a dialogue by datagrams also
-/// what holds pings back.
+/// Whether a kind acts on a sonar whose pings travel as datagrams alone: it changes the first datagram, or no ping; in a dialogue
+/// by datagrams it may also hold pings back.
 bool acts_without_stream(const FaultKind& kind, bool dialogue) {
   if (kind.stage == S::stream) return false;
   if (kind.stage == S::framing)
@@ -22,7 +22,7 @@ bool acts_without_stream(const FaultKind& kind, bool dialogue) {
   return std::find(std::begin(of_streams), std::end(of_streams), kind.effect) == std::end(of_streams);
 }
 
-/// What can change an integer without a fixed place.
+/// Whether an effect can change an integer without a fixed place.
 bool takes_integer(E effect) {
   constexpr E all[] = {E::renumber, E::add_to_field, E::heat, E::beacon_address, E::second_beacon};
   return std::find(std::begin(all), std::end(all), effect) != std::end(all);

@@ -236,7 +236,7 @@ Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
   return bytes;
 }
 
-/// What changes when and in which pieces the bytes are written.
+/// Changes the times and pieces in which the bytes are written.
 Touch alter_pace(const Fault& fault, MessageEdit& m) {
   const Bytes& bytes = m.bytes;
   using E = FaultEffect;

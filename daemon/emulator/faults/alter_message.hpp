@@ -19,7 +19,7 @@ struct MessageEdit {
   Outbox::Shape::End end = Outbox::Shape::End::none;
   bool dropped = false;
 };
-/// What a kind needs to know beside the message.
+/// Inputs of a kind beside the message.
 struct MessageContext {
   const protocol::Vendor& vendor;
   FaultDraws draws;

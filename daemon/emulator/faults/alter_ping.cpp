@@ -59,7 +59,7 @@ class Levels {
   std::uint32_t full() const { return full_; }
   bool are_of_ranges() const { return of_ranges_ != nullptr; }
 
-  /// Of a range image: the return at so many times its range, none beyond `most_m`.
+  /// Code of a range image's return at a multiple of its range; none beyond `most_m`.
   std::uint32_t at_range(std::uint32_t code, double factor, double most_m) const {
     const double range = static_cast<double>(code & most_range) * factor;
     if (range < 1 || range > std::min<double>(most_range, most_m / of_ranges_->range_unit_m)) return 0;
@@ -72,7 +72,7 @@ class Levels {
   std::uint32_t full_;
 };
 
-/// What moves, scales or removes rows and beams.
+/// Moves, scales or removes rows and beams.
 void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
   const Levels levels(ping, image.full());
   const double most_m = ping.request.settings.range_m;

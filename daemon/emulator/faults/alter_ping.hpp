@@ -1,4 +1,4 @@
-// What faults of the stage payload do to the samples of a ping. Pure functions.
+// Effects of faults of the stage payload on the samples of a ping. Pure functions.
 #pragma once
 
 #include "core/sonar/ping.hpp"

@@ -60,7 +60,7 @@ void Faults::add(Fault fault, bool manual, Time now) {
     begin(entry, now);
 }
 
-/// Of those that are over, the last few are listed.
+/// The last few ended faults stay listed.
 void Faults::forget_old() {
   std::size_t over =
       static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.over; }));

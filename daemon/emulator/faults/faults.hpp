@@ -20,7 +20,7 @@
 
 namespace sonar {
 
-/// What a fault has the sonar do, at once.
+/// Immediate effects of a fault on the sonar.
 struct SetListening {
   bool on = true;
 };
@@ -103,18 +103,19 @@ class Faults {
     std::size_t collect = 0;
   };
   Hold hold(const Connection& to, std::uint32_t ping, Time now);
-  /// Of the rate that holds; 0 = no pings.
+  /// Factor of the present rate; 0 = no pings.
   double rate_factor() const;
 
   // ---- clients
   enum class Admission { as_configured, wait, take_over, turn_away, reset };
   Admission admission() const;
   void on_served(const Connection& client, Time now);
-  enum class Request { apply, ignore, end, reset };
+  enum class RequestVerdict { apply, ignore, end, reset };
   /// A client requested settings. `change` may be limited. `ignore`: the sonar does not apply it (it may come back as an order).
-  Request on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state, Time now);
+  RequestVerdict on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
+                            Time now);
   /// A client sent bytes, whatever they are.
-  Request on_bytes(const std::string& who, Time now);
+  RequestVerdict on_bytes(const std::string& who, Time now);
 
   // ---- status messages
   void alter_beacons(std::vector<protocol::Bytes>& beacons, Time now);

@@ -1,4 +1,4 @@
-// What faults do about clients: which of them they are for, who is admitted, what becomes of requests.
+// Faults of clients: whom they concern, admission, the outcome of requests.
 #include "daemon/emulator/faults/faults.hpp"
 
 namespace sonar {
@@ -45,8 +45,8 @@ void Faults::on_served(const Connection& client, Time now) {
   if (any(Effect::outbox_policy)) orders_.emplace_back(DropNewestPings{true});
 }
 
-Faults::Request Faults::on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
-                                   Time now) {
+Faults::RequestVerdict Faults::on_request(protocol::ChangeSettings& change, const std::string& who,
+                                          const protocol::DeviceState& state, Time now) {
   on(Occasion::config, now);
   for (Entry& e : entries_) {
     if (!e.active) continue;
@@ -55,12 +55,12 @@ Faults::Request Faults::on_request(protocol::ChangeSettings& change, const std::
     switch (e.fault.kind->effect) {
       case Effect::ignore_requests:
         note(e, FaultEntry::What::injected, now, std::move(more));
-        return Request::ignore;
+        return RequestVerdict::ignore;
       case Effect::delay_requests:
         if (e.late.size() < most_late_requests)
           e.late.emplace_back(now + nanoseconds_from(e.fault.number("seconds")), ApplyRequest{change, who});
         note(e, FaultEntry::What::injected, now, std::move(more));
-        return Request::ignore;
+        return RequestVerdict::ignore;
       case Effect::clamp_requests: {
         if (change.settings.range_m <= e.fault.number("range-m")) break;
         protocol::DeviceState with = state;
@@ -75,23 +75,23 @@ Faults::Request Faults::on_request(protocol::ChangeSettings& change, const std::
       }
       case Effect::end_on_request:
         note(e, FaultEntry::What::injected, now, std::move(more));
-        return e.fault.word("how") == "reset" ? Request::reset : Request::end;
+        return e.fault.word("how") == "reset" ? RequestVerdict::reset : RequestVerdict::end;
       default:
         break;
     }
   }
-  return Request::apply;
+  return RequestVerdict::apply;
 }
 
-Faults::Request Faults::on_bytes(const std::string& who, Time now) {
+Faults::RequestVerdict Faults::on_bytes(const std::string& who, Time now) {
   for (Entry& e : entries_) {
     if (!e.active || e.fault.kind->effect != Effect::end_on_request || e.fault.word("command") != "any") continue;
     FaultEntry more;
     more.client = who;
     note(e, FaultEntry::What::injected, now, std::move(more));
-    return e.fault.word("how") == "reset" ? Request::reset : Request::end;
+    return e.fault.word("how") == "reset" ? RequestVerdict::reset : RequestVerdict::end;
   }
-  return Request::apply;
+  return RequestVerdict::apply;
 }
 
 }  // namespace sonar

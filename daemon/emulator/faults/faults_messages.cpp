@@ -1,4 +1,4 @@
-// What faults do to pings, to the messages of clients, to their requests and to status messages.
+// Effects of faults on pings, on messages to clients, on their requests and on status messages.
 #include <algorithm>
 #include <cmath>
 #include <span>

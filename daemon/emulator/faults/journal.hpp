@@ -1,4 +1,4 @@
-// What a fault did, as it did it: the truth against which a driver's reaction is judged.
+// Record of a fault's effects as they occur: the truth against which a driver's reaction is judged.
 #pragma once
 
 #include <cstdint>

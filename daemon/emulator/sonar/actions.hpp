@@ -1,4 +1,4 @@
-// What an emulated sonar asks of its caller, which moves the bytes: returned by every call of Sonar, carried out in order.
+// Requests of an emulated sonar to its caller, which moves the bytes: returned by every call of Sonar, carried out in order.
 #pragma once
 
 #include <cstdint>
@@ -96,7 +96,7 @@ using Action = std::variant<ComputePing, Serve, KeepWaiting, TurnAway, Listen, R
                             Announce, PingQueued, Report, EngineFailed>;
 using Actions = std::vector<Action>;
 
-/// What became of a PingRequest.
+/// Outcome of a PingRequest.
 struct PingOutcome {
   std::shared_ptr<const Ping> ping = nullptr;  // null on failure
   std::string failure = {};

@@ -27,7 +27,7 @@ struct Connection {
   enum class State {
     waiting,  // for a slot
     served,
-    leaving,  // told to finish: takes the rest of its message, counts as a client no more when another took over
+    leaving,  // finishing: gets the rest of its message, is no longer a client when another took over
   };
   ConnectionId id = 0;
   Role role = Role::client;
@@ -37,7 +37,7 @@ struct Connection {
   const protocol::Port* port = nullptr;  // of the vendor's
   std::unique_ptr<protocol::Dialogue> dialogue;
   Outbox outbox;
-  /// Of a client: what it requested, one list for each stream it named. Of a stream: the device's own list, one.
+  /// Receivers that a client requested, one list for each stream it named; for a stream the device's own list, one.
   std::vector<protocol::SetReceivers> receivers;
   struct Held {  // by a fault
     Outbox::Message ping;
@@ -52,7 +52,7 @@ struct Connection {
   std::uint64_t requests = 0;                            // for settings or a ping
   std::string complaint = {};                            // the last about what it sent
 
-  /// What it gets is datagrams: of a port of kind udp_stream or udp_dialogue.
+  /// Whether it gets datagrams: its port is of kind udp_stream or udp_dialogue.
   bool takes_datagrams() const { return port != nullptr && port->kind != protocol::Port::Kind::tcp_stream; }
   /// By its own connection or a stream.
   std::uint64_t pings_written() const { return outbox.pings_written() + streamed_pings; }

@@ -1,4 +1,4 @@
-// What is counted while the daemon runs: figures of one sonar and histograms of its times.
+// Counters of the running daemon: figures of one sonar and histograms of its times.
 // Plain values, filled by the Sonar and written out by prometheus.hpp; no clock, no I/O.
 #pragma once
 
@@ -23,7 +23,7 @@ class Histogram {
   void add(double seconds);
   std::uint64_t count() const { return count_; }
   double sum_s() const { return sum_s_; }
-  /// Of times up to and including bounds_s[i], and not of the bound before; the last one has those beyond all bounds.
+  /// Counts of times up to and including bounds_s[i], above the bound before; the last counts those beyond all bounds.
   const std::array<std::uint64_t, bounds_s.size() + 1>& counts() const { return counts_; }
   /// Linear between the bounds round it, so right to a factor of 2.5; beyond them the last bound. 0 when empty. q in [0, 1].
   double quantile_s(double q) const;

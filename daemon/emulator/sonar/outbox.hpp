@@ -1,4 +1,4 @@
-// What one client is still to be sent: the message being written, control replies in order, and at most `depth` waiting pings.
+// Messages that wait for one client: the one being written, control replies in order, and at most `depth` waiting pings.
 // Filled by the Sonar, emptied by what writes to the client; whole messages only, so a stream can never be cut or mixed.
 #pragma once
 

@@ -158,7 +158,7 @@ Actions Sonar::tick_conversations(Time now) {
   }
   faults_.on_tick(now);
   for (Connection& c : connections_.all()) release_held(c, now, false, actions);
-  obey_faults(now, actions);
+  apply_fault_orders(now, actions);
   return actions;
 }
 
@@ -204,7 +204,7 @@ PingNumber Sonar::next_number() {
   return PingNumber(state_.last_ping = ++ping_number_);
 }
 
-/// But for its number.
+/// The request without its number.
 PingRequest Sonar::request_at(Time at) const {
   const Config& config = around_.config;
   const bool stale = around_.world.is_stale(config_.vehicle, at);
@@ -294,7 +294,7 @@ void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
   state_.framed_at = reported->request.fired_at;
   for (const auto& [from, event] : events) on_event(source_of(*from), event, now, actions);
   actions.emplace_back(std::move(queued));
-  obey_faults(now, actions);
+  apply_fault_orders(now, actions);
 }
 
 /// An exception costs this ping, not the stream, which belongs to the device.

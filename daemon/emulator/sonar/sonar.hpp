@@ -49,7 +49,7 @@ class Sonar {
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
   /// The next message to write, whole; empty when there is none or one is being written.
   Outbox::Message next_message(ConnectionId id, Time now);
-  /// So many bytes of it were taken; after the last one on_written().
+  /// Reports `bytes` of it as sent; after the last one on_written() follows.
   void on_sent(ConnectionId id, std::size_t bytes);
   void on_written(ConnectionId id, const Outbox::Message& message, Time now);
   /// The message of a stream that was taken last had no receiver left, or none of its datagrams could be sent.
@@ -132,7 +132,7 @@ class Sonar {
   bool busy() const { return busy_; }
   bool wants_pings() const;
   DeviceFigures figures() const;
-  /// Of those: pings that at least one client has got, and pings that were made.
+  /// Pings that at least one client received, and pings that were made.
   std::uint64_t served() const { return figures_.served; }
   std::uint64_t pings() const { return figures_.pings; }
   /// A ping as a client would get it now, with a number and noise that no client's ping has: nothing of the sonar changes. None
@@ -158,13 +158,13 @@ class Sonar {
   void set_receivers(const Source& from, protocol::SetReceivers wanted, Time now);
   void update_pacer(Time now);
   // Faults (sonar_faults.cpp).
-  void obey_faults(Time now, Actions& actions);
-  void obey(const FaultOrder& order, Time now, Actions& actions);
+  void apply_fault_orders(Time now, Actions& actions);
+  void apply(const FaultOrder& order, Time now, Actions& actions);
   void deliver(Connection& to, Outbox::Message ping, Time now, Actions& actions);
   void release_held(Connection& to, Time now, bool all, Actions& actions);
   void serve_waiting(Time now, Actions& actions);
   void change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions);
-  void end_by_fault(Connection& connection, Faults::Request fate, Actions& actions);
+  void end_by_fault(Connection& connection, Faults::RequestVerdict verdict, Actions& actions);
   void serve(Connection& connection, Time now, Actions& actions);
   /// An exception is a mistake in sonard: it may cost this connection, never the others.
   template <class Call>

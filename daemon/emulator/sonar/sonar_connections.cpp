@@ -57,7 +57,7 @@ void Sonar::serve(Connection& connection, Time now, Actions& actions) {
   connection.number = ++figures_.clients;
   on_membership(now, actions);
   faults_.on_served(connection, now);
-  obey_faults(now, actions);
+  apply_fault_orders(now, actions);
 }
 
 /// After a client came or went.
@@ -167,7 +167,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
   if (connection_role == Role::stream) update_pacer(now);
   if (!was_client) return actions;
   faults_.on(Occasion::disconnect, now);
-  obey_faults(now, actions);
+  apply_fault_orders(now, actions);
   const bool kept_waiting = faults_.admission() == Faults::Admission::wait;
   Connection* const next = stopping_ || kept_waiting ? nullptr : connections_.longest_waiting();
   if (next == nullptr) {
@@ -210,8 +210,9 @@ Actions Sonar::on_bytes(ConnectionId id, protocol::BytesView bytes, Time now) {
   from->bytes_read += bytes.size();
   from->not_before = {};
   if (from->finishing) return actions;
-  if (const auto fate = faults_.on_bytes(from->peer.name, now); fate != Faults::Request::apply && from->role == Role::client) {
-    end_by_fault(*from, fate, actions);
+  if (const auto verdict = faults_.on_bytes(from->peer.name, now);
+      verdict != Faults::RequestVerdict::apply && from->role == Role::client) {
+    end_by_fault(*from, verdict, actions);
     return actions;
   }
   guarded(*from, actions, [&] { handle(*from, from->dialogue->on_bytes(bytes, unskipped(now)), now, actions); });

@@ -1,4 +1,4 @@
-// What faults have an emulated sonar do (daemon/emulator/faults).
+// Effects of faults on an emulated sonar (daemon/emulator/faults).
 #include <algorithm>
 
 #include "daemon/emulator/sonar/sonar.hpp"
@@ -55,7 +55,7 @@ Actions Sonar::add_faults(const std::vector<Fault>& faults, bool manual, Time no
            {{"kind", std::string(fault.kind->code)}}, actions);
     faults_.add(fault, manual, now);
   }
-  obey_faults(now, actions);
+  apply_fault_orders(now, actions);
   return actions;
 }
 
@@ -64,17 +64,17 @@ bool Sonar::end_faults(const std::string& name, Time now, Actions& actions) {
   if (name.empty()) faults_.clear(now);
   if (found)
     report(Report::Topic::state, LogLevel::info, "faults ended: " + (name.empty() ? std::string("all") : name), {}, actions);
-  obey_faults(now, actions);
+  apply_fault_orders(now, actions);
   return found;
 }
 
 // ---- what they order
 
-void Sonar::obey_faults(Time now, Actions& actions) {
-  for (const FaultOrder& order : faults_.take_orders()) obey(order, now, actions);
+void Sonar::apply_fault_orders(Time now, Actions& actions) {
+  for (const FaultOrder& order : faults_.take_orders()) apply(order, now, actions);
 }
 
-void Sonar::obey(const FaultOrder& order, Time now, Actions& actions) {
+void Sonar::apply(const FaultOrder& order, Time now, Actions& actions) {
   if (const auto* listen = std::get_if<SetListening>(&order)) {
     actions.emplace_back(Listen{listen->on});
   } else if (const auto* end = std::get_if<EndClients>(&order)) {
@@ -130,14 +130,14 @@ void Sonar::serve_waiting(Time now, Actions& actions) {
 }
 
 void Sonar::change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions) {
-  const Faults::Request fate = faults_.on_request(change, from.name, state_, now);
-  obey_faults(now, actions);
-  if (fate == Faults::Request::apply) return change_settings(change, from.name, now, actions);
-  if (from.connection != nullptr && fate != Faults::Request::ignore) end_by_fault(*from.connection, fate, actions);
+  const Faults::RequestVerdict verdict = faults_.on_request(change, from.name, state_, now);
+  apply_fault_orders(now, actions);
+  if (verdict == Faults::RequestVerdict::apply) return change_settings(change, from.name, now, actions);
+  if (from.connection != nullptr && verdict != Faults::RequestVerdict::ignore) end_by_fault(*from.connection, verdict, actions);
 }
 
-void Sonar::end_by_fault(Connection& connection, Faults::Request fate, Actions& actions) {
-  if (fate == Faults::Request::reset)
+void Sonar::end_by_fault(Connection& connection, Faults::RequestVerdict verdict, Actions& actions) {
+  if (verdict == Faults::RequestVerdict::reset)
     actions.emplace_back(Reset{connection.id, "a fault"});
   else
     begin_finish(connection, "a fault", actions);

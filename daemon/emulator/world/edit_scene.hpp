@@ -18,7 +18,7 @@ using ScenePointer = std::shared_ptr<const Scene>;
 
 Result<ScenePointer> with_object(const Scene& scene, const control::AddObject& wanted);
 Result<ScenePointer> without_object(const Scene& scene, std::string_view name);
-/// Of an object that stands still: hidden, shown, elsewhere. Of a moving one only shown or hidden; its poses are the World's.
+/// Hides, shows or moves an object that stands still. A moving one is only hidden or shown; its poses are the World's.
 Result<ScenePointer> with_object_set(const Scene& scene, const control::SetObject& wanted);
 
 /// The moving body of that name, or -1.

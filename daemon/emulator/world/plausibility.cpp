@@ -22,7 +22,7 @@ constexpr double ground_flatness = 0.05;       // height over width: what is fla
 constexpr double least_ground_m = 2;           // its width: a plate is no ground
 constexpr double long_ranges = 5;              // lengths of the longest range that an object may have
 
-// Each cure is one kind of note: a kind is told once.
+// Each cure is one kind of note: a kind is reported once.
 constexpr const char* surface_cure =
     "was NED taken for ENU, or the reverse? ENU_FLU counts z upwards, NED_FRD downwards: 3 m deep is z = -3 in the one and z = 3 "
     "in the other; say the frame that was sent";
@@ -65,7 +65,7 @@ Location judge_location(Vec3d sonar_m, const Surroundings& around) {
   return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Location::far_away : Location::fine;
 }
 
-/// Of the first sonar of a carrier that is at no good place.
+/// The first implausible place of a carrier's sonar.
 std::optional<Vec3d> doubtful_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
   for (const Pose& mount : carrier.mounts)
     if (const Vec3d at_m = compose(vehicle_in_world, mount).position_m; judge_location(at_m, around) != Location::fine)

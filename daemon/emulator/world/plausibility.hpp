@@ -1,6 +1,6 @@
-// What is allowed and was probably not meant: poses above the water, degrees taken for radians, quaternions in the wrong order,
+// Finds probable mistakes: poses above the water, degrees taken for radians, quaternions in the wrong order,
 // sonars upside down, meshes in millimetres. Pure functions from facts to notes; `sonard check`, the log at the start, the log
-// when a pose shows it and the daemon's status (for `sonarctl doctor`) all have theirs from here.
+// when a pose shows it and the daemon's status (for `sonarctl doctor`) use them.
 #pragma once
 
 #include <map>
@@ -25,14 +25,14 @@ struct Note {
 /// "the sonar of rov is 3.0 m above the water's surface (z = 0); ENU_FLU counts z upwards ..."
 std::string text_of(const Note& note);
 
-/// What a mesh shows of itself, along its own axes.
+/// Size of a mesh along its own axes.
 struct MeshShape {
   Extent own;
   bool is_ground = false;  // flat, or every triangle faces up: it may be long
 };
 using MeshShapes = std::map<std::shared_ptr<const Mesh>, MeshShape>;
 
-/// What poses are judged against. The sea surface is no part of it.
+/// Facts against which poses are judged. The sea surface is not one of them.
 struct Surroundings {
   Extent scene;                // where the scene puts what can be seen
   std::vector<Extent> ground;  // of each plane, seabed and height map that stands still
@@ -56,7 +56,7 @@ std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around)
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
 /// `largest_angle_rad`: as in PoseSample.
 std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad);
-/// Of at most some 10,000 poses, evenly spread. Of a moving object when the carrier has no mounts: its place is not judged then.
+/// Notes on at most some 10,000 poses, evenly spread. A carrier without mounts is a moving object: its place is not judged.
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around);
 
 /// All that is known before the first pose.
@@ -68,9 +68,9 @@ class Plausibility {
   /// At the start, and after either of the two has changed; returns what has not been returned before. Trajectories and poses
   /// are judged again where the scene's places have changed.
   std::vector<Note> use(const Config& config, const Scene& scene);
-  /// Of a vehicle's pose that was accepted; returns what has not been returned before of this vehicle.
+  /// Judges an accepted pose of a vehicle; returns the notes that were not returned before for this vehicle.
   std::vector<Note> use(const control::PoseSample& sample);
-  /// What holds now. Poses take the place of what was noted on their vehicle's start or trajectory.
+  /// Notes that hold now. Those on poses replace those on a vehicle's start or trajectory.
   std::vector<Note> all() const;
 
  private:

@@ -72,7 +72,7 @@ World::Track* World::find(PoseSample::Of of, const std::string& name, std::strin
 bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) const {
   const bool known = !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain;
   if (!known) return false;
-  // Where time goes by the stamps, silence cannot be told by it; a simulator that began anew can.
+  // Where time follows the stamps it cannot show silence; but it shows a simulator that began anew.
   return rules_.follows ? at >= track.history.newest().at - rules_.stale_after : now - track.last_arrival <= rules_.stale_after;
 }
 

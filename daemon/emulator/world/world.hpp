@@ -34,7 +34,7 @@ struct BodyStart {
   motion::Plan plan{};  // followed until the first accepted pose
 };
 
-/// Who sent a pose. A different `id` starts a new history; a different `source` is worth a log line.
+/// Sender of a pose. A different `id` starts a new history; a different `source` is worth a log line.
 struct Sender {
   std::string id;      // "json udp 127.0.0.1:40123"
   std::string source;  // "json 127.0.0.1"
@@ -95,7 +95,7 @@ class World {
   bool is_hidden(std::size_t object) const { return objects_[object].hidden; }
   /// Until its next pose, or show_again().
   void hide(std::size_t object, bool hidden) { objects_[object].hidden = objects_[object].hidden_for_now = hidden; }
-  /// What hide() has hidden; what poses hide stays.
+  /// Shows objects that hide() has hidden; those hidden by poses stay so.
   void show_again();
   /// True when poses came once and then stopped for longer than the rules allow.
   bool is_stale(std::size_t vehicle, Time now) const { return is_stale(vehicles_[vehicle], now); }
@@ -142,7 +142,7 @@ class World {
   /// Empty, or one sentence about a time stamp that cannot be accepted.
   std::string why_bad_time(const control::PoseSample& sample, Time at, Time now) const;
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now) const;
-  /// Of a pose that continues the history: refuses late ones, and clears the history at a jump.
+  /// Whether a pose continues the history: refuses late ones, and clears the history at a jump.
   bool is_next(Track& track, const control::PoseSample& sample, Time at, PoseOutcome& out);
   void keep(Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now);
   /// How far our time is ahead of the sender's, who stamped a pose with `at`.
@@ -154,7 +154,7 @@ class World {
   Time last_news(const Track& track) const;
   Pose pose_at(const Track& track, Time t) const;
   Pose orbit(const Pose& initial, Time t) const;
-  /// Of a body that follows its trajectory; moving as fast as it is played.
+  /// Moment of a body that follows its trajectory; moving as fast as it is played.
   static motion::Moment played(const Track& track, Time t);
   static std::optional<Played> plays(const Track& track) {
     if (!track.body.plan || !track.history.empty()) return std::nullopt;

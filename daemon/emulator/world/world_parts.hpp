@@ -1,4 +1,4 @@
-// What the World is made of, out of a configuration and a scene: when the daemon starts, and when either changes.
+// Parts of the World, from a configuration and a scene: when the daemon starts, and when either changes.
 #pragma once
 
 #include <algorithm>

@@ -48,7 +48,7 @@ void raise_descriptor_limit() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == limit.rlim_max) return;
   limit.rlim_cur = limit.rlim_max;
-  setrlimit(RLIMIT_NOFILE, &limit);  // refused: then there are fewer, and clients are turned away sooner
+  setrlimit(RLIMIT_NOFILE, &limit);  // refused: then there are fewer, and clients are refused sooner
 }
 
 void close_politely(tcp::socket& socket) {
@@ -73,8 +73,7 @@ bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
   // The descriptor's number says how many are in use below it: all.
   if (number_of(socket) < first_spare(limits_, purpose)) return true;
   ++for_descriptors_;
-  say(descriptors_said_,
-      "file descriptors run out: clients are turned away until some are free (raise LimitNOFILE or ulimit -n)");
+  say(descriptors_said_, "file descriptors run out: refusing clients until some are free (raise LimitNOFILE or ulimit -n)");
   return false;
 }
 
@@ -87,7 +86,7 @@ Admission::Place Admission::enter(const tcp::socket& socket) {
   if (!leaves_spare(socket, Purpose::client)) return {};
   if (*count_ >= static_cast<std::uint64_t>(limits_.clients)) {
     ++for_places_;
-    say(places_said_, "all places taken: clients are turned away until one is free (limits.clients)");
+    say(places_said_, "no connection slot free: refusing clients until one is (limits.clients)");
     return {};
   }
   ++*count_;
@@ -124,8 +123,7 @@ bool Admission::send_away(tcp::acceptor& acceptor, const error_code& why) {
     ::close(visitor);
   }
   reserve_ = open_reserve();
-  say(descriptors_said_,
-      "file descriptors have run out: clients are turned away until some are free (raise LimitNOFILE or ulimit -n)");
+  say(descriptors_said_, "file descriptors have run out: refusing clients until some are free (raise LimitNOFILE or ulimit -n)");
   return visitor >= 0;
 }
 

@@ -34,17 +34,17 @@ class Admission {
 
   enum class Purpose { client, control };
 
-  /// For a socket just accepted. An empty place: it must be closed; the log has been told, once for each spell of it.
+  /// For a socket just accepted. An empty slot: it must be closed; the log has a line, once for each spell of it.
   Place enter(const tcp::socket& socket);
-  /// Of a socket that is no driver's: its descriptor is one of those for drivers, or beyond. A connection of the same listener
-  /// must go for it.
+  /// Whether a socket of another kind has one of the descriptors for drivers, or one beyond. A connection of the same listener
+  /// must then be closed for it.
   bool is_drivers(const tcp::socket& socket) const;
   /// The next visitor of a listener, whatever its descriptor. Nothing: the listener is closed.
   asio::awaitable<std::optional<tcp::socket>> accept(tcp::acceptor& acceptor);
   /// The next one of a listener without places of ours, whose descriptor is none of the spare ones. Nothing: likewise.
   asio::awaitable<std::optional<tcp::socket>> next_visitor(tcp::acceptor& acceptor, Purpose purpose);
 
-  /// Connected now: clients, those who wait and those being turned away.
+  /// Connected now: clients, waiting ones and those being refused.
   std::uint64_t now() const { return *count_; }
   std::uint64_t refused_for_places() const { return for_places_; }
   std::uint64_t refused_for_descriptors() const { return for_descriptors_; }
@@ -52,7 +52,7 @@ class Admission {
  private:
   using Steady = std::chrono::steady_clock;
   void say(Steady::time_point& last, const char* what);
-  /// False: the descriptor is one of the spare ones; the log has been told.
+  /// False: the descriptor is one of the spare ones; the log has a line.
   bool leaves_spare(const tcp::socket& socket, Purpose purpose);
   /// accept() failed with `why`. True when that was for want of descriptors and the visitor has been sent away: accept again.
   bool send_away(tcp::acceptor& acceptor, const error_code& why);

@@ -1,4 +1,4 @@
-// What TCP connections of control and of sonars' HTTP share: limits, admission, the token, the log.
+// Shared services of TCP connections of control and of sonars' HTTP: limits, admission, the token, the log.
 #pragma once
 
 #include <chrono>
@@ -15,7 +15,7 @@
 
 namespace sonar {
 
-/// Of one server; outlives its connections.
+/// Services of one server; outlive its connections.
 struct ConnectionServices {
   asio::io_context& io;
   const LimitConfig& limits;

@@ -34,7 +34,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   Endpoint reached() const { return reached_; }
   /// The address of the other end.
   Ipv4 peer() const { return peer_; }
-  /// Of a client that has shown the token in a way that only the service knows. False: no slot is free.
+  /// Claims a slot for a client that has shown the token in a way that only the service knows. False: no slot is free.
   bool claim_slot() { return !claim_slot_ || std::exchange(claim_slot_, nullptr)(); }
   /// For a takeover.
   tcp::socket& socket() { return socket_; }

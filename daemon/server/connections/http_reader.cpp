@@ -27,7 +27,7 @@ HttpRefusal refusal_of(const boost::beast::error_code& ec, std::size_t most_body
   return {400, "this is not an HTTP request: " + ec.message()};
 }
 
-/// Of all headers of the name (RFC 9110, 5.3).
+/// Values of all headers of the name, joined (RFC 9110, 5.3).
 std::string joined(const http::request<http::string_body>& message, http::field name) {
   std::string all;
   const auto [first, last] = message.equal_range(name);

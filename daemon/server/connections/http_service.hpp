@@ -1,4 +1,4 @@
-// What an HTTP server answers: the interface between HttpConnection, which moves requests and answers, and the control server or
+// Interface between HttpConnection, which moves requests and answers, and the control server or
 // an emulated sonar, which know what they mean.
 #pragma once
 
@@ -44,7 +44,7 @@ class HttpService {
   virtual ~HttpService() = default;
   /// `from` outlives the call. May wait on from.wait_timer(), which ends when the connection does.
   virtual asio::awaitable<HttpOutcome> answer(const HttpRequest& request, HttpConnection& from) = 0;
-  /// Of a request that cannot be parsed, or that finds no slot.
+  /// Answer to a request that cannot be parsed, or that finds no slot.
   virtual HttpAnswer refusal(const HttpRefusal& refusal) const = 0;
 };
 

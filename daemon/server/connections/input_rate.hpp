@@ -12,7 +12,7 @@ namespace sonar {
 class InputRate {
  public:
   using Steady = std::chrono::steady_clock;
-  /// What may come at once after a pause: a second's worth. 0 bytes a second: no limit.
+  /// Allows a second's worth of bytes at once after a pause. 0 bytes a second: no limit.
   explicit InputRate(std::size_t bytes_per_s) : rate_(static_cast<double>(bytes_per_s)), tokens_(rate_) {}
   /// From now on.
   void use(std::size_t bytes_per_s) { rate_ = static_cast<double>(bytes_per_s); }
@@ -22,7 +22,7 @@ class InputRate {
     tokens_ = std::max(tokens_, -rate_ * std::chrono::duration<double>(longest).count());
   }
 
-  /// What may be read now without a pause after it.
+  /// Bytes that may be read now without a pause after them.
   std::size_t left(Steady::time_point now) const {
     if (rate_ <= 0) return std::numeric_limits<std::size_t>::max();
     const double tokens =

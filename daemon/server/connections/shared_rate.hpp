@@ -28,12 +28,12 @@ class SharedRate {
     return Part(counted_);
   }
 
-  /// Of one client, bytes a second.
+  /// Share of one client, bytes a second.
   std::size_t share() const {
     const auto parts = static_cast<std::size_t>(std::max(counted_.use_count() - 1, 1L));
     return std::max<std::size_t>(bytes_per_s_ / parts, 1);
   }
-  /// What may be read of the client now without a pause after it.
+  /// Bytes of the client that may be read now without a pause after them.
   std::size_t left(const Part& part, Steady::time_point now) const {
     return std::max(std::min(part.share_.left(now), share()), together_.left(now));
   }

@@ -27,7 +27,7 @@ class Token {
   std::string secret_;
 };
 
-/// Of "Authorization: Bearer abc"; empty for anything else.
+/// The token in "Authorization: Bearer abc"; empty for anything else.
 std::string_view bearer_token(std::string_view authorization);
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-// What the clients of one address may cost a server: a bucket of work for each address, so that connecting again and again gains
+// Limit of the work that clients of one address cause: a bucket for each address, so that connecting again and again gains
 // nothing and a flood from one address delays no other. Work is counted in bytes: those that come, those of an answer, and a
 // fixed number for what costs time beside its bytes. Pure arithmetic, as InputRate.
 #pragma once

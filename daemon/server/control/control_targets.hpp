@@ -1,4 +1,4 @@
-// What requests of control act on, by stream or HTTP.
+// Parts of the daemon that requests of control act on, by stream or HTTP.
 #pragma once
 
 #include "daemon/server/connections/shared_rate.hpp"

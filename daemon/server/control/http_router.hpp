@@ -36,7 +36,7 @@ struct SocketAction {
   std::vector<std::pair<std::string, std::string>> query;
 };
 struct TicketAction {};
-/// What an HTTP request asks for. A Subscribe = a stream of events.
+/// Action of an HTTP request. A Subscribe = a stream of events.
 using HttpAction = std::variant<HttpAnswer, HelpAction, HealthAction, MetricsAction, OperationAction, control::Subscribe,
                                 SocketAction, TicketAction>;
 

@@ -100,11 +100,11 @@ constexpr SonarFamily sonar_families[] = {
      [](const DeviceFigures& f) { return static_cast<double>(f.waiting); }},
     {"sonard_clients", Type::gauge, "Clients that are served now.",
      [](const DeviceFigures& f) { return static_cast<double>(f.clients_now); }},
-    {"sonard_clients_queued", Type::gauge, "Clients that wait for a place now.",
+    {"sonard_clients_queued", Type::gauge, "Clients that wait for a connection slot now.",
      [](const DeviceFigures& f) { return static_cast<double>(f.clients_queued); }},
     {"sonard_clients_total", Type::counter, "Clients served since the start.",
      [](const DeviceFigures& f) { return static_cast<double>(f.clients); }},
-    {"sonard_clients_refused_total", Type::counter, "Clients turned away: all places of this sonar or of the daemon taken.",
+    {"sonard_clients_refused_total", Type::counter, "Clients refused because no connection slot was free.",
      [](const DeviceFigures& f) { return static_cast<double>(f.refused_clients); }},
     {"sonard_sent_bytes_total", Type::counter, "Bytes written to clients.",
      [](const DeviceFigures& f) { return static_cast<double>(f.bytes_written); }},
@@ -173,7 +173,7 @@ void write_poses(PrometheusText& text, const PoseCounters& poses) {
        {std::pair("accepted", poses.accepted), std::pair("refused", poses.refused), std::pair("late", poses.late),
         std::pair("replaced", poses.replaced), std::pair("over_rate", poses.over_rate)})
     text.sample({{"outcome", outcome}}, static_cast<double>(count));
-  text.family("sonard_poses_stale_total", Type::counter, "Times that the poses of a vehicle or object stopped coming.");
+  text.family("sonard_poses_stale_total", Type::counter, "Number of times a pose source became stale.");
   text.sample({}, static_cast<double>(poses.stale));
 }
 
@@ -191,7 +191,7 @@ void write_process(PrometheusText& text, const DaemonFigures& figures) {
     text.family(name, type, help);
     text.sample({}, value);
   };
-  one("sonard_connections", Type::gauge, "Connections to all sonars now, those in queues too.",
+  one("sonard_connections", Type::gauge, "Current connections to all sonars, including queued ones.",
       static_cast<double>(figures.clients_now));
   text.family("sonard_connections_refused_total", Type::counter, "Connections closed at once for a limit of the whole daemon.");
   text.sample({{"reason", "places"}}, static_cast<double>(figures.turned_away_for_places));

@@ -20,7 +20,7 @@ class PrometheusText {
   enum class Type { counter, gauge, histogram };
 
   void family(std::string_view name, Type type, std::string_view help);
-  /// Of the family begun last. Whole numbers keep all their digits up to 2^53.
+  /// Writes a sample of the family begun last. Whole numbers keep all their digits up to 2^53.
   void sample(const Labels& labels, double value);
   void sample(const Labels& labels, const Histogram& histogram);
   std::string take() { return std::move(text_); }

@@ -11,9 +11,9 @@
 
 namespace sonar {
 
-/// `say` is told why the CPU computes where a device was wished for, on the thread that makes the engine or runs it. Throws
-/// std::runtime_error, which start_engine makes a sentence of, when there must be a device and is none; with such a wish, a
-/// device that fails later is EngineUnavailable, while `automatic` goes on with the CPU. The pool must outlive the engine.
+/// `say` gets the reason why the CPU computes instead of a requested device, on the thread that makes or runs the engine. Throws
+/// std::runtime_error, which start_engine turns into a sentence, when a required device is missing; a required device that fails
+/// later is EngineUnavailable, while `automatic` continues with the CPU. The pool must outlive the engine.
 std::unique_ptr<PingEngine> choose_engine(EngineDevice device, std::shared_ptr<const Scene> scene, Parallel& pool,
                                           const EngineOptions& options, std::function<void(const std::string&)> say);
 

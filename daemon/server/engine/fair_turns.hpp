@@ -1,5 +1,5 @@
-// Whose ping is next when several sonars share one engine: who has had least of its time, and whether a ping is worth letting in
-// before one under way is finished. Pure: times are passed in; owned by the Simulator.
+// Chooses the next ping when several sonars share one engine: of the sonar that had least of its time; and whether a ping may
+// come before one under way is finished. Pure: times are passed in; owned by the Simulator.
 #pragma once
 
 #include <algorithm>

@@ -84,7 +84,7 @@ std::vector<Simulator::Job> Simulator::take_together() {
   return jobs;
 }
 
-/// Who has had least, of those whose requests are for the present engine; of equals who has waited longest.
+/// The job of the sonar that had least of the present engine; of equals the one that has waited longest.
 std::list<Simulator::Job>::iterator Simulator::next_to_run() {
   auto best = waiting_.begin();
   for (auto it = waiting_.begin(); it != waiting_.end() && !it->engine; ++it)

@@ -12,7 +12,7 @@ namespace sonar {
 namespace v1 {
 class FaultStatus;
 }
-/// Of all sonars; `over_too`: the last that have ended as well.
+/// Statuses of the faults of all sonars; `over_too`: the last that have ended as well.
 std::vector<v1::FaultStatus> fault_statuses(const Fleet& fleet, Time now, bool over_too);
 
 class FaultOperations {

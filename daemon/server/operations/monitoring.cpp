@@ -13,7 +13,7 @@ std::string whole_seconds(std::chrono::nanoseconds t) {
   return std::to_string(std::chrono::duration_cast<std::chrono::seconds>(t).count()) + " s";
 }
 
-/// Of a vehicle or an object.
+/// Fills in the trajectory of a vehicle or an object.
 void set_trajectory(auto& out, const std::optional<World::Played>& played, Time now) {
   if (!played) return;
   const motion::Playback& playback = played->playback;

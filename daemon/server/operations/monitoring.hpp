@@ -1,4 +1,4 @@
-// What the daemon tells of itself: the answer to GetStatus, figures for /metrics, and what is wrong for /healthz and the log.
+// The daemon's report on itself: the answer to GetStatus, figures for /metrics, and problems for /healthz and the log.
 #pragma once
 
 #include <chrono>

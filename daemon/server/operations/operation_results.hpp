@@ -1,4 +1,4 @@
-// What operations are answered, from sentences and errors.
+// Answers to operations, from sentences and errors.
 #pragma once
 
 #include <string>

@@ -26,7 +26,7 @@ class SceneOperations {
  private:
   using Edit = std::function<Result<ScenePointer>(const Scene&)>;
 
-  /// Of the scene as it is when the changes before have been made. `what` = for the log: "object crate added".
+  /// Edits the scene as it is after the changes before. `what` = for the log: "object crate added".
   void edit(Edit edit, const std::string& what, const Sender& sender, Operations::Done done);
   OperationResult without_details(const Error& error, const SceneFile& file, const Sender& sender);
   void log_change(const std::string& what, const Sender& sender);

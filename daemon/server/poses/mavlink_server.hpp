@@ -29,9 +29,9 @@ class MavlinkServer {
 
   /// "udpin:127.0.0.1:14551", with the port the system chose for 0.
   std::vector<std::string> endpoints() const;
-  /// Of the links that bring no poses: what is missing.
+  /// Notes on links that bring no poses: their missing messages.
   std::vector<Note> notes() const;
-  /// Of a listening link, in the order of the configuration.
+  /// Address of a listening link, in the order of the configuration.
   Endpoint listens_at(std::size_t link) const;
 
  private:

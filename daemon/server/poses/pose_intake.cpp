@@ -44,7 +44,7 @@ std::string PoseIntake::place(const control::SetObject& asked, std::size_t body,
     sample.of = control::PoseSample::Of::object;
     sample.name = asked.object;
     sample.pose = *asked.in_world;
-    sample.velocity_mps = sample.angular_velocity_radps = Vec3d{};  // it is put there: that is no movement to carry on
+    sample.velocity_mps = sample.angular_velocity_radps = Vec3d{};  // placed, not moved: do not extrapolate
     sample.reset_counter = ++placements_;
     if (std::string refusal = take(std::move(sample), sender); !refusal.empty()) return refusal;
   }

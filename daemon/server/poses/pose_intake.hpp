@@ -27,7 +27,7 @@ class PoseIntake {
   std::string place(const control::SetObject& asked, std::size_t body, const Sender& sender);
   /// Pauses, seeks or plays a trajectory. The refusal's sentence, or empty.
   std::string steer(const control::SetTrajectory& asked, const Sender& sender);
-  /// Of what should have been a pose.
+  /// Counts and logs an invalid pose message.
   void refuse(const std::string& why, const Sender& sender);
 
  private:

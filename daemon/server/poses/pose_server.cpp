@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t most_connections = 32;
 constexpr std::size_t most_lines_of_a_datagram = 64;
-constexpr std::size_t work_of_a_turn = 4096;            // bytes; then others have theirs
+constexpr std::size_t work_of_a_turn = 4096;            // bytes processed before yielding
 constexpr std::size_t least_work = 64;                  // bytes that cost as much as a read, or a line, does beside its own
 constexpr int most_not_json = 8;                        // lines in a row that begin as JSON objects and are none
 constexpr std::size_t dropped_per_s = 256u << 20;       // reading away costs little, but not nothing
@@ -98,15 +98,15 @@ void PoseServer::stop() {
 
 // ---- what arrives
 
-PoseServer::Heard PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
+PoseServer::LineKind PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
   if (line.too_long) {
     intake_.refuse("line is longer than 4096 bytes", sender);
-    return Heard::no_json;
+    return LineKind::not_json;
   }
   const auto sample = control::parse_json_pose(line.text);
-  if (sample) return intake_.take(*sample, sender).empty() ? Heard::pose : Heard::object;
+  if (sample) return intake_.take(*sample, sender).empty() ? LineKind::pose : LineKind::other_object;
   intake_.refuse(sample.error().text, sender);
-  return control::is_json_object(line.text) ? Heard::object : Heard::no_json;
+  return control::is_json_object(line.text) ? LineKind::other_object : LineKind::not_json;
 }
 
 void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from) {
@@ -155,7 +155,7 @@ void PoseServer::admit(tcp::socket socket) {
   connections_.forget_if([](Connection& c) { return has_left(c.socket); });
   const auto say_evicted = [this](const Connection& evicted) {
     log_limited(log_, notices_, LogLevel::info,
-                "pose connection closed: without a pose, or beyond the limits, for longest, and its place was needed",
+                "pose connection closed to make room: without a pose, or beyond its limit, for longest",
                 {{"from", evicted.sender.id}});
   };
   if (admission_.is_drivers(socket)) connections_.evict(sender.source, say_evicted);
@@ -199,15 +199,15 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
     const auto line = c.lines.next();
     if (!line && c.lines.may_become_object()) return Turn::over;
     if (!line) intake_.refuse(no_json, c.sender);
-    const Heard heard = line ? on_line(*line, c.sender) : Heard::no_json;
-    c.not_json = heard == Heard::no_json ? c.not_json + 1 : 0;
-    if (c.not_json == most_not_json || (heard == Heard::no_json && !(line && line->begins_object))) {
+    const LineKind kind = line ? on_line(*line, c.sender) : LineKind::not_json;
+    c.not_json = kind == LineKind::not_json ? c.not_json + 1 : 0;
+    if (c.not_json == most_not_json || (kind == LineKind::not_json && !(line && line->begins_object))) {
       log_limited(log_, notices_, LogLevel::warning, std::string("pose connection closed: ") + no_json, {{"from", c.sender.id}});
       return Turn::end;
     }
     taken += line->text.size() + least_work;
     work.bytes += least_work;
-    work.has_pose |= heard == Heard::pose;
+    work.has_pose |= kind == LineKind::pose;
   }
   return Turn::not_over;
 }
@@ -234,7 +234,7 @@ asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& 
   co_return Rested::leaves_much;
 }
 
-/// Nothing of it acts later than now, and hanging up again and again gains nothing; but its last word counts.
+/// Applies the last waiting pose of a closed connection, and none of the others, so that reconnecting gains nothing.
 void PoseServer::take_newest(Connection& c) {
   std::optional<control::LineParser::Line> newest;
   std::array<std::byte, work_of_a_turn> buffer;
@@ -246,7 +246,7 @@ void PoseServer::take_newest(Connection& c) {
   if (newest) on_line(*newest, c.sender);
 }
 
-/// Of what waits in the kernel, the newest stays: 0.1 s of the allowed rate, however late we are. True: the rest was dropped.
+/// Keeps the newest bytes that wait in the kernel, 0.1 s of the allowed rate. True: the rest was dropped.
 bool PoseServer::drop_backlog(Connection& c) {
   int waiting = 0;
   if (::ioctl(c.socket.native_handle(), FIONREAD, &waiting) != 0 || waiting <= 0) return false;

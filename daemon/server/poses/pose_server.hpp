@@ -88,8 +88,8 @@ class PoseServer {
   void admit(tcp::socket socket);
 
   void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);
-  enum class Heard { pose, object, no_json };  // a pose that counts; another JSON object; neither
-  Heard on_line(const control::LineParser::Line& line, const Sender& sender);
+  enum class LineKind { pose, other_object, not_json };  // a pose that counts; another JSON object; neither
+  LineKind on_line(const control::LineParser::Line& line, const Sender& sender);
 
   asio::io_context& io_;
   const PoseConfig& config_;

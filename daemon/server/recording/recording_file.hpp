@@ -42,8 +42,8 @@ class RecordingFile {
  public:
   enum class Kind { mcap, pcap, oculus_log, raw_dump, aris, sonar, ping_log };
 
-  /// Of a name in the folder: letters, digits, - _ and . that does not begin it, at most 128, ending in .mcap, .pcap, .oculus,
-  /// .raw, .aris, .sonar or .svlog. A sentence where it is none; .aris is of the ARIS family only, .sonar of Water Linked, .svlog
+  /// Kind of a file's name: letters, digits, - _ and . that does not begin it, at most 128, ending in .mcap, .pcap, .oculus,
+  /// .raw, .aris, .sonar or .svlog. An error for another name; .aris is of the ARIS family only, .sonar of Water Linked, .svlog
   /// of a Surveyor, the others but .mcap of the Oculus family.
   static Result<Kind> kind_of(std::string_view name, std::string_view vendor);
   /// `labels`: in MCAP, of pings that have them. io; a file that is there already is not touched.

@@ -242,7 +242,7 @@ void Recordings::fail(const Pointer& recording, const std::string& why) {
   end(recording, why);
 }
 
-/// What waits is written before the file is closed.
+/// Messages that wait are written before the file is closed.
 void Recordings::end(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running) return;
   recording->state = Recording::State::ending;

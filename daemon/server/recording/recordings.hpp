@@ -49,7 +49,7 @@ class Recordings {
   void finish();
 
   bool takes(const std::string& sonar) const;
-  /// What beams meet is kept in MCAP only.
+  /// Whether first hits of beams are wanted: they are kept in MCAP only.
   bool wants_truth(const std::string& sonar) const;
   bool wants_labels(const std::string& sonar) const;
   void take(const std::string& sonar, RecordedPing ping);
@@ -59,12 +59,12 @@ class Recordings {
 
   /// Before anything is taken, and whenever another scene is put to use.
   void use_scene(const Scene& scene);
-  /// Of the scene that pings are made in from now on.
+  /// Names of the scene that pings are made in from now on.
   const std::shared_ptr<const SceneNames>& names() const { return names_; }
 
   /// Those that run, and the last that have ended, oldest first.
   std::vector<v1::RecordingStatus> status() const;
-  /// Nothing is open.
+  /// Whether no recording is open.
   bool idle() const { return running() == 0; }
 
  private:

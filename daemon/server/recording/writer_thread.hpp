@@ -40,7 +40,7 @@ class WriterThread {
       });
     });
   }
-  /// What `job` returns, or what it throws.
+  /// Returns, or throws, what `job` does.
   template <class Job>
   static Result<void> attempt(Job&& job) {
     try {

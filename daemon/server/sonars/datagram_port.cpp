@@ -47,13 +47,13 @@ bool is_closed_port(msghdr& message) {
 Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port, bool shared) {
   number_ = port;
   Socket& own = sockets_.emplace_back(io_);
-  // Else the system refuses broadcasts: it alone knows all addresses that are such.
+  // With `groups` broadcasts are enabled: only the system knows all broadcast addresses.
   if (auto r = bind_udp(own.socket, {sonar.bind_ip, port}, !sonar.groups.empty(), shared); !r) return r;
   send_multicast_from(own.socket, sonar.bind_ip);
   return {};
 }
 
-void DatagramPort::hear_broadcasts(const SonarConfig& sonar) {
+void DatagramPort::receive_broadcasts(const SonarConfig& sonar) {
   if (sonar.bind_ip == Ipv4{}) return;
   for (const Ipv4& broadcast : {broadcast_of(sonar), Ipv4{255, 255, 255, 255}}) {
     if (broadcast == sonar.bind_ip) continue;

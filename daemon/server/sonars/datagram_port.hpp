@@ -27,12 +27,12 @@ class DatagramPort {
   /// From start() on, what arrives is answered.
   void answer_with(Answer answer) { answer_ = std::move(answer); }
   /// A host whose port is closed is named when its computer says so, to what was sent there. Before start().
-  void tell_of_closed_ports(std::function<void(Endpoint host)> tell) { closed_ = std::move(tell); }
-  /// What arrives at the broadcast address, too. One that cannot be bound is left out.
-  void hear_broadcasts(const SonarConfig& sonar);
+  void on_port_unreachable(std::function<void(Endpoint host)> tell) { closed_ = std::move(tell); }
+  /// Receives broadcasts, too. An address that cannot be bound is left out.
+  void receive_broadcasts(const SonarConfig& sonar);
   void start();
   void stop();
-  /// Of the sonar's own address, to send from.
+  /// Socket of the sonar's own address, to send from.
   udp::socket& socket() { return sockets_.front().socket; }
   std::uint16_t number() const { return number_; }
 

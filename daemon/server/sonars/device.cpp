@@ -65,11 +65,11 @@ Result<void> Device::open(const protocol::Port& port) {
       on_host_datagram(*at, port, from, datagram);
       return std::vector<protocol::Bytes>{};
     });
-    (*datagrams)->tell_of_closed_ports([this, &port](Endpoint host) { on_host_closed(port, host); });
+    (*datagrams)->on_port_unreachable([this, &port](Endpoint host) { on_host_closed(port, host); });
     return {};
   }
   if (port.kind == Kind::udp_answer) {
-    (*datagrams)->hear_broadcasts(config());
+    (*datagrams)->receive_broadcasts(config());
     (*datagrams)->answer_with([this, &port](Endpoint from, protocol::BytesView datagram) {
       Sonar::Answers answers = sonar_.on_datagram(port, from, datagram, network_.clock.now());
       perform(std::move(answers.actions));
@@ -78,7 +78,7 @@ Result<void> Device::open(const protocol::Port& port) {
     });
     return {};
   }
-  (*datagrams)->tell_of_closed_ports([this](Endpoint receiver) { on_receiver_closed(receiver); });
+  (*datagrams)->on_port_unreachable([this](Endpoint receiver) { on_receiver_closed(receiver); });
   const ConnectionId id = ++last_connection_;
   streams_.push_back(std::make_shared<DatagramStream>(*this, (*datagrams)->socket(), id, port.gap));
   perform(sonar_.open_stream(id, port, network_.clock.now()));
@@ -308,7 +308,7 @@ void Device::carry_out(const TurnAway& action) {
   if (from.role == Role::client)
     turned_away_ = Visit{peer_of(from.socket).name, action.reset ? "reset by a fault" : "no place is free"};
   if (action.reset) {
-    report_visit(from.role, VisitLog::Kind::turned_away, "client turned away: reset", {});
+    report_visit(from.role, VisitLog::Kind::turned_away, "client refused: reset", {});
     error_code ec;
     from.socket.set_option(asio::socket_base::linger(true, 0), ec);
     from.socket.close(ec);  // its destructor would send FIN
@@ -316,11 +316,11 @@ void Device::carry_out(const TurnAway& action) {
   }
   if (from.role == Role::observer) {
     const std::string most = std::to_string(config().max_observers);
-    report_visit(from.role, VisitLog::Kind::turned_away, "observer turned away: " + most + " look on already", {});
+    report_visit(from.role, VisitLog::Kind::turned_away, "observer refused: " + most + " observers connected", {});
     return close_politely(from.socket);
   }
   const std::string most = std::to_string(config().max_clients);
-  report_visit(from.role, VisitLog::Kind::turned_away, "client turned away: " + most + " already connected", {});
+  report_visit(from.role, VisitLog::Kind::turned_away, "client refused: " + most + " already connected", {});
   if (turning_away_ >= most_turned_away_at_once || stopping_) return;
   ++turning_away_;
   asio::co_spawn(

@@ -37,7 +37,7 @@ class SonarStatus;
 
 class Device;
 
-/// What a device needs of the daemon beside the network; outlives it.
+/// A device's needs of the daemon beside the network; outlives it.
 class DeviceParent {
  public:
   virtual ~DeviceParent() = default;
@@ -45,7 +45,7 @@ class DeviceParent {
   virtual void compute(const Device& of, PingRequest request, Simulator::Done done) = 0;
   virtual void on_ping_queued(const Device& of, const PingQueued& ping) = 0;
   virtual void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) = 0;
-  /// Nothing more will come of it.
+  /// The device has stopped for good.
   virtual void on_stop(const Device& of, const std::string& why) = 0;
   /// Something stepped time, or the end, may have waited for.
   virtual void on_change() = 0;
@@ -67,7 +67,7 @@ struct StreamDigest {
   std::string sha256;
 };
 
-/// What became of one that came.
+/// Outcome of a connection attempt.
 struct Visit {
   std::string address, why;
   std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
@@ -90,7 +90,7 @@ class Device final : public SessionParent {
   void tick_sessions() { perform(sonar_.tick_conversations(network_.clock.now())); }
   void skip(std::chrono::nanoseconds by) { sonar_.skip(by); }
 
-  /// What the sonar asked for, in order.
+  /// Carries out the sonar's requests, in order.
   void perform(Actions actions);
 
   bool gone() const;  // after stop(): nothing is left
@@ -121,8 +121,8 @@ class Device final : public SessionParent {
   }
   /// Empty = all. False: there is none of that name.
   bool end_faults(const std::string& name);
-  /// Closes connections whose peer has hung up. Now and then, and before a slot is given or refused: the listener may be ready
-  /// before the reader of the one that left.
+  /// Closes connections whose peer hung up. Called periodically and before a client is admitted or refused: the
+  /// listener may be ready before the reader of the closed connection.
   void forget_who_left();
 
   void on_bytes(ConnectionId from, protocol::BytesView bytes) override;

@@ -24,8 +24,8 @@ bool is_broadcast(const Ipv4& ip, const SonarConfig& sonar) {
 
 }  // namespace
 
-/// Of those that clients asked for: no address of many computers that neither the product nor the configuration names, and none
-/// whose port is closed.
+/// Receivers that clients asked for. Left out are group addresses that neither the product nor the configuration names, and
+/// receivers whose port is closed.
 std::vector<Endpoint> Device::receivers(ConnectionId stream) {
   const Connection* const connection = sonar_.connections().find(stream);
   std::vector<Endpoint> all = sonar_.receivers(stream);

@@ -60,7 +60,7 @@ class Fleet final : public DeviceParent {
     tap_ = std::move(tap);
     tap_wants_truth_ = std::move(wants_truth);
   }
-  /// Of a Preview: neither drivers nor recordings hear of it.
+  /// Computes a ping of a Preview: drivers and recordings get none of it.
   void compute_preview(PingRequest request, Simulator::Done done) { simulator_.submit(std::move(request), std::move(done)); }
   bool gone() const;  // after stop(): nothing is left
   std::uint64_t served() const;

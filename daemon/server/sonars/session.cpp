@@ -57,7 +57,7 @@ void Session::start() {
   spawn(&Session::watch);
 }
 
-/// A session without one of its parts would hold its place for ever: an exception ends it, and it alone.
+/// If one of its coroutines failed, the session would keep its slot forever; so an exception ends this session.
 void Session::spawn(asio::awaitable<void> (Session::*part)()) {
   const auto self = shared_from_this();
   asio::co_spawn(
@@ -82,7 +82,7 @@ asio::awaitable<void> Session::read() {
     while (!reading_ && !finishing_ && !over_) co_await rest(never);
     if (over_) co_return;
     received_at_ = Steady::now();
-    // Nothing of it may act, and it must not hold a driver's place.
+    // Its bytes must not act, and it must not hold a driver's slot.
     if (http_.speaks_http(std::span(received_).first(n))) co_return over("it speaks HTTP");
     parent_.on_bytes(setup_.id, std::span(received_).first(n));
     const auto pause = input_rate_.pause_after(n, Steady::now());
@@ -252,7 +252,7 @@ asio::awaitable<void> Session::watch() {
   }
 }
 
-/// Not one whose bytes wait to be read: this process may have been stopped for a while.
+/// A client with unread bytes is not silent: this process may have been stopped for a while.
 bool Session::is_silent(Steady::time_point now) const {
   const auto longest = parent_.longest_silence(setup_.id);
   error_code ec;

@@ -21,14 +21,14 @@
 
 namespace sonar {
 
-/// What a session or a stream of datagrams needs from its parent, which outlives it.
+/// Interface of a session or a stream of datagrams to its parent, which outlives it.
 class SessionParent {
  public:
   virtual ~SessionParent() = default;
   virtual void on_bytes(ConnectionId from, protocol::BytesView bytes) = 0;
   /// The next message to write; empty when there is none.
   virtual Outbox::Message next_message(ConnectionId to) = 0;
-  /// Of a stream: where its messages go.
+  /// Destinations of a stream's messages.
   virtual std::vector<Endpoint> receivers(ConnectionId stream) = 0;
   virtual void on_sent(ConnectionId to, std::size_t bytes) = 0;
   /// A message has been handed to the kernel whole.

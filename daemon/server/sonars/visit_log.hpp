@@ -1,4 +1,4 @@
-// What the log says of clients that come and go: a line each, and where they come and go often, one line now and then that says
+// Log lines on clients that connect and leave: a line each, and for frequent visits one line now and then that states
 // how many did. Used by Device, for what any visitor can cause again and again. I/O thread only.
 #pragma once
 
@@ -17,7 +17,7 @@ class VisitLog {
   enum class Kind { connected, gone, turned_away, waits, kinds };
   static constexpr int lines_a_spell = 8;
 
-  /// `spell`: up to lines_a_spell visits within one are told as they happen.
+  /// `spell`: up to lines_a_spell visits within one are logged as they happen.
   VisitLog(asio::io_context& io, Log& log, std::string sonar, std::chrono::milliseconds spell = std::chrono::seconds(10));
   void say(Kind kind, const std::string& what, std::vector<LogField> fields);
   /// Writes what has been held back; from now on every line is written at once.

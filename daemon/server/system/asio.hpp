@@ -23,10 +23,10 @@ using boost::system::error_code;
 /// co_await socket.async_...(..., into(ec)): no exceptions in coroutines.
 inline auto into(error_code& ec) { return asio::redirect_error(asio::use_awaitable, ec); }
 
-/// Of a timer that waits for an event only.
+/// Expiry of a timer that waits for an event only.
 inline constexpr auto never = std::chrono::steady_clock::time_point::max();
 
-/// What an exception that ended a coroutine says. asio::detached would swallow it.
+/// Text of an exception that ended a coroutine. asio::detached would swallow it.
 inline std::string text_of(const std::exception_ptr& fault) {
   try {
     std::rethrow_exception(fault);

@@ -15,7 +15,7 @@
 
 namespace sonar {
 
-/// What a service manager put into the environment.
+/// Address from a service manager's environment.
 struct NotifyTarget {
   std::string socket;                     // a path, or @name in the abstract namespace; empty = no service manager
   std::chrono::microseconds watchdog{0};  // 0 = none

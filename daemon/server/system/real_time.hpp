@@ -9,7 +9,7 @@ namespace sonar {
 /// Niceness of the threads that compute pings: of equals the I/O thread goes first. More would leave pings little beside programs
 /// that never sleep, which at +10 take nine tenths of their core.
 inline constexpr int compute_niceness = 1;
-/// Of those that no ping waits for: building a scene, recording.
+/// Niceness of threads that no ping waits for: building a scene, recording.
 inline constexpr int background_niceness = 10;
 
 /// The calling thread runs before all others of the computer that are not scheduled so (SCHED_FIFO); threads it starts do not.

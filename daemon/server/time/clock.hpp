@@ -1,4 +1,4 @@
-// The daemon's time: real (UNIX time that never jumps) or stepped (moves only when told, by daemon/server/time/stepped_time.hpp).
+// The daemon's time: real (UNIX time that never jumps) or stepped (moved only by daemon/server/time/stepped_time.hpp).
 // I/O thread only.
 #pragma once
 
@@ -11,7 +11,7 @@ namespace sonar {
 
 class Clock {
  public:
-  /// What the computer's clock on the wall says; people and NTP set it, now() does not follow.
+  /// Time of the computer's wall clock; people and NTP set it, now() does not follow.
   using Wall = Time (*)();
   static Time system_wall() { return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now()); }
   explicit Clock(bool stepped, Wall wall = system_wall)

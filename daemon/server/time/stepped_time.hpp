@@ -15,7 +15,7 @@ namespace sonar {
 
 class SteppedTime {
  public:
-  /// Of one request, and of all that wait.
+  /// Limit of one request, and of all that wait.
   static constexpr double longest_step_s = 3600;
   static constexpr std::size_t most_waiting = 4096;
   /// Poses of a simulator that does not wait for pings lead by no more than this; ticks before are skipped as in real time, but

@@ -33,7 +33,7 @@ SonarDescription some_sonar() {
   return sonar;
 }
 
-/// What a sonar sees of its host, and how it answers.
+/// The sonar's end of a link: it records its host's messages and answers them.
 class Peer {
  public:
   explicit Peer(int fd) : socket_(fd) {}
@@ -292,7 +292,7 @@ TEST(Link, ClosingTellsWhoWaits) {
   EXPECT_EQ(code.get(), socket_closed);
 }
 
-/// What the library logs while `work` runs.
+/// Log lines of the library while `work` runs.
 template <class F>
 std::string logged(const F& work) {
   const std::string path = testing::TempDir() + "bvtsdk_link_test.log";

@@ -1,4 +1,4 @@
-"""A host whose daemon goes away, comes back, or freezes: the codes it is told, and that opening again is all it takes."""
+"""A host whose daemon goes away, comes back, or freezes: the codes it gets, and that opening again suffices."""
 import ctypes
 import signal
 import time

@@ -25,7 +25,7 @@ inline PolarPing make_ping(int beams, int bins, float start_m, float bin_m, cons
   return p;
 }
 
-/// Nothing but one echo of `level`, `wide` beams and `deep` bins in size.
+/// A ping with a single echo of `level`, `wide` beams and `deep` bins in size.
 inline PolarPing make_ping_with_target(double range_m, double bearing_deg, int level = 60000, int beams = 512, int bins = 400,
                                        float start_m = 1, float bin_m = 0.025f, double wide = 3, double deep = 3) {
   const PolarPing frame = make_ping(beams, bins, start_m, bin_m, [](int, int) { return 0; });

@@ -1,4 +1,4 @@
-// What the computer and the control groups leave, read from a tree of files that stands for /.
+// Memory that the computer and the control groups leave, read from a tree of files that stands for /.
 #include "core/base/memory_left.hpp"
 
 #include <gmock/gmock.h>

@@ -112,7 +112,7 @@ TEST(SurfaceCells, EveryLatticePointOfATerrainHasExactlyOneOwner) {
   EXPECT_LE(wrong, 20);  // rounding of stored places only
 }
 
-// What makes a flat bed even (docs/acoustics.md, section 3): a strip of a block's sixteenth holds one point, whatever its shape.
+// Condition of an even flat bed (docs/acoustics.md, section 3): a strip of a block's sixteenth of any shape holds one point.
 TEST(SurfaceCells, SixteenNeighboursShareTheirBlockOutEvenly) {
   SurfaceCells cells(scene_of(terrain(1, 2.0, [](double, double) { return 0.0; })), Seed{5}, 1u << 30);
   Parallel pool(1);

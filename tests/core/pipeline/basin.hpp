@@ -83,7 +83,7 @@ inline PingRequest low() {
   return r;
 }
 
-/// What two sonars may ask one after the other: all at once, then one thing changed at a time, and back.
+/// Requests of two sonars one after the other: all at once, then one thing changed at a time, and back.
 inline std::vector<std::pair<std::string, PingRequest>> turns() {
   std::vector<std::pair<std::string, PingRequest>> all;
   const auto both = [&all](const std::string& what, const std::function<void(PingRequest&)>& change) {

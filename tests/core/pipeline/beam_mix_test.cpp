@@ -1,5 +1,5 @@
-// What a receiver's profile and its focus do to beams: widths and noise against closed forms and sums over the array, and nothing
-// where they are off or not given (docs/acoustics.md, sections 5 and 6).
+// Effects of a receiver's profile and focus on beams: widths and noise against closed forms and sums over the array, and no
+// effect where they are off or not given (docs/acoustics.md, sections 5 and 6).
 #include "core/pipeline/beam_mix.hpp"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ Sounding with(const std::function<void(ReceiverModel&)>& change, const SceneMake
   return {maker.make(), mode, settings};
 }
 
-/// What a beam at sine `beam` hears of a point at sine `u`: the sum over the aperture, whose phase is wrong by
+/// Response of a beam at sine `beam` to a point at sine `u`: the sum over the aperture, whose phase is wrong by
 /// edge_rad (2 x / L)^2.
 double array_sum(const ReceivePattern& pattern, double u, double beam, double edge_rad) {
   constexpr int elements = 2000;

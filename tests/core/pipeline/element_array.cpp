@@ -46,7 +46,7 @@ std::vector<std::vector<Complex>> ElementArray::beams(std::span<const PlacedScat
         if (std::abs(off_s) > reach_s + across_s) continue;
         Complex sum;
         for (std::size_t e = 0; e < place_m_.size(); ++e) {
-          // What is left of the detour to this element once the beam's own delay is taken out.
+          // The rest of the detour to this element after the beam's own delay.
           const double left_s =
               (detour_m(r, sine, place_m_[e]) - detour_m(focus_m, beam_sines[j], place_m_[e])) / sound_speed_mps_;
           sum += weight_[e] * p(off_s - left_s) * std::polar(1.0, -2 * pi * turns_per_s_ * left_s);

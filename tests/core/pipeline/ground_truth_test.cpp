@@ -1,4 +1,4 @@
-// What a ping tells beside its picture: the first hit of every beam, and the complex signal behind the magnitudes.
+// Data of a ping beside its picture: the first hit of every beam, and the complex signal behind the magnitudes.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -168,7 +168,7 @@ TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
   EXPECT_THROW(simd::kernels_for(SimdLevel::automatic), std::runtime_error);
 }
 
-// What falls back from one level to the next is of the processor's own family.
+// A level falls back only to one of the processor's own family.
 TEST(KernelSets, NeonIsOfArmProcessorsAlone) {
 #if defined(__aarch64__)
   for (const SimdLevel level : {SimdLevel::neon, SimdLevel::avx2, SimdLevel::avx512})

@@ -169,7 +169,7 @@ TEST(Labels, APointTargetIsAnInstance) {
 }
 
 TEST(Labels, EchoesBelowTheNoiseThatChannelsShareHaveNone) {
-  // Of a point at the edge of the sector, where that noise is loud near the sonar.
+  // Share of a point at the edge of the sector, where that noise is loud near the sonar.
   const auto share = [](float level_db) {
     FrequencyMode mode = p900();
     mode.receiver.shared_noise.level_db = level_db;

@@ -96,7 +96,7 @@ TEST(LevelOracles, Oracle08_AbsoluteSeabedLevel) {
   }
 }
 
-/// What sum sigma_i / r_i^4 comes to, from the beams of a whole ping: the sum of E|s|^2 over rows and beams counts every echo
+/// The sum of sigma_i / r_i^4, from the beams of a whole ping: the sum of E|s|^2 over rows and beams counts every echo
 /// theta_eff tau_eff times.
 double echo_per_m2(const Sounding& s) {
   double sum = 0;

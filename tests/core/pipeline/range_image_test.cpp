@@ -46,7 +46,7 @@ class RangeImageSounding {
     const double a = grid().azimuth_rad(column), e = grid().elevation_rad(row), r = range_m(column, row);
     return {r * std::cos(e) * std::cos(a), r * std::cos(e) * std::sin(a), r * std::sin(e)};
   }
-  /// Of the pixels with a return: the mean column and row.
+  /// Mean column and row of the pixels with a return.
   std::pair<double, double> middle() {
     double columns = 0, rows = 0, n = 0;
     for (int row = 0; row < 64; ++row)

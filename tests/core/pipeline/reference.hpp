@@ -13,7 +13,7 @@ namespace sonar::reference {
 
 using Complex = std::complex<double>;
 
-/// What sound does on its way, and what the transmitter sent.
+/// The water that sound passes, and the transmitted pulse.
 struct Medium {
   double sound_speed_mps = 1500;
   double absorption_np_per_m = 0;

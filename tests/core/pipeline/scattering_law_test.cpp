@@ -118,7 +118,7 @@ TEST(ScatteringLaw, TrendWithFrequency) {
   }
 }
 
-// What the specular echo loses is what scatters: 0.6, 2.5 and 9.9 dB at 900 kHz; 3.4 and 13 dB at 2.1 MHz.
+// The energy that the specular echo loses is scattered: 0.6, 2.5 and 9.9 dB at 900 kHz; 3.4 and 13 dB at 2.1 MHz.
 TEST(ScatteringLaw, RoughnessSharesEnergyBetweenMirrorAndScatter) {
   struct Case {
     double hz;

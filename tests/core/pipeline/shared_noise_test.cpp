@@ -1,4 +1,4 @@
-// What channels share, noise and leak: its power in every beam against the sum over the channels, what beams have in common, its
+// Noise and leak that channels share: power in every beam against the sum over the channels, correlation of beams, its
 // end, and nothing where it is off (docs/acoustics.md, section 5). Codes that are cut off, not rounded (section 7).
 #include "core/pipeline/shared_noise.hpp"
 
@@ -58,7 +58,7 @@ int groups(const FrequencyMode& mode) {
   return 2 * law.channels / law.group + 1;
 }
 double focused_power(const FrequencyMode& mode, double r, double u) { return std::norm(focused(mode, r, u, all)); }
-/// Of two beams, E[a b*] re a channel's power.
+/// E[a b*] of two beams re a channel's power.
 std::complex<double> in_common(const FrequencyMode& mode, double r, double u, double v) {
   std::complex<double> sum = 0;
   for (int g = 0; g < groups(mode); ++g) sum += focused(mode, r, u, g) * std::conj(focused(mode, r, v, g));
@@ -179,7 +179,7 @@ TEST(SharedNoise, FadesAway) {
   EXPECT_NEAR(s.power(s.rows() - 1, 0) / (own_upa * own_upa), 1, 0.01);
 }
 
-// What two beams have in common, over 30 pings and 50 rows, against the sum over groups; and two pings, nothing.
+// Correlation of two beams, over 30 pings and 50 rows, against the sum over groups; two pings have none.
 TEST(SharedNoise, IsOneDrawAGroupNewInEveryPing) {
   Sounding s = with(loud);
   s.request.switches.keep_beams = true;

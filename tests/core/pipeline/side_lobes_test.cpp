@@ -38,7 +38,7 @@ TEST(SideLobes, PointsAreHeardAllAround) {
   }
 }
 
-/// Of a bed 2 m below, looked at with the nose down: the mean over beams about the middle, over blocks of rows, re the closed
+/// Expects of a bed 2 m below, nose down, the mean over beams about the middle, over blocks of rows, re the closed
 /// form.
 void expect_bed(const FrequencyMode& mode, bool side_lobes, bool speckle) {
   constexpr double height = 2, tilt = 0.1, lambert_db = -20;

@@ -82,7 +82,7 @@ TEST(Motion, O40APoleFartherAwayIsTurnedFartherByAYaw) {
   }
 }
 
-// What hides what is looked up where the rays saw it, not where the echo is received.
+// Occlusion is that at the rays' directions, not at those of reception.
 TEST(Motion, O40TurnsShowNoFarSides) {
   constexpr double near_m = 2, far_m = 10;
   for (const double deg_per_s : {-40.0, 40.0, 60.0, 120.0}) {

@@ -33,7 +33,7 @@ class Sounding {
   Sounding(std::shared_ptr<const Scene> scene, const FrequencyMode& mode, const PingSettings& settings,
            const SoundingOptions& options = {});
 
-  /// What the next ping is made of; keep_pressure on, noise and specular off, water with c = 1500 m/s.
+  /// Request of the next ping; keep_pressure on, noise and specular off, water with c = 1500 m/s.
   PingRequest request;
 
   const Ping& ping();  // with the request as it stands

@@ -344,7 +344,7 @@ TEST(StageOracles, Oracle44_AwkwardSettingsAreRefusedWithASentence) {
   refused([&](PingRequest& r) { r.switches.fixed_fan = std::numeric_limits<int>::max(); });
 }
 
-// What would ask for more memory than any machine has is refused, too; what is merely large is not.
+// Requests for more memory than any machine has are refused, too; merely large ones are not.
 TEST(StageOracles, Oracle44_PicturesBeyondAllMemoryAreRefusedWithASentence) {
   Sounding s(SceneMaker().make(), p900(), default_rows(10, 394));
   const auto why = [&](auto&& change, bool exact = false) {

@@ -1,5 +1,5 @@
-// What is thinner than the depth map can tell: bodies of a few centimetres echo from the side that faces the sonar alone, and
-// what stands close behind an opaque face is not heard. Expected power, against integrals in double.
+// Bodies too thin for the depth map: a few centimetres thick, they echo from the side that faces the sonar alone, and
+// bodies close behind an opaque face do not echo. Expected power, against integrals in double.
 #include <gtest/gtest.h>
 
 #include <cmath>

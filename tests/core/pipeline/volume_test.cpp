@@ -162,7 +162,7 @@ TEST(Volume, IsNotTheNoiseAndOffIsOff) {
     turbid.request.switches.volume = false;
     EXPECT_EQ(turbid.ping().pressure_upa, none);
   }
-  // Nothing but noise when blank.
+  // A blank ping has noise only.
   turbid.request.switches.volume = true;
   turbid.request.blank = clear.request.blank = true;
   EXPECT_EQ(turbid.ping().pressure_upa, clear.ping().pressure_upa);

@@ -166,7 +166,7 @@ TEST(RayScene, AnEmptySceneMissesEverywhere) {
 // Embree may trace 4, 8 or 16 rays as one, and which of them depends on the processor.
 class TracerWidth : public ::testing::TestWithParam<const char*> {
  protected:
-  // What Embree has code for: of the instruction set that it is held to, and of this processor.
+  // The width that Embree has code for: of the instruction set that it is held to, and of this processor.
   static int expected() {
     const std::string isa = GetParam();
 #if defined(__x86_64__)
@@ -189,7 +189,7 @@ TEST_P(TracerWidth, AgreesWithBruteForce) {
   compare(*scene, rays, {}, draw, 60, 30, false, 1e-4);
 }
 
-// What a caller left in lanes that are not active: rays of an earlier packet, nothing, or bytes that are no numbers.
+// Inactive lanes hold a caller's old bytes: rays of an earlier packet, zeros, or bytes that are no numbers.
 TEST_P(TracerWidth, LanesThatAreNotActiveAreNotRead) {
   Draw draw(8);
   const auto scene = three_soups(draw, {});

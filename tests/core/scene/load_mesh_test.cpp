@@ -238,7 +238,7 @@ TEST_F(LoadMesh, TrianglesWithoutAreaAreLeftOutAndCounted) {
   EXPECT_GE(mesh.centred.left_out, 1u);
 }
 
-// What a sonar needs of a face are its vertices: texture coordinates and normals may be missing, or stripped by a tool.
+// A sonar needs only the vertices of a face: texture coordinates and normals may be missing, or stripped by a tool.
 TEST_F(LoadMesh, ObjFacesThatNameMissingTextureCoordinatesAreRead) {
   const std::string left = "vn 0 0 1\no left\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n",
                     right = "v 2 0 0\nv 3 0 0\nv 3 1 0\nv 2 1 0\n";

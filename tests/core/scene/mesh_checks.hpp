@@ -1,4 +1,4 @@
-// What every mesh must be: indices in range, triangles with area; and, for solids, closed with its normals outwards.
+// Conditions of every mesh: indices in range, triangles with area; and, for solids, closed with its normals outwards.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -17,7 +17,7 @@ namespace {
 constexpr int beams = 64, directions = 16;
 constexpr double above_db = 15, width_rad = 7 * pi / 180;
 
-/// Of 21 elements, Hamming, 7 degrees wide at -3 dB; by the difference of two sines.
+/// Pattern of 21 elements, Hamming, 7 degrees wide at -3 dB; by the difference of two sines.
 double pattern(double sines) {
   static const std::vector<double> table = [] {
     std::vector<double> values;

@@ -1,4 +1,4 @@
-// What is wrong with a command line, said in one sentence with option, value and what is allowed.
+// Faults of a command line, in one sentence with option, value and the allowed values.
 #include "core/text/arguments.hpp"
 
 #include <gmock/gmock.h>

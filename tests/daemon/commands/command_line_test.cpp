@@ -1,4 +1,4 @@
-// What the user types reaches the configuration, and wins over the file; what is not typed changes nothing.
+// The user's options reach the configuration, and win over the file; options that are absent change nothing.
 #include "daemon/commands/command_line.hpp"
 
 #include <gmock/gmock.h>
@@ -28,7 +28,7 @@ Config overridden(const std::vector<std::string>& words, const std::string& engi
   return *std::move(config);
 }
 
-/// Of a configuration whose controls are off, with these words.
+/// Overrides a configuration whose controls are off, with these words.
 Result<void> deaf_with(const std::string& clock, const std::vector<std::string>& words) {
   auto config = parse_config(
       "world: {scene: demo.yaml}\nvehicles: [{name: rov}]\nsonars: [{name: a, profile: oculus-m1200d, bind_ip: "
@@ -134,7 +134,7 @@ TEST(CommandLine, PartsThatTheModeLeavesOutAreNotSwitchedOn) {
   }
   EXPECT_THROW(overridden({"--fixed-fan", "8", "--multipath", "on"}), std::runtime_error);
   EXPECT_NO_THROW(overridden({"--fixed-fan", "8", "--specular", "on"}));
-  EXPECT_NO_THROW(overridden({"--mode", "paper"}, "{specular: on}"));  // the file's own wish is told, not refused
+  EXPECT_NO_THROW(overridden({"--mode", "paper"}, "{specular: on}"));  // the file's own setting is logged, not refused
 }
 
 TEST(CommandLine, SwitchesWinOverTheFileOnlyWhenGiven) {
@@ -223,7 +223,7 @@ TEST(CommandLine, WhatAnOffsetCannotMoveIsSaid) {
   EXPECT_THAT(why("9", "127.0.250.2", "{}"), ::testing::HasSubstr("there is no room for 127.0.250.2"));
   EXPECT_THAT(why("9", "127.0.0.2", "{json: '127.0.0.1:65500'}"), ::testing::HasSubstr("no port that far above 127.0.0.1:65500"));
   EXPECT_EQ(why("9", "127.0.0.2", "{json: '127.0.0.1:0'}"), "moved");
-  // What would lie on something of the daemon that is not moved.
+  // Addresses that would coincide with one of the daemon without an offset.
   const auto links = [](const std::string& more) { return "{mavlink: [{endpoint: 'udpin:127.0.0.1:14550'}" + more + "]}"; };
   EXPECT_EQ(
       why("22", "127.0.0.2", links("")),

@@ -1,4 +1,4 @@
-// What a console reads while a scene loads: nothing of a short load, then a line now and again.
+// Console lines while a scene loads: none for a short load, then a line now and again.
 #include "daemon/commands/load_progress.hpp"
 
 #include <gmock/gmock.h>

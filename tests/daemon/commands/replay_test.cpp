@@ -309,7 +309,7 @@ class Controller {
     command.acoustics = {1, 5, 300, 2000, 20000, 4, 6, 1, true, aris::Frequency::high, true, 12};
     asio::write(commands_, asio::buffer(aris::framed(command)));
   }
-  /// Nothing: no datagram comes within `wait`.
+  /// The next frame; empty if no datagram comes within `wait`.
   std::optional<aris::DecodedFrame> next(milliseconds wait = patience) {
     Bytes datagram(2000);
     while (true) {

@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// Of this test process.
+/// Folder of this test process.
 struct Folder {
   Folder() {
     std::string pattern = ::testing::TempDir() + "/mistakesXXXXXX";

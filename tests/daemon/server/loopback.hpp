@@ -1,4 +1,4 @@
-// What the daemon's loopback tests share: a daemon with a fake engine in a thread, and a driver-side client with deadlines.
+// Common parts of the daemon's loopback tests: a daemon with a fake engine in a thread, and a driver-side client with deadlines.
 // Programs that use it link own_network: the ports are those of the products.
 #pragma once
 

@@ -1,4 +1,4 @@
-// What control asks of a running daemon: status, settings, water, poses, events. Pings are made by a fake engine that remembers
+// Requests of control to a running daemon: status, settings, water, poses, events. Pings are made by a fake engine that remembers
 // what it was asked.
 #include <gmock/gmock.h>
 

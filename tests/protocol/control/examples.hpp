@@ -94,7 +94,7 @@ inline std::vector<v1::Event> every_event() {
           message_from<v1::Event>(R"(scene { scene: "harbour" text: "loaded" })")};
 }
 
-/// What a request is, whatever the road it came by: its bytes.
+/// Equality of two requests, by their bytes, however they came.
 inline bool same(const Request& a, const Request& b) { return encode_request(a) == encode_request(b); }
 inline bool same(const v1::Response& a, const v1::Response& b) { return encode_response(a) == encode_response(b); }
 

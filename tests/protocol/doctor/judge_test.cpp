@@ -1,4 +1,4 @@
-// What a daemon's status says of its drivers: statuses in, findings out.
+// Findings on drivers from a daemon's status: statuses in, findings out.
 #include "protocol/doctor/judge.hpp"
 
 #include <gmock/gmock.h>

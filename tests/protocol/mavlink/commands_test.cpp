@@ -1,4 +1,4 @@
-// MAV_CMD_INJECT_FAILURE: who may be addressed, what the handler is told, and the answer's bytes.
+// MAV_CMD_INJECT_FAILURE: possible addressees, the handler's input, and the answer's bytes.
 #include <limits>
 #include <tuple>
 

@@ -1,4 +1,4 @@
-// What is said to the autopilot and to the user.
+// Reports to the autopilot and to the user.
 #include <functional>
 
 #include "tests/protocol/mavlink/mavlink_testing.hpp"

@@ -1,4 +1,4 @@
-// The driver-side decoder: broken pings are told apart in sentences, hostile ones never read or allocate beyond themselves.
+// The driver-side decoder: each broken ping has its own sentence, hostile ones never read or allocate beyond themselves.
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
 namespace sonar::oculus::tests {

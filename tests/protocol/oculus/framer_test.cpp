@@ -100,7 +100,7 @@ TEST(Framer, AHugeLengthCostsNoMemory) {
   EXPECT_TRUE(framer.next().has_value());
 }
 
-// What waits is always less than one message, whatever arrives.
+// Waiting bytes are always less than one message, whatever arrives.
 TEST(Framer, NeverKeepsMoreThanAMessage) {
   Framer framer(Sender::client);
   for (std::uint32_t i = 0; i < 20000; ++i) {

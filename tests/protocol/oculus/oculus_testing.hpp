@@ -114,7 +114,7 @@ inline Ping made_up_ping(const protocol::DeviceState& state, const PingSettings&
   return ping;
 }
 
-/// What a device answers to a fire message: resolved, pinged with made-up samples, framed, decoded.
+/// A device's answer to a fire message: resolved, pinged with made-up samples, framed, decoded.
 inline DecodedPing answer(const protocol::DeviceState& state, const FireRequest& request, std::uint32_t number = 1) {
   const Ping ping = made_up_ping(state, resolve(request, state).settings, number);
   return decode_ping(encode_ping(ping, state, request)).value();

@@ -1,4 +1,4 @@
-// What a Ping360, an Omniscan and a Surveyor see of bodies at known places, through the whole engine, in closed form.
+// Pictures of a Ping360, an Omniscan and a Surveyor of bodies at known places, through the whole engine, in closed form.
 #include <gtest/gtest.h>
 
 #include <cmath>

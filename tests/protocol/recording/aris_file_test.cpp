@@ -71,7 +71,7 @@ Bytes three_frames() {
   return file;
 }
 
-/// What is read, and what is said of it.
+/// Messages read, and the reader's complaint.
 struct ReadBack {
   std::vector<aris::DecodedFrame> frames;
   std::string damage;

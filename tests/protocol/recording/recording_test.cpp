@@ -1,4 +1,4 @@
-// What holds for every format: what was written is read again, whatever part of the file is there, and a full disk spoils
+// Rules of every format: written messages are read again, whatever part of the file is there, and a full disk spoils
 // nothing.
 #include "tests/protocol/recording/recording_testing.hpp"
 #include "tests/small_disk.hpp"

@@ -1,4 +1,4 @@
-// What the tests of recordings share: a small conversation with everything in it, and files that go away.
+// Common parts of the tests of recordings: a small conversation with everything in it, and files that go away.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -112,7 +112,7 @@ inline std::unique_ptr<RecordingWriter> writer_for(Format format, std::unique_pt
   }
 }
 
-/// What this format keeps of a conversation.
+/// The part of a conversation that this format keeps.
 inline std::vector<RecordedMessage> kept_by(Format format, std::vector<RecordedMessage> messages) {
   if (format == Format::oculus_log || format == Format::raw_dump)
     std::erase_if(messages, [](const RecordedMessage& message) {

@@ -1,4 +1,4 @@
-// What travels to workers, without a server.
+// Records and files that travel to workers, without a server.
 #include "daemon/commands/farm/farm_job.hpp"
 
 #include <gmock/gmock.h>

@@ -222,7 +222,7 @@ TEST(RenderFile, WhatIsWrongWithASceneIsBadDataWhereverItStands) {
   std::ofstream(file) << "objects: [{type: ball}]\n";
   EXPECT_EQ(kind("scene: " + file + rest), ErrorKind::bad_data) << "as load_scene has it";
   EXPECT_THAT(refusal("scene: " + file + rest), HasSubstr("r.yaml:1:8: scene: "));
-  // What is wrong with the render file itself is not.
+  // A fault of the render file itself is a fault of configuration.
   EXPECT_EQ(kind("scene: {objects: []}\nsonar: {ping: {range_m: -4}}\n"), ErrorKind::config);
   EXPECT_EQ(kind("scene: {objects: []}\nsonr: {}\n"), ErrorKind::config);
   EXPECT_EQ(kind("scene: no-such-scene.yaml\n"), ErrorKind::config) << "as world.scene of a configuration";

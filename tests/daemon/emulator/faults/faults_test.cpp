@@ -173,7 +173,7 @@ TEST(FaultRecords, TwoThatWriteTheSamePartAreRefused) {
 
 // ---- every kind
 
-/// What a run leaves when nothing else is said: offsets, then numbers of pings.
+/// A run with the kind alone: offsets, then numbers of pings.
 class EveryKind : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(EveryKind, ActsTheSameInEveryRunOnOneSonarAloneAndEnds) {

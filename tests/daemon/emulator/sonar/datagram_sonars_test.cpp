@@ -19,7 +19,7 @@ using ::testing::IsEmpty;
 
 constexpr ConnectionId stream = 99;
 
-/// What a sonar sends by datagrams, ping by ping.
+/// Datagrams of a sonar, ping by ping.
 struct Talk {
   explicit Talk(const std::string& profile, const std::string& options = {})
       : time(yaml_of("  - name: front\n    profile: " + profile + "\n    bind_ip: 127.0.0.2\n" + options)) {}
@@ -137,7 +137,7 @@ struct Sounder : Talk {
       }
     throw std::runtime_error("no ping");
   }
-  /// Of the next ping: each frame is a datagram, and its sum is right.
+  /// Frames of the next ping: each is a datagram, and its sum is right.
   std::vector<ping::Frame> frames() {
     std::vector<ping::Frame> all;
     const auto sent = pings(milliseconds(150));

@@ -1,4 +1,4 @@
-// Only a sonar that computing keeps from its rate is told of, once, with the figures that say what is possible.
+// Only a sonar that computing keeps from its rate is reported, once, with the possible rate.
 #include "daemon/emulator/sonar/rate_watch.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// What viewers of a trajectory are told: its time, and what changes by steps.
+// Messages to viewers of a trajectory: its time, and changes by steps.
 #include "daemon/emulator/view/playback_watch.hpp"
 
 #include <gtest/gtest.h>

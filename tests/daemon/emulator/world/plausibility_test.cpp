@@ -1,4 +1,4 @@
-// What was probably not meant: each mistake that newcomers make has its note, what is right has none, and a running daemon tells
+// Notes on probable mistakes: each common mistake has its note, a right value has none, and a running daemon logs
 // each kind once and keeps it in its status as long as it holds.
 #include "daemon/emulator/world/plausibility.hpp"
 

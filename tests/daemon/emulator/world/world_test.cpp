@@ -1,4 +1,4 @@
-// Who is believed, when, and what the daemon answers for a moment: the rules of docs/poses.md, "Time and order".
+// Accepted senders and times of poses, and the daemon's pose for a moment: the rules of docs/poses.md, "Time and order".
 #include "daemon/emulator/world/world.hpp"
 
 #include <gmock/gmock.h>

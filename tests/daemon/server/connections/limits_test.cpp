@@ -1,4 +1,4 @@
-// What strangers may cost: places of the whole daemon, bytes a second, and accounts that balance whatever they do.
+// Limits of untrusted clients: slots of the whole daemon, bytes a second, and accounts that balance whatever they do.
 #include <gmock/gmock.h>
 
 #include <fcntl.h>
@@ -36,7 +36,7 @@ TEST(Limits, PlacesOfTheWholeDaemonCountThoseWhoWaitToo) {
     EXPECT_TRUE(newcomer.read_to_end());
     EXPECT_EQ(newcomer.bytes_read, 0u);
   }
-  EXPECT_EQ(count(daemon.log_text(), "all places taken"), 1u) << "said once";
+  EXPECT_EQ(count(daemon.log_text(), "no connection slot free"), 1u) << "logged once";
   ASSERT_TRUE(served->next_ping());
   served->close();
   waits.fire(fire_at(PingRate::hz40));

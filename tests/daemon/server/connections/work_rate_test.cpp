@@ -1,4 +1,4 @@
-// What clients of an address may cost: counted in virtual time, whatever they send and however often they connect.
+// Limit of the work of an address: counted in virtual time, whatever it sends and however often it connects.
 #include "daemon/server/connections/work_rate.hpp"
 
 #include <gtest/gtest.h>

@@ -23,7 +23,7 @@ struct StreamClient {
     ASSERT_EQ(answer->status().code(), v1::Status::OK) << answer->status().text();
     ASSERT_TRUE(answer->has_hello());
   }
-  /// Nothing at the deadline or the end of the stream.
+  /// The next answer; empty at the deadline or the end of the stream.
   std::shared_ptr<const v1::Response> next(milliseconds timeout = patience) {
     const auto deadline = Steady::now() + timeout;
     while (true) {

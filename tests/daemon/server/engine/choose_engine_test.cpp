@@ -1,4 +1,4 @@
-// Who computes: the CPU unless something else is wished for; a wish that cannot be had is a sentence or a log line, as asked.
+// Choice of the engine: the CPU by default; a device that is missing is an error or a log line, as requested.
 #include "daemon/server/engine/choose_engine.hpp"
 
 #include <gmock/gmock.h>

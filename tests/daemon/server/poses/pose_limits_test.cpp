@@ -1,4 +1,4 @@
-// What senders of poses by TCP may cost: bytes a second, turns, places, and the connection when they speak something else.
+// Limits of senders of poses by TCP: bytes a second, turns, slots, and the connection when they speak another protocol.
 #include <gmock/gmock.h>
 
 #include <list>
@@ -112,7 +112,7 @@ TEST_F(PoseLimits, ThoseBehindGiveTheirPlacesToNewcomers) {
     flood.back().send(lines(300000));
   }
   EXPECT_TRUE(a_newcomer_moves_the_boat());
-  EXPECT_THAT(daemon->log_text(), HasSubstr("beyond the limits, for longest, and its place was needed"));
+  EXPECT_THAT(daemon->log_text(), HasSubstr("closed to make room: without a pose, or beyond its limit"));
 }
 
 TEST_F(PoseLimits, ThoseWhoSendNoPosesGiveTheirPlacesToNewcomers) {

@@ -61,7 +61,7 @@ TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {
   EXPECT_GE(daemon.figures().dropped, slow_ids.skipped_ids());
 }
 
-/// What an engine that takes 60 ms a ping makes of 40 Hz: the requests of a dozen pings that a client got.
+/// Requests of a dozen pings that a client got at 40 Hz from an engine that takes 60 ms a ping.
 std::vector<PingRequest> overloaded(const std::string& sonar_lines) {
   DaemonSetup setup;
   setup.sonar_lines = sonar_lines;
@@ -117,7 +117,7 @@ TEST(Clients, OneWhoseComputerDiedInStandbyFreesItsPlace) {
   EXPECT_TRUE(next.next_ping());
 }
 
-/// Nothing is sent to it: dummies are far apart, so only the kernel's probes can find out.
+/// It gets no bytes, as dummies are far apart, so only the kernel's probes can find out.
 TEST(Clients, OneWhoseComputerDiedInSilenceFreesItsPlace) {
   DaemonSetup setup;
   setup.more = "limits: {dead_peer_s: 3}\n";

@@ -1,4 +1,4 @@
-// What a device does with the network when its sonar asks for a closed port, a reset or a client that is not read.
+// Network actions of a device when its sonar asks for a closed port, a reset or a client that is not read.
 #include "daemon/server/sonars/device.hpp"
 
 #include <gmock/gmock.h>
@@ -129,7 +129,7 @@ TEST_F(DeviceActions, TurnAwayByReset) {
   device.perform({TurnAway{2, true}});
   EXPECT_FALSE(waits.read_to_end());
   EXPECT_TRUE(waits.was_reset);
-  EXPECT_THAT(log_text, HasSubstr("client turned away: reset"));
+  EXPECT_THAT(log_text, HasSubstr("client refused: reset"));
 }
 
 TEST_F(DeviceActions, AClientThatIsNotReadFillsItsWindowAndLosesNothing) {

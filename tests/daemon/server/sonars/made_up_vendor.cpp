@@ -64,7 +64,7 @@ std::optional<protocol::Endpoint> endpoint_of(const std::string& text) {
   return protocol::Endpoint{*ip, static_cast<std::uint16_t>(std::atoi(text.c_str() + colon + 1))};
 }
 
-/// What a line asks for; the reply is "ok" or a refusal.
+/// Carries out a line; the reply is "ok" or a refusal.
 protocol::Reaction obey(const std::string& line, const DeviceState& device) {
   std::istringstream words(line);
   std::string command, reply = "ok";

@@ -1,4 +1,4 @@
-// Who looks on gets what the clients get, and nothing else is different for it.
+// An observer gets the same pings as clients, and changes nothing else.
 #include <gmock/gmock.h>
 
 #include <list>

@@ -1,5 +1,5 @@
-// What a service manager hears, by a socket of our own: when we are ready, reload and stop, and signs of life only while the
-// simulation thread gets on.
+// Messages to a service manager, by a socket of our own: when we are ready, reload and stop, and signs of life only while the
+// simulation thread makes progress.
 #include "daemon/server/system/notify.hpp"
 
 #include <gmock/gmock.h>

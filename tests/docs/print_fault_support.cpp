@@ -1,0 +1,9 @@
+// Prints which fault takes effect on which make, as a Markdown table: `ninja docs` writes it into the build folder.
+#include <iostream>
+
+#include "daemon/config/faults/kinds.hpp"
+
+int main() {
+  std::cout << "# Faults: what takes effect where\n\n" << sonar::support_table();
+  return std::cout.flush() ? 0 : 1;
+}
