@@ -8,6 +8,10 @@ import re
 import subprocess
 import sys
 
+# What a make of sonar may include beside its own folder.
+DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/dialogue.hpp", "protocol/host.hpp",
+          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/recording/byte_source.hpp", "protocol/recording/codec.hpp", "protocol/recording/message_splitter.hpp",
+          "protocol/recording/raw_dump.hpp", "protocol/recording/recorded_message.hpp", "protocol/recording/zlib.hpp"]
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
     "core/base": ["core/base/"],
@@ -25,11 +29,11 @@ FLOORS = {
     "protocol/control": ["core/base/", "protocol/control/"],
     "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/", "protocol/host.hpp"],
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
-    "protocol/oculus": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
-    "protocol/aris": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/aris/"],
-    "protocol/waterlinked": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/waterlinked/"],
-    "protocol/ping": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/ping/"],
-    "protocol/blueview": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
+    "protocol/oculus": [*DEVICE, "protocol/oculus/"],
+    "protocol/aris": [*DEVICE, "protocol/aris/"],
+    "protocol/waterlinked": [*DEVICE, "protocol/waterlinked/"],
+    "protocol/ping": [*DEVICE, "protocol/ping/"],
+    "protocol/blueview": [*DEVICE, "protocol/blueview/"],
     "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/wire/", "protocol/aris/", "protocol/oculus/", "protocol/ping/", "protocol/recording/", "protocol/waterlinked/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     # Within the daemon: files of configuration < what is emulated < sockets, threads and clocks < commands.
