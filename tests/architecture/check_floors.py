@@ -34,7 +34,7 @@ FLOORS = {
     "protocol/waterlinked": [*DEVICE, "protocol/waterlinked/"],
     "protocol/ping": [*DEVICE, "protocol/ping/"],
     "protocol/blueview": [*DEVICE, "protocol/blueview/"],
-    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/wire/", "protocol/aris/", "protocol/oculus/", "protocol/ping/", "protocol/recording/", "protocol/waterlinked/"],
+    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/wire/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     # Within the daemon: files of configuration < what is emulated < sockets, threads and clocks < commands.
     "daemon/config": ["core/", "protocol/", "daemon/config/"],
