@@ -138,7 +138,7 @@ TEST(Doctor, KnowsWhyNoStatusComes) {
 TEST(Doctor, SaysWhatDriversWouldObjectToInTheStatus) {
   Facts facts = healthy();
   facts.status.received[0].complaints = {"datagram length 140 is not a status message's 142"};
-  expect(line(facts, "status"), Level::fail, "datagram length 140", "142 bytes");
+  expect(line(facts, "status"), Level::fail, "datagram length 140", "is it a sonar?");
 }
 
 TEST(Doctor, FollowsTheAdvertisedAddress) {
@@ -345,11 +345,12 @@ TEST(Doctor, ChecksEverySonarAndTellsThemApart) {
 TEST(Doctor, FindsBlueViewHeads) {
   Facts facts = healthy();
   daemon_in(facts).MergeFrom(control::message_from<v1::DaemonStatus>(
-      R"(sonars { name: "bow" listens: "127.0.0.4:14750" advertised: "127.0.0.4" rate_hz: 10 })"));
-  expect(line(facts, "blueview"), Level::warn, "BlueView sonar bow at 127.0.0.4:14750 does not answer discovery", "udp 14751");
+      R"(sonars { name: "bow" profile: "blueview-p900-90" listens: "127.0.0.4:14750" advertised: "127.0.0.4" rate_hz: 10 })"));
+  expect(line(facts, "blueview"), Level::warn, "bow at 127.0.0.4:14750, a BlueView sonar, does not answer discovery on udp 14751",
+         "udp 14751");
   facts.address_given = true;  // 127.0.0.2: the other one was not asked
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("does not answer discovery")));
-  facts.heads = {{"127.0.0.4:14750", "P900-90", "123"}};
+  facts.found = {{find_make("blueview"), "127.0.0.4:14750", "BlueView head P900-90 (123)"}};
   expect(line(facts, "blueview"), Level::ok, "BlueView head P900-90 (123) answers discovery at tcp 127.0.0.4:14750", "");
 }
 
@@ -365,7 +366,7 @@ Facts healthy_head() {
   head.set_listens("127.0.0.2:14750");
   head.set_rate_hz(15);
   report(facts);
-  facts.heads = {{"127.0.0.2:14750", "BlueView P900-90", "7001"}};
+  facts.found = {{find_make("blueview"), "127.0.0.2:14750", "BlueView head BlueView P900-90 (7001)"}};
   facts.kernel_ports = {};
   return facts;
 }
@@ -398,7 +399,7 @@ TEST(Doctor, SaysWhatIsWrongWithAHead) {
   s.outcome = Outcome::closed_without_a_byte;
   expect(line(facts, "ping"), Level::warn, "all its client slots are taken", "clients.max");
   s.outcome = Outcome::refused;
-  expect(line(facts, "ping"), Level::fail, "refuses the connection", "sonard --demo blueview");
+  expect(line(facts, "ping"), Level::fail, "refuses the connection", "sonard --help");
 }
 
 TEST(Doctor, ChecksThePortsOfTheSonarsThatAreThere) {

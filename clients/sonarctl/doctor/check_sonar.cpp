@@ -97,7 +97,7 @@ class SonarChecks {
     if (!received->complaints.empty())
       return add(Level::fail, "status",
                  "the status from " + received->from + " is not what drivers expect: " + joined(received->complaints),
-                 "is it a sonar? sonard sends 142 bytes");
+                 "is it a sonar?");
     std::string text = "status broadcast received back on udp " + port + " from " + received->from;
     if (received->advertised == received->from) return add(Level::ok, "status", text, "");
     text += ", which tells drivers to connect to " + received->advertised;
@@ -198,8 +198,8 @@ class SonarChecks {
       if (received.advertised != sonar_.at.host)
         return "a status broadcast names a sonar at " + received.advertised + ": sonarctl doctor " + received.advertised;
     if (sonar_.on_this_host)
-      return "start it: sonard serves its demo on 127.0.0.2 (a BlueView head: sonard --demo blueview), sonard FILE the sonars of "
-             "a "
+      return "start it: sonard serves its demo on 127.0.0.2 (sonard --help lists those of other makes), sonard FILE the sonars "
+             "of a "
              "configuration";
     return "start sonard on that computer; its banner names the address of each sonar";
   }
