@@ -110,8 +110,22 @@ FORBIDDEN = [
     ("mark", r"", None, r"\b(TO" + r"DO|FIX" + r"ME|X" + r"XX)\b", "finish it, or write an issue"),
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]
+# A make of sonar is its folder and a line of makes.cpp; these files still name one. The list only gets shorter.
+MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|surveyor|omniscan|3d-?15|protocol/ping/|\bping::", re.I)
+MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping)/|protocol/makes\.cpp$|clients/bvtsdk/|(.*/)?tests/|docs/"
+NAME_MAKES = {
+    "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py", "clients/python/sonard_client/control.py",
+    "clients/python/sonard_client/daemon.py", "clients/python/sonard_client/judge/__main__.py", "clients/python/sonard_client/judge/cases.py",
+    "clients/python/sonard_client/judge/report.py", "clients/python/sonard_client/judge/scene.py", "clients/python/sonard_client/lab.py",
+    "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/nmea_to_pose.py", "clients/python/sonard_client/oculus.py",
+    "clients/python/sonard_client/poses.py", "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py",
+    "clients/sonarctl/completion/make_completion.py", "clients/sonarctl/setting_options.cpp", "clients/web/src/panels/head.js",
+    "clients/wireshark/aris.lua", "clients/wireshark/oculus.lua", "clients/wireshark/ping.lua", "clients/wireshark/waterlinked.lua",
+    "daemon/commands/command_line.cpp", "daemon/commands/render/render_file.cpp", "daemon/commands/replay/replay_device.cpp",
+    "daemon/commands/replay/replay_device.hpp", "daemon/commands/run/banner.cpp", "daemon/config/config.cpp", "daemon/config/faults/support.cpp",
+}
 CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc"}
-TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ""}
+TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ".js", ""}
 # A page of ours, and what of it is cited: docs/acoustics.md, section 8; docs/protocols/oculus.md, 5.1; docs/architecture.md, "Errors".
 PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
                       (?:,?\ section\ (?P<section>\d+(?:\.\d+)*)|,?\ (?P<number>\d+(?:\.\d+)*)|,\ "(?P<title>[^"\n]+)")?""", re.X)
@@ -180,6 +194,18 @@ def include_violations(name, code):
                 yield number, f'{floor} must not include "{header}" (floors of docs/architecture.md)'
 
 
+def make_violations(name, code):
+    """Of product files; those that NAME_MAKES excepts must name one."""
+    if re.match(MAY_NAME_MAKES, name):
+        return
+    found = MAKE.search(code)
+    if found and name not in NAME_MAKES:
+        yield line_of(code, found.start()), (f'make: "{found.group()}"; only the make\'s folder and protocol/makes.cpp name a make: '
+                                             "ask protocol::Make (protocol/host.hpp)")
+    if not found and name in NAME_MAKES:
+        yield 1, "make: names none any more: take it out of NAME_MAKES"
+
+
 def line_of(text, position):
     return text.count("\n", 0, position) + 1
 
@@ -202,6 +228,9 @@ def violations(root):
                 yield f"{name}:1: header without #pragma once"
             if not name.startswith("tests/") and text.count("\n") > LONGEST_FILE:
                 yield f"{name}:{LONGEST_FILE}: longer than {LONGEST_FILE} lines: split it"
+        if is_code or path.suffix in {".py", ".lua", ".js"}:
+            for number, what in make_violations(name, code):
+                yield f"{name}:{number}: {what}"
         for position, what in citation_violations(root, name, comments_of(text) if is_code else text):
             yield f"{name}:{line_of(text, position)}: {what}"
         for rule, where, excepted, pattern, why in FORBIDDEN:
