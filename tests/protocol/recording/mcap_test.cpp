@@ -141,6 +141,18 @@ TEST(Mcap, MessagesWithoutSamplesGetTheImageOfThePing) {
   EXPECT_EQ(read_all(**messages).size(), 1u);
 }
 
+TEST(Mcap, ClientsSendAsTheMakeDoes) {
+  for (const auto& [name, by] : {std::pair{"oculus", Carrier::stream}, std::pair{"ping360", Carrier::datagram}}) {
+    Bytes file;
+    McapSession writer(sink_into(file), "front", *protocol::find_make(name));
+    EXPECT_TRUE(writer.write({after_ms(0), Origin::client, by, bytes_of("a request")}));
+    EXPECT_TRUE(writer.close());
+    auto messages = read_mcap(source_from("a file", file));
+    ASSERT_TRUE(messages);
+    expect_same(read_all(**messages), {{after_ms(0), Origin::client, by, bytes_of("a request")}});
+  }
+}
+
 TEST(Mcap, WithoutItsEndEverythingButTheLastChunkIsThere) {
   auto opened = open_bytes(session(conversation(), false));  // chunks of 2 s: the last one never reached the file
   ASSERT_TRUE(opened);
