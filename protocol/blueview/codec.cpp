@@ -1,8 +1,8 @@
-#include "protocol/blueview/codec.hpp"
-
+// Its messages and files, for recordings.
 #include <algorithm>
 
 #include "protocol/blueview/frames.hpp"
+#include "protocol/blueview/host.hpp"
 #include "protocol/blueview/models.hpp"
 
 namespace sonar::blueview {

@@ -15,4 +15,6 @@ extern const protocol::Search search;
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 
+recording::Codec codec();
+
 }  // namespace sonar::blueview

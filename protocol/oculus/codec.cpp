@@ -1,8 +1,8 @@
-#include "protocol/oculus/codec.hpp"
-
+// Its messages and files, for recordings.
 #include <array>
 
 #include "protocol/oculus/decode.hpp"
+#include "protocol/oculus/host.hpp"
 #include "protocol/oculus/models.hpp"
 #include "protocol/oculus/oculus_log.hpp"
 

@@ -19,4 +19,8 @@ std::optional<protocol::Announcement> announced(wire::BytesView datagram);
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 
+/// Of its stream.
+extern const recording::Framing framing;
+recording::Codec codec();
+
 }  // namespace sonar::oculus

@@ -1,9 +1,9 @@
-#include "protocol/ping/codec.hpp"
-
+// Its messages and files, for recordings.
 #include <algorithm>
 #include <array>
 #include <initializer_list>
 
+#include "protocol/ping/host.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/omniscan.hpp"
 #include "protocol/ping/ping360.hpp"

@@ -1,8 +1,8 @@
-#include "protocol/waterlinked/codec.hpp"
-
+// Its messages and files, for recordings.
 #include <array>
 
 #include "protocol/recording/raw_dump.hpp"
+#include "protocol/waterlinked/host.hpp"
 #include "protocol/waterlinked/models.hpp"
 #include "protocol/waterlinked/rip.hpp"
 #include "protocol/waterlinked/sonar_file.hpp"

@@ -1,5 +1,5 @@
 // .oculus log files and raw dumps of anybody. A compressed item may hold a message of the largest kind.
-#include "protocol/oculus/codec.hpp"
+#include "protocol/oculus/host.hpp"
 #include "protocol/oculus/messages.hpp"
 #include "protocol/oculus/oculus_log.hpp"
 #include "protocol/recording/raw_dump.hpp"

@@ -1,5 +1,5 @@
 // The splitter loses no byte that is not part of a broken message, however the stream is cut.
-#include "protocol/oculus/codec.hpp"
+#include "protocol/oculus/host.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::tests {
