@@ -342,6 +342,20 @@ TEST(Doctor, ChecksEverySonarAndTellsThemApart) {
               HasSubstr("warn  127.0.0.3: 127.0.0.3 was not examined: the time limit was reached; raise it with --within"));
 }
 
+TEST(Doctor, ASonarByHttpThatSendsNothingIsAnErrorWhenAHostSetItUp) {
+  Facts facts = healthy();
+  SonarFacts& sonar = facts.sonars[0];
+  sonar.make = find_make("waterlinked");
+  v1::SonarStatus& reported = *daemon_in(facts).mutable_sonars(0);
+  reported.set_profile("waterlinked-3d15");
+  reported.set_pinging(false);
+  report(facts);
+  expect(line(facts, "ping"), Level::warn, "no images are made", "post true to /acoustics/enabled");
+  reported.set_asked_by("10.0.0.7");
+  report(facts);
+  expect(line(facts, "ping"), Level::fail, "no images are made, although 10.0.0.7 has set it up", "a mode to /udp");
+}
+
 TEST(Doctor, FindsBlueViewHeads) {
   Facts facts = healthy();
   daemon_in(facts).MergeFrom(control::message_from<v1::DaemonStatus>(

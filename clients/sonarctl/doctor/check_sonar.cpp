@@ -72,9 +72,13 @@ class SonarChecks {
   void check_images() {
     const std::string at = "http at " + sonar_.at.host;
     if (!sonar_.reported) return add(Level::warn, "ping", at + ": no daemon tells whether images are sent", "");
-    if (!sonar_.reported->pinging())
-      return add(Level::warn, "ping", at + ": no images are made",
-                 "post true to /acoustics/enabled and a mode to /udp, below http://" + sonar_.at.host + "/api/v1/integration");
+    if (!sonar_.reported->pinging()) {
+      const std::string& who = sonar_.reported->asked_by();
+      const bool is_waited_for = !who.empty();
+      return add(is_waited_for ? Level::fail : Level::warn, "ping",
+                 at + ": no images are made" + (is_waited_for ? ", although " + who + " has set it up" : ""),
+                 std::string(sonar_.make->remedy) + ", of " + sonar_.at.host);
+    }
     add(Level::ok, "ping",
         at + ": images by UDP at " + format("%g", sonar_.reported->rate_hz()) + " Hz, " +
             std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",

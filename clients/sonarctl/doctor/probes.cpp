@@ -53,6 +53,8 @@ std::optional<Datagram> receive(const Socket& socket, Steady::time_point deadlin
   }
 }
 
+constexpr int refusal_within_ms = 500;
+
 Socket udp_socket() { return Socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)); }
 
 std::string line_of(const std::string& file) {
@@ -99,6 +101,18 @@ bool is_on_this_host(const std::string& ipv4) {
   }
   ::freeifaddrs(interfaces);
   return found;
+}
+
+bool refuses(const Endpoint& at) {
+  const auto to = address_of(at);
+  const Socket socket(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  if (!to || ::connect(socket.fd(), generic(*to), sizeof *to) == 0) return false;
+  if (errno != EINPROGRESS) return errno == ECONNREFUSED;
+  pollfd decided{socket.fd(), POLLOUT, 0};
+  int error = 0;
+  socklen_t size = sizeof error;
+  return ::poll(&decided, 1, refusal_within_ms) == 1 && ::getsockopt(socket.fd(), SOL_SOCKET, SO_ERROR, &error, &size) == 0 &&
+         error == ECONNREFUSED;
 }
 
 StatusListener::StatusListener(const Endpoint& on) {

@@ -18,6 +18,9 @@ Result<std::string> ipv4_of(const std::string& host);
 /// All of 127.0.0.0/8, and the addresses of the interfaces.
 bool is_on_this_host(const std::string& ipv4);
 
+/// No program listens at this TCP port: its computer says so at once.
+bool refuses(const Endpoint& at);
+
 /// Receives status messages and sorts them, also those that arrive during other queries.
 class StatusListener {
  public:
