@@ -13,8 +13,10 @@
 #include <variant>
 #include <vector>
 
+#include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
 #include "core/image/polar_image.hpp"
+#include "protocol/recording/codec.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::protocol {
@@ -105,6 +107,23 @@ class Host {
   virtual bool expects_echo() const { return false; }
 };
 
+/// What a beacon says to hosts.
+struct Announcement {
+  Ipv4 address{}, client{};  // where hosts connect; who is connected, 0.0.0.0: no one
+  std::uint32_t device_id = 0;
+  std::vector<std::string> complaints;  // deviations that hosts reject
+};
+/// How hosts find such sonars: by a datagram to all.
+struct Search {
+  struct Answer {
+    std::uint16_t port = 0;
+    std::string about;  // "BlueView head P900-90 (7001)"
+  };
+  std::uint16_t port = 0;
+  Bytes (*question)() = nullptr;
+  std::optional<Answer> (*answer)(BytesView datagram) = nullptr;  // nullopt: it is none
+};
+
 /// A make of sonar, both ends. Adding one = one folder + one line in makes.cpp.
 struct Make {
   const Vendor* device = nullptr;
@@ -114,14 +133,20 @@ struct Make {
   std::span<const HostPort> ports;
   /// usage: a setting that such a sonar does not have.
   Result<std::unique_ptr<Host>> (*host)(const Wanted& wanted) = nullptr;
+  recording::Codec codec;
+  std::optional<Announcement> (*announced)(BytesView beacon) = nullptr;  // nullopt: it is none; null: hosts need no beacon
+  const Search* search = nullptr;                                        // null: hosts do not search
 
-  bool each_ping_requested = false;  // by its hosts; a rate is a limit
-  bool own_numbers = false;          // of pings: not those of sonard's events
-  bool scans = false;                // pings come as fast as its head turns
+  bool each_ping_requested = false;             // by its hosts; a rate is a limit
+  bool own_numbers = false;                     // of pings: not those of sonard's events
+  bool scans = false;                           // pings come as fast as its head turns
+  std::optional<RollPitchYaw> demo_mount = {};  // in the demo; nullopt: it looks ahead
 
   std::string_view name() const { return device->name(); }
 };
 std::span<const Make> makes();
+/// Null: no make has this name.
+const Make* find_make(std::string_view name);
 /// The make of a product; of an unknown one the first.
 const Make& make_of_profile(std::string_view profile);
 

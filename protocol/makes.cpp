@@ -71,13 +71,17 @@ std::span<const Make> makes() {
        .request = "fire message",
        .remedy = "send a fire message (type 0x15)",
        .ports = oculus::host_ports,
-       .host = oculus::make_host},
+       .host = oculus::make_host,
+       .codec = oculus::codec(),
+       .announced = oculus::announced},
       {.device = &blueview::vendor(),
        .title = "a BlueView sonar",
        .request = "request for a ping",
        .remedy = "send a request for a ping, or a subscription",
        .ports = blueview::host_ports,
        .host = blueview::make_host,
+       .codec = blueview::codec(),
+       .search = &blueview::search,
        .each_ping_requested = true},
       {.device = &aris::vendor(),
        .title = "an ARIS",
@@ -85,19 +89,22 @@ std::span<const Make> makes() {
        .remedy = "send SET_FRAMESTREAM_RECEIVER and SET_ACOUSTICS",
        .ports = aris::host_ports,
        .host = aris::make_host,
+       .codec = aris::codec(),
        .own_numbers = true},
       {.device = &waterlinked::vendor(),
        .title = "a Sonar 3D-15",
        .request = "request",
        .remedy = "post true to /acoustics/enabled and a mode to /udp, below /api/v1/integration",
        .ports = waterlinked::host_ports,
-       .host = waterlinked::make_host},
+       .host = waterlinked::make_host,
+       .codec = waterlinked::codec()},
       {.device = &ping::ping360::vendor(),
        .title = "a Ping360",
        .request = "request",
        .remedy = "send auto_transmit (2602), or transducer (2601) with transmit 1",
        .ports = ping::ping360::host_ports,
        .host = ping::ping360::make_host,
+       .codec = ping::ping360::codec(),
        .own_numbers = true,
        .scans = true},
       {.device = &ping::surveyor::vendor(),
@@ -106,16 +113,26 @@ std::span<const Make> makes() {
        .remedy = "send set_ping_parameters (3023) with ping_enable 1",
        .ports = ping::surveyor::host_ports,
        .host = ping::surveyor::make_host,
-       .own_numbers = true},
+       .codec = ping::surveyor::codec(),
+       .own_numbers = true,
+       .demo_mount = RollPitchYaw{0, pi / 2, 0}},  // it looks down
       {.device = &ping::omniscan::vendor(),
        .title = "an Omniscan",
        .request = "request",
        .remedy = "send os_ping_params (2197) with enable 1",
        .ports = ping::omniscan::host_ports,
        .host = ping::omniscan::make_host,
-       .own_numbers = true},
+       .codec = ping::omniscan::codec(),
+       .own_numbers = true,
+       .demo_mount = RollPitchYaw{0, pi / 6, -pi / 2}},  // to starboard
   }};
   return all;
+}
+
+const Make* find_make(std::string_view name) {
+  for (const Make& make : makes())
+    if (make.name() == name) return &make;
+  return nullptr;
 }
 
 const Make& make_of_profile(std::string_view profile) {

@@ -6,53 +6,26 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "core/base/result.hpp"
 #include "core/sonar/ping.hpp"
-#include "core/text/ipv4.hpp"
+#include "protocol/dialogue.hpp"
+#include "protocol/message_fields.hpp"
+#include "protocol/options.hpp"
+#include "protocol/transport.hpp"
 #include "protocol/wire/wire.hpp"
 
 namespace sonar::protocol {
 
-using text::Ipv4;
-using wire::Bytes;
-using wire::BytesView;
 using wire::Field;
-
-struct Endpoint {
-  Ipv4 ip{};
-  std::uint16_t port = 0;
-  bool operator==(const Endpoint&) const = default;
-};
-
-/// One named choice of a protocol's unknowns, settable under `options:` of a sonar in the configuration.
-struct Option {
-  std::string_view name;
-  std::vector<std::string_view> allowed;  // first = default; empty = a number above 0, or the word of default_value
-  std::string_view default_value;
-  std::string_view meaning;
-  double lowest = 0, highest = 0;  // of a number, inclusive; 0, 0 = any above 0
-  std::string_view word = {};      // that may stand for a number, beside the default
-};
-/// "number above 0", "number from 5 to 170".
-inline std::string numbers_of(const Option& option) {
-  if (option.highest <= 0) return "number above 0";
-  char text[64];
-  std::snprintf(text, sizeof text, "number from %g to %g", option.lowest, option.highest);
-  return text + (option.word.empty() ? "" : ", or " + std::string(option.word));
-}
-using OptionValues = std::map<std::string, std::string>;
 
 /// The emulated device as its own packets describe it. Owned by the daemon's Device; read on the I/O thread only.
 struct DeviceState {
@@ -71,175 +44,8 @@ struct DeviceState {
   Time framed_at{};                                // stamp of the ping that was framed before; Time{} = there is none
   std::chrono::nanoseconds skipped{0};             // by which stamps of pings are ahead of the time that dialogues are told
   bool simulated_time = false;                     // it may stop while clients wait
-  struct StoredAddress {                           // what a client wrote; stored, never applied
-    std::uint32_t ip = 0, netmask = 0;
-    bool dhcp = false;
-  } stored_address;
+  StoredAddress stored_address;
 };
-
-/// Where the device sends the datagrams of its pings from now on. Requested in a conversation: the list is that connection's,
-/// beside those of others, and ends with it. Requested by a datagram or over HTTP: the device's own list, which replaces
-/// Port::group.
-struct SetReceivers {
-  std::vector<Endpoint> to;  // address 0.0.0.0 = that of the host which requests it
-  std::size_t stream = 0;    // which of the vendor's ports of kind udp_stream, counted from 0
-};
-/// The client replaced the device's settings, perhaps by the same ones: some drivers repeat them at ping rate.
-struct ChangeSettings {
-  PingSettings settings;
-  std::shared_ptr<const VendorSettings> vendor_settings;
-  std::string summary;                         // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
-  std::optional<SetReceivers> receivers = {};  // the device's own list, where it is one of the settings
-};
-/// Settings override, from the control protocol or of a fault. Unset fields keep their value; all values must be finite.
-struct SettingsOverride {
-  std::optional<double> range_m, rate_hz, gain_percent;  // rate 0 = standby; gain 0 to 100 of what a client can turn it
-  std::optional<std::uint32_t> mode, beams;              // mode: index into SonarModel::modes
-  std::optional<std::uint32_t> sample_bits = {};
-  std::optional<bool> row_gains = {};
-};
-struct RequestPing {   // one ping now (network trigger, BlueView)
-  bool joins = false;  // a ping that is under way already will do
-  /// Of a mechanical scan: the ping is fired with the sonar turned so far to port about its own z axis, and framed with `with` in
-  /// place of the device's settings. Both hold until the next request.
-  double head_rad = 0;
-  std::shared_ptr<const VendorSettings> with = nullptr;
-};
-struct StoreAddress {
-  DeviceState::StoredAddress address;
-};
-struct Notice {  // worth one (rate-limited) log line, e.g. junk skipped or a request refused
-  std::string text;
-};
-struct Close {
-  std::string why;
-};
-using Event = std::variant<ChangeSettings, RequestPing, StoreAddress, SetReceivers, Notice, Close>;
-struct Reaction {
-  std::vector<Event> events;
-  std::vector<Bytes> replies;  // whole messages, in order
-};
-
-/// How one client gets a ping of the device: a message for each prefix, the prefix and then the bytes that all clients share.
-struct Delivery {
-  std::vector<Bytes> prefixes;
-  std::vector<Event> events;  // what it wants next
-};
-
-class Dialogue {
- public:
-  virtual ~Dialogue() = default;
-  /// Any split of the stream, any garbage. Never throws, never grows without bound.
-  virtual Reaction on_bytes(BytesView received, Time now) = 0;
-  /// Keep-alives and subscriptions. Called at or after next_tick(). `ping_pending`: a client has asked the device for one ping,
-  /// which has not been started.
-  virtual Reaction on_tick(Time now, bool ping_pending) = 0;
-  virtual Time next_tick() const = 0;
-  /// Time of the next ping that on_tick() will request by itself. Stepped time advances to it, but not for keep-alives alone.
-  virtual std::optional<Time> next_ping_request() const { return std::nullopt; }
-  /// A client that says nothing for longer has gone. By the wall's clock, whatever the time is that the dialogue is told of:
-  /// clients live by theirs. Nothing: it may be silent.
-  virtual std::optional<std::chrono::milliseconds> longest_silence() const { return std::nullopt; }
-  /// Of one with longest_silence() by datagrams: known hosts say nothing while they get pings, so that a computer which answers
-  /// for the host is as good as a word.
-  virtual bool hosts_fall_silent() const { return false; }
-  /// A ping was put into this client's outbox: keep-alives only fill silence.
-  virtual void on_ping_queued(Time now) = 0;
-  /// A ping is ready, made with `made_with` (null: the initial settings); its framed size is `shared_bytes`. Most clients take
-  /// every ping as it is; where hosts request single pings, only those that requested one get it. Calls on_ping_queued itself
-  /// when anything is delivered.
-  virtual Delivery on_ping(const VendorSettings* made_with, std::size_t shared_bytes, Time now) {
-    static_cast<void>(made_with), static_cast<void>(shared_bytes);
-    on_ping_queued(now);
-    return {{Bytes{}}, {}};
-  }
-};
-
-/// A transport of the device. A vendor may have several of a kind, but one beacon.
-struct Port {
-  enum class Kind {
-    tcp_stream,    // listens at `number`: one Dialogue for each connection; observers have those of the vendor's first
-    udp_beacon,    // sends Vendor::beacon to `number` of the configured addresses: broadcast, multicast or hosts
-    udp_answer,    // passes datagrams that arrive at `number`, broadcast ones too, to Vendor::on_datagram
-    udp_stream,    // sends Vendor::datagrams of each ping from `number` (0: any; may be that of a udp_answer) to the receivers
-    http,          // serves Vendor::on_http at `number`
-    udp_dialogue,  // one Dialogue at `number` with the host that sent the last request; it gets Vendor::datagrams of its pings
-  } kind{};
-  std::uint16_t number = 0;
-  std::chrono::milliseconds period{0};  // of a beacon
-  bool on_change = false;               // of a beacon: also sent at once when a client comes or goes
-  Endpoint group{};        // of a udp_stream: its receiver until SetReceivers, often a multicast group; port 0 = none
-  bool any_group = false;  // of a udp_stream: receivers may be multicast groups that the configuration does not name
-  /// Of a udp_stream: least time between two datagrams of a ping. Of a tcp_stream: pause between the parts of a ping that
-  /// Vendor::datagrams gives and Vendor::frame holds one behind the other.
-  std::chrono::nanoseconds gap{0};
-};
-
-/// One request for a resource of the device, its sizes already limited by the server.
-struct ResourceRequest {
-  std::string method, path, query, content_type, body;  // path without the query: "/api/v1/speed"
-  Ipv4 from{};
-};
-struct ResourceReply {
-  unsigned status = 200;
-  std::string body;
-  std::string content_type = "application/json";
-  std::string allow = {};  // of 405
-  std::vector<Event> events = {};
-};
-
-/// What a field of a message means, whatever a vendor calls it.
-enum class FieldName {
-  magic,
-  source_id,
-  destination_id,
-  message_type,
-  version,
-  payload_size,
-  ping_id,
-  ping_status,
-  frequency,
-  temperature,
-  pressure,
-  heading,
-  pitch,
-  roll,
-  sound_speed,
-  time,
-  sample_type,
-  range_resolution,
-  rows,
-  beams,
-  image_offset,
-  image_size,
-  message_size,
-  range,
-  ping_rate,
-  gain,
-  device_id,
-  part_number,
-  device_status,
-  firmware,
-  address,
-  netmask,
-  connected_address,
-  mac,
-};
-/// The same words, in that order.
-inline constexpr std::array<std::string_view, 34> field_names{
-    "magic",     "source_id",   "destination_id",    "message_type", "version",       "payload_size",
-    "ping_id",   "ping_status", "frequency",         "temperature",  "pressure",      "heading",
-    "pitch",     "roll",        "sound_speed",       "time",         "sample_type",   "range_resolution",
-    "rows",      "beams",       "image_offset",      "image_size",   "message_size",  "range",
-    "ping_rate", "gain",        "device_id",         "part_number",  "device_status", "firmware",
-    "address",   "netmask",     "connected_address", "mac"};
-static_assert(field_names.size() == static_cast<std::size_t>(FieldName::mac) + 1);
-
-/// The message that carries a ping, as a client receives it, prefix included; the beacon.
-enum class Part { ping, beacon };
-/// Of a ping: what every message begins with, the other fields, the table of the beams' directions, the samples.
-enum class Region { header, metadata, bearings, image };
-inline constexpr std::array<std::string_view, 4> region_names{"header", "metadata", "bearings", "image"};
 
 class Vendor {
  public:

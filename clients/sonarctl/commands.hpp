@@ -23,10 +23,12 @@ struct SourceOptions {
   const Make* make = nullptr;       // null: any that answers at the host of `device`
   bool discover = false;            // take the device from its status broadcast
   std::filesystem::path recording;  // instead of a device
+  std::string sonar;                // selects one of several in a recording
   Wanted wanted;
   double connect_patience_s = 2;
   double silence_limit_s = 10;  // longest time without a byte
   bool observe = false;         // occupy no client slot, request nothing
+  bool keeps_messages = false;  // PingStream::Item::messages
   std::string control;  // HOST:PORT of sonard's control stream, which reports the address for observers; empty = its default
   std::filesystem::path token_file;
 };

@@ -16,58 +16,6 @@ using text::number;
 using text::one_of;
 using text::whole_number;
 
-/// Options that belong to a source of pings; finish() turns their texts into a SourceOptions once the line is parsed.
-struct SourceArguments {
-  DeviceArguments device;
-  bool as_it_is = false, observe = false;
-  std::string make;
-  std::string control;
-  std::filesystem::path token_file;
-  std::string recording;
-  SettingArguments settings;
-
-  void add_to(CLI::App& app, bool recordings) {
-    std::string usual;
-    std::vector<std::string> names;
-    for (const Make& one : protocol::makes()) {
-      usual += (usual.empty() ? "" : ", ") + std::to_string(one.ports.front().number) + " of " + std::string(one.title);
-      names.emplace_back(one.name());
-    }
-    device.add_to(app, "port of the sonar (default: " + usual + ", the first that answers)");
-    app.add_option("--make", make, "make of the sonar; needed on a port that is not the make's own")->check(one_of(names));
-    if (recordings) app.add_option("--from-raw", recording, "read a recording of the raw TCP bytes instead of a device");
-    app.add_flag("--as-it-is", as_it_is, "send no settings (many sonars then send no pings)");
-    app.add_flag("--observe", observe,
-                 "receive the pings that clients request, without occupying a client slot or sending settings");
-    app.add_option("--control", control, "HOST:PORT of sonard's control stream, which reports the address for observers")
-        ->check(clients::address());
-    app.add_option("--token-file", token_file, "the daemon's control.token_file, if it has one");
-    settings.add_to(app);
-  }
-
-  Result<SourceOptions> finish() const {
-    SourceOptions source;
-    Result<Endpoint> at = parse_endpoint(device.address, {"127.0.0.2", device.port});
-    if (!at) return tl::unexpected(at.error());
-    source.make = make.empty() ? make_at(at->port) : find_make(make);
-    if (source.make == nullptr && at->port != 0) source.make = &protocol::makes().front();
-    if (device.discover && !make.empty() && source.make != &protocol::makes().front())
-      return failure(ErrorKind::usage, "--discover finds " + std::string(protocol::makes().front().title) +
-                                           " only: leave it out, and give the address of " + std::string(source.make->title));
-    source.device = *at;
-    source.discover = device.discover;
-    source.recording = recording;
-    source.connect_patience_s = device.patience_s;
-    source.silence_limit_s = std::max(source.silence_limit_s, device.patience_s);
-    source.observe = observe;
-    source.control = control;
-    source.token_file = token_file;
-    source.wanted = settings.wanted();
-    source.wanted.as_it_is = as_it_is;
-    return source;
-  }
-};
-
 struct StyleArguments {
   std::string colour_map = "copper";
   int width_px = 1000;
@@ -97,7 +45,6 @@ Run add_listen(CLI::App& app) {
       "  sonarctl listen --seconds 60\n"
       "  sonarctl listen 127.0.0.3 --mode 1 --range 30 --beams 512 --pings 100 --quiet\n"
       "  sonarctl listen --discover --json | head\n"
-      "  sonarctl listen 127.0.0.3 --range 20          detects a BlueView head at that address\n"
       "exit code 0 only when every ping was valid and the settings were echoed as requested");
   struct Arguments {
     ListenOptions options;
@@ -135,7 +82,7 @@ Run add_view(CLI::App& app) {
       "  sonarctl view --png ping.png\n"
       "  sonarctl view --term --live                  in the terminal until Ctrl-C\n"
       "  sonarctl view --png ping.png --live          the file is replaced with every ping\n"
-      "  sonarctl view --from-raw recording.raw --ping 2 --png ping.png --colour-map gray --width 1600");
+      "  sonarctl view --from run.mcap --ping 2 --png ping.png --colour-map gray --width 1600");
   struct Arguments {
     ViewOptions options;
     SourceArguments source;
@@ -170,7 +117,7 @@ Run add_stats(CLI::App& app) {
   command.footer(
       "examples:\n"
       "  sonarctl stats --rows 400:650\n"
-      "  sonarctl stats --from-raw recording.raw --rows 400:650 --json\n"
+      "  sonarctl stats --from run.pcap --rows 400:650 --json\n"
       "  sonarctl stats --rows 150:300,0:200 --shadow 220:260,240:270 --surroundings 220:260,300:400");
   struct Arguments {
     StatsOptions options;

@@ -12,7 +12,7 @@
 
 #include "clients/sonarctl/http.hpp"
 #include "core/text/ipv4.hpp"
-#include "protocol/oculus/messages.hpp"
+#include "protocol/recording/recording.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -59,19 +59,14 @@ bool is_over(const Result<PingStream>& stream) { return stream || stream.error()
 
 }  // namespace
 
-const Make* find_make(std::string_view name) {
-  for (const Make& make : protocol::makes())
-    if (make.name() == name) return &make;
-  return nullptr;
-}
-
 const Make* make_at(std::uint16_t port) {
   for (const Make& make : protocol::makes())
     if (make.ports.front().number == port) return &make;
   return nullptr;
 }
 
-Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, const Wanted& wanted, milliseconds patience) {
+Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, const Wanted& wanted, milliseconds patience,
+                                    bool keeps_messages) {
   const auto deadline = Clock::now() + patience;
   using Candidate = std::pair<const Make*, Endpoint>;
   std::vector<Candidate> streams, others;
@@ -80,10 +75,10 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
     const Endpoint at{device.host, make != nullptr && device.port != 0 ? device.port : one.ports.front().number};
     (one.ports.front().kind == Kind::tcp ? streams : others).emplace_back(&one, at);
   }
-  const auto started = [](const Candidate& at, Result<std::unique_ptr<protocol::Host>> host, std::optional<Socket> connected,
-                          milliseconds within) -> Result<PingStream> {
+  const auto started = [&](const Candidate& at, Result<std::unique_ptr<protocol::Host>> host, std::optional<Socket> connected,
+                           milliseconds within) -> Result<PingStream> {
     if (!host) return tl::unexpected(host.error());
-    PingStream stream(*at.first, at.second, *std::move(host));
+    PingStream stream(*at.first, at.second, *std::move(host), keeps_messages);
     if (Result<void> opened = stream.start(std::move(connected), within); !opened) return tl::unexpected(opened.error());
     return stream;
   };
@@ -195,6 +190,8 @@ void PingStream::carry_out(protocol::HostActions actions) {
         ended_ = Error{ErrorKind::io, "is sent bytes at a port that is not open"};
       else if (const auto sent = write_all(*sockets_[send->port], send->bytes); !sent)
         ended_ = sent.error();
+      else
+        keep(send->port, recording::Origin::client, send->bytes);
     } else if (const auto* ask = std::get_if<protocol::ResourceRequest>(&action)) {
       const auto reply = http_ask(device_, ask->method, ask->path, ask->body, answer_patience_);
       if (!reply) {
@@ -206,7 +203,7 @@ void PingStream::carry_out(protocol::HostActions actions) {
         carry_out(host_->on_reply(of_device, now()));
       }
     } else if (auto* ping = std::get_if<HostPing>(&action)) {
-      items_.push_back({Wait::data, std::move(*ping), std::exchange(notices, {}), {}});
+      items_.push_back({Wait::data, std::move(*ping), std::exchange(notices, {}), std::exchange(kept_, {}), {}});
     } else if (auto* notice = std::get_if<protocol::Notice>(&action)) {
       notices.push_back(std::move(notice->text));
     } else if (auto* error = std::get_if<Error>(&action)) {
@@ -214,7 +211,7 @@ void PingStream::carry_out(protocol::HostActions actions) {
       if (ended_->kind != ErrorKind::usage) ended_->text = place() + " " + ended_->text;
     }
   }
-  if (!notices.empty()) items_.push_back({Wait::data, {}, std::move(notices), {}});
+  if (!notices.empty()) items_.push_back({Wait::data, {}, std::move(notices), std::exchange(kept_, {}), {}});
 }
 
 void PingStream::receive(milliseconds patience) {
@@ -261,8 +258,51 @@ void PingStream::read_port(std::size_t port) {
   const auto messages = [this] { return host_->counts().value_or(protocol::Host::Counts{}).messages; };
   const auto before = messages();
   const std::size_t items = items_.size();
-  carry_out(host_->on_bytes(port, received, now()));
-  if (messages() > before && items_.size() == items) items_.push_back({Wait::data, {}, {}, {}});
+  take(port, received);
+  const bool has_more = messages() > before || !kept_.empty();
+  if (has_more && items_.size() == items) items_.push_back({Wait::data, {}, {}, std::exchange(kept_, {}), {}});
+}
+
+/// Where messages are kept, the host has them one by one: each stands before the ping that it completes.
+void PingStream::take(std::size_t port, std::span<const std::byte> bytes) {
+  const auto give = [&](std::span<const std::byte> message) {
+    keep(port, recording::Origin::device, message);
+    carry_out(host_->on_bytes(port, message, now()));
+  };
+  if (!splitter_ || port != 0) return give(bytes);
+  splitter_->append({}, bytes);
+  while (const auto message = splitter_->next()) give(message->bytes);
+}
+
+void PingStream::keep(std::size_t port, recording::Origin from, std::span<const std::byte> bytes) {
+  if (!keeps_) return;
+  const auto unix_now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
+  last_kept_ = std::max(last_kept_, Time(unix_now));
+  const bool by_tcp = make_->ports[port].kind == Kind::tcp;
+  kept_.push_back(
+      {last_kept_, from, by_tcp ? recording::Carrier::stream : recording::Carrier::datagram, {bytes.begin(), bytes.end()}});
+}
+
+recording::PcapConversation PingStream::conversation() const {
+  const auto end_from = [](const sockaddr_in& at) { return recording::IpEnd{ntohl(at.sin_addr.s_addr), ntohs(at.sin_port)}; };
+  recording::PcapConversation ends;
+  ends.device = {ntohl(device_ip_), device_.port};
+  ends.status_from.address = ends.device.address;
+  if (const auto* const beacon = make_->device->port(protocol::Port::Kind::udp_beacon))
+    ends.status_from.port = ends.status_to.port = beacon->number;
+  if (const auto towards = connect_udp(device_)) ends.client.address = end_from(own_address(*towards)).address;
+  for (std::size_t port = 0; port < sockets_.size(); ++port) {
+    const protocol::HostPort& of = make_->ports[port];
+    if (!sockets_[port]) continue;
+    const recording::IpEnd own = end_from(own_address(*sockets_[port]));
+    if (of.kind == Kind::tcp) {
+      ends.client = own;
+      continue;
+    }
+    ends.status_from.port = port == 0 ? device_.port : own.port;
+    ends.status_to = {of.group != protocol::Ipv4{} ? text::number_from_ipv4(of.group) : ends.client.address, own.port};
+  }
+  return ends;
 }
 
 PingStream::Item PingStream::next(milliseconds patience) {
@@ -274,9 +314,9 @@ PingStream::Item PingStream::next(milliseconds patience) {
       items_.pop_front();
       return item;
     }
-    if (ended_) return {Wait::closed, {}, {}, ended_->text, ended_->kind};
+    if (ended_) return {Wait::closed, {}, {}, std::exchange(kept_, {}), ended_->text, ended_->kind};
     receive(left_until(deadline));
-    if (std::exchange(interrupted_, false)) return {Wait::interrupted, {}, {}, {}};
+    if (std::exchange(interrupted_, false)) return {Wait::interrupted, {}, {}, {}, {}};
     if (items_.empty() && !ended_ && Clock::now() >= deadline) return {};
   }
 }
@@ -300,51 +340,45 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
     return failure(ErrorKind::usage, "only pings that come by TCP are recorded as raw bytes; this is " + about());
   if (make_->each_ping_requested)  // a recording begins after the greeting, without which its pings mean nothing
     return failure(ErrorKind::usage, "only sonars that send pings unasked are recorded as raw bytes; this is " + about() +
-                                         ": read pings with sonarctl listen --json, or record with the hosts of that make");
+                                         ": sonarctl record keeps the messages of both ends");
   record_.open(file, std::ios::binary | std::ios::trunc);
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
   return {};
 }
 
-Result<std::vector<HostPing>> read_recording(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": no such file, or no permission");
-  for (const Make& make : protocol::makes()) {
-    if (make.ports.front().kind != Kind::tcp) continue;
-    const auto host = make.host(nothing_wanted());
-    std::vector<HostPing> pings;
-    std::vector<char> chunk(1 << 16);
-    in.clear();
-    in.seekg(0);
-    while (host && (in.read(chunk.data(), static_cast<std::streamsize>(chunk.size())), in.gcount() > 0)) {
-      const auto bytes = std::as_bytes(std::span(chunk)).first(static_cast<std::size_t>(in.gcount()));
-      for (protocol::HostAction& action : (*host)->on_bytes(0, bytes, Time{}))
+Result<std::vector<HostPing>> read_recording(const std::filesystem::path& file, const std::string& sonar) {
+  auto opened = recording::open_recording(file, sonar);
+  if (!opened) return tl::unexpected(opened.error());
+  const auto by = recording::find_sender(*opened->reader);
+  std::vector<HostPing> pings;
+  if (const auto host = by ? by->make->host(nothing_wanted()) : failure(ErrorKind::bad_data, ""); host) {
+    while (const auto message = opened->reader->next()) {
+      const auto port = recording::host_port(*by->make, message->by);
+      if (!port || message->from != recording::Origin::device) continue;
+      for (protocol::HostAction& action : (*host)->on_bytes(*port, message->bytes, message->at))
         if (auto* ping = std::get_if<HostPing>(&action)) pings.push_back(std::move(*ping));
     }
-    if (!pings.empty()) return pings;
   }
-  return failure(ErrorKind::bad_data,
-                 file.string() + " holds no ping of a known sonar: it must be the raw bytes of its TCP stream");
+  if (!pings.empty()) return pings;
+  const auto damage = opened->reader->damage();
+  return failure(ErrorKind::bad_data, file.string() + " holds no ping of a known sonar" + (damage ? ": " + damage->text : ""));
 }
 
 Result<Discovered> discover(milliseconds patience) {
-  auto socket = listen_udp(oculus::status_port);
+  const auto makes = protocol::makes();
+  const auto make = std::find_if(makes.begin(), makes.end(), [](const Make& one) { return one.announced != nullptr; });
+  const std::uint16_t port = make->device->port(protocol::Port::Kind::udp_beacon)->number;
+  auto socket = listen_udp(port);
   if (!socket) return tl::unexpected(socket.error());
   const auto deadline = Clock::now() + patience;
   for (;;) {
     std::array<std::byte, 2048> datagram;
     const Read read = read_some(*socket, datagram, left_until(deadline));
     if (read.what != Wait::data)
-      return failure(ErrorKind::unavailable, "no status datagram on udp " + std::to_string(oculus::status_port) +
+      return failure(ErrorKind::unavailable, "no status datagram on udp " + std::to_string(port) +
                                                  ": is a sonar running, and does its status_to reach this machine?");
-    const auto status = oculus::decode_status(std::span<const std::byte>(datagram).first(read.size));
-    if (!status) continue;  // not a status message
-    Discovered found;
-    found.status = *status;
-    found.device.host = text::format_ipv4(status->ip_address);
-    found.device.port = oculus::tcp_port;
-    found.complaints = oculus::status_violations(*status, read.size);
-    return found;
+    const auto announced = make->announced(std::span<const std::byte>(datagram).first(read.size));
+    if (announced) return Discovered{{text::format_ipv4(announced->address), make->ports.front().number}, *announced};
   }
 }
 

@@ -1,5 +1,5 @@
-// Runs the host of a make of sonar over blocking sockets: pings of a device for listen, view, stats and doctor. And other sources
-// of pings: raw recordings, and the status datagrams that announce a device.
+// Runs the host of a make of sonar over blocking sockets: pings of a device for listen, view, stats, record and doctor. And other
+// sources of pings: recordings, and the status datagrams that announce a device.
 #pragma once
 
 #include <chrono>
@@ -15,17 +15,16 @@
 #include "clients/sonarctl/net.hpp"
 #include "core/base/result.hpp"
 #include "protocol/host.hpp"
-#include "protocol/oculus/decode.hpp"
+#include "protocol/recording/pcap/pcap.hpp"
 
 namespace sonar::clients {
 
+using protocol::find_make;
 using protocol::HostPing;
 using protocol::Make;
 using protocol::PingFacts;
 using protocol::Wanted;
 
-/// Null: no make has this name.
-const Make* find_make(std::string_view name);
 /// The make that is usual at this port; null: none is.
 const Make* make_at(std::uint16_t port);
 
@@ -33,9 +32,9 @@ class PingStream {
  public:
   /// Connects and opens the conversation. `make`: null = the first that answers at its own port. `patience`: for the connection
   /// and for answers. usage: settings that the sonar does not have; io: closed; unavailable: no answer; bad_data: another
-  /// service.
+  /// service. `keeps_messages`: for Item::messages.
   static Result<PingStream> open(const Endpoint& device, const Make* make, const Wanted& wanted,
-                                 std::chrono::milliseconds patience);
+                                 std::chrono::milliseconds patience, bool keeps_messages = false);
   PingStream(PingStream&&) = default;
   ~PingStream();
 
@@ -43,6 +42,8 @@ class PingStream {
     Wait what = Wait::timed_out;
     std::optional<HostPing> ping;      // with Wait::data; without one: another message
     std::vector<std::string> notices;  // of the host
+    /// All that was sent and received up to this ping, if that is kept.
+    std::vector<recording::RecordedMessage> messages = {};
     std::string error;
     ErrorKind kind = ErrorKind::io;  // of the error
   };
@@ -56,17 +57,23 @@ class PingStream {
   const protocol::Host& host() const { return *host_; }
   const Make& make() const { return *make_; }
   const Endpoint& device() const { return device_; }
+  /// The ends of its connection and of its datagrams, for the headers of a capture.
+  recording::PcapConversation conversation() const;
   /// "127.0.0.1:41022", our end at the first port; of http there is none.
   std::string own() const;
   /// "127.0.0.2:14750, a BlueView P900-90, serial 7001"
   std::string about() const;
 
  private:
-  PingStream(const Make& make, Endpoint device, std::unique_ptr<protocol::Host> host)
-      : make_(&make), device_(std::move(device)), host_(std::move(host)) {}
+  PingStream(const Make& make, Endpoint device, std::unique_ptr<protocol::Host> host, bool keeps_messages)
+      : make_(&make), device_(std::move(device)), host_(std::move(host)), keeps_(keeps_messages) {
+    if (keeps_ && make.codec.framing != nullptr) splitter_.emplace(recording::Origin::device, *make.codec.framing);
+  }
   Result<void> start(std::optional<Socket> connected, std::chrono::milliseconds patience);
   Result<Socket> open_port(std::size_t port, std::chrono::milliseconds patience);
   void carry_out(protocol::HostActions actions);
+  void take(std::size_t port, std::span<const std::byte> bytes);
+  void keep(std::size_t port, recording::Origin from, std::span<const std::byte> bytes);
   void receive(std::chrono::milliseconds patience);
   void read_port(std::size_t port);
   std::string place() const;  // "tcp 127.0.0.2:14750"
@@ -82,17 +89,20 @@ class PingStream {
   bool interrupted_ = false, has_answered_ = false;  // has_answered_: at the first port
   bool is_started_ = false;                          // the sonar is to hear that we leave
   std::ofstream record_;
+  bool keeps_ = false;
+  std::vector<recording::RecordedMessage> kept_;        // since the last item
+  std::optional<recording::MessageSplitter> splitter_;  // of the first port, while messages are kept
+  Time last_kept_{};                                    // UNIX time, which never decreases
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };
 
-/// Every ping of a raw dump: messages back to back, exactly the bytes of a TCP stream.
-Result<std::vector<HostPing>> read_recording(const std::filesystem::path& file);
+/// Every ping of a recording of any kind. `sonar`: selects one of several.
+Result<std::vector<HostPing>> read_recording(const std::filesystem::path& file, const std::string& sonar = {});
 
-/// Waits for the status broadcast of a device on UDP 52102; reports deviations that real drivers reject in `complaints`.
+/// Waits for the beacon of a device, of a make whose hosts connect to the address in it.
 struct Discovered {
-  oculus::StatusMessage status;
   Endpoint device;
-  std::vector<std::string> complaints;
+  protocol::Announcement announced;
 };
 Result<Discovered> discover(std::chrono::milliseconds patience);
 

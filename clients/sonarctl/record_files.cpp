@@ -1,32 +1,58 @@
 #include "clients/sonarctl/record_files.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
-#include "protocol/oculus/framer.hpp"
-#include "protocol/recording/oculus_log.hpp"
 #include "protocol/recording/raw_dump.hpp"
 
 namespace sonar::clients {
 
-Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const recording::PcapConversation& conversation,
-                                        const std::string& sonar) {
+namespace {
+
+/// The codes of a picture, of 8 or 16 bits.
+recording::Samples samples_of(const PolarImage& image, unsigned bits) {
+  const auto codes = std::make_shared<wire::Bytes>();
+  const std::uint32_t most = bits == 8 ? 0xFF : 0xFFFF;
+  for (const float sample : image.samples) {
+    const auto code = std::min(static_cast<std::uint32_t>(std::max(0.0f, sample)), most);
+    codes->push_back(static_cast<std::byte>(code & 0xFF));
+    if (bits != 8) codes->push_back(static_cast<std::byte>(code >> 8));
+  }
+  return {image.beams, image.rows, bits == 8 ? 8 : 16, codes};
+}
+
+}  // namespace
+
+Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const Make& make,
+                                        const recording::PcapConversation& conversation, const std::string& sonar) {
   RecordFiles files;
+  files.make_ = &make;
   Result<void> made;
-  const auto add = [&](const std::filesystem::path& path, const auto& make) {
+  for (const auto& [ending, path] : options.files) {
+    const auto& kinds = make.codec.files;
+    if (std::none_of(kinds.begin(), kinds.end(), [&ending](const auto& kind) { return kind.ending == ending; }))
+      return failure(ErrorKind::usage, path.string() + ": such files do not hold the messages of " + std::string(make.title) +
+                                           ": --mcap and --pcap hold those of every sonar");
+  }
+  const auto add = [&](const std::filesystem::path& path, const auto& writer_of) {
     if (path.empty() || !made) return;
     auto sink = recording::create_sink(path);
     if (!sink) {
       made = tl::unexpected(sink.error());
       return;
     }
-    files.writers_.push_back(make(std::move(*sink)));
+    files.writers_.push_back(writer_of(std::move(*sink)));
     files.paths_.push_back(path);
   };
   add(options.pcap, [&](auto sink) { return recording::write_pcap(std::move(sink), conversation); });
-  add(options.oculus, [](auto sink) { return recording::write_oculus_log(std::move(sink)); });
-  add(options.raw, [](auto sink) { return recording::write_raw_dump(std::move(sink)); });
+  for (const recording::FileKind& kind : make.codec.files)
+    if (const auto named = options.files.find(kind.ending); named != options.files.end()) add(named->second, kind.write);
+  add(options.raw, [&make](auto sink) {
+    const bool by_tcp = make.device->pings_over_tcp();
+    return recording::write_raw_dump(std::move(sink), by_tcp ? recording::Carrier::stream : recording::Carrier::datagram);
+  });
   add(options.mcap, [&](auto sink) {
-    auto session = std::make_unique<recording::McapSession>(std::move(sink), sonar);
+    auto session = std::make_unique<recording::McapSession>(std::move(sink), sonar, make);
     files.mcap_ = session.get();
     return session;
   });
@@ -39,10 +65,15 @@ Result<void> RecordFiles::write(const recording::RecordedMessage& message) {
     if (Result<void> written = writer->write(message); !written) return written;
   ++messages_;
   bytes_ += message.bytes.size();
-  const bool ping = message.from == recording::Origin::device && message.bytes.size() >= oculus::header_size &&
-                    oculus::header_of(message.bytes).type == oculus::MessageType::ping_result;
-  pings_ += ping ? 1 : 0;
   return {};
+}
+
+Result<void> RecordFiles::write_ping(Time at, const HostPing& ping) {
+  ++pings_;
+  // The session makes images of messages that hold samples; a scan would be written whole with each of its lines.
+  if (mcap_ == nullptr || make_->codec.samples != nullptr || make_->scans) return {};
+  const Result<PolarImage> image = ping.picture();
+  return image ? mcap_->write_image(at, samples_of(*image, ping.facts.bits)) : Result<void>{};  // some pings are no picture
 }
 
 Result<void> RecordFiles::write_pose(Time at, Time of, const Pose& sonar_in_world) {

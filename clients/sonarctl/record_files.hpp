@@ -12,12 +12,14 @@ namespace sonar::clients {
 
 class RecordFiles {
  public:
-  /// Creates all files that the options name. io.
-  static Result<RecordFiles> create(const RecordOptions& options, const recording::PcapConversation& conversation,
-                                    const std::string& sonar);
+  /// Creates all files that the options name. io; usage: a kind of file that another make has.
+  static Result<RecordFiles> create(const RecordOptions& options, const Make& make,
+                                    const recording::PcapConversation& conversation, const std::string& sonar);
 
   /// Writes to every file; the first failure ends all. io.
   Result<void> write(const recording::RecordedMessage& message);
+  /// Counts the ping whose last message was written; its picture goes to the MCAP file, if any.
+  Result<void> write_ping(Time at, const HostPing& ping);
   /// Writes to the MCAP file, if any.
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
   /// Finishes every file, also after a failure; returns the first error. io.
@@ -31,6 +33,7 @@ class RecordFiles {
   std::string sizes() const;
 
  private:
+  const Make* make_ = nullptr;
   std::vector<std::unique_ptr<recording::RecordingWriter>> writers_;
   std::vector<std::filesystem::path> paths_;
   recording::McapSession* mcap_ = nullptr;  // one of the writers

@@ -1,6 +1,7 @@
 #include "clients/sonarctl/setting_options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 
 #include "core/text/arguments.hpp"
@@ -71,6 +72,51 @@ protocol::Wanted SettingArguments::wanted() const {
   for (const auto& [name, given] : more)
     if (!given.empty()) wanted.more.emplace(name, given);
   return wanted;
+}
+
+void SourceArguments::add_to(CLI::App& app, bool recordings, const std::string& control_help) {
+  std::string usual;
+  std::vector<std::string> names;
+  for (const Make& one : protocol::makes()) {
+    usual += (usual.empty() ? "" : ", ") + std::to_string(one.ports.front().number) + " of " + std::string(one.title);
+    names.emplace_back(one.name());
+  }
+  device.add_to(app, "port of the sonar (default: " + usual + ", the first that answers)");
+  app.add_option("--make", make, "make of the sonar; needed on a port that is not the make's own")->check(one_of(names));
+  app.add_flag("--as-it-is", as_it_is, "send no settings (many sonars then send no pings)");
+  app.add_flag("--observe", observe,
+               "receive the pings that clients request, without occupying a client slot or sending settings");
+  CLI::Option* const stream = app.add_option("--control", control, "HOST:PORT of sonard's control stream, which " + control_help)
+                                  ->check(clients::address());
+  app.add_option("--token-file", token_file, "the daemon's control.token_file, if it has one");
+  settings.add_to(app);
+  if (!recordings) return;
+  CLI::Option* const from =
+      app.add_option("--from,--from-raw", recording, "read this recording, of any kind, instead of a sonar")->excludes(stream);
+  app.add_option("--sonar", sonar, "with --from: selects one of several: by address in captures, by name in MCAP")->needs(from);
+}
+
+Result<SourceOptions> SourceArguments::finish() const {
+  SourceOptions source;
+  Result<Endpoint> at = parse_endpoint(device.address, {"127.0.0.2", device.port});
+  if (!at) return tl::unexpected(at.error());
+  source.make = make.empty() ? make_at(at->port) : protocol::find_make(make);
+  if (source.make == nullptr && at->port != 0) source.make = &protocol::makes().front();
+  if (device.discover && !make.empty() && source.make != &protocol::makes().front())
+    return failure(ErrorKind::usage, "--discover finds " + std::string(protocol::makes().front().title) +
+                                         " only: leave it out, and give the address of " + std::string(source.make->title));
+  source.device = *at;
+  source.discover = device.discover;
+  source.recording = recording;
+  source.sonar = sonar;
+  source.connect_patience_s = device.patience_s;
+  source.silence_limit_s = std::max(source.silence_limit_s, device.patience_s);
+  source.observe = observe;
+  source.control = control;
+  source.token_file = token_file;
+  source.wanted = settings.wanted();
+  source.wanted.as_it_is = as_it_is;
+  return source;
 }
 
 }  // namespace sonar::clients

@@ -1,11 +1,13 @@
-// The sonar's settings on the command line, the same for every make. Used by every command that talks to a device.
+// Options that say where pings come from and the settings of the sonar, the same for every make. Used by every command that shows
+// or keeps pings.
 #pragma once
 
 #include <CLI/App.hpp>
 #include <map>
 #include <string>
 
-#include "protocol/host.hpp"
+#include "clients/sonarctl/argument_checks.hpp"
+#include "clients/sonarctl/commands.hpp"
 
 namespace sonar::clients {
 
@@ -17,6 +19,19 @@ struct SettingArguments {
   void add_to(CLI::App& app);
   /// The options that were typed.
   protocol::Wanted wanted() const;
+};
+
+/// finish() turns the texts into a SourceOptions once the line is parsed.
+struct SourceArguments {
+  DeviceArguments device;
+  bool as_it_is = false, observe = false;
+  std::string make, control, sonar;
+  std::filesystem::path token_file, recording;
+  SettingArguments settings;
+
+  /// `recordings`: also instead of a sonar. `control_help`: what the daemon is asked for.
+  void add_to(CLI::App& app, bool recordings, const std::string& control_help = "reports the address for observers");
+  Result<SourceOptions> finish() const;
 };
 
 }  // namespace sonar::clients

@@ -18,7 +18,7 @@ constexpr int stale_pings = 4;
 constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without a free slot closes at once
 
 Result<HostPing> fetch_recorded(const SourceOptions& source, std::size_t number) {
-  auto pings = read_recording(source.recording);
+  auto pings = read_recording(source.recording, source.sonar);
   if (!pings) return tl::unexpected(pings.error());
   if (number < pings->size()) return std::move((*pings)[number]);
   return failure(ErrorKind::usage, source.recording.string() + " holds pings 0 to " + std::to_string(pings->size() - 1) +
@@ -52,7 +52,7 @@ Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device
   if (!at) return tl::unexpected(at.error());
   Wanted nothing;
   nothing.as_it_is = true;
-  auto stream = PingStream::open(*at, &make, nothing, milliseconds_from(source.connect_patience_s));
+  auto stream = PingStream::open(*at, &make, nothing, milliseconds_from(source.connect_patience_s), source.keeps_messages);
   if (!stream) return tl::unexpected(stream.error());
   const auto now = std::chrono::steady_clock::now();
   if (stream->is_rejected(first_byte_within))
@@ -107,7 +107,8 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
     const Make& usual = make != nullptr ? *make : protocol::makes().front();
     return observe(source, {device.host, device.port != 0 ? device.port : usual.ports.front().number}, usual);
   }
-  auto stream = PingStream::open(device, make, source.wanted, milliseconds_from(source.connect_patience_s));
+  auto stream =
+      PingStream::open(device, make, source.wanted, milliseconds_from(source.connect_patience_s), source.keeps_messages);
   if (!stream) return tl::unexpected(stream.error());
   const auto now = std::chrono::steady_clock::now();
   if (!stream->is_rejected(first_byte_within)) return OpenedStream{*std::move(stream), now};
@@ -140,8 +141,9 @@ Result<Endpoint> find_device(const SourceOptions& source, bool say) {
   if (!source.discover) return source.device;
   auto found = discover(std::chrono::seconds(5));
   if (!found) return tl::unexpected(found.error());
-  if (say) std::printf("status from device %u at %s\n", found->status.device_id, text_from(found->device).c_str());
-  if (!found->complaints.empty()) return failure(ErrorKind::bad_data, "the status datagram: " + found->complaints.front());
+  if (say) std::printf("status from device %u at %s\n", found->announced.device_id, text_from(found->device).c_str());
+  if (const auto& wrong = found->announced.complaints; !wrong.empty())
+    return failure(ErrorKind::bad_data, "the status datagram: " + wrong.front());
   return found->device;
 }
 

@@ -170,7 +170,7 @@ void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int f
   if (power > 0) to.push_back(middle);
 }
 
-/// Of one ray of a cell's lattice.
+/// The echo of one ray of a cell's lattice.
 RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) const {
   const auto i = static_cast<std::size_t>(lane);
   const Rotation sonar_from_world = transposed(world_from_sonar_);
@@ -201,7 +201,7 @@ RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) con
   return r;
 }
 
-/// Of the place that a ray met.
+/// The speckle of the place that a ray met.
 ComplexNormal RangeReturns::speckle_of(const RayPacket& p, int lane) const {
   const auto i = static_cast<std::size_t>(lane);
   const auto cell = [](float origin, float direction, float far) {

@@ -1,4 +1,4 @@
-// What the rays of a range image meet (core/pipeline/range_image.hpp): each cell of the grid of beams is seen by one ray along
+// The hits of the rays of a range image (core/pipeline/range_image.hpp): each cell of the grid of beams is seen by one ray along
 // its middle and a few round it, and by many where things are thinner than it.
 #pragma once
 
@@ -24,7 +24,7 @@ struct RangeReturn {
   // The same by range cells: from `first` to `last`, the power in the first, in each between, and in the last when it is another.
   std::int32_t first = 0, last = 0;
   double of_first = 0, of_each = 0, of_last = 0;
-  // Of the patch of surface: cosine of the incidence, how far its ranges are from range_m, how many of the cell's rays met it.
+  // The patch of surface: cosine of the incidence, how far its ranges are from range_m, how many of the cell's rays met it.
   double cosine = 0, spread_m = 0;
   int rays = 0;
 
@@ -46,14 +46,14 @@ class RangeReturns {
 
   /// The same on any number of threads.
   void trace(Parallel& pool);
-  /// Of a cell of the grid; nothing before trace().
+  /// Returns of a cell of the grid; none before trace().
   std::span<const RangeReturn> of(int column, int row) const {
     const Row& of_row = rows_[static_cast<std::size_t>(row)];
     if (of_row.begin.empty()) return {};
     const std::size_t* begin = of_row.begin.data() + column;
     return {of_row.returns.data() + begin[0], begin[1] - begin[0]};
   }
-  /// Of the point targets that are not hidden.
+  /// Returns of the point targets that are not hidden.
   std::vector<PointReturn> of_points() const;
   double device_per_true() const { return device_per_true_; }  // ranges
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "protocol/host.hpp"
+
 namespace sonar {
 namespace {
 
@@ -53,8 +55,7 @@ Result<void> use_product(Config& config, std::string_view profile) {
   sonar.options = *std::move(options);
   sonar.max_clients = found->vendor->default_max_clients();
   sonar.max_observers = default_max_observers(*found->vendor);
-  if (found->vendor->name() == "surveyor240") sonar.mount.orientation = quat_from_rpy({0, pi / 2, 0});        // it looks down
-  if (found->vendor->name() == "omniscan450") sonar.mount.orientation = quat_from_rpy({0, pi / 6, -pi / 2});  // to starboard
+  if (const auto mount = protocol::make_of_profile(profile).demo_mount) sonar.mount.orientation = quat_from_rpy(*mount);
   return {};
 }
 

@@ -13,4 +13,6 @@ inline constexpr std::array<protocol::HostPort, 2> host_ports{
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 
+recording::Codec codec();
+
 }  // namespace sonar::aris

@@ -161,8 +161,12 @@ class BlueViewHost final : public protocol::Host {
   HostActions on_bytes(std::size_t, wire::BytesView received, Time now) override {
     HostActions actions;
     framer_.append(received);
-    while (const auto frame = framer_.next())
-      if (frame->header.request_id == last_id_) on_answer(*frame, now, actions);
+    while (const auto frame = framer_.next()) {
+      if (last_id_ == 0)
+        on_recorded(*frame, actions);
+      else if (frame->header.request_id == last_id_)
+        on_answer(*frame, now, actions);
+    }
     if (!framer_.broken().empty()) actions.emplace_back(Error{ErrorKind::bad_data, framer_.broken()});
     return actions;
   }
@@ -195,6 +199,12 @@ class BlueViewHost final : public protocol::Host {
   void send(FrameType type, std::uint32_t id, wire::BytesView payload, Time now, HostActions& actions) {
     sent_at_ = now;
     actions.emplace_back(protocol::HostSend{0, make_frame(type, id, payload)});
+  }
+
+  /// This host has requested nothing: the answers are those to another one.
+  void on_recorded(const Frame& frame, HostActions& actions) {
+    if (frame.header.type == FrameType::hello_ok) greeting_ = read_greeting(frame.payload).value_or(greeting_);
+    if (frame.header.type == FrameType::ping_data) on_ping(frame, actions);
   }
 
   void on_answer(const Frame& frame, Time now, HostActions& actions) {
@@ -255,7 +265,7 @@ class BlueViewHost final : public protocol::Host {
                   16,
                   static_cast<double>(h.bin_m),
                   static_cast<double>(h.stop_m),
-                  static_cast<double>(greeting_.heads[head_].centre_hz),
+                  head_ < greeting_.heads.size() ? static_cast<double>(greeting_.heads[head_].centre_hz) : 0,
                   header_size + frame.payload.size()};
     ping.picture = [kept = std::make_shared<const DecodedPing>(*std::move(decoded))] { return picture_of(*kept); };
     actions.emplace_back(std::move(ping));
@@ -272,6 +282,27 @@ class BlueViewHost final : public protocol::Host {
 };
 
 }  // namespace
+
+const protocol::Search search{.port = discovery_port,
+                              .question =
+                                  [] {
+                                    wire::Bytes question;
+                                    const Put put(question);
+                                    put("mark", discovery_question);
+                                    put("version", protocol_version);
+                                    return question;
+                                  },
+                              .answer = [](wire::BytesView datagram) -> std::optional<protocol::Search::Answer> {
+                                wire::Reader reader(datagram);
+                                std::array<std::uint8_t, 4> mark{};
+                                std::uint16_t version = 0, port = 0;
+                                reader("mark", mark);
+                                reader("version", version);
+                                reader("port", port);
+                                const std::string model = read_text(reader, "model"), serial = read_text(reader, "serial");
+                                if (!reader.ok() || mark != discovery_answer) return std::nullopt;
+                                return protocol::Search::Answer{port, "BlueView head " + model + " (" + serial + ")"};
+                              }};
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
   if (auto known = protocol::accept_settings(wanted, "a BlueView sonar", {"range", "rate", "gain", "mode"}); !known)

@@ -11,6 +11,10 @@ namespace sonar::blueview {
 
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
 
+extern const protocol::Search search;
+
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+
+recording::Codec codec();
 
 }  // namespace sonar::blueview

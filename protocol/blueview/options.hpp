@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "protocol/option_values.hpp"
+#include "protocol/options.hpp"
 
 namespace sonar::blueview {
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "protocol/doctor/finding.hpp"
@@ -16,9 +15,6 @@ namespace sonar::doctor {
 inline constexpr const char* less_to_compute =
     "fewer beams, less range, more threads (engine.threads), or less else on this computer";
 inline constexpr const char* free_a_place = "stop the other client, or raise clients.max of the sonar";
-
-/// End of the reason of a visit: why the connection of a driver ended that had got no ping.
-inline constexpr std::string_view before_first_ping = ", before its first ping";
 
 /// "computing takes 138 ms per ping: 7.2 Hz at most here".
 std::string computing_text(double ms_per_ping);

@@ -1,7 +1,6 @@
 #include "protocol/doctor/judge.hpp"
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <set>
 
@@ -18,7 +17,6 @@ constexpr double soon_s = 1;     // a driver that does right has fired and has r
 constexpr double recent_s = 60;  // visits before are of no interest
 constexpr double enough_of_rate = 0.9;
 constexpr std::size_t most_elsewhere = 4;
-constexpr std::array left_by_itself{"closed by the client", "Connection reset by peer", "Broken pipe"};  // Session's words
 
 std::string seconds_text(double s) { return format("%.0f s", s); }
 
@@ -26,13 +24,7 @@ std::string utc_text(std::int64_t ns) {
   const std::int64_t s = ns / 1'000'000'000 % 86'400;
   return format("%02d:%02d:%02d UTC", static_cast<int>(s / 3600), static_cast<int>(s / 60 % 60), static_cast<int>(s % 60));
 }
-/// By itself or by the daemon.
-bool left_before_first_ping(const v1::Visit& gone) { return gone.why().ends_with(before_first_ping); }
-bool was_disconnected(const v1::Visit& gone) {
-  std::string why = gone.why();
-  if (left_before_first_ping(gone)) why.resize(why.size() - before_first_ping.size());
-  return std::find(left_by_itself.begin(), left_by_itself.end(), why) == left_by_itself.end();
-}
+std::string reason_of(const v1::Visit& gone) { return gone.why() + (gone.without_ping() ? ", before its first ping" : ""); }
 bool is_recent(const v1::Visit& visit) { return !visit.address().empty() && visit.ago_s() < recent_s; }
 
 std::string counted(std::uint64_t count, const std::string& what) {
@@ -138,7 +130,7 @@ class SonarJudge {
     const v1::Visit &gone = sonar_.gone(), &searched = sonar_.searched();
     std::string last;
     if (!gone.address().empty())
-      last = "; the last one, " + gone.address() + ", left at " + utc_text(gone.utc_ns()) + ": " + gone.why();
+      last = "; the last one, " + gone.address() + ", left at " + utc_text(gone.utc_ns()) + ": " + reason_of(gone);
     const bool by_http = make_.ports.front().kind == protocol::HostPort::Kind::http;  // no driver stays connected
     const std::string cure =
         by_http ? std::string(make_.remedy) + ", of " + sonar_.advertised() : "point a driver at " + where_to_connect(sonar_);
@@ -151,7 +143,7 @@ class SonarJudge {
           searched.address() + " searched for sonars at " + utc_text(searched.utc_ns()) +
               " and was answered, but has not connected",
           "it must connect to " + where_to_connect(sonar_) + "; a firewall may drop that", searched.address());
-    if (left_before_first_ping(gone)) check_who_left();
+    if (gone.without_ping()) check_who_left();
     check_observer();
   }
 
@@ -165,10 +157,10 @@ class SonarJudge {
 
   void check_who_left() {
     const v1::Visit& gone = sonar_.gone();
-    if (!is_recent(gone) || !was_disconnected(gone)) return;
-    const bool got_none = left_before_first_ping(gone);
+    if (!is_recent(gone) || gone.by_itself()) return;
+    const bool got_none = gone.without_ping();
     add(got_none ? Level::fail : Level::warn, "driver",
-        "The connection of " + gone.address() + " ended at " + utc_text(gone.utc_ns()) + ": " + gone.why(),
+        "The connection of " + gone.address() + " ended at " + utc_text(gone.utc_ns()) + ": " + reason_of(gone),
         got_none ? std::string(make_.remedy) : "", gone.address());
   }
 

@@ -161,7 +161,7 @@ class OculusDialogue final : public protocol::Dialogue {
   const DeviceState& device_;
   Framer framer_{Sender::client};
   protocol::Bytes last_request_;
-  DeviceState::StoredAddress stored_;  // as of this call: a read may follow its write in the same bytes
+  protocol::StoredAddress stored_;  // as of this call: a read may follow its write in the same bytes
   Time dummy_at_{};
   std::shared_ptr<const VendorSettings> fired_;  // by the last fire message
   bool is_heard_ = false, requested_ping_ = false;

@@ -142,6 +142,13 @@ Result<FireRequest> fire_from(const protocol::Wanted& wanted) {
   return fire;
 }
 
+std::optional<protocol::Announcement> announced(wire::BytesView datagram) {
+  const auto status = decode_status(datagram);
+  if (!status) return std::nullopt;
+  return protocol::Announcement{status->ip_address, status->connected_ip, status->device_id,
+                                status_violations(*status, datagram.size())};
+}
+
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
   std::optional<FireRequest> asked;
   if (!wanted.as_it_is) {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "protocol/option_values.hpp"
+#include "protocol/options.hpp"
 
 namespace sonar::oculus {
 

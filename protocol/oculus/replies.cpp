@@ -47,7 +47,7 @@ wire::Bytes make_dummy(std::uint16_t device_id) {
   return wire::bytes_of(DummyMessage{header_for(MessageType::dummy, device_id, header_size)});
 }
 
-wire::Bytes make_user_config(std::uint16_t device_id, const protocol::DeviceState::StoredAddress& stored,
+wire::Bytes make_user_config(std::uint16_t device_id, const protocol::StoredAddress& stored,
                              const protocol::DeviceState& device) {
   UserConfigMessage config;
   config.header = header_for(MessageType::user_config, device_id, user_config_size);

@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-#include "protocol/option_values.hpp"
+#include "protocol/options.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/vendor.hpp"
 

@@ -10,16 +10,19 @@ namespace sonar::ping {
 namespace ping360 {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::udp, 12345}}};
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+recording::Codec codec();
 }  // namespace ping360
 
 namespace surveyor {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 62312}}};
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+recording::Codec codec();
 }  // namespace surveyor
 
 namespace omniscan {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 51200}}};
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+recording::Codec codec();
 }  // namespace omniscan
 
 }  // namespace sonar::ping

@@ -39,12 +39,12 @@ protocol::Bytes discovery_answer(const protocol::DeviceState& device) {
 }
 
 /// "SetSS1IP 192.168.002.010"; all zeros = by DHCP.
-std::optional<protocol::DeviceState::StoredAddress> address_in(const std::string& text) {
+std::optional<protocol::StoredAddress> address_in(const std::string& text) {
   unsigned a = 0, b = 0, c = 0, d = 0;
   if (std::sscanf(text.c_str(), "SetSS1IP %3u.%3u.%3u.%3u", &a, &b, &c, &d) != 4 || std::max({a, b, c, d}) > 255) return {};
   const protocol::Ipv4 ip{static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b), static_cast<std::uint8_t>(c),
                           static_cast<std::uint8_t>(d)};
-  return protocol::DeviceState::StoredAddress{.ip = text::number_from_ipv4(ip), .netmask = 0, .dhcp = ip == protocol::Ipv4{}};
+  return protocol::StoredAddress{.ip = text::number_from_ipv4(ip), .netmask = 0, .dhcp = ip == protocol::Ipv4{}};
 }
 
 class Ping360Vendor final : public protocol::Vendor {

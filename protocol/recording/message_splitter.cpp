@@ -5,28 +5,17 @@
 namespace sonar::recording {
 namespace {
 
-constexpr std::byte first_magic{oculus::magic & 0xFF}, second_magic{oculus::magic >> 8};
-
-bool starts_like_header(wire::BytesView bytes) {
-  return !bytes.empty() && bytes[0] == first_magic && (bytes.size() < 2 || bytes[1] == second_magic);
+bool begins_with(wire::BytesView bytes, const std::array<std::uint8_t, 2>& magic) {
+  return !bytes.empty() && bytes[0] == std::byte{magic[0]} && (bytes.size() < 2 || bytes[1] == std::byte{magic[1]});
 }
 
 }  // namespace
 
-bool is_known(const oculus::MessageHeader& header) {
-  using enum oculus::MessageType;
-  switch (header.type) {
-    case status:
-    case fire:
-    case full_ping_result:
-    case ping_result:
-    case user_config:
-    case log:
-    case dummy:
-      return true;
-  }
-  return false;
+bool Framing::begins_message(wire::BytesView bytes, Origin from) const {
+  return bytes.size() >= header_size && begins_with(bytes, magic) && length(bytes.first(header_size), from, true);
 }
+
+bool MessageSplitter::starts_like_header(wire::BytesView bytes) const { return begins_with(bytes, framing_->magic); }
 
 void MessageSplitter::append(Time at, wire::BytesView bytes) {
   buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(begin_));
@@ -57,10 +46,8 @@ void MessageSplitter::break_off() {
 /// of known types count: two bytes of an image soon look like the magic number.
 std::optional<std::size_t> MessageSplitter::length_at_front(wire::BytesView waiting) const {
   if (!starts_like_header(waiting)) return std::nullopt;
-  if (waiting.size() < oculus::header_size) return 0;
-  const oculus::MessageHeader header = oculus::header_of(waiting);
-  if (strict_ && !is_known(header)) return std::nullopt;
-  return oculus::message_length(header, from_ == Origin::device ? oculus::Sender::device : oculus::Sender::client);
+  if (waiting.size() < framing_->header_size) return 0;
+  return framing_->length(waiting.first(framing_->header_size), from_, strict_);
 }
 
 std::optional<RecordedMessage> MessageSplitter::next() {

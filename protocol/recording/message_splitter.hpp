@@ -1,17 +1,29 @@
-// Splits the bytes of one direction of an Oculus connection into whole messages and the bytes between them; no byte is lost.
+// Splits the bytes of one direction of a connection into whole messages and the bytes between them; no byte is lost.
 // Used on raw dumps, captures and live sockets.
 #pragma once
 
+#include <array>
 #include <optional>
 
-#include "protocol/oculus/framer.hpp"
 #include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording {
 
+/// How the messages of a make's stream are told apart.
+struct Framing {
+  std::array<std::uint8_t, 2> magic{};  // the bytes that every message begins with
+  std::size_t header_size = 0;
+  /// Total length of the message with this header; nullopt: this is none. `strict`: of a type that is known.
+  std::optional<std::size_t> (*length)(wire::BytesView header, Origin from, bool strict) = nullptr;
+
+  /// A header of a known type at the front.
+  bool begins_message(wire::BytesView bytes, Origin from) const;
+};
+
 class MessageSplitter {
  public:
-  explicit MessageSplitter(Origin from) : from_(from) {}
+  /// `framing` must outlive it.
+  MessageSplitter(Origin from, const Framing& framing) : from_(from), framing_(&framing) {}
 
   /// Drain with next() before the next append: less than one message then remains.
   void append(Time at, wire::BytesView bytes);
@@ -28,19 +40,18 @@ class MessageSplitter {
   std::size_t waiting_bytes() const { return buffer_.size() - begin_; }
 
  private:
+  bool starts_like_header(wire::BytesView bytes) const;
   std::optional<std::size_t> length_at_front(wire::BytesView waiting) const;
   RecordedMessage cut(std::size_t count);
   void lose(std::size_t count);
 
   Origin from_;
+  const Framing* framing_;
   Time at_{};
   wire::Bytes buffer_;
   std::size_t begin_ = 0;
   bool lost_ = false, strict_ = false, finished_ = false;
   std::uint64_t lost_bytes_ = 0, losses_ = 0;
 };
-
-/// True for headers of the message types that are known.
-bool is_known(const oculus::MessageHeader& header);
 
 }  // namespace sonar::recording

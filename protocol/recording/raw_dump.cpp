@@ -7,7 +7,8 @@ constexpr std::size_t dump_block_bytes = 256 << 10;
 
 class RawReader final : public RecordingReader {
  public:
-  explicit RawReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
+  RawReader(std::unique_ptr<Source> source, const Framing& framing)
+      : source_(std::move(source)), framing_(framing), scan_(*source_) {}
 
   std::optional<RecordedMessage> next() override {
     while (true) {
@@ -21,7 +22,7 @@ class RawReader final : public RecordingReader {
   std::optional<Error> damage() const override { return damages_.error(source_->name()); }
   void rewind() override {
     scan_.seek(0);
-    splitter_ = MessageSplitter(Origin::device);
+    splitter_ = MessageSplitter(Origin::device, framing_);
     damages_.clear();
     ended_ = false;
   }
@@ -44,8 +45,9 @@ class RawReader final : public RecordingReader {
   }
 
   std::unique_ptr<Source> source_;
+  const Framing& framing_;
   Scan scan_;
-  MessageSplitter splitter_{Origin::device};
+  MessageSplitter splitter_{Origin::device, framing_};
   Damages damages_;
   bool ended_ = false;
 };
@@ -66,13 +68,11 @@ class RawWriter final : public RecordingWriter {
 
 }  // namespace
 
-Result<std::unique_ptr<RecordingReader>> read_raw_dump(std::unique_ptr<Source> source) {
+Result<std::unique_ptr<RecordingReader>> read_raw_dump(std::unique_ptr<Source> source, const Framing& framing) {
   Scan scan(*source);
-  const BytesView front = scan.read(oculus::header_size);
-  const bool header = front.size() == oculus::header_size && is_known(oculus::header_of(front)) &&
-                      oculus::message_length(oculus::header_of(front), oculus::Sender::device);
-  if (!header) return failure(ErrorKind::bad_data, source->name() + " does not begin with an Oculus message");
-  return std::make_unique<RawReader>(std::move(source));
+  if (!framing.begins_message(scan.read(framing.header_size), Origin::device))
+    return failure(ErrorKind::bad_data, source->name() + " does not begin with a message of a sonar");
+  return std::make_unique<RawReader>(std::move(source), framing);
 }
 
 std::unique_ptr<RecordingWriter> write_raw_dump(std::unique_ptr<Sink> sink, Carrier by) {

@@ -1,25 +1,38 @@
-// A recording of any kind, identified by its first bytes: .oculus log, raw dump, capture (pcap, pcapng), MCAP, .aris, .sonar,
-// .svlog. What `sonard replay` and `sonarctl record --from` open.
+// A recording of any kind, identified by its first bytes: a capture (pcap, pcapng), MCAP, a file of a make's own kind, or a raw
+// dump. Used by `sonard replay`, and by `sonarctl` for --from.
 #pragma once
 
 #include <filesystem>
 #include <memory>
+#include <string_view>
 
+#include "protocol/host.hpp"
 #include "protocol/recording/byte_source.hpp"
 #include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording {
 
-enum class Format { oculus_log, raw_dump, pcap, mcap, aris_file, sonar_file, ping_log };
-const char* name_of(Format format);
+/// ".pcap, .mcap, .raw, .oculus, ...": of every kind of file that is read and written.
+std::string file_endings();
 
 struct Recording {
-  Format format{};
+  std::string_view format;  // ".oculus log", "MCAP", "capture"
   std::unique_ptr<RecordingReader> reader;
 };
 /// `sonar`: selects one of several, by IPv4 address in captures, by name in MCAP; empty = the one with most bytes, or the first.
 /// missing_file, io, bad_data; usage for a sonar that no such file can name.
 Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});
+
+struct SentBy {
+  const protocol::Make* make = nullptr;
+  Sender sender;
+};
+/// nullopt: it is of a client, or of no make that is known.
+std::optional<SentBy> sender_of(const RecordedMessage& message);
+/// The first message of a device tells, of its first 64 MB. Rewinds the reader.
+std::optional<SentBy> find_sender(RecordingReader& reader);
+/// The port at which a host of the make takes messages of this carrier; nullopt: it takes none.
+std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by);
 
 }  // namespace sonar::recording

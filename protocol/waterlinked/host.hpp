@@ -20,4 +20,6 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 
+recording::Codec codec();
+
 }  // namespace sonar::waterlinked

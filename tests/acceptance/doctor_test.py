@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+import urllib.request
 
 from running_sonard import SONARCTL, Sonard, eventually, run
 
@@ -160,6 +161,19 @@ class Doctor(unittest.TestCase):
                 while not is_connected:  # one that is silent for 10 s is disconnected: a busy machine takes longer to examine it
                     findings, is_connected = self.examine_driver(daemon, port, b"")
                 self.expect(findings, "driver", "fail", "is connected to front and has not asked for pings: it has sent nothing", remedy)
+
+    def test_a_host_by_http_that_gets_no_image_is_an_error(self):
+        with Sonard(scene="l-targets.yaml", profile="waterlinked-3d15") as daemon:
+            code, findings, found = doctor(daemon.address, *PATIENT)
+            self.expect(findings, "ping", "warn", "no images are made", "post true to /acoustics/enabled")
+            self.assertEqual(code, 0, found)  # no host has set it up
+            request = urllib.request.Request(f"http://{daemon.address}/api/v1/integration/acoustics/range",
+                                             b'{"min": 0, "max": 5}', {"Content-Type": "application/json"})
+            with urllib.request.urlopen(request, timeout=30) as reply:
+                self.assertEqual(reply.status, 204)
+            code, findings, found = doctor(daemon.address, *PATIENT)
+            self.assertEqual(code, 69, found)
+            self.expect(findings, "ping", "fail", "no images are made, although ", "a mode to /udp")
 
     def test_a_driver_that_gets_no_ping_is_an_error_beside_doctors_own_pings(self):
         with Sonard(scene="l-targets.yaml", arguments=("--clients", "2")) as daemon, \

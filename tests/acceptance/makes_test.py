@@ -16,6 +16,7 @@ import zlib
 os.environ.update(SONARD_SIMD="portable", SONARD_EMBREE_ISA="sse2")  # whatever the processor: samples differ in their last digits
 
 import mcap_checker  # noqa: E402
+from recording_test import Replay  # noqa: E402
 from running_sonard import SONARCTL, Sonard, run  # noqa: E402
 
 EXPECTED = pathlib.Path(__file__).with_name("makes_expected.json")
@@ -105,6 +106,50 @@ class Makes(unittest.TestCase):
             for what, value in seen.items():
                 with self.subTest(profile=profile, what=what):
                     self.assertEqual(value, expected[profile][what])
+
+
+OWN_KINDS = {"oculus-m1200d": "oculus", "aris-3000": "aris", "waterlinked-3d15": "sonar-file", "surveyor-240": "svlog", "omniscan-450": "svlog"}
+
+
+NO_PICTURE = {"surveyor-240": "a picture takes two points", "omniscan-450": "one beam makes no picture"}  # with so little computed
+
+
+class Recordings(unittest.TestCase):
+    """`sonarctl record` of a running sonar, and what `view` makes of its files."""
+
+    def ctl(self, *arguments):
+        return run(SONARCTL, *arguments, patience_s=300)
+
+    def test_every_make_is_recorded_and_seen_again(self):
+        for profile, (port, *settings) in MAKES.items():
+            with self.subTest(profile=profile), Sonard(scene="l-targets.yaml", profile=profile, arguments=CHEAP) as daemon:
+                folder = pathlib.Path(daemon.folder.name)
+                kinds = ["mcap", "pcap"] + ([OWN_KINDS[profile]] if profile in OWN_KINDS else [])
+                pings = 210 if profile == "ping360" else PINGS  # a picture is of a whole scan
+                outputs = [word for kind in kinds for word in (f"--{kind}", folder / f"run.{kind}")]
+                done = self.ctl("record", f"{daemon.address}:{port}", "--pings", pings, *settings, *PATIENCE, *outputs)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertIn(f"recorded {pings} pings", done.stdout)
+                shown = set()
+                for kind in kinds:
+                    done = self.ctl("view", "--from", folder / f"run.{kind}", "--ping", pings - 1, "--png", folder / "view.png")
+                    self.assertEqual(done.returncode, 64 if profile in NO_PICTURE else 0, kind + done.stderr)
+                    self.assertIn(NO_PICTURE.get(profile, ""), done.stderr)
+                    if profile not in NO_PICTURE:
+                        shown.add(pixels_of(folder / "view.png"))
+                self.assertEqual(len(shown), 0 if profile in NO_PICTURE else 1, "the same of every file")
+                for kind in kinds:
+                    with self.subTest(profile=profile, kind=kind):
+                        self.replay(folder / f"run.{kind}", port, profile in ("blueview-p900-90", "ping360"))
+
+    def replay(self, path, port, depends_on_requests):
+        """`sonarctl listen` of `sonard replay`."""
+        with Replay(path, "--loop") as replay:
+            if depends_on_requests:
+                self.assertIn("they cannot be replayed", replay.text())
+                return
+            done = self.ctl("listen", f"{replay.address}:{port}", "--as-it-is" if port == 52100 else "--quiet", "--pings", 2, *PATIENCE)
+            self.assertIn("pings 2", done.stdout, done.stderr + replay.text())
 
 
 if __name__ == "__main__":

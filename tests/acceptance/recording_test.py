@@ -366,8 +366,8 @@ class OneIntoAnother(Files):
         self.assertIn("named for two kinds of files", done.stderr)
         self.assertFalse(once.exists())
         done = self.convert(SEEDS / "aris_file/two.aris", "--oculus", self.path("oculus"))
-        self.assertEqual((done.returncode, self.path("oculus").exists()), (65, False))
-        self.assertIn("two.aris holds no Oculus messages", done.stderr)
+        self.assertEqual((done.returncode, self.path("oculus").exists()), (64, False))
+        self.assertIn("such files do not hold the messages of an ARIS", done.stderr)
         for code, words in [(66, [self.folder / "none"]), (65, [self.path("raw")]), (64, [self.path("raw"), "--ip", "nowhere"])]:
             done = run(SONARD, "replay", *words)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, 1), done.stderr)

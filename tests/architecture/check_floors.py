@@ -8,6 +8,10 @@ import re
 import subprocess
 import sys
 
+# What a make of sonar may include beside its own folder.
+DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/dialogue.hpp", "protocol/host.hpp",
+          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/recording/byte_source.hpp", "protocol/recording/codec.hpp", "protocol/recording/message_splitter.hpp",
+          "protocol/recording/raw_dump.hpp", "protocol/recording/recorded_message.hpp", "protocol/recording/zlib.hpp"]
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
     "core/base": ["core/base/"],
@@ -25,12 +29,12 @@ FLOORS = {
     "protocol/control": ["core/base/", "protocol/control/"],
     "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/", "protocol/host.hpp"],
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
-    "protocol/oculus": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/oculus/"],
-    "protocol/aris": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/aris/"],
-    "protocol/waterlinked": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/waterlinked/"],
-    "protocol/ping": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/ping/"],
-    "protocol/blueview": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "protocol/host.hpp", "protocol/option_values.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/blueview/"],
-    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/wire/", "protocol/aris/", "protocol/oculus/", "protocol/ping/", "protocol/recording/", "protocol/waterlinked/"],
+    "protocol/oculus": [*DEVICE, "protocol/oculus/"],
+    "protocol/aris": [*DEVICE, "protocol/aris/"],
+    "protocol/waterlinked": [*DEVICE, "protocol/waterlinked/"],
+    "protocol/ping": [*DEVICE, "protocol/ping/"],
+    "protocol/blueview": [*DEVICE, "protocol/blueview/"],
+    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/wire/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     # Within the daemon: files of configuration < what is emulated < sockets, threads and clocks < commands.
     "daemon/config": ["core/", "protocol/", "daemon/config/"],
@@ -106,8 +110,22 @@ FORBIDDEN = [
     ("mark", r"", None, r"\b(TO" + r"DO|FIX" + r"ME|X" + r"XX)\b", "finish it, or write an issue"),
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]
+# A make of sonar is its folder and a line of makes.cpp; these files still name one. The list only gets shorter.
+MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|surveyor|omniscan|3d-?15|protocol/ping/|\bping::", re.I)
+MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
+NAME_MAKES = {
+    "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py", "clients/python/sonard_client/control.py",
+    "clients/python/sonard_client/daemon.py", "clients/python/sonard_client/judge/__main__.py", "clients/python/sonard_client/judge/cases.py",
+    "clients/python/sonard_client/judge/report.py", "clients/python/sonard_client/judge/scene.py", "clients/python/sonard_client/lab.py",
+    "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/nmea_to_pose.py", "clients/python/sonard_client/oculus.py",
+    "clients/python/sonard_client/poses.py", "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py",
+    "clients/sonarctl/completion/make_completion.py", "clients/sonarctl/setting_options.cpp", "clients/web/src/panels/head.js",
+    "clients/wireshark/aris.lua", "clients/wireshark/oculus.lua", "clients/wireshark/ping.lua", "clients/wireshark/waterlinked.lua",
+    "daemon/commands/command_line.cpp", "daemon/commands/render/render_file.cpp", "daemon/commands/replay/replay_device.cpp",
+    "daemon/commands/replay/replay_device.hpp", "daemon/commands/run/banner.cpp", "daemon/config/config.cpp", "daemon/config/faults/support.cpp",
+}
 CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc"}
-TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ""}
+TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ".js", ""}
 # A page of ours, and what of it is cited: docs/acoustics.md, section 8; docs/protocols/oculus.md, 5.1; docs/architecture.md, "Errors".
 PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
                       (?:,?\ section\ (?P<section>\d+(?:\.\d+)*)|,?\ (?P<number>\d+(?:\.\d+)*)|,\ "(?P<title>[^"\n]+)")?""", re.X)
@@ -194,6 +212,18 @@ def wording_violations(name, text):
         before = line.strip()
 
 
+def make_violations(name, code):
+    """Of product files; those that NAME_MAKES excepts must name one."""
+    if re.match(MAY_NAME_MAKES, name):
+        return
+    found = MAKE.search(code)
+    if found and name not in NAME_MAKES:
+        yield line_of(code, found.start()), (f'make: "{found.group()}"; only the make\'s folder and protocol/makes.cpp name a make: '
+                                             "ask protocol::Make (protocol/host.hpp)")
+    if not found and name in NAME_MAKES:
+        yield 1, "make: names none any more: take it out of NAME_MAKES"
+
+
 def line_of(text, position):
     return text.count("\n", 0, position) + 1
 
@@ -216,6 +246,9 @@ def violations(root):
                 yield f"{name}:1: header without #pragma once"
             if not name.startswith("tests/") and text.count("\n") > LONGEST_FILE:
                 yield f"{name}:{LONGEST_FILE}: longer than {LONGEST_FILE} lines: split it"
+        if is_code or path.suffix in {".py", ".lua", ".js"}:
+            for number, what in make_violations(name, code):
+                yield f"{name}:{number}: {what}"
         for position, what in citation_violations(root, name, comments_of(text) if is_code else text):
             yield f"{name}:{line_of(text, position)}: {what}"
         for rule, where, excepted, pattern, why in FORBIDDEN:

@@ -50,7 +50,7 @@ class Planted(unittest.TestCase):
     def test_dependencies_enter_through_one_file(self):
         for name, header in [
                 ("core/scene/scene.cpp", "embree3/rtcore.h"), ("core/pipeline/a.cpp", "embree4/rtcore.h"),
-                ("core/pipeline/a.cpp", "fftw3.h"), ("daemon/config/config.cpp", "yaml-cpp/yaml.h"),
+                ("core/pipeline/a.cpp", "fftw3.h"), ("daemon/config/a.cpp", "yaml-cpp/yaml.h"),
                 ("core/scene/files/load_mesh.cpp", "assimp/scene.h"), ("protocol/oculus/a.cpp", "spdlog/spdlog.h"),
                 ("daemon/a.cpp", "google/protobuf/message.h"), ("daemon/server/sonars/session.cpp", "boost/asio.hpp"),
                 ("daemon/emulator/world/world.hpp", "protocol/control/answers.hpp"), ("daemon/server/app.cpp", "protocol/control/answers.hpp"),
@@ -118,6 +118,13 @@ class Planted(unittest.TestCase):
             "core/base/b.cpp": 'f("What to' + 'ld");\n// Whatever comes.\n// Nothing is lost.\n',
             "protocol/a.cpp": "/// Of a ping.\n"}), [])
 
+    def test_makes_are_named_in_their_folders_only(self):
+        for name, line in [("daemon/server/a.cpp", "oculus::Framer framer;"), ("clients/sonarctl/a.cpp", '#include "protocol/ping/messages.hpp"'),
+                           ("clients/python/a.py", "# of an ARIS"), ("protocol/recording/a.cpp", 'if (name == "blueview") return;')]:
+            with self.subTest(name=name):
+                self.expect(name, line + "\n", 1, "only the make's folder")
+        self.expect("daemon/config/config.cpp", "int x;\n", 1, "take it out of NAME_MAKES")
+
     def test_headers_and_sizes(self):
         found = found_in({"core/base/a.hpp": "int x;\n"})
         self.assertEqual(found, ["core/base/a.hpp:1: header without #pragma once"])
@@ -136,7 +143,7 @@ class Innocent(unittest.TestCase):
             "protocol/makes.cpp": '#include "protocol/oculus/oculus.hpp"\n',
             "daemon/server/system/asio.hpp": "#pragma once\n#include <utility>\n#include <boost/asio.hpp>\n",
             "daemon/commands/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
-            "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/oculus/decode.hpp"\n',
+            "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/host.hpp"  // of an Oculus\n',
             "clients/bvtsdk/abi4/include/bvt_sdk.h": '#pragma once\n#include "bvt_sdk_classes.h"\n',
             "clients/bvtsdk/core/link.cpp": "#include <thread>\nstd::thread reader(f);\n",
             "tests/core/a.cpp": '#include <Eigen/Dense>\n#include "daemon/emulator/world/world.hpp"\nstd::thread t; // steady_clock\n',

@@ -184,7 +184,7 @@ TEST(Doctor, KnowsWhyNoStatusComes) {
 TEST(Doctor, SaysWhatDriversWouldObjectToInTheStatus) {
   Facts facts = healthy();
   facts.status.received[0].complaints = {"datagram length 140 is not a status message's 142"};
-  expect(line(facts, "status"), Level::fail, "datagram length 140", "142 bytes");
+  expect(line(facts, "status"), Level::fail, "datagram length 140", "is it a sonar?");
 }
 
 TEST(Doctor, FollowsTheAdvertisedAddress) {
@@ -388,14 +388,29 @@ TEST(Doctor, ChecksEverySonarAndTellsThemApart) {
               HasSubstr("warn  127.0.0.3: 127.0.0.3 was not examined: the time limit was reached; raise it with --within"));
 }
 
+TEST(Doctor, ASonarByHttpThatSendsNothingIsAnErrorWhenAHostSetItUp) {
+  Facts facts = healthy();
+  SonarFacts& sonar = facts.sonars[0];
+  sonar.make = find_make("waterlinked");
+  v1::SonarStatus& reported = *daemon_in(facts).mutable_sonars(0);
+  reported.set_profile("waterlinked-3d15");
+  reported.set_pinging(false);
+  report(facts);
+  expect(line(facts, "ping"), Level::warn, "no images are made", "post true to /acoustics/enabled");
+  reported.set_asked_by("10.0.0.7");
+  report(facts);
+  expect(line(facts, "ping"), Level::fail, "no images are made, although 10.0.0.7 has set it up", "a mode to /udp");
+}
+
 TEST(Doctor, FindsBlueViewHeads) {
   Facts facts = healthy();
   daemon_in(facts).MergeFrom(control::message_from<v1::DaemonStatus>(
-      R"(sonars { name: "bow" listens: "127.0.0.4:14750" advertised: "127.0.0.4" rate_hz: 10 })"));
-  expect(line(facts, "blueview"), Level::warn, "BlueView sonar bow at 127.0.0.4:14750 does not answer discovery", "udp 14751");
+      R"(sonars { name: "bow" profile: "blueview-p900-90" listens: "127.0.0.4:14750" advertised: "127.0.0.4" rate_hz: 10 })"));
+  expect(line(facts, "blueview"), Level::warn, "bow at 127.0.0.4:14750, a BlueView sonar, does not answer discovery on udp 14751",
+         "udp 14751");
   facts.address_given = true;  // 127.0.0.2: the other one was not asked
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("does not answer discovery")));
-  facts.heads = {{"127.0.0.4:14750", "P900-90", "123"}};
+  facts.found = {{find_make("blueview"), "127.0.0.4:14750", "BlueView head P900-90 (123)"}};
   expect(line(facts, "blueview"), Level::ok, "BlueView head P900-90 (123) answers discovery at tcp 127.0.0.4:14750", "");
 }
 
@@ -411,7 +426,7 @@ Facts healthy_head() {
   head.set_listens("127.0.0.2:14750");
   head.set_rate_hz(15);
   report(facts);
-  facts.heads = {{"127.0.0.2:14750", "BlueView P900-90", "7001"}};
+  facts.found = {{find_make("blueview"), "127.0.0.2:14750", "BlueView head BlueView P900-90 (7001)"}};
   facts.kernel_ports = {};
   return facts;
 }
@@ -444,7 +459,7 @@ TEST(Doctor, SaysWhatIsWrongWithAHead) {
   s.outcome = Outcome::closed_without_a_byte;
   expect(line(facts, "ping"), Level::warn, "all its client slots are taken", "clients.max");
   s.outcome = Outcome::refused;
-  expect(line(facts, "ping"), Level::fail, "refuses the connection", "sonard --demo blueview");
+  expect(line(facts, "ping"), Level::fail, "refuses the connection", "sonard --help");
 }
 
 TEST(Doctor, ChecksThePortsOfTheSonarsThatAreThere) {

@@ -1,5 +1,5 @@
 // .aris files of any origin: their frames come out as datagrams of a bounded size.
-#include "protocol/recording/aris_file.hpp"
+#include "protocol/aris/aris_file.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,6 +1,7 @@
 // .oculus log files and raw dumps of anybody. A compressed item may hold a message of the largest kind.
+#include "protocol/oculus/host.hpp"
 #include "protocol/oculus/messages.hpp"
-#include "protocol/recording/oculus_log.hpp"
+#include "protocol/oculus/oculus_log.hpp"
 #include "protocol/recording/raw_dump.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 
@@ -9,6 +10,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const recording::Bytes bytes = fuzz::bytes_from(data, size);
   const std::uint64_t items = size / 40;
   fuzz::check_reader(recording::read_oculus_log(recording::source_from("input", bytes)), items * oculus::reply_limit);
-  fuzz::check_reader(recording::read_raw_dump(recording::source_from("input", bytes)), size);
+  fuzz::check_reader(recording::read_raw_dump(recording::source_from("input", bytes), oculus::framing), size);
   return 0;
 }

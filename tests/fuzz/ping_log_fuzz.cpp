@@ -1,5 +1,5 @@
 // Logs of the ping protocol of any origin: their frames come out as they are.
-#include "protocol/recording/ping_log.hpp"
+#include "protocol/ping/ping_log.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

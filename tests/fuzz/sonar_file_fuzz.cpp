@@ -1,5 +1,5 @@
 // .sonar files of any origin: their packets come out whole, wherever the search for the next one begins.
-#include "protocol/recording/sonar_file.hpp"
+#include "protocol/waterlinked/sonar_file.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

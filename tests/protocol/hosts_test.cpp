@@ -6,7 +6,14 @@
 #include <gtest/gtest.h>
 
 #include <deque>
+#include <functional>
+#include <map>
 #include <random>
+
+#include "protocol/recording/mcap/mcap_session.hpp"
+#include "protocol/recording/pcap/pcap.hpp"
+#include "protocol/recording/raw_dump.hpp"
+#include "protocol/recording/recording.hpp"
 
 namespace sonar::protocol::hosts_test {
 namespace {
@@ -283,6 +290,64 @@ TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
   EXPECT_EQ(talk.settings.rate_hz, first.rate_hz);
   if (!GetParam().each_ping_requested) {  // such a request names the head, which becomes the active one
     EXPECT_EQ(talk.state.settings, before);
+  }
+}
+
+/// All that the device sent, as a recording keeps it.
+std::vector<recording::RecordedMessage> messages_of(const Talk& talk) {
+  std::vector<recording::RecordedMessage> messages;
+  for (const auto& [port, bytes] : talk.sent) {
+    const bool by_tcp = talk.make.ports[port].kind == HostPort::Kind::tcp;
+    messages.push_back({Time(1'700'000'000s) + messages.size() * 10ms, recording::Origin::device,
+                        by_tcp ? recording::Carrier::stream : recording::Carrier::datagram, bytes});
+  }
+  return messages;
+}
+
+std::vector<std::vector<float>> samples_of(const std::vector<HostPing>& pings) {
+  std::vector<std::vector<float>> all;
+  for (const HostPing& ping : pings) all.push_back(ping.picture().value_or(PolarImage{}).samples);
+  return all;
+}
+
+std::vector<HostPing> read_back(const Make& make, Bytes file) {
+  auto opened = recording::open_recording(recording::source_from("a file", std::move(file)));
+  if (!opened) throw std::runtime_error(opened.error().text);
+  const auto by = recording::find_sender(*opened->reader);
+  EXPECT_EQ(by ? by->make->name() : "no make", make.name());
+  Wanted nothing;
+  nothing.as_it_is = true;
+  const auto host = *make.host(nothing);
+  std::vector<HostPing> pings;
+  while (const auto message = opened->reader->next())
+    if (const auto port = recording::host_port(make, message->by))
+      for (HostAction& action : host->on_bytes(*port, message->bytes, message->at))
+        if (auto* ping = std::get_if<HostPing>(&action)) pings.push_back(std::move(*ping));
+  EXPECT_FALSE(opened->reader->damage()) << opened->reader->damage()->text;
+  return pings;
+}
+
+TEST_P(Hosts, ReadTheSamePingsFromEveryKindOfFile) {
+  const Make& make = GetParam();
+  Talk talk(make, all_that_is_known(make, range_m), 0, model_of(make));
+  talk.run(6);
+  ASSERT_FALSE(talk.pings.empty());
+  const bool by_tcp = make.device->pings_over_tcp();
+  recording::PcapConversation ends;
+  ends.device.port = make.ports.front().number;
+  std::map<std::string, std::function<std::unique_ptr<recording::RecordingWriter>(std::unique_ptr<recording::Sink>)>> kinds;
+  kinds["mcap"] = [&](auto sink) { return std::make_unique<recording::McapSession>(std::move(sink), "front", make); };
+  kinds["pcap"] = [&](auto sink) { return recording::write_pcap(std::move(sink), ends); };
+  if (make.codec.framing != nullptr && by_tcp)
+    kinds["raw"] = [](auto sink) { return recording::write_raw_dump(std::move(sink)); };
+  for (const recording::FileKind& kind : make.codec.files) kinds[std::string(kind.ending)] = kind.write;
+  for (const auto& [name, write] : kinds) {
+    SCOPED_TRACE(name);
+    Bytes file;
+    const auto writer = write(recording::sink_into(file));
+    for (const recording::RecordedMessage& message : messages_of(talk)) ASSERT_TRUE(writer->write(message));
+    ASSERT_TRUE(writer->close());
+    EXPECT_EQ(samples_of(read_back(make, file)), samples_of(talk.pings));
   }
 }
 

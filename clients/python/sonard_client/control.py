@@ -16,7 +16,7 @@ Json = Dict[str, Any]
 
 _FIRST_REPLY_S = 2.0  # sonard replies to /healthz at once; a longer silence means a different server
 
-# 64-bit fields of control.proto: strings in protobuf's JSON mapping, converted to int here.
+# 64-bit fields of control.proto's answers: strings in protobuf's JSON mapping, converted to int here. A test compares them.
 _WIDE = {"seed", "pings", "refused", "served", "dropped", "skipped_ticks", "clients", "refused_clients", "pings_written",
          "pings_dropped", "bytes_written", "bytes_read", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "now_ns", "unsent", "messages", "bytes",
          "seq", "utc_ns", "mono_ns", "time_ns", "client_number", "offset", "bytes_before", "bytes_after", "injections"}
@@ -302,7 +302,12 @@ def _error(status: int, body: str) -> ControlError:
 
 
 def _as_number(item: Json) -> Json:
-    return {name: int(value) if name in _WIDE and isinstance(value, str) else value for name, value in item.items()}
+    def number(value: Any) -> Any:
+        if isinstance(value, dict):  # a map: its keys are names of other things
+            return {key: number(inner) for key, inner in value.items()}
+        return int(value) if isinstance(value, str) else value
+
+    return {name: number(value) if name in _WIDE else value for name, value in item.items()}
 
 
 def _read_json(text: Union[str, bytes]) -> Any:

@@ -1,6 +1,7 @@
 """Requests of Control over HTTP and its handling of replies, against a fake server."""
 import http.server
 import json
+import re
 import socket
 import sys
 import threading
@@ -9,12 +10,13 @@ import unittest
 
 from common import PACKAGE  # and it is on the path
 
-from sonard_client import Control, ControlError, OculusClient
+from sonard_client import Control, ControlError, OculusClient, control
 
 ANSWERS = {
     "/healthz": (503, "scene cannot be loaded\n"),
     "/metrics": (200, '# HELP a b\n# TYPE a counter\nsonard_pings_total{sonar="front left"} 12\nsonard_late_seconds 1e-3\n\n'),
-    "/api/v1/status": (200, '{"seed":"18446744073709551615","sonars":[{"clients":[],"figures":{"pings":"7","clients":"1"}}]}'),
+    "/api/v1/status": (200, '{"seed":"18446744073709551615","sonars":[{"clients":[],"figures":{"pings":"7","clients":"1"}}],'
+                            '"viewers":[{"dropped":{"/front/image":"12"}}]}'),
     "/api/v1/sonar": (400, '{"code":"REFUSED","text":"no sonar is called \\"rear\\"; there are: front"}'),
     "/api/v1/faults/journal?after=6":
         (200, '{"journal":[{"seq":"7","utc_ns":"1152921504606846976","offset":"-1","bytes_before":"10","with":{}}]}'),
@@ -62,6 +64,21 @@ class Refused(unittest.TestCase):
                 Control(port=port).status()
             with self.assertRaisesRegex(ConnectionRefusedError, f"127.0.0.1:{port} refuses the connection: is a sonar running"):
                 OculusClient("127.0.0.1", port)
+
+
+class WideFields(unittest.TestCase):
+    def test_all_that_answers_hold_are_known(self):
+        text = re.sub(r"//[^\n]*", "", (PACKAGE.parents[1] / "protocol/control/control.proto").read_text(encoding="utf-8"))
+        bodies = dict(re.findall(r"^message (\w+) \{(.*?)^\}", text, re.M | re.S))
+        reached, waiting = set(), ["DaemonStatus", "Event", "FaultEntry"]
+        while waiting:
+            name = waiting.pop()
+            reached.add(name)
+            waiting += [word for word in re.findall(r"\w+", bodies[name]) if word in bodies and word not in reached]
+        wide = {field for name in reached
+                for field in re.findall(r"(?:\bu?int64|fixed64>?|, uint64>)\s+(\w+)\s*=", bodies[name])}
+        self.assertIn("dropped", wide)
+        self.assertEqual(wide - control._WIDE, set())
 
 
 class WrongPort(unittest.TestCase):
@@ -119,6 +136,7 @@ class Requests(unittest.TestCase):
         status = self.control.status()
         self.assertEqual(status["seed"], 2 ** 64 - 1)
         self.assertEqual(status["sonars"][0], {"clients": [], "figures": {"pings": 7, "clients": 1}})
+        self.assertEqual(status["viewers"], [{"dropped": {"/front/image": 12}}])
         self.assertEqual(self.last(), ("GET", "/api/v1/status", None))
 
     def test_trajectories_and_recordings(self):

@@ -12,11 +12,11 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-OPTION = re.compile(r"^  (?:(-\w),)?(--[\w-]+)((?:[ :=(]\S.*|\s{2,}.*)?)$")
+OPTION = re.compile(r"^  (?:(-\w),)?(--[\w-]+)(?:,--[\w-]+)*((?:[ :=(]\S.*|\s{2,}.*)?)$")
 CHOICES = re.compile(r"\{([^}]+)\}|TEXT:([\w.-]+(?:\|[\w.-]+)*)|INT:([\w.-]+(?:\|[\w.-]+)+)")  # of CLI11's own check, and of ours
 COMMAND = re.compile(r"^  ([a-z][\w-]*)\s{2,}\S")
-FILE_WORDS = {"--png", "--record", "--from-raw", "--token-file", "--out", "--poses", "--json-file", "--pcap", "--mcap",
-              "--oculus", "--raw", "--from", "--credentials"}
+FILE_WORDS = {"--png", "--record", "--token-file", "--out", "--poses", "--json-file", "--pcap", "--mcap",
+              "--oculus", "--aris", "--sonar-file", "--svlog", "--raw", "--from", "--credentials"}
 SCENE_COMMANDS = {"load", "run", "check", "render", "dataset", "replay", "info", "import", "submit", "collect"}  # they take files, not addresses
 
 

@@ -5,6 +5,7 @@
 #include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/control/control_commands.hpp"
+#include "protocol/recording/recording.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -37,7 +38,7 @@ Run add_recording(CLI::App& app) {
   RecordingArguments& a = *arguments;
 
   CLI::App& start =
-      add_command(recording, "start", "start a file; its suffix selects the format: .mcap, .pcap, .oculus, .raw", a);
+      add_command(recording, "start", "start a file; its suffix selects the format: " + recording::file_endings(), a);
   start.add_option("FILE", a.start.file, "file name, without a folder")->required();
   start.add_option("--sonar", a.start.sonar, "name of the sonar (default: the only one)");
   start.add_flag("--labels", a.start.labels,
@@ -45,7 +46,7 @@ Run add_recording(CLI::App& app) {
   start.footer(
       "examples:\n"
       "  sonarctl recording start run-1.mcap --labels\n"
-      "  sonarctl recording start left.oculus --sonar left");
+      "  sonarctl recording start left.pcap --sonar left");
   start.callback([&a] {
     a.what = [&a] { return steer(a.control, a.start, a.start.file + " is being recorded; sonarctl status shows how it goes"); };
   });

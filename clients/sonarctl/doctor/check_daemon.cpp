@@ -73,20 +73,22 @@ bool was_examined(const Facts& facts, const v1::SonarStatus& sonar) {
                                              [&sonar](const SonarFacts& s) { return s.at.host == sonar.advertised(); });
 }
 
-void check_heads(const Facts& facts, std::vector<Finding>& findings) {
-  for (const BlueViewHead& head : facts.heads)
-    findings.push_back({Level::ok, "blueview",
-                        "BlueView head " + head.model + " (" + head.serial + ") answers discovery at tcp " + head.at, ""});
+/// Sonars of makes that hosts search for.
+void check_search(const Facts& facts, std::vector<Finding>& findings) {
+  for (const FoundSonar& found : facts.found)
+    findings.push_back({Level::ok, std::string(found.make->name()), found.about + " answers discovery at tcp " + found.at, ""});
   if (!facts.control.status) return;
   for (const v1::SonarStatus& sonar : facts.control.status->sonars()) {
-    if (!sonar.listens().ends_with(":14750") || !was_examined(facts, sonar)) continue;
-    const auto answered = [&sonar](const BlueViewHead& head) {
-      return head.at == sonar.advertised() + ":14750" || head.at == sonar.listens();
-    };
-    if (std::none_of(facts.heads.begin(), facts.heads.end(), answered))
-      findings.push_back({Level::warn, "blueview",
-                          "BlueView sonar " + sonar.name() + " at " + sonar.listens() + " does not answer discovery on udp 14751",
-                          "hosts that are given its address need no discovery; else see whether a firewall drops udp 14751"});
+    const protocol::Make& make = protocol::make_of_profile(sonar.profile());
+    if (make.search == nullptr || !was_examined(facts, sonar)) continue;
+    const std::string usual = sonar.advertised() + ":" + std::to_string(make.ports.front().number);
+    const auto answered = [&](const FoundSonar& found) { return found.at == usual || found.at == sonar.listens(); };
+    const std::string port = "udp " + std::to_string(make.search->port);
+    if (std::none_of(facts.found.begin(), facts.found.end(), answered))
+      findings.push_back(
+          {Level::warn, std::string(make.name()),
+           sonar.name() + " at " + sonar.listens() + ", " + std::string(make.title) + ", does not answer discovery on " + port,
+           "hosts that are given its address need no discovery; else see whether a firewall drops " + port});
   }
 }
 
@@ -107,7 +109,7 @@ void check_daemon(const Facts& facts, std::vector<Finding>& findings) {
   check_control(facts, findings);
   if (facts.control.status) sonar::doctor::check_poses(*facts.control.status, findings);
   check_http(facts, findings);
-  check_heads(facts, findings);
+  check_search(facts, findings);
   check_clocks(facts.control, findings);
 }
 

@@ -72,9 +72,13 @@ class SonarChecks {
   void check_images() {
     const std::string at = "http at " + sonar_.at.host;
     if (!sonar_.reported) return add(Level::warn, "ping", at + ": no daemon tells whether images are sent", "");
-    if (!sonar_.reported->pinging())
-      return add(Level::warn, "ping", at + ": no images are made",
-                 "post true to /acoustics/enabled and a mode to /udp, below http://" + sonar_.at.host + "/api/v1/integration");
+    if (!sonar_.reported->pinging()) {
+      const std::string& who = sonar_.reported->asked_by();
+      const bool is_waited_for = !who.empty();
+      return add(is_waited_for ? Level::fail : Level::warn, "ping",
+                 at + ": no images are made" + (is_waited_for ? ", although " + who + " has set it up" : ""),
+                 std::string(sonar_.make->remedy) + ", of " + sonar_.at.host);
+    }
     add(Level::ok, "ping",
         at + ": images by UDP at " + format("%g", sonar_.reported->rate_hz()) + " Hz, " +
             std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",
@@ -97,7 +101,7 @@ class SonarChecks {
     if (!received->complaints.empty())
       return add(Level::fail, "status",
                  "the status from " + received->from + " is not what drivers expect: " + joined(received->complaints),
-                 "is it a sonar? sonard sends 142 bytes");
+                 "is it a sonar?");
     std::string text = "status broadcast received back on udp " + port + " from " + received->from;
     if (received->advertised == received->from) return add(Level::ok, "status", text, "");
     text += ", which tells drivers to connect to " + received->advertised;
@@ -198,8 +202,8 @@ class SonarChecks {
       if (received.advertised != sonar_.at.host)
         return "a status broadcast names a sonar at " + received.advertised + ": sonarctl doctor " + received.advertised;
     if (sonar_.on_this_host)
-      return "start it: sonard serves its demo on 127.0.0.2 (a BlueView head: sonard --demo blueview), sonard FILE the sonars of "
-             "a "
+      return "start it: sonard serves its demo on 127.0.0.2 (sonard --help lists those of other makes), sonard FILE the sonars "
+             "of a "
              "configuration";
     return "start sonard on that computer; its banner names the address of each sonar";
   }

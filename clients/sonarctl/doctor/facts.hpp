@@ -92,8 +92,10 @@ struct HttpFacts {
   int code = 0;  // 0 = no answer
   std::string text;
 };
-struct BlueViewHead {
-  std::string at, model, serial;
+/// A sonar that answered a search.
+struct FoundSonar {
+  const protocol::Make* make = nullptr;
+  std::string at, about;  // "BlueView head P900-90 (7001)"
 };
 /// By HTTP, with images by UDP: no client connects for them.
 inline bool is_by_http(const SonarFacts& sonar) { return sonar.make->ports.front().kind == protocol::HostPort::Kind::http; }
@@ -121,7 +123,7 @@ struct Facts {
   ControlFacts control;
   HttpFacts http;
   KernelPorts kernel_ports;
-  std::vector<BlueViewHead> heads;
+  std::vector<FoundSonar> found;
   std::vector<PortHolder> daemons;  // sonards of this computer, a line for each data port
 };
 

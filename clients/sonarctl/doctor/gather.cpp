@@ -6,9 +6,7 @@
 #include "clients/sonarctl/doctor/proc_net.hpp"
 #include "clients/sonarctl/doctor/watch_pings.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
-#include "protocol/blueview/link.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/oculus/messages.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -19,7 +17,10 @@ constexpr auto status_patience = 2500ms;  // status messages come every second
 constexpr auto first_status = 1300ms;     // to learn who is connected
 const Endpoint usual_http{"127.0.0.1", 8088};
 constexpr auto short_patience = 700ms, own_patience = 200ms;
-constexpr auto head_patience = 400ms, head_patience_here = 100ms;  // for an answer to discovery
+constexpr auto search_patience = 400ms, search_patience_here = 100ms;  // for an answer to discovery
+
+/// Of the sonars that announce themselves by status messages.
+const std::uint16_t usual_port = protocol::makes().front().ports.front().number;
 
 class Gathering {
  public:
@@ -40,14 +41,14 @@ class Gathering {
     ask_control(*control);
     ask_http(*http);
     given->host = ipv4_of(given->host).value_or(given->host);  // examine() reports a name without an address
-    const DiscoveryQuestion heads(facts_.address_given ? std::vector{given->host} : std::vector<std::string>{});
+    const DiscoveryQuestion search(facts_.address_given ? std::vector{given->host} : std::vector<std::string>{});
     const auto sockets = tcp_sockets();
     const auto programs = programs_by_socket();
     note_daemons(sockets, programs);
-    find_sonars(*given, heads);
+    find_sonars(*given, search);
     for (SonarFacts& sonar : facts_.sonars) examine(sonar, sockets, programs);
     listen_to_all();
-    heads.receive_answers(facts_.heads, Steady::now());
+    search.receive_answers(facts_.found, Steady::now());
     facts_.kernel_ports = kernel_ports();
     facts_.machine = this_machine();
     return std::move(facts_);
@@ -103,19 +104,19 @@ class Gathering {
     }
   }
 
-  void find_sonars(const Endpoint& given, const DiscoveryQuestion& heads) {
+  void find_sonars(const Endpoint& given, const DiscoveryQuestion& search) {
     if (facts_.address_given) {
-      const auto patience = is_on_this_host(given.host) ? head_patience_here : head_patience;
-      if (!facts_.control.status) heads.receive_answers(facts_.heads, no_later_than(Steady::now() + patience));
+      const auto patience = is_on_this_host(given.host) ? search_patience_here : search_patience;
+      if (!facts_.control.status) search.receive_answers(facts_.found, no_later_than(Steady::now() + patience));
       return add_sonar(with_port(given), "");
     }
     if (facts_.control.status)
       for (const v1::SonarStatus& s : facts_.control.status->sonars()) add_sonar({s.advertised(), port_of(s)}, s.name());
     if (facts_.sonars.empty()) {
       status_.listen("", no_later_than(start_ + first_status));
-      for (const ReceivedStatus& received : status_.facts().received) add_sonar({received.advertised, oculus::tcp_port}, "");
-      heads.receive_answers(facts_.heads, Steady::now());
-      for (const BlueViewHead& head : facts_.heads) add_sonar(*parse_endpoint(head.at, {}), "");
+      for (const ReceivedStatus& received : status_.facts().received) add_sonar({received.advertised, usual_port}, "");
+      search.receive_answers(facts_.found, Steady::now());
+      for (const FoundSonar& found : facts_.found) add_sonar(*parse_endpoint(found.at, {}), "");
     }
     if (facts_.sonars.empty()) add_sonar(with_port(given), "");
   }
@@ -135,17 +136,17 @@ class Gathering {
     if (facts_.control.status)
       for (const v1::SonarStatus& s : facts_.control.status->sonars())
         if (is_at(s, given.host)) return {given.host, port_of(s)};
-    for (const BlueViewHead& head : facts_.heads)
-      if (head.at.starts_with(given.host + ":")) return *parse_endpoint(head.at, {});
-    return {given.host, oculus::tcp_port};
+    for (const FoundSonar& found : facts_.found)
+      if (found.at.starts_with(given.host + ":")) return *parse_endpoint(found.at, {});
+    return {given.host, usual_port};
   }
   const Make& make_of(const Endpoint& at) const {
     if (facts_.control.status)
       for (const v1::SonarStatus& s : facts_.control.status->sonars())
         if (is_at(s, at.host) && port_of(s) == at.port) return make_of(s);
-    const bool is_head = std::any_of(facts_.heads.begin(), facts_.heads.end(),
-                                     [&at](const BlueViewHead& head) { return head.at == text_from(at); });
-    const Make* const found = make_at(is_head ? blueview::tcp_port : at.port);
+    for (const FoundSonar& found : facts_.found)
+      if (found.at == text_from(at)) return *found.make;
+    const Make* const found = make_at(at.port);
     return found != nullptr ? *found : protocol::makes().front();
   }
 

@@ -17,8 +17,6 @@
 #include "clients/sonarctl/doctor/proc_net.hpp"
 #include "clients/sonarctl/http.hpp"
 #include "core/text/ipv4.hpp"
-#include "protocol/blueview/frames.hpp"
-#include "protocol/oculus/decode.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
@@ -55,6 +53,8 @@ std::optional<Datagram> receive(const Socket& socket, Steady::time_point deadlin
     return Datagram{text, {buffer.begin(), buffer.begin() + received}};
   }
 }
+
+constexpr int refusal_within_ms = 500;
 
 Socket udp_socket() { return Socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)); }
 
@@ -116,6 +116,18 @@ Machine this_machine() {
   return is_container ? Machine::container : Machine::ordinary;
 }
 
+bool refuses(const Endpoint& at) {
+  const auto to = address_of(at);
+  const Socket socket(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  if (!to || ::connect(socket.fd(), generic(*to), sizeof *to) == 0) return false;
+  if (errno != EINPROGRESS) return errno == ECONNREFUSED;
+  pollfd decided{socket.fd(), POLLOUT, 0};
+  int error = 0;
+  socklen_t size = sizeof error;
+  return ::poll(&decided, 1, refusal_within_ms) == 1 && ::getsockopt(socket.fd(), SOL_SOCKET, SO_ERROR, &error, &size) == 0 &&
+         error == ECONNREFUSED;
+}
+
 StatusListener::StatusListener(const Endpoint& on) {
   facts_.on = on;
   const auto address = address_of(on);
@@ -148,15 +160,17 @@ void StatusListener::listen(const std::string& host, Steady::time_point deadline
 }
 
 void StatusListener::add(const std::string& from, std::span<const std::byte> datagram) {
-  const auto status = oculus::decode_status(datagram);
+  std::optional<protocol::Announcement> status;
+  for (const protocol::Make& make : protocol::makes())
+    if (!status && make.announced != nullptr) status = make.announced(datagram);
   if (!status) return;  // not a status message
   ReceivedStatus received;
   received.from = from;
-  received.advertised = text::format_ipv4(status->ip_address);
-  if (status->connected_ip != std::array<std::uint8_t, 4>{}) received.client = text::format_ipv4(status->connected_ip);
+  received.advertised = text::format_ipv4(status->address);
+  if (status->client != protocol::Ipv4{}) received.client = text::format_ipv4(status->client);
   received.device_id = status->device_id;
   received.size = datagram.size();
-  received.complaints = oculus::status_violations(*status, datagram.size());
+  received.complaints = status->complaints;
   const auto known = std::find_if(facts_.received.begin(), facts_.received.end(), [&received](const ReceivedStatus& h) {
     return h.from == received.from && h.advertised == received.advertised;
   });
@@ -172,32 +186,26 @@ DiscoveryQuestion::DiscoveryQuestion(const std::vector<std::string>& hosts) {
   socket_.emplace(udp_socket());
   const int yes = 1;
   ::setsockopt(socket_->fd(), SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
-  wire::Bytes question;
-  const blueview::Put put(question);
-  put("mark", blueview::discovery_question);
-  put("version", blueview::protocol_version);
   const std::vector<std::string> everywhere{"127.255.255.255", "255.255.255.255"};
-  for (const std::string& host : hosts.empty() ? everywhere : hosts)
-    if (const auto to = address_of({host, blueview::discovery_port}))
-      ::sendto(socket_->fd(), question.data(), question.size(), 0, generic(*to),
-               sizeof *to);  // fails without a network: then no answer arrives
+  for (const protocol::Make& make : protocol::makes()) {
+    if (make.search == nullptr) continue;
+    const wire::Bytes question = make.search->question();
+    for (const std::string& host : hosts.empty() ? everywhere : hosts)
+      if (const auto to = address_of({host, make.search->port}))
+        ::sendto(socket_->fd(), question.data(), question.size(), 0, generic(*to),
+                 sizeof *to);  // fails without a network: then no answer arrives
+  }
 }
 
-void DiscoveryQuestion::receive_answers(std::vector<BlueViewHead>& heads, Steady::time_point deadline) const {
-  while (const auto datagram = receive(*socket_, heads.empty() ? deadline : Steady::now())) {
-    wire::Reader reader(datagram->bytes);
-    std::array<std::uint8_t, 4> mark{};
-    std::uint16_t version = 0, port = 0;
-    reader("mark", mark);
-    reader("version", version);
-    reader("port", port);
-    BlueViewHead head;
-    head.model = blueview::read_text(reader, "model");
-    head.serial = blueview::read_text(reader, "serial");
-    if (!reader.ok() || mark != blueview::discovery_answer) continue;
-    head.at = datagram->from + ":" + std::to_string(port);
-    const bool known = std::any_of(heads.begin(), heads.end(), [&head](const BlueViewHead& h) { return h.at == head.at; });
-    if (!known) heads.push_back(std::move(head));
+void DiscoveryQuestion::receive_answers(std::vector<FoundSonar>& found, Steady::time_point deadline) const {
+  while (const auto datagram = receive(*socket_, found.empty() ? deadline : Steady::now())) {
+    for (const protocol::Make& make : protocol::makes()) {
+      const auto answer = make.search != nullptr ? make.search->answer(datagram->bytes) : std::nullopt;
+      if (!answer) continue;
+      const std::string at = datagram->from + ":" + std::to_string(answer->port);
+      if (std::none_of(found.begin(), found.end(), [&at](const FoundSonar& f) { return f.at == at; }))
+        found.push_back({&make, at, answer->about});
+    }
   }
 }
 

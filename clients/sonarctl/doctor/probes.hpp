@@ -21,6 +21,9 @@ bool is_on_this_host(const std::string& ipv4);
 bool is_in_our_network(const std::string& ipv4);
 Machine this_machine();
 
+/// No program listens at this TCP port: its computer says so at once.
+bool refuses(const Endpoint& at);
+
 /// Receives status messages and sorts them, also those that arrive during other queries.
 class StatusListener {
  public:
@@ -39,12 +42,13 @@ class StatusListener {
   StatusFacts facts_;
 };
 
-/// Broadcasts on this computer and its networks, or asks `hosts` alone (IPv4); answers are read by `receive_answers`.
+/// Searches for sonars of every make that can be searched: on this computer and its networks, or at `hosts` alone (IPv4); answers
+/// are read by `receive_answers`.
 class DiscoveryQuestion {
  public:
   explicit DiscoveryQuestion(const std::vector<std::string>& hosts);
-  /// Adds new heads; waits for the first answer until `deadline`.
-  void receive_answers(std::vector<BlueViewHead>& heads, Steady::time_point deadline) const;
+  /// Adds new sonars; waits for the first answer until `deadline`.
+  void receive_answers(std::vector<FoundSonar>& found, Steady::time_point deadline) const;
 
  private:
   std::optional<Socket> socket_;

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/doctor/probes.hpp"
 #include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
@@ -104,10 +105,10 @@ class Watch {
 };
 
 /// Of a failed connection or greeting of a head.
-Outcome outcome_of(const Error& error) {
+Outcome outcome_of(const Error& error, const Endpoint& at) {
   if (error.kind == ErrorKind::io) return Outcome::closed_without_a_byte;
   if (error.kind == ErrorKind::bad_data) return Outcome::no_ping;
-  return error.text.find("refused") != std::string::npos ? Outcome::refused : Outcome::unreachable;
+  return refuses(at) ? Outcome::refused : Outcome::unreachable;
 }
 
 void set_latency(SonarFacts& sonar, const std::vector<double>& delays_s, ControlFacts& clocks) {
@@ -132,7 +133,7 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
       PingStream::open(sonar.at, sonar.make, wanted, std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
   if (!stream) {
     facts.error = stream.error().text;
-    facts.outcome = outcome_of(stream.error());
+    facts.outcome = outcome_of(stream.error(), sonar.at);
     return;
   }
   facts.own = stream->own();

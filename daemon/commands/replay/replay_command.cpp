@@ -12,15 +12,13 @@ namespace sonar {
 void add_replay_options(CLI::App& app, ReplayCommand& replay) {
   app.footer(
       "examples:\n"
-      "  sonard replay run.oculus                          at 127.0.0.2, at the pace it was recorded with\n"
+      "  sonard replay run.pcap                            at 127.0.0.2, at the pace it was recorded with\n"
       "  sonard replay capture.pcapng --speed 4 --loop\n"
       "  sonard replay run.mcap --stepped                  as fast as the driver reads\n"
       "Ends when a driver has had the whole recording, or, with --loop, by Ctrl-C.");
-  app.add_option("file", replay.file, "recording: .oculus log, raw dump, pcap, pcapng, MCAP, .aris, .sonar or .svlog")
-      ->required();
+  app.add_option("file", replay.file, "recording: pcapng, " + recording::file_endings())->required();
   app.add_option("--ip", replay.ip, "address to serve it at, one of this computer's")->capture_default_str();
-  app.add_option("--port", replay.port, "TCP port (default: the sonar's, 52100 of an Oculus)")
-      ->check(text::whole_number(1, 65535));
+  app.add_option("--port", replay.port, "TCP port (default: the sonar's)")->check(text::whole_number(1, 65535));
   app.add_option("--status-to", replay.status_to,
                  "IP or IP:PORT for status datagrams (default: broadcast of the address's network)");
   CLI::Option* speed = app.add_option("--speed", replay.speed, "2 = twice as fast as recorded")
@@ -89,7 +87,7 @@ Result<void> run_replay(const ReplayCommand& command) {
   ReplayServer server(io, *opened->reader, *device, *options, log);
   if (auto listening = server.open(); !listening) return listening;
   if (!opened->reader->note().empty()) log.info(opened->reader->note());
-  log.announce(std::string("replaying ") + command.file + " (" + recording::name_of(opened->format) + ") as " + device->name() +
+  log.announce(std::string("replaying ") + command.file + " (" + std::string(opened->format) + ") as " + device->name() +
                " on tcp " + text_of(server.at()) + "; Ctrl-C stops\n");
   server.start();
   io.run();

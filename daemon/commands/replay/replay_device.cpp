@@ -1,72 +1,26 @@
 #include "daemon/commands/replay/replay_device.hpp"
 
 #include "daemon/server/time/clock.hpp"
-#include "protocol/aris/aris.hpp"
-#include "protocol/aris/encode_frame.hpp"
-#include "protocol/aris/models.hpp"
+#include "protocol/host.hpp"
 #include "protocol/oculus/decode.hpp"
-#include "protocol/ping/messages.hpp"
-#include "protocol/ping/omniscan.hpp"
-#include "protocol/ping/surveyor.hpp"
-#include "protocol/waterlinked/rip.hpp"
-#include "protocol/waterlinked/waterlinked.hpp"
+#include "protocol/oculus/oculus.hpp"
 
 namespace sonar {
 namespace {
 
 constexpr std::uint64_t most_looked_at_bytes = 64u << 20;  // a status comes every second
 
-void take(ReplayDevice& device, const protocol::Vendor& vendor, std::shared_ptr<const SonarModel> model) {
-  device.vendor = &vendor;
+/// A sonar that answers its hosts.
+void take(ReplayDevice& device, const recording::SentBy& by) {
+  device.vendor = by.make->device;
   device.state = std::make_shared<protocol::DeviceState>();
-  device.state->model = std::move(model);
-  if (const auto options = check_options(vendor, {})) device.state->options = *options;
-}
-
-/// The ARIS that sent this datagram; none: it is not the first of a frame, or of no known product.
-void take_aris(ReplayDevice& device, const protocol::Bytes& datagram) {
-  aris::FramePart part;
-  if (!aris::protobuf::read(datagram, part) || !part.header || part.header->size() < aris::header_size) return;
-  aris::FrameHeader header;
-  wire::Reader reader(*part.header);
-  fields(reader, header);
-  for (const auto& model : aris::vendor().models()) {
-    if (static_cast<std::uint32_t>(aris::product_of(*model).system) != header.system) continue;
-    device.serial = header.serial;
-    return take(device, aris::vendor(), model);
+  device.state->model = by.sender.model;
+  if (device.http() != nullptr) {  // its resources hold both
+    device.state->id = 1;
+    device.state->powered_up_at = Clock::system_wall();
   }
-}
-
-std::optional<ping::Header> ping_header(const protocol::Bytes& message) {
-  ping::Header header;
-  wire::Reader reader(message);
-  fields(reader, header);
-  return reader.ok() && header.start == ping::Header{}.start ? std::optional(header) : std::nullopt;
-}
-
-/// The sonar of the ping protocol that sends such frames; none: several kinds do.
-void take_ping(ReplayDevice& device, const protocol::Bytes& message) {
-  const auto found = ping_header(message);
-  if (!found) return;
-  const ping::Header& header = *found;
-  if (header.id == ping::Id::atof_point_data || header.id == ping::Id::yz_point_data)
-    take(device, ping::surveyor::vendor(), ping::surveyor::vendor().models().front());
-  if (header.id == ping::Id::os_mono_profile) take(device, ping::omniscan::vendor(), ping::omniscan::vendor().models().front());
-}
-
-/// A Sonar 3D-15, whose packets do not tell which.
-void take_3d15(ReplayDevice& device, const protocol::Bytes& datagram) {
-  if (waterlinked::rip_length(datagram) != datagram.size()) return;
-  take(device, waterlinked::vendor(), waterlinked::vendor().models().front());
-  device.state->id = 1;
-  device.state->powered_up_at = Clock::system_wall();
-}
-
-/// By what a device sent; none: another packet may tell.
-void take_sender(ReplayDevice& device, const recording::RecordedMessage& message) {
-  if (message.by == recording::Carrier::stream) return take_ping(device, message.bytes);
-  take_3d15(device, message.bytes);
-  if (device.vendor == nullptr) take_aris(device, message.bytes);
+  device.serial = by.sender.serial;
+  if (const auto options = check_options(*device.vendor, {})) device.state->options = *options;
 }
 
 }  // namespace
@@ -105,14 +59,20 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   ReplayDevice device;
   std::optional<std::uint16_t> id;
   std::uint64_t looked_at = 0;
-  bool speaks_ping = false;  // as a Ping360 does
+  const protocol::Make* unserved = nullptr;  // whose pings depend on the requests of its host
   while (auto message = reader.next()) {
     looked_at += message->bytes.size();
     if (looked_at > most_looked_at_bytes || (id && device.recorded_status)) break;
     if (message->from != recording::Origin::device) continue;
-    take_sender(device, *message);
-    if (device.vendor != nullptr) break;
-    speaks_ping = speaks_ping || ping_header(message->bytes).has_value();
+    const auto by = recording::sender_of(*message);
+    if (by && (by->make->each_ping_requested || by->make->scans)) {
+      unserved = by->make;
+      break;
+    }
+    if (by && by->make->device != &oculus::vendor()) {
+      take(device, *by);
+      break;
+    }
     if (message->bytes.size() < oculus::header_size) continue;
     const oculus::MessageHeader header = oculus::header_of(message->bytes);
     if (header.oculus_id != oculus::magic) continue;
@@ -126,11 +86,10 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   const auto damage = reader.damage();
   reader.rewind();
   if (device.vendor != nullptr) return device;
-  if (!id && speaks_ping)
-    return failure(ErrorKind::bad_data,
-                   file +
-                       " holds messages of the ping protocol, but no points and no profile: pings of a Surveyor "
-                       "or an Omniscan can be replayed, those of a Ping360 cannot");
+  if (unserved != nullptr)
+    return failure(ErrorKind::bad_data, file + " holds pings of " + std::string(unserved->title) +
+                                            ", which depend on the requests of its host: they cannot be replayed; see them with "
+                                            "sonarctl view --from");
   if (!id)
     return failure(ErrorKind::bad_data, file + " holds no message of a sonar" + (damage ? ": " + damage->text : std::string()));
   if (!device.recorded_status) {

@@ -68,7 +68,6 @@ enum class FaultEffect {
   outbox_policy,
   beacon_field,
   heat,
-  stop_pings,
   // status messages
   no_beacon,
   beacon_size,
@@ -89,12 +88,10 @@ enum class FaultEffect {
   dead_beams,
   spokes,
   gain_step,
-  drop_samples,
   mirror,
   missing_rows,
   scale_range,
   intermittent,
-  shift_rows,
   // datagrams of a ping
   lose_part,
   reorder_parts,

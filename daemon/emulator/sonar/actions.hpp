@@ -71,6 +71,7 @@ struct Closed {
   bool served = false;  // else it waited for a slot
   std::uint64_t pings_written = 0, pings_dropped = 0;
   std::string why;
+  bool by_client = false;  // it left
 };
 /// The status broadcast has news: send it now.
 struct Announce {};

@@ -57,7 +57,7 @@ class Sonar {
   /// The caller ends the connection after the message being written.
   void finish(ConnectionId id);
   /// The connection is closed; also one that waited. `why` is for the log.
-  Actions on_closed(ConnectionId id, const std::string& why, Time now);
+  Actions on_closed(ConnectionId id, const std::string& why, Time now, bool by_client = false);
   /// The caller had no slot for a client that connected.
   void count_refused_client() { ++figures_.refused_clients; }
   /// Every connection is finished and no ping requested any more; `why` is for the log.

@@ -152,7 +152,7 @@ Sonar::HttpAnswer Sonar::on_http(const protocol::Port& port, const protocol::Res
 
 // ---- the end of a connection
 
-Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
+Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool by_client) {
   Actions actions;
   Connection* const connection = connections_.find(id);
   if (connection == nullptr) return actions;
@@ -161,7 +161,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now) {
   for (Connection::Held& held : connection->held) connection->outbox.push_ping(std::move(held.ping));
   connection->outbox.end(connection->finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection->peer.name, connection->role, connection->state != Connection::State::waiting,
-                              connection->pings_written(), connection->outbox.pings_dropped(), why});
+                              connection->pings_written(), connection->outbox.pings_dropped(), why, by_client});
   if (connection->role != Role::observer) add_traffic(figures_, *connection);
   connections_.remove(id);
   if (connection_role == Role::stream) update_pacer(now);

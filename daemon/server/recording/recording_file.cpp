@@ -1,13 +1,10 @@
 #include "daemon/server/recording/recording_file.hpp"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
-#include "protocol/recording/aris_file.hpp"
-#include "protocol/recording/oculus_log.hpp"
-#include "protocol/recording/ping_log.hpp"
 #include "protocol/recording/raw_dump.hpp"
+#include "protocol/recording/recording.hpp"
 
 namespace sonar {
 namespace {
@@ -17,13 +14,18 @@ using Kind = RecordingFile::Kind;
 
 constexpr std::size_t longest_name = 128;
 constexpr auto status_period = std::chrono::seconds(1);
-constexpr std::array<std::pair<std::string_view, Kind>, 7> endings{{{".mcap", Kind::mcap},
-                                                                    {".pcap", Kind::pcap},
-                                                                    {".oculus", Kind::oculus_log},
-                                                                    {".raw", Kind::raw_dump},
-                                                                    {".aris", Kind::aris},
-                                                                    {".sonar", Kind::sonar},
-                                                                    {".svlog", Kind::ping_log}}};
+constexpr const char* another_kind = ", and this is a sonar of another kind: end the name in .mcap";
+
+const protocol::Make& make_of(std::string_view vendor) {
+  const protocol::Make* const found = protocol::find_make(vendor);
+  return found != nullptr ? *found : protocol::makes().front();
+}
+
+/// All that it sends of a ping, as it is sent.
+bool is_one_stream(const protocol::Make& make) {
+  return make.codec.framing != nullptr && !make.each_ping_requested &&
+         make.device->port(protocol::Port::Kind::udp_stream) == nullptr;
+}
 
 bool may_stand_in_name(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
@@ -59,33 +61,36 @@ std::size_t RecordedPing::size() const {
          ping->request.bodies_in_world.size() * sizeof(Pose);
 }
 
+const recording::FileKind RecordingFile::mcap{.ending = ".mcap", .name = "MCAP", .holds = "pings of any sonar"};
+const recording::FileKind RecordingFile::pcap{.ending = ".pcap", .name = "capture", .holds = "pings that are one stream"};
+const recording::FileKind RecordingFile::raw_dump{
+    .ending = ".raw",
+    .name = "raw dump",
+    .holds = "pings that are one stream",
+    .write = [](std::unique_ptr<recording::Sink> sink) { return recording::write_raw_dump(std::move(sink)); }};
+
 Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vendor) {
-  const auto ending = std::find_if(endings.begin(), endings.end(), [&](const auto& e) { return name.ends_with(e.first); });
-  const auto refuse = [&](const char* why) {
-    std::string text = "\"";
-    text.append(name.substr(0, longest_name)).append("\": ").append(why);
-    return failure(ErrorKind::usage, std::move(text));
+  const auto refuse = [&](const std::string& why) {
+    return failure(ErrorKind::usage, "\"" + std::string(name.substr(0, longest_name)) + "\": " + why);
   };
   if (name.size() > longest_name || name.empty() || name.front() == '.' ||
       !std::all_of(name.begin(), name.end(), may_stand_in_name))
     return refuse("the name of a recording has letters, digits, - _ and . only, 128 at most, and no folder: run-1.mcap");
   if (name.front() == '-')
     return refuse("the name of a recording does not begin with -, which every program takes for an option: run-1.mcap");
-  if (ending == endings.end())
-    return refuse("name the kind of file by its end: .mcap, .pcap, .oculus, .raw, .aris, .sonar or .svlog");
-  if (ending->second == Kind::mcap) return ending->second;
-  if (ending->second == Kind::aris && vendor != "aris")
-    return refuse("such files hold frames of an ARIS, and this is a sonar of another kind: end the name in .mcap");
-  if (ending->second == Kind::sonar && vendor != "waterlinked")
-    return refuse("such files hold images of a Sonar 3D-15, and this is a sonar of another kind: end the name in .mcap");
-  if (ending->second == Kind::ping_log && vendor != "surveyor240" && vendor != "omniscan450")
-    return refuse(
-        "such files hold frames of a Surveyor or an Omniscan, and this is a sonar of another kind: end the name in .mcap");
-  const bool of_another_vendor =
-      ending->second == Kind::aris || ending->second == Kind::sonar || ending->second == Kind::ping_log;
-  if (!of_another_vendor && vendor != "oculus")
-    return refuse("such files hold Oculus messages, and this is a sonar of another kind: end the name in .mcap");
-  return ending->second;
+  if (name.ends_with(mcap.ending)) return &mcap;
+  const protocol::Make& own = make_of(vendor);
+  for (const Kind kind : {&pcap, &raw_dump}) {
+    if (!name.ends_with(kind->ending)) continue;
+    if (is_one_stream(own)) return kind;
+    return refuse("such files hold " + std::string(kind->holds) + another_kind);
+  }
+  for (const recording::FileKind& kind : own.codec.files)
+    if (name.ends_with(kind.ending)) return &kind;
+  for (const protocol::Make& make : protocol::makes())
+    for (const recording::FileKind& kind : make.codec.files)
+      if (name.ends_with(kind.ending)) return refuse("such files hold " + std::string(kind.holds) + another_kind);
+  return refuse("name the kind of file by its end: " + recording::file_endings());
 }
 
 Result<std::unique_ptr<RecordingFile>> RecordingFile::create(const std::filesystem::path& file, Kind kind,
@@ -96,29 +101,19 @@ Result<std::unique_ptr<RecordingFile>> RecordingFile::create(const std::filesyst
 }
 
 RecordingFile::RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, const RecordedSonar& sonar, bool labels)
-    : kind_(kind), vendor_(sonar.vendor), labels_(labels) {
+    : kind_(kind), make_(&make_of(sonar.vendor)), labels_(labels) {
   auto counted = std::make_unique<CountedSink>(std::move(sink), bytes_);
-  if (kind == Kind::pcap) {
-    writer_ = recording::write_pcap(std::move(counted), sonar.ends);
-  } else if (kind == Kind::oculus_log) {
-    writer_ = recording::write_oculus_log(std::move(counted));
-  } else if (kind == Kind::aris) {
-    writer_ = recording::write_aris_file(std::move(counted));
-  } else if (kind == Kind::sonar) {  // its datagrams, back to back
-    writer_ = recording::write_raw_dump(std::move(counted), recording::Carrier::datagram);
-  } else if (kind == Kind::ping_log) {
-    writer_ = recording::write_ping_log(std::move(counted));
-  } else if (kind == Kind::raw_dump) {
-    writer_ = recording::write_raw_dump(std::move(counted));
-  } else {
-    auto session = std::make_unique<recording::McapSession>(std::move(counted), sonar.name, sonar.vendor);
+  if (kind == &mcap) {
+    auto session = std::make_unique<recording::McapSession>(std::move(counted), sonar.name, *make_);
     mcap_ = session.get();
     writer_ = std::move(session);
+  } else {
+    writer_ = kind == &pcap ? recording::write_pcap(std::move(counted), sonar.ends) : kind->write(std::move(counted));
   }
 }
 
 Result<void> RecordingFile::write(const RecordedPing& ping) {
-  const bool keeps_status = kind_ == Kind::mcap || kind_ == Kind::pcap;
+  const bool keeps_status = kind_ == &mcap || kind_ == &pcap;
   if (keeps_status && !ping.status.empty() && (!status_at_ || ping.at - *status_at_ >= status_period)) {
     status_at_ = ping.at;
     if (Result<void> put_it = put({ping.at, Origin::device, recording::Carrier::datagram, ping.status}); !put_it) return put_it;
@@ -140,7 +135,7 @@ Result<void> RecordingFile::put(recording::RecordedMessage message) {
 
 Result<void> RecordingFile::put_truth(const RecordedPing& ping) {
   const PingRequest& request = ping.ping->request;
-  if (vendor_ != "oculus")  // whose messages the session reads itself
+  if (make_->codec.samples == nullptr)  // else the session reads them from the messages
     if (Result<void> written = mcap_->write_image(ping.at, ping.ping); !written) return written;
   if (Result<void> written = mcap_->write_pose(ping.at, request.fired_at, request.sonar_in_world); !written) return written;
   recording::mcap::PingTruth truth;

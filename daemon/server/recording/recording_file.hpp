@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/sonar/ping.hpp"
+#include "protocol/host.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/vendor.hpp"
@@ -36,15 +37,17 @@ struct RecordedPing {
 struct RecordedSonar {
   std::string name, vendor;
   recording::PcapConversation ends;  // for the headers of a capture
+  bool has_range_images = false;     // which have no labels
 };
 
 class RecordingFile {
  public:
-  enum class Kind { mcap, pcap, oculus_log, raw_dump, aris, sonar, ping_log };
+  /// One of the three below, or a row of a make's Codec::files.
+  using Kind = const recording::FileKind*;
+  static const recording::FileKind mcap, pcap, raw_dump;
 
-  /// Kind of a file's name: letters, digits, - _ and . that does not begin it, at most 128, ending in .mcap, .pcap, .oculus,
-  /// .raw, .aris, .sonar or .svlog. An error for another name; .aris is of the ARIS family only, .sonar of Water Linked, .svlog
-  /// of a Surveyor, the others but .mcap of the Oculus family.
+  /// Kind of a file's name: letters, digits, - _ and . that does not begin it, at most 128, ending in .mcap or as files of this
+  /// vendor do; for one whose pings are a stream also in .pcap or .raw. An error for another name.
   static Result<Kind> kind_of(std::string_view name, std::string_view vendor);
   /// `labels`: in MCAP, of pings that have them. io; a file that is there already is not touched.
   static Result<std::unique_ptr<RecordingFile>> create(const std::filesystem::path& file, Kind kind, const RecordedSonar& sonar,
@@ -71,7 +74,7 @@ class RecordingFile {
   Result<void> put_truth(const RecordedPing& ping);
 
   Kind kind_;
-  std::string vendor_;
+  const protocol::Make* make_;
   bool labels_;
   std::shared_ptr<std::uint64_t> bytes_ = std::make_shared<std::uint64_t>(0);
   std::unique_ptr<recording::RecordingWriter> writer_;

@@ -14,8 +14,8 @@ std::vector<LogField> fields_of(const v1::RecordingStatus& status) {
 }
 
 std::string why_without_labels(RecordingFile::Kind kind, const RecordedSonar& sonar, const Switches& switches) {
-  if (kind != RecordingFile::Kind::mcap) return "labels are recorded in MCAP only: end the name in .mcap";
-  if (sonar.vendor == "waterlinked") return "range images have no labels; the file's truth is what each column sees";
+  if (kind != &RecordingFile::mcap) return "labels are recorded in MCAP only: end the name in .mcap";
+  if (sonar.has_range_images) return "range images have no labels; the file's truth is what each column sees";
   if (switches.mode != Mode::canonical || switches.fixed_fan > 0)
     return "labels need the canonical model: sonard was started with another mode or a fixed fan";
   return {};
@@ -171,7 +171,7 @@ bool Recordings::takes(const std::string& sonar) const {
 
 bool Recordings::wants_truth(const std::string& sonar) const {
   return std::any_of(recordings_.begin(), recordings_.end(), [&](const Pointer& r) {
-    return r->state == Recording::State::running && r->status.sonar() == sonar && r->kind == RecordingFile::Kind::mcap;
+    return r->state == Recording::State::running && r->status.sonar() == sonar && r->kind == &RecordingFile::mcap;
   });
 }
 

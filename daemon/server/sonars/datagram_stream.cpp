@@ -13,7 +13,7 @@ void DatagramStream::start() {
       socket_.get_executor(), [self] { return self->send(); },
       [self](std::exception_ptr fault) {
         if (fault) self->parent_.on_fault(text_of(fault));
-        self->parent_.on_over(self->id_, fault ? "an internal fault" : self->why_);
+        self->parent_.on_over(self->id_, fault ? "an internal fault" : self->why_, false);
       });
 }
 

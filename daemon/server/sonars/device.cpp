@@ -226,7 +226,7 @@ void Device::on_send_error(const Endpoint& to, const std::string& why) {
               {{"sonar", config().name}, {"to", text_of(to)}});
 }
 
-void Device::on_over(ConnectionId id, const std::string& why) {
+void Device::on_over(ConnectionId id, const std::string& why, bool by_client) {
   const Connection* const connection = sonar_.connections().find(id);
   const SessionPointer session = session_of(id);
   if (network_.digest && session && connection != nullptr && connection->role == Role::client)
@@ -234,7 +234,7 @@ void Device::on_over(ConnectionId id, const std::string& why) {
   sessions_.remove(session);
   streams_.remove_if([id](const StreamPointer& s) { return s->id() == id; });
   forget_who_left();
-  perform(sonar_.on_closed(id, why, network_.clock.now()));
+  perform(sonar_.on_closed(id, why, network_.clock.now(), by_client));
 }
 
 std::vector<StreamDigest> Device::digests() const {
@@ -375,7 +375,9 @@ void Device::carry_out(const Closed& action) {
   } else if (action.role == Role::observer) {
     report_visit(Role::observer, VisitLog::Kind::gone, "observer gone: " + action.why, {{"observer", action.peer}});
   } else {
-    gone_ = Visit{action.peer, action.why + std::string(action.pings_written == 0 ? doctor::before_first_ping : "")};
+    gone_ = Visit{action.peer, action.why};
+    gone_->by_itself = action.by_client;
+    gone_->without_ping = action.pings_written == 0;
     report_visit(Role::client, VisitLog::Kind::gone, "client gone: " + action.why,
                  {{"client", action.peer}, {"pings", action.pings_written}, {"dropped", action.pings_dropped}});
     parent_.on_client(*this, action.peer, false, action.why);

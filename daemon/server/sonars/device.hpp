@@ -71,6 +71,7 @@ struct StreamDigest {
 struct Visit {
   std::string address, why;
   std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
+  bool by_itself = false, without_ping = false;
 };
 
 class Device final : public SessionParent {
@@ -136,7 +137,7 @@ class Device final : public SessionParent {
   void on_finish(ConnectionId session) override { sonar_.finish(session); }
   void on_fault(const std::string& what) override;
   void on_send_error(const Endpoint& to, const std::string& why) override;
-  void on_over(ConnectionId session, const std::string& why) override;
+  void on_over(ConnectionId session, const std::string& why, bool by_client) override;
 
  private:
   using SessionPointer = std::shared_ptr<Session>;

@@ -1,6 +1,7 @@
 // A Device as the control protocol sees it: what it says of itself, and what may be asked of it while it runs.
 #include <algorithm>
 
+#include "core/sonar/range_image.hpp"
 #include "core/text/ipv4.hpp"
 #include "daemon/server/sonars/device.hpp"
 #include "protocol/control/answers.hpp"
@@ -30,6 +31,8 @@ v1::Visit message_of(const Visit& visit) {
   out.set_why(visit.why);
   out.set_utc_ns(std::chrono::nanoseconds(visit.at.time_since_epoch()).count());
   out.set_ago_s(seconds(std::chrono::system_clock::now() - visit.at));
+  out.set_by_itself(visit.by_itself);
+  out.set_without_ping(visit.without_ping);
   return out;
 }
 
@@ -115,6 +118,8 @@ RecordedSonar Device::recorded() const {
   RecordedSonar sonar{config().name, std::string(sonar_.vendor().name()), {}};
   sonar.ends.device = {text::number_from_ipv4(sonar_.state().advertise_ip), data_endpoint().port};
   sonar.ends.status_from.address = sonar.ends.device.address;
+  const auto first = sonar_.vendor().initial_settings(sonar_.state());
+  sonar.has_range_images = dynamic_cast<const RangeImageSettings*>(first.vendor_settings.get()) != nullptr;
   if (const Connection* const client = sonar_.connections().oldest_client())
     sonar.ends.client.address = text::number_from_ipv4(client->peer.ip);
   return sonar;

@@ -76,7 +76,7 @@ asio::awaitable<void> Session::read() {
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(received_), into(ec));
     if (over_) co_return;
     if (ec) {
-      over(finishing_ ? why_ : reason(ec));
+      over_after(ec);
       co_return;
     }
     while (!reading_ && !finishing_ && !over_) co_await rest(never);
@@ -285,10 +285,18 @@ void Session::end_if_closed() {
   socklen_t size = sizeof fault;
   ::getsockopt(socket_.native_handle(), SOL_SOCKET, SO_ERROR, &fault, &size);
   ec = fault == 0 ? error_code(asio::error::eof) : error_code(fault, boost::system::system_category());
-  over(finishing_ ? why_ : reason(ec));
+  over_after(ec);
 }
 
-void Session::over(std::string why) {
+void Session::over_after(const error_code& ec) {
+  const bool left = ec == asio::error::eof || ec == asio::error::connection_reset || ec == asio::error::broken_pipe;
+  if (finishing_)
+    over(why_);
+  else
+    over(reason(ec), left);
+}
+
+void Session::over(std::string why, bool by_client) {
   if (std::exchange(over_, true)) return;
   error_code ec;
   socket_.close(ec);
@@ -296,7 +304,7 @@ void Session::over(std::string why) {
   wake_writer_.cancel();
   wake_watch_.cancel();
   pause_.cancel();
-  parent_.on_over(setup_.id, why);
+  parent_.on_over(setup_.id, why, by_client);
 }
 
 }  // namespace sonar

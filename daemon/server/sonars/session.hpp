@@ -45,7 +45,8 @@ class SessionParent {
   virtual void on_fault(const std::string& what) = 0;
   /// A datagram could not be sent.
   virtual void on_send_error(const Endpoint& to, const std::string& why) = 0;
-  virtual void on_over(ConnectionId session, const std::string& why) = 0;
+  /// `by_client`: it left; the daemon did not end the connection.
+  virtual void on_over(ConnectionId session, const std::string& why, bool by_client) = 0;
 };
 
 class Session : public std::enable_shared_from_this<Session> {
@@ -105,7 +106,8 @@ class Session : public std::enable_shared_from_this<Session> {
   bool is_silent(Steady::time_point now) const;
   bool has_all(Steady::time_point now);
   void send_fin();
-  void over(std::string why);
+  void over(std::string why, bool by_client = false);
+  void over_after(const error_code& ec);
   void spawn(asio::awaitable<void> (Session::*part)());
 
   SessionParent& parent_;

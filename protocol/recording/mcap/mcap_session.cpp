@@ -4,12 +4,10 @@
 #include <set>
 
 #include "protocol/foxglove/foxglove_messages.hpp"
-#include "protocol/oculus/decode.hpp"
 
 namespace sonar::recording {
 namespace {
 
-constexpr const char* replayed_encoding = "oculus";  // of opaque messages: the vendor whose recordings are read
 constexpr std::size_t most_names = 16;
 constexpr const char* world = "world";  // the frame of poses
 
@@ -17,17 +15,6 @@ Bytes bytes_of(const std::string& text) {
   Bytes bytes(text.size());
   std::transform(text.begin(), text.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
   return bytes;
-}
-
-/// Full scale is the largest code of that many bits: the message does not state another.
-foxglove::Image image_of(const oculus::DecodedPing& ping) {
-  const auto codes = std::make_shared<Bytes>();
-  for (std::size_t row = 0; row < ping.rows(); ++row) {
-    const BytesView samples = ping.row_samples(row);
-    codes->insert(codes->end(), samples.begin(), samples.end());
-  }
-  const int bits = static_cast<int>(8 * ping.bytes_per_sample());
-  return foxglove::image_of(ping.beams(), ping.rows(), bits, 0xFFFFFFFFu >> (32 - bits), codes);
 }
 
 class McapRecordingReader final : public RecordingReader {
@@ -38,7 +25,7 @@ class McapRecordingReader final : public RecordingReader {
   std::optional<RecordedMessage> next() override {
     while (auto message = reader_.next()) {
       const mcap::Channel& channel = reader_.channels().at(message->channel);
-      if (channel.message_encoding != replayed_encoding) continue;
+      if (protocol::find_make(channel.message_encoding) == nullptr) continue;
       const auto metadata = [&channel](const char* key) {
         const auto found = channel.metadata.find(key);
         return found == channel.metadata.end() ? std::string() : found->second;
@@ -72,10 +59,11 @@ class McapRecordingReader final : public RecordingReader {
 
 }  // namespace
 
-McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::string vendor)
-    : writer_(std::move(sink)), sonar_(std::move(sonar)), vendor_(std::move(vendor)) {
+McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make)
+    : writer_(std::move(sink)), sonar_(std::move(sonar)), make_(&make) {
   device_ = vendor_channel("device", "device", "tcp");
-  client_ = vendor_channel("client", "client", "tcp");
+  const bool by_udp = make.ports.front().kind == protocol::HostPort::Kind::udp;
+  client_ = vendor_channel("client", "client", by_udp ? "udp" : "tcp");
   status_ = vendor_channel("status", "device", "udp");
   image_ = protobuf_channel("/" + sonar_ + "/image", "foxglove.RawImage");
   pose_ = protobuf_channel("/" + sonar_ + "/pose", "foxglove.PoseInFrame");
@@ -91,8 +79,8 @@ McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::str
 std::uint16_t McapSession::vendor_channel(const char* topic, const char* from, const char* carrier) {
   mcap::Channel channel;
   channel.topic = std::string("/") + sonar_ + "/" + topic;
-  channel.message_encoding = vendor_;
-  channel.metadata = {{"vendor", vendor_}, {"sonar", sonar_}, {"from", from}, {"carrier", carrier}};
+  channel.message_encoding = make_->name();
+  channel.metadata = {{"vendor", channel.message_encoding}, {"sonar", sonar_}, {"from", from}, {"carrier", carrier}};
   return writer_.add_channel(std::move(channel));
 }
 
@@ -115,11 +103,9 @@ std::uint16_t McapSession::json_channel(const std::string& topic, const mcap::Js
 Result<void> McapSession::write(const RecordedMessage& message) {
   const std::uint16_t channel = message.from == Origin::client ? client_ : message.by == Carrier::datagram ? status_ : device_;
   if (Result<void> written = writer_.write(channel, message.at, message.bytes); !written) return written;
-  if (vendor_ != replayed_encoding || channel != device_ || message.bytes.size() < oculus::header_size) return {};
-  if (oculus::header_of(message.bytes).type != oculus::MessageType::ping_result) return {};
-  const auto ping = oculus::decode_ping(message.bytes);
-  if (!ping || !ping->has_image) return {};
-  return writer_.write(image_, message.at, foxglove::raw_image(message.at, sonar_, image_of(*ping)));
+  if (channel != device_ || make_->codec.samples == nullptr) return {};
+  const auto samples = make_->codec.samples(message.bytes);
+  return samples ? write_image(message.at, *samples) : Result<void>{};
 }
 
 Result<void> McapSession::write_pose(Time at, Time of, const Pose& sonar_in_world) {
@@ -130,6 +116,13 @@ Result<void> McapSession::write_pose(Time at, Time of, const Pose& sonar_in_worl
 
 Result<void> McapSession::write_image(Time at, const std::shared_ptr<const Ping>& ping) {
   return writer_.write(image_, at, foxglove::raw_image(at, sonar_, foxglove::image_of(ping)));
+}
+
+/// Full scale is the largest code of that many bits: messages do not state another.
+Result<void> McapSession::write_image(Time at, const Samples& samples) {
+  const auto image =
+      foxglove::image_of(samples.beams, samples.rows, samples.bits, 0xFFFFFFFFu >> (32 - samples.bits), samples.codes);
+  return writer_.write(image_, at, foxglove::raw_image(at, sonar_, image));
 }
 
 Result<void> McapSession::write_truth(Time at, const mcap::PingTruth& truth) {

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "protocol/host.hpp"
 #include "protocol/recording/mcap/mcap_json.hpp"
 #include "protocol/recording/mcap/mcap_reader.hpp"
 #include "protocol/recording/mcap/mcap_writer.hpp"
@@ -16,14 +17,15 @@ namespace sonar::recording {
 /// /faults in JSON.
 class McapSession final : public RecordingWriter {
  public:
-  /// `vendor`: vendor of the messages; only pings of "oculus" are converted to images automatically.
-  McapSession(std::unique_ptr<Sink> sink, std::string sonar, std::string vendor = "oculus");
+  /// `make`: that of the messages; of those that hold samples (Codec::samples) images are made.
+  McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make = protocol::makes().front());
 
   Result<void> write(const RecordedMessage& message) override;
   /// Pose of the sonar at time `of`, also as the frame NAME of /tf. `at` as in RecordedMessage: must not decrease.
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
-  /// Image of a ping of another vendor than Oculus.
+  /// Image of a ping whose messages hold no samples.
   Result<void> write_image(Time at, const std::shared_ptr<const Ping>& ping);
+  Result<void> write_image(Time at, const Samples& samples);
   /// Moving bodies also as the frames object/NAME of /tf.
   Result<void> write_truth(Time at, const mcap::PingTruth& truth);
   /// Labels of the samples as pictures, and the instances that they name.
@@ -39,7 +41,8 @@ class McapSession final : public RecordingWriter {
   Result<void> write_json(std::uint16_t channel, Time at, const std::string& text);
 
   mcap::Writer writer_;
-  std::string sonar_, vendor_;
+  std::string sonar_;
+  const protocol::Make* make_;
   std::uint16_t device_, client_, status_, image_, pose_, tf_, truth_, labels_, share_, caster_, instances_, faults_;
 };
 

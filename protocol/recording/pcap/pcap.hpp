@@ -14,8 +14,9 @@ namespace sonar::recording {
 struct PcapReading {
   std::optional<std::uint32_t> device;  // its address, when the capture holds several sonars; else the one that sent most
 };
-/// All connections of one sonar, one after the other, and its status datagrams. Reads the file once to find the sonar: the end of
-/// TCP port 52100, or one that sends Oculus messages. bad_data: none found.
+/// All connections of one sonar, one after the other, and its status datagrams; of one that sends its pings by UDP all its
+/// datagrams. Reads the file once to find the sonar: of those that send messages of a make the one at that make's port, else the
+/// one that sent most. bad_data: none found.
 Result<std::unique_ptr<RecordingReader>> read_pcap(std::unique_ptr<Source> source, const PcapReading& reading = {});
 
 struct PcapConversation {

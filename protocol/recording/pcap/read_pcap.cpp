@@ -6,6 +6,7 @@
 #include "protocol/recording/pcap/packets.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/recording/pcap/tcp_stream.hpp"
+#include "protocol/recording/recording.hpp"
 
 namespace sonar::recording {
 namespace {
@@ -13,58 +14,83 @@ namespace {
 constexpr std::size_t most_senders = 4096, most_connections = 64;
 constexpr std::size_t most_held_bytes = 64u << 20;  // of all connections: early segments and messages under way
 
-bool begins_message(BytesView payload) {
-  if (payload.size() < oculus::header_size) return false;
-  const oculus::MessageHeader header = oculus::header_of(payload);
-  return header.oculus_id == oculus::magic && is_known(header);
-}
-
 // ---- first pass: find the sonar
 
-struct Sender {
+using protocol::Make;
+
+struct SenderEnd {
+  IpEnd at;
+  bool tcp = true;
+  auto operator<=>(const SenderEnd&) const = default;
+};
+struct Sent {
   std::uint64_t bytes = 0;
-  bool oculus = false;
+  const Make* make = nullptr;  // whose messages it sends; null: no sonar's
 };
 struct Found {
-  IpEnd device;
+  SenderEnd device;
+  const Make* make = nullptr;
   std::string note;
 };
+
+/// Of a device, or of a client that sends such messages too. Streams: that of the usual port, else the first.
+const Make* make_of(const Segment& segment) {
+  const Make* found = nullptr;
+  if (!segment.tcp) {
+    const auto by = sender_of({{}, Origin::device, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});
+    return by && !by->make->device->pings_over_tcp() ? by->make : nullptr;
+  }
+  for (const Make& make : protocol::makes()) {
+    const Framing* const framing = make.codec.framing;
+    if (framing == nullptr || !framing->begins_message(segment.payload, Origin::device)) continue;
+    if (found == nullptr || make.ports.front().number == segment.source.port) found = &make;
+  }
+  return found;
+}
 
 Result<Found> find_device(Source& source, const PcapReading& reading) {
   auto packets = PacketReader::open(source);
   if (!packets) return tl::unexpected(packets.error());
-  std::map<IpEnd, Sender> senders;
+  std::map<SenderEnd, Sent> senders;
   std::set<std::uint32_t> unknown_links;
   while (const auto packet = packets->next()) {
     if (!is_known_link_type(packet->link_type) && unknown_links.size() < 16) unknown_links.insert(packet->link_type);
     const auto segment = parse_packet(packet->link_type, packet->bytes);
-    if (!segment || !segment->tcp || segment->payload.empty()) continue;
-    if (senders.size() >= most_senders && !senders.contains(segment->source)) continue;
-    Sender& sender = senders[segment->source];
-    sender.bytes += segment->payload.size();
-    sender.oculus = sender.oculus || begins_message(segment->payload);
+    if (!segment || segment->payload.empty()) continue;
+    const SenderEnd from{segment->source, segment->tcp};
+    if (senders.size() >= most_senders && !senders.contains(from)) continue;
+    Sent& sent = senders[from];
+    sent.bytes += segment->payload.size();
+    if (sent.make == nullptr) sent.make = make_of(*segment);
   }
-  std::optional<IpEnd> best;
+  std::optional<SenderEnd> best;
   std::string others;
-  const auto rank = [&](const IpEnd& end) { return std::pair(end.port == oculus::tcp_port, senders.at(end).bytes); };
-  for (const auto& [end, sender] : senders)
-    if (sender.oculus && (!reading.device || *reading.device == end.address) && (!best || rank(end) > rank(*best))) best = end;
+  const auto rank = [&](const SenderEnd& end) {
+    const Sent& sent = senders.at(end);
+    return std::pair(end.at.port == sent.make->ports.front().number, sent.bytes);
+  };
+  for (const auto& [end, sent] : senders)
+    if (sent.make != nullptr && (!reading.device || *reading.device == end.at.address) && (!best || rank(end) > rank(*best)))
+      best = end;
   if (!best) {
-    std::string why = source.name() + " holds no TCP stream of an Oculus" + (reading.device ? " with that address" : "");
+    std::string why = source.name() + " holds no pings of a sonar" + (reading.device ? " with that address" : "");
     for (const std::uint32_t type : unknown_links) why += "; packets of link type " + std::to_string(type) + " are not read";
     if (packets->damages().any()) why += "; " + packets->damages().first();
     return failure(ErrorKind::bad_data, why);
   }
-  for (const auto& [end, sender] : senders)
-    if (sender.oculus && end.port == best->port && end != *best) others += (others.empty() ? "" : ", ") + text_of(end);
-  return Found{*best, others.empty() ? "" : "the capture holds other sonars too: " + others};
+  for (const auto& [end, sent] : senders)
+    if (sent.make != nullptr && end.at.port == best->at.port && end != *best)
+      others += (others.empty() ? "" : ", ") + text_of(end.at);
+  return Found{*best, senders.at(*best).make, others.empty() ? "" : "the capture holds other sonars too: " + others};
 }
 
 // ---- second pass: messages of the sonar and its clients
 
 struct Connection {
+  explicit Connection(const Framing& framing) : device(Origin::device, framing), client(Origin::client, framing) {}
+
   TcpStream device_stream, client_stream;
-  MessageSplitter device{Origin::device}, client{Origin::client};
+  MessageSplitter device, client;
   std::uint64_t last_packet = 0;
 
   std::size_t held_bytes() const {
@@ -113,15 +139,28 @@ class PcapReader final : public RecordingReader {
   using Place = std::map<IpEnd, Connection>::iterator;
 
   void add(Time at, const Segment& segment) {
-    const IpEnd& device = found_.device;
-    if (!segment.tcp) {
-      if (segment.target.port == oculus::status_port && segment.source.address == device.address &&
-          begins_message(segment.payload))
-        ready_.push_back({at, Origin::device, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});
-      return;
-    }
+    const IpEnd& device = found_.device.at;
+    if (!segment.tcp) return add_datagram(at, segment);
+    if (!found_.device.tcp) return;
     if (segment.source == device) add(at, segment, segment.target, Origin::device);
     if (segment.target == device) add(at, segment, segment.source, Origin::client);
+  }
+
+  /// Pings, or the status beside pings by TCP.
+  void add_datagram(Time at, const Segment& segment) {
+    const auto take = [&](Origin from) {
+      ready_.push_back({at, from, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});
+    };
+    const bool from_device = segment.source.address == found_.device.at.address;
+    if (!found_.device.tcp) {
+      if (from_device) return take(Origin::device);
+      if (segment.target == found_.device.at) take(Origin::client);
+      return;
+    }
+    const protocol::Port* const beacon = found_.make->device->port(protocol::Port::Kind::udp_beacon);
+    if (from_device && beacon != nullptr && segment.target.port == beacon->number &&
+        found_.make->codec.framing->begins_message(segment.payload, Origin::device))
+      take(Origin::device);
   }
 
   void add(Time at, const Segment& segment, const IpEnd& client, Origin from) {
@@ -134,7 +173,7 @@ class PcapReader final : public RecordingReader {
     if (place == connections_.end()) {
       if (!syn && segment.payload.empty()) return;
       if (connections_.size() >= most_connections) finish_oldest();
-      place = connections_.try_emplace(client).first;
+      place = connections_.try_emplace(client, *found_.make->codec.framing).first;
     }
     place->second.last_packet = packet_number_;
     stream_of(place->second, from).add(at, segment.sequence, segment.payload, syn);
@@ -165,8 +204,8 @@ class PcapReader final : public RecordingReader {
       splitter.finish();
       while (auto message = splitter.next()) ready_.push_back(std::move(*message));
       if (splitter.losses() > losses)
-        damages_.add("the last message from " + text_of(from == Origin::device ? found_.device : place->first) + " to " +
-                     text_of(from == Origin::device ? place->first : found_.device) + " is not whole");
+        damages_.add("the last message from " + text_of(from == Origin::device ? found_.device.at : place->first) + " to " +
+                     text_of(from == Origin::device ? place->first : found_.device.at) + " is not whole");
     }
     connections_.erase(place);
   }

@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::size_t most_segment = 65'495;  // capacity of an IPv4 packet after two headers of 20 bytes
 constexpr std::uint8_t window_scale = 7;      // windows of 8 MB: no message waits for an acknowledgement
-constexpr std::uint8_t tcp_protocol = 6, udp_protocol = 17;
+constexpr std::uint8_t ip_tcp = 6, ip_udp = 17;
 
 struct PcapFileHeader {
   std::uint32_t magic = 0xA1B23C4D;  // nanoseconds
@@ -28,7 +28,7 @@ constexpr void fields(V& visit, M& m) {
 struct IpHeader {
   std::uint8_t version_and_length = 0x45, service = 0;
   std::uint16_t total_length = 0, identification = 0, fragment = 0x4000;
-  std::uint8_t time_to_live = 64, protocol = tcp_protocol;
+  std::uint8_t time_to_live = 64, protocol = ip_tcp;
   std::uint16_t checksum = 0;
   std::uint32_t source = 0, target = 0;
 };
@@ -157,22 +157,24 @@ class PcapWriter final : public RecordingWriter {
            {2u, 4u, unsigned{most_segment >> 8}, unsigned{most_segment & 0xFF}, 1u, 3u, 3u, unsigned{window_scale}})
         body.push_back(static_cast<std::byte>(b));
     body.insert(body.end(), payload.begin(), payload.end());
-    put_u16(body, 16, transport_checksum(tcp_protocol, from.place, to.place, body));
-    packet(packets, tcp_protocol, from.place, to.place, body);
+    put_u16(body, 16, transport_checksum(ip_tcp, from.place, to.place, body));
+    packet(packets, ip_tcp, from.place, to.place, body);
     const bool takes_a_number = (flags & (tcp_flag::syn | tcp_flag::fin)) != 0;
     from.sequence += static_cast<std::uint32_t>(payload.size()) + (takes_a_number ? 1u : 0u);
   }
 
   void datagram(Bytes& packets, const RecordedMessage& message) {
-    const IpEnd &from = conversation_.status_from, &to = conversation_.status_to;
+    const bool by_device = message.from == Origin::device;
+    const IpEnd& from = by_device ? conversation_.status_from : conversation_.status_to;
+    const IpEnd& to = by_device ? conversation_.status_to : conversation_.status_from;
     Bytes body;
     wire::Writer writer(body, wire::Endian::big);
     const auto size = static_cast<std::uint16_t>(8 + std::min<std::size_t>(message.bytes.size(), most_segment));
     for (const std::uint16_t value : {from.port, to.port, size, std::uint16_t{0}}) writer("u16", value);
     body.insert(body.end(), message.bytes.begin(), message.bytes.begin() + (size - 8));
-    const std::uint16_t sum = transport_checksum(udp_protocol, from, to, body);
+    const std::uint16_t sum = transport_checksum(ip_udp, from, to, body);
     put_u16(body, 6, sum == 0 ? 0xFFFF : sum);  // 0 means no checksum
-    packet(packets, udp_protocol, from, to, body);
+    packet(packets, ip_udp, from, to, body);
   }
 
   static std::uint16_t transport_checksum(std::uint8_t protocol, const IpEnd& from, const IpEnd& to, BytesView body) {

@@ -7,14 +7,14 @@
 #include <thread>
 
 #include "daemon/commands/replay/replay_server.hpp"
+#include "protocol/aris/aris_file.hpp"
 #include "protocol/aris/encode_frame.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "protocol/oculus/encode_ping.hpp"
+#include "protocol/oculus/oculus_log.hpp"
 #include "protocol/ping/messages.hpp"
-#include "protocol/recording/aris_file.hpp"
-#include "protocol/recording/oculus_log.hpp"
+#include "protocol/ping/ping_log.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
-#include "protocol/recording/ping_log.hpp"
 #include "protocol/recording/raw_dump.hpp"
 #include "protocol/waterlinked/messages.hpp"
 #include "protocol/waterlinked/rip.hpp"
@@ -480,13 +480,15 @@ TEST(ReplayOfPingLogs, AFileOfNoKnownSonarIsRefused) {
 TEST(Replay, SaysThatAPing360CannotBeReplayed) {
   Bytes file;
   const auto writer = recording::write_ping_log(recording::sink_into(file));
-  ASSERT_TRUE(
-      writer->write({{}, Origin::device, Carrier::stream, ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{})}));
+  const Bytes line = ping::framed_message(ping::Id::auto_device_data, 0, ping::AutoDeviceData{});
+  ASSERT_TRUE(writer->write({{}, Origin::device, Carrier::stream, line}));
   auto opened = recording::open_recording(recording::source_from("f", file));
   ASSERT_TRUE(opened);
   const auto device = find_replay_device(*opened->reader, "f", 1042);
   ASSERT_FALSE(device);
-  EXPECT_THAT(device.error().text, ::testing::HasSubstr("those of a Ping360 cannot"));
+  EXPECT_THAT(
+      device.error().text,
+      ::testing::HasSubstr("f holds pings of a Ping360, which depend on the requests of its host: they cannot be replayed"));
 }
 
 // ---- .sonar files

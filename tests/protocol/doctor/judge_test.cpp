@@ -165,8 +165,9 @@ TEST(Judge, OneThatWasDisconnected) {
 
 TEST(Judge, OneThatWasDisconnectedBeforeItsFirstPing) {
   const auto left = [](const std::string& why, const std::string& ago_s) {
-    return "gone { address: \"10.0.0.7:1\" why: \"" + why + ", before its first ping\" utc_ns: 3723000000000 ago_s: " + ago_s +
-           " }";
+    const std::string by_itself = why == "closed by the client" ? " by_itself: true" : "";
+    return "gone { address: \"10.0.0.7:1\" why: \"" + why + "\" utc_ns: 3723000000000 without_ping: true ago_s: " + ago_s +
+           by_itself + " }";
   };
   const std::string junk = "is not a BVE1 link: a frame has another magic number";
   for (const std::string& others : {std::string(), pinging + driver}) {

@@ -2,8 +2,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "protocol/aris/aris_file.hpp"
 #include "protocol/aris/encode_frame.hpp"
-#include "protocol/recording/aris_file.hpp"
 #include "protocol/recording/recording.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
@@ -80,7 +80,7 @@ ReadBack read_back(Bytes file) {
   ReadBack read;
   auto opened = open_recording(source_from("f", std::move(file)));
   if (!opened) return {{}, opened.error().text};
-  EXPECT_EQ(opened->format, Format::aris_file);
+  EXPECT_EQ(opened->format, ".aris file");
   for (int times = 0; times < 2; ++times, opened->reader->rewind()) {
     aris::FrameAssembler assembler;
     read.frames.clear();

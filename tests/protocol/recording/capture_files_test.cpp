@@ -191,7 +191,7 @@ TEST(CaptureFiles, TheSonarIsKnownByItsPortOrItsMessages) {
   EXPECT_EQ(read(pcap_of(raw_frames(other), 101)).stream, both_pings);
   std::vector<Sent> web{{bytes_of("GET / HTTP/1.0"), 1}};
   web[0].device_port = 80;
-  EXPECT_THAT(read(pcap_of(raw_frames(web), 101)).damage, HasSubstr("holds no TCP stream of an Oculus"));
+  EXPECT_THAT(read(pcap_of(raw_frames(web), 101)).damage, HasSubstr("holds no pings of a sonar"));
   for (const Sent& each : two_pings()) web.push_back(each);
   EXPECT_EQ(read(pcap_of(raw_frames(web), 101)).stream, both_pings);
 }

@@ -122,9 +122,9 @@ TEST(Mcap, ImagesOfWiderSamples) {
   }
 }
 
-TEST(Mcap, PingsOfOtherVendorsAreKeptAndSeenButNotReplayed) {
+TEST(Mcap, MessagesWithoutSamplesGetTheImageOfThePing) {
   Bytes file;
-  McapSession writer(sink_into(file), "head", "blueview");
+  McapSession writer(sink_into(file), "head", *protocol::find_make("blueview"));
   const auto ping = std::make_shared<Ping>();
   ping->request.settings.beam_count = 2;
   ping->request.settings.range_bin_count = 1;
@@ -138,7 +138,19 @@ TEST(Mcap, PingsOfOtherVendorsAreKeptAndSeenButNotReplayed) {
   EXPECT_EQ(found["/head/image"].at(0).data, image_of(after_ms(0), "head", 2, 1, 16, bytes_of("abcd")));
   auto messages = read_mcap(source_from("a file", file));
   ASSERT_TRUE(messages);
-  EXPECT_FALSE((*messages)->next());
+  EXPECT_EQ(read_all(**messages).size(), 1u);
+}
+
+TEST(Mcap, ClientsSendAsTheMakeDoes) {
+  for (const auto& [name, by] : {std::pair{"oculus", Carrier::stream}, std::pair{"ping360", Carrier::datagram}}) {
+    Bytes file;
+    McapSession writer(sink_into(file), "front", *protocol::find_make(name));
+    EXPECT_TRUE(writer.write({after_ms(0), Origin::client, by, bytes_of("a request")}));
+    EXPECT_TRUE(writer.close());
+    auto messages = read_mcap(source_from("a file", file));
+    ASSERT_TRUE(messages);
+    expect_same(read_all(**messages), {{after_ms(0), Origin::client, by, bytes_of("a request")}});
+  }
 }
 
 TEST(Mcap, WithoutItsEndEverythingButTheLastChunkIsThere) {

@@ -5,7 +5,7 @@
 #include <new>
 
 #include "protocol/ping/messages.hpp"
-#include "protocol/recording/ping_log.hpp"
+#include "protocol/ping/ping_log.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace {

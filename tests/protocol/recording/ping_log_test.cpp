@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 
 #include "protocol/ping/messages.hpp"
-#include "protocol/recording/ping_log.hpp"
+#include "protocol/ping/ping_log.hpp"
 #include "protocol/recording/recording.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
@@ -52,7 +52,7 @@ ReadBack read_back(Bytes file) {
   ReadBack read;
   auto opened = open_recording(source_from("f", std::move(file)));
   if (!opened) return {{}, opened.error().text};
-  EXPECT_EQ(opened->format, Format::ping_log);
+  EXPECT_EQ(opened->format, "ping protocol log");
   for (int times = 0; times < 2; ++times, opened->reader->rewind()) {
     read.messages.clear();
     while (auto message = opened->reader->next()) read.messages.push_back(std::move(*message));

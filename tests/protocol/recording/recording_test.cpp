@@ -18,7 +18,7 @@ INSTANTIATE_TEST_SUITE_P(Recording, EveryFormat, ::testing::ValuesIn(all_formats
 TEST_P(EveryFormat, GivesBackWhatWasWritten) {
   auto opened = open_bytes(recorded(GetParam(), conversation()));
   ASSERT_TRUE(opened) << opened.error().text;
-  EXPECT_EQ(opened->format, GetParam());
+  EXPECT_EQ(opened->format, name_of(GetParam()));
   for (int round = 0; round < 2; ++round) {
     expect_same(read_all(*opened->reader), kept_by(GetParam(), conversation()), opened->reader->knows_times());
     EXPECT_FALSE(opened->reader->damage());
@@ -114,9 +114,9 @@ TEST(Recording, RefusesOtherFiles) {
   };
   EXPECT_EQ(text_of(""), "a file is empty");
   EXPECT_THAT(text_of("hello"),
-              HasSubstr("not a recording: expected an .oculus log, a raw dump, pcap, pcapng, MCAP, .aris, .sonar or .svlog"));
+              HasSubstr("not a recording: expected pcapng, .pcap, .mcap, .raw, .oculus, .aris, .sonar, .svlog"));
   EXPECT_THAT(text_of("SQLite format 3"), HasSubstr("version 2"));
-  EXPECT_THAT(text_of("SO, it begins like a message"), HasSubstr("does not begin with an Oculus message"));
+  EXPECT_THAT(text_of("SO, it begins like a message"), HasSubstr("does not begin with a message of a sonar"));
   const auto missing = open_recording("/no/such/recording");
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().kind, ErrorKind::missing_file);

@@ -5,19 +5,25 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "protocol/oculus/encode_ping.hpp"
 #include "protocol/oculus/fire.hpp"
+#include "protocol/oculus/oculus_log.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
-#include "protocol/recording/oculus_log.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/recording/raw_dump.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace sonar::recording::tests {
+
+enum class Format { oculus_log, raw_dump, pcap, mcap };
+inline std::string name_of(Format format) {
+  return std::array<const char*, 4>{".oculus log", "raw dump", "capture", "MCAP"}.at(static_cast<std::size_t>(format));
+}
 
 inline const Time start = Time(std::chrono::nanoseconds(1'700'000'000'123'456'789));
 inline Time after_ms(int ms) { return start + std::chrono::milliseconds(ms); }

@@ -39,7 +39,7 @@ ReadBack read_back(Bytes file) {
   ReadBack read;
   auto opened = open_recording(source_from("f", std::move(file)));
   if (!opened) return {{}, opened.error().text};
-  EXPECT_EQ(opened->format, Format::sonar_file);
+  EXPECT_EQ(opened->format, ".sonar file");
   for (int times = 0; times < 2; ++times, opened->reader->rewind()) {
     read.packets.clear();
     while (auto packet = opened->reader->next()) read.packets.push_back(std::move(*packet));

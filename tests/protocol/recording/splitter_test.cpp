@@ -1,4 +1,5 @@
 // The splitter loses no byte that is not part of a broken message, however the stream is cut.
+#include "protocol/oculus/host.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::tests {
@@ -20,7 +21,7 @@ TEST(MessageSplitter, FindsMessagesHoweverTheStreamIsCut) {
   const std::vector<Bytes> sent{dummy_message(), bytes_of("S S?SOno"), ping_message(1), dummy_message(), ping_message(2)};
   const Bytes stream = joined(sent);
   for (std::size_t cut = 0; cut <= stream.size(); ++cut) {
-    MessageSplitter splitter(Origin::device);
+    MessageSplitter splitter(Origin::device, oculus::framing);
     splitter.append(after_ms(1), BytesView(stream).first(cut));
     std::vector<Bytes> found = drain(splitter);
     splitter.append(after_ms(2), BytesView(stream).subspan(cut));
@@ -34,7 +35,7 @@ TEST(MessageSplitter, FindsMessagesHoweverTheStreamIsCut) {
 
 TEST(MessageSplitter, TimeIsThatOfTheLastByte) {
   const Bytes ping = ping_message(1);
-  MessageSplitter splitter(Origin::device);
+  MessageSplitter splitter(Origin::device, oculus::framing);
   splitter.append(after_ms(1), BytesView(ping).first(100));
   EXPECT_FALSE(splitter.next());
   splitter.append(after_ms(7), BytesView(ping).subspan(100));
@@ -45,7 +46,7 @@ TEST(MessageSplitter, TimeIsThatOfTheLastByte) {
 
 TEST(MessageSplitter, MissingBytesCostTheMessagesTheyBelongTo) {
   const Bytes ping = ping_message(1), next = ping_message(2);
-  MessageSplitter splitter(Origin::device);
+  MessageSplitter splitter(Origin::device, oculus::framing);
   splitter.append(start, BytesView(ping).first(500));
   EXPECT_TRUE(drain(splitter).empty());
   splitter.break_off();
@@ -58,7 +59,7 @@ TEST(MessageSplitter, MissingBytesCostTheMessagesTheyBelongTo) {
 
 TEST(MessageSplitter, AnUnfinishedMessageIsNotGiven) {
   const Bytes ping = ping_message(1);
-  MessageSplitter splitter(Origin::device);
+  MessageSplitter splitter(Origin::device, oculus::framing);
   splitter.append(start, BytesView(ping).first(ping.size() - 1));
   splitter.finish();
   EXPECT_TRUE(drain(splitter).empty());
@@ -69,7 +70,7 @@ TEST(MessageSplitter, AnUnfinishedMessageIsNotGiven) {
 TEST(MessageSplitter, ClientsMayLeaveTheirPayloadSizeOut) {
   Bytes fire = oculus::make_fire({});
   for (std::size_t i = 10; i < 14; ++i) fire[i] = std::byte{0};
-  MessageSplitter splitter(Origin::client);
+  MessageSplitter splitter(Origin::client, oculus::framing);
   splitter.append(start, fire);
   splitter.append(start, fire);
   EXPECT_EQ(drain(splitter), (std::vector<Bytes>{fire, fire}));

@@ -18,7 +18,6 @@ namespace {
 using oculus::PingRate;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using Kind = RecordingFile::Kind;
 
 /// A folder of the test's own, gone with it.
 struct Folder {
@@ -49,19 +48,19 @@ std::uint64_t messages_in(const std::filesystem::path& file) {
 // ---- names and files
 
 TEST(RecordingName, SaysTheKindAndNoFolder) {
-  EXPECT_EQ(*RecordingFile::kind_of("run-1.mcap", "oculus"), Kind::mcap);
-  EXPECT_EQ(*RecordingFile::kind_of("Run_2.a.pcap", "oculus"), Kind::pcap);
-  EXPECT_EQ(*RecordingFile::kind_of("r.oculus", "oculus"), Kind::oculus_log);
-  EXPECT_EQ(*RecordingFile::kind_of("r.raw", "oculus"), Kind::raw_dump);
-  EXPECT_EQ(*RecordingFile::kind_of("head.mcap", "blueview"), Kind::mcap);
-  EXPECT_EQ(*RecordingFile::kind_of("a.aris", "aris"), Kind::aris);
-  EXPECT_EQ(*RecordingFile::kind_of("a.sonar", "waterlinked"), Kind::sonar);
+  EXPECT_EQ(*RecordingFile::kind_of("run-1.mcap", "oculus"), &RecordingFile::mcap);
+  EXPECT_EQ(*RecordingFile::kind_of("Run_2.a.pcap", "oculus"), &RecordingFile::pcap);
+  EXPECT_EQ((*RecordingFile::kind_of("r.oculus", "oculus"))->ending, ".oculus");
+  EXPECT_EQ(*RecordingFile::kind_of("r.raw", "oculus"), &RecordingFile::raw_dump);
+  EXPECT_EQ(*RecordingFile::kind_of("head.mcap", "blueview"), &RecordingFile::mcap);
+  EXPECT_EQ((*RecordingFile::kind_of("a.aris", "aris"))->ending, ".aris");
+  EXPECT_EQ((*RecordingFile::kind_of("a.sonar", "waterlinked"))->ending, ".sonar");
   EXPECT_THAT(RecordingFile::kind_of("a.sonar", "oculus").error().text, HasSubstr("images of a Sonar 3D-15"));
-  EXPECT_EQ(*RecordingFile::kind_of("a.svlog", "surveyor240"), Kind::ping_log);
-  EXPECT_EQ(*RecordingFile::kind_of("a.svlog", "omniscan450"), Kind::ping_log);
+  EXPECT_EQ((*RecordingFile::kind_of("a.svlog", "surveyor240"))->ending, ".svlog");
+  EXPECT_EQ((*RecordingFile::kind_of("a.svlog", "omniscan450"))->ending, ".svlog");
   EXPECT_THAT(RecordingFile::kind_of("a.svlog", "aris").error().text, HasSubstr("frames of a Surveyor"));
   EXPECT_THAT(RecordingFile::kind_of("a.aris", "oculus").error().text, HasSubstr("frames of an ARIS"));
-  EXPECT_THAT(RecordingFile::kind_of("a.raw", "aris").error().text, HasSubstr("Oculus messages"));
+  EXPECT_THAT(RecordingFile::kind_of("a.raw", "aris").error().text, HasSubstr("pings that are one stream"));
   EXPECT_THAT(RecordingFile::kind_of("head.pcap", "blueview").error().text, HasSubstr("end the name in .mcap"));
   const std::string longest = std::string(123, 'a') + ".mcap";
   EXPECT_TRUE(RecordingFile::kind_of(longest, "oculus"));
@@ -88,7 +87,7 @@ RecordedPing ping_at(double at_s, std::size_t bytes = 64) {
 
 TEST(RecordingFile, KeepsAStatusASecondAndTheTruthOfEveryPing) {
   recording::Bytes bytes;
-  RecordingFile file(recording::sink_into(bytes), Kind::mcap, {"front", "oculus", {}});
+  RecordingFile file(recording::sink_into(bytes), &RecordingFile::mcap, {"front", "oculus", {}});
   for (const double at_s : {0.0, 0.5, 0.999, 1.0, 1.5}) EXPECT_TRUE(file.write(ping_at(at_s)));
   EXPECT_TRUE(file.close());
   EXPECT_EQ(file.figures().pings, 5u);
@@ -122,7 +121,7 @@ TEST(RecordingFile, KeepsLabelsWhenAsked) {
     labelled.ping = ping, labelled.names = names;
     EXPECT_EQ(labelled.size(), plain.size() + 15);
     recording::Bytes bytes;
-    RecordingFile file(recording::sink_into(bytes), Kind::mcap, {"front", "oculus", {}}, asked);
+    RecordingFile file(recording::sink_into(bytes), &RecordingFile::mcap, {"front", "oculus", {}}, asked);
     EXPECT_TRUE(file.write(labelled));
     EXPECT_TRUE(file.close());
     auto reader = recording::mcap::Reader::open(recording::source_from("it", bytes));
@@ -146,7 +145,7 @@ TEST(RecordingFile, AnExistingFileIsNotTouched) {
   const Folder folder;
   const std::filesystem::path file = folder.path + "/mine.mcap";
   std::ofstream(file) << "mine";
-  const auto made = RecordingFile::create(file, Kind::mcap, {"front", "oculus", {}});
+  const auto made = RecordingFile::create(file, &RecordingFile::mcap, {"front", "oculus", {}});
   ASSERT_FALSE(made);
   EXPECT_THAT(made.error().text, HasSubstr("is there already"));
   EXPECT_EQ(std::filesystem::file_size(file), 4u);
@@ -286,7 +285,7 @@ TEST(Recordings, LabelsOnlyWhereSamplesHaveThem) {
   Queue q(1 << 20);
   const auto answer = [&](const std::string& name, const char* vendor) {
     std::string text = "not answered";
-    q.recordings->start({name, "front", true}, {"front", vendor, {}}, "test",
+    q.recordings->start({name, "front", true}, {"front", vendor, {}, std::string_view(vendor) == "waterlinked"}, "test",
                         [&](const Result<void>& r) { text = r ? "ok" : r.error().text; });
     q.run();
     return text;

@@ -23,7 +23,7 @@ struct ThrowingParent final : SessionParent {
   void on_written(ConnectionId, const Outbox::Message&) override {}
   void on_fault(const std::string& what) override { fault = what; }
   void on_send_error(const Endpoint&, const std::string&) override {}
-  void on_over(ConnectionId, const std::string& reason) override { why = reason; }
+  void on_over(ConnectionId, const std::string& reason, bool) override { why = reason; }
 };
 
 TEST(Faults, EndTheSessionTheyHappenIn) {

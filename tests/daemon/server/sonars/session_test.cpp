@@ -17,6 +17,7 @@ struct Parent final : SessionParent {
   std::deque<Outbox::Message> messages;
   int written = 0;
   std::string why;
+  bool client_left = false;
   void on_bytes(ConnectionId, protocol::BytesView) override {}
   Outbox::Message next_message(ConnectionId) override {
     if (messages.empty()) return {};
@@ -33,7 +34,10 @@ struct Parent final : SessionParent {
   void on_written(ConnectionId, const Outbox::Message&) override { ++written; }
   void on_fault(const std::string& what) override { ADD_FAILURE() << what; }
   void on_send_error(const Endpoint&, const std::string&) override {}
-  void on_over(ConnectionId, const std::string& reason) override { why = reason; }
+  void on_over(ConnectionId, const std::string& reason, bool by_client) override {
+    why = reason;
+    client_left = by_client;
+  }
 };
 
 Outbox::Message shaped(const std::string& text, Outbox::Shape shape) {
@@ -147,6 +151,16 @@ TEST_F(SessionShapes, ResetComesAfterTheLastByte) {
   EXPECT_TRUE(client.was_reset);
   EXPECT_EQ(parent.written, 1);
   EXPECT_EQ(parent.why, "a fault reset the connection");
+  EXPECT_FALSE(parent.client_left);
+}
+
+TEST_F(SessionShapes, SaysThatTheClientLeft) {
+  start({});
+  client.close();
+  io.restart();
+  for (int turns = 0; parent.why.empty() && turns < 1000; ++turns) io.run_one_for(milliseconds(10));
+  EXPECT_EQ(parent.why, "closed by the client");
+  EXPECT_TRUE(parent.client_left);
 }
 
 TEST_F(SessionShapes, AnEmptyMessageEndsAtABoundary) {

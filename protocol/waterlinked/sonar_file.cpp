@@ -1,4 +1,4 @@
-#include "protocol/recording/sonar_file.hpp"
+#include "protocol/waterlinked/sonar_file.hpp"
 
 #include <utility>
 

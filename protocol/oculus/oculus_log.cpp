@@ -1,8 +1,8 @@
-#include "protocol/recording/oculus_log.hpp"
+#include "protocol/oculus/oculus_log.hpp"
 
 #include <cmath>
 
-#include "protocol/recording/message_splitter.hpp"
+#include "protocol/oculus/framer.hpp"
 #include "protocol/recording/zlib.hpp"
 
 namespace sonar::recording {
@@ -183,6 +183,8 @@ Result<std::unique_ptr<RecordingReader>> read_oculus_log(std::unique_ptr<Source>
   Scan scan(*source);
   const BytesView front = scan.read(file_header_bytes);
   const auto refuse = [&](const std::string& why) { return failure(ErrorKind::bad_data, source->name() + why); };
+  if (!front.empty() && front[0] == std::byte{'S'})
+    return refuse(" is an SQLite database: .oculus files of version 2 are not read, only version 1");
   if (front.size() < file_header_bytes) return refuse(" ends within its file header: it holds no message");
   const auto header = read_as<OculusLogHeader>(front);
   if (header.magic != OculusLogHeader{}.magic || header.size != file_header_bytes) return refuse(" is not an .oculus log file");

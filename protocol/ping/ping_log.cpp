@@ -1,4 +1,4 @@
-#include "protocol/recording/ping_log.hpp"
+#include "protocol/ping/ping_log.hpp"
 
 #include <optional>
 #include <string>
@@ -9,13 +9,22 @@
 namespace sonar::recording {
 namespace {
 
-/// As the makers' own programs begin a log, without what they say of their computer.
-std::string beginning(BytesView message) {
+ping::Id first_id(BytesView message) {
   ping::Header header;
   wire::Reader reader(message);
   fields(reader, header);
+  return header.id;
+}
+/// Of a device to a host that asked: it may come before the pings, and does not name the product.
+bool is_answer(ping::Id id) {
+  using enum ping::Id;
+  return ping::is_of_device(id) || id == device_information || id == protocol_version;
+}
+
+/// As the makers' own programs begin a log, without what they say of their computer.
+std::string beginning(ping::Id first) {
   return std::string(R"({"session_id":1,"session_uptime":0.0,"session_devices":[{"product_id":")") +
-         (header.id == ping::Id::os_mono_profile ? "os450" : "mbes24016") + R"("}],"is_recording":true})";
+         (first == ping::Id::os_mono_profile ? "os450" : "mbes24016") + R"("}],"is_recording":true})";
 }
 
 /// Milliseconds since power-up, of the messages that tell them.
@@ -101,8 +110,9 @@ class PingLogWriter final : public RecordingWriter {
   Result<void> write(const RecordedMessage& message) override {
     if (message.from != Origin::device || message.by != Carrier::stream) return {};
     Bytes record;
-    if (!begun_) {
-      const std::string text = beginning(message.bytes);
+    if (!begun_) {  // the first message names the product
+      if (is_answer(first_id(message.bytes))) return {};
+      const std::string text = beginning(first_id(message.bytes));
       record = ping::framed(ping::Id::json_wrapper, 0, std::as_bytes(std::span(text)));
     }
     record.insert(record.end(), message.bytes.begin(), message.bytes.end());

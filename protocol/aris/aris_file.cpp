@@ -1,4 +1,4 @@
-#include "protocol/recording/aris_file.hpp"
+#include "protocol/aris/aris_file.hpp"
 
 #include <deque>
 

@@ -1,0 +1,44 @@
+// Its messages and files, for recordings.
+#include <algorithm>
+
+#include "protocol/blueview/frames.hpp"
+#include "protocol/blueview/host.hpp"
+#include "protocol/blueview/models.hpp"
+
+namespace sonar::blueview {
+namespace {
+
+std::optional<FrameHeader> header_of(wire::BytesView bytes) {
+  FrameHeader header;
+  wire::Reader reader(bytes);
+  fields(reader, header);
+  return reader.ok() && header.magic == magic && header.payload_length <= longest_payload ? std::optional(header) : std::nullopt;
+}
+
+std::optional<std::size_t> length_of(wire::BytesView bytes, recording::Origin, bool) {
+  const auto header = header_of(bytes);
+  return header ? std::optional(header_size + header->payload_length) : std::nullopt;
+}
+
+/// The greeting names the model; pings do not.
+std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
+  const auto header = header_of(message.bytes);
+  if (!header || message.by != recording::Carrier::stream) return std::nullopt;
+  recording::Sender sender{models().front()};
+  wire::Reader reader(message.bytes.size() > header_size ? wire::BytesView(message.bytes).subspan(header_size)
+                                                         : wire::BytesView());
+  std::uint16_t version = 0;
+  reader("proto", version);
+  const std::string name = header->type == FrameType::hello_ok ? read_text(reader, "model") : std::string();
+  const auto found = std::find_if(models().begin(), models().end(), [&name](const auto& model) { return model->name == name; });
+  if (found != models().end()) sender.model = *found;
+  return sender;
+}
+
+constexpr recording::Framing framing{{magic[0], magic[1]}, header_size, length_of};
+
+}  // namespace
+
+recording::Codec codec() { return {.framing = &framing, .sender = sender_of}; }
+
+}  // namespace sonar::blueview

@@ -1,0 +1,63 @@
+// Names of fields and regions of messages, the same for every make: what faults change.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+namespace sonar::protocol {
+
+/// What a field of a message means, whatever a vendor calls it.
+enum class FieldName {
+  magic,
+  source_id,
+  destination_id,
+  message_type,
+  version,
+  payload_size,
+  ping_id,
+  ping_status,
+  frequency,
+  temperature,
+  pressure,
+  heading,
+  pitch,
+  roll,
+  sound_speed,
+  time,
+  sample_type,
+  range_resolution,
+  rows,
+  beams,
+  image_offset,
+  image_size,
+  message_size,
+  range,
+  ping_rate,
+  gain,
+  device_id,
+  part_number,
+  device_status,
+  firmware,
+  address,
+  netmask,
+  connected_address,
+  mac,
+};
+/// The same words, in that order.
+inline constexpr std::array<std::string_view, 34> field_names{
+    "magic",     "source_id",   "destination_id",    "message_type", "version",       "payload_size",
+    "ping_id",   "ping_status", "frequency",         "temperature",  "pressure",      "heading",
+    "pitch",     "roll",        "sound_speed",       "time",         "sample_type",   "range_resolution",
+    "rows",      "beams",       "image_offset",      "image_size",   "message_size",  "range",
+    "ping_rate", "gain",        "device_id",         "part_number",  "device_status", "firmware",
+    "address",   "netmask",     "connected_address", "mac"};
+static_assert(field_names.size() == static_cast<std::size_t>(FieldName::mac) + 1);
+
+/// The message that carries a ping, as a client receives it, prefix included; the beacon.
+enum class Part { ping, beacon };
+/// Of a ping: what every message begins with, the other fields, the table of the beams' directions, the samples.
+enum class Region { header, metadata, bearings, image };
+inline constexpr std::array<std::string_view, 4> region_names{"header", "metadata", "bearings", "image"};
+
+}  // namespace sonar::protocol

@@ -1,0 +1,73 @@
+// Its messages and files, for recordings.
+#include <array>
+
+#include "protocol/oculus/decode.hpp"
+#include "protocol/oculus/host.hpp"
+#include "protocol/oculus/models.hpp"
+#include "protocol/oculus/oculus_log.hpp"
+
+namespace sonar::oculus {
+namespace {
+
+using recording::Origin;
+using recording::RecordedMessage;
+
+bool is_known(MessageType type) {
+  using enum MessageType;
+  switch (type) {
+    case status:
+    case fire:
+    case full_ping_result:
+    case ping_result:
+    case user_config:
+    case log:
+    case dummy:
+      return true;
+  }
+  return false;
+}
+
+std::optional<std::size_t> length_of(wire::BytesView header, Origin from, bool strict) {
+  const MessageHeader read = header_of(header);
+  if (strict && !is_known(read.type)) return std::nullopt;
+  return message_length(read, from == Origin::device ? Sender::device : Sender::client);
+}
+
+/// Which model it is, only its status tells.
+std::optional<recording::Sender> sender_of(const RecordedMessage& message) {
+  if (!framing.begins_message(message.bytes, Origin::device)) return std::nullopt;
+  return recording::Sender{models().front(), header_of(message.bytes).source};
+}
+
+std::optional<recording::Samples> samples_of(wire::BytesView message) {
+  if (message.size() < header_size || header_of(message).type != MessageType::ping_result) return std::nullopt;
+  const auto ping = decode_ping(message);
+  if (!ping || !ping->has_image) return std::nullopt;
+  const auto codes = std::make_shared<wire::Bytes>();
+  for (std::size_t row = 0; row < ping->rows(); ++row) {
+    const wire::BytesView samples = ping->row_samples(row);
+    codes->insert(codes->end(), samples.begin(), samples.end());
+  }
+  return recording::Samples{ping->beams(), ping->rows(), static_cast<int>(8 * ping->bytes_per_sample()), codes};
+}
+
+constexpr std::array<recording::FileKind, 1> kinds{{{
+    .ending = ".oculus",
+    .name = ".oculus log",
+    .holds = "Oculus messages",
+    .begins =
+        [](wire::BytesView front) {
+          return recording::begins_with(front, {0x44, 0x33, 0x22, 0x11}) ||
+                 recording::begins_with(front, {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f'});  // of version 2
+        },
+    .read = recording::read_oculus_log,
+    .write = recording::write_oculus_log,
+}}};
+
+}  // namespace
+
+const recording::Framing framing{{magic & 0xFF, magic >> 8}, header_size, length_of};
+
+recording::Codec codec() { return {&framing, kinds, sender_of, samples_of}; }
+
+}  // namespace sonar::oculus

@@ -1,0 +1,50 @@
+// Options of a sonar in the configuration: what a make offers, and the values, complete as check_options() makes them.
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace sonar::protocol {
+
+/// One named choice of a protocol's unknowns, settable under `options:` of a sonar in the configuration.
+struct Option {
+  std::string_view name;
+  std::vector<std::string_view> allowed;  // first = default; empty = a number above 0, or the word of default_value
+  std::string_view default_value;
+  std::string_view meaning;
+  double lowest = 0, highest = 0;  // of a number, inclusive; 0, 0 = any above 0
+  std::string_view word = {};      // that may stand for a number, beside the default
+};
+/// "number above 0", "number from 5 to 170".
+inline std::string numbers_of(const Option& option) {
+  if (option.highest <= 0) return "number above 0";
+  char text[64];
+  std::snprintf(text, sizeof text, "number from %g to %g", option.lowest, option.highest);
+  return text + (option.word.empty() ? "" : ", or " + std::string(option.word));
+}
+using OptionValues = std::map<std::string, std::string>;
+
+inline std::string_view text_option(const OptionValues& values, std::string_view name) {
+  const auto found = values.find(std::string(name));
+  return found == values.end() ? std::string_view{} : std::string_view(found->second);
+}
+
+/// Nothing: a word stands for the number.
+inline std::optional<double> given_number(const OptionValues& values, std::string_view name) {
+  const std::string_view text = text_option(values, name);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool is_number = error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
+  return is_number ? std::optional(value) : std::nullopt;
+}
+
+/// 0 for a word.
+inline double number_option(const OptionValues& values, std::string_view name) { return given_number(values, name).value_or(0); }
+
+}  // namespace sonar::protocol

@@ -1,0 +1,72 @@
+// Its messages and files, for recordings.
+#include <algorithm>
+#include <array>
+#include <initializer_list>
+
+#include "protocol/ping/host.hpp"
+#include "protocol/ping/messages.hpp"
+#include "protocol/ping/omniscan.hpp"
+#include "protocol/ping/ping360.hpp"
+#include "protocol/ping/ping_log.hpp"
+#include "protocol/ping/surveyor.hpp"
+#include "protocol/recording/raw_dump.hpp"
+
+namespace sonar::ping {
+namespace {
+
+using recording::RecordedMessage;
+
+constexpr std::size_t longest_payload = 65535;
+
+std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool) {
+  Header header;
+  wire::Reader reader(bytes);
+  fields(reader, header);
+  return reader.ok() ? std::optional(header_size + header.length + sum_size) : std::nullopt;
+}
+
+/// A frame with one of the pings of a product.
+bool holds(const RecordedMessage& message, std::initializer_list<Id> pings) {
+  Framer framer(longest_payload, true);
+  framer.append(message.bytes);
+  while (const auto frame = framer.next())
+    if (frame->sum_is_right && std::find(pings.begin(), pings.end(), frame->header.id) != pings.end()) return true;
+  return false;
+}
+std::optional<recording::Sender> one_of(const protocol::Vendor& vendor) { return recording::Sender{vendor.models().front()}; }
+
+constexpr recording::Framing framing{{'B', 'R'}, header_size, length_of};
+
+constexpr std::array<recording::FileKind, 1> kinds{{{
+    .ending = ".svlog",
+    .name = "ping protocol log",
+    .holds = "frames of a Surveyor or an Omniscan",
+    .begins =
+        [](BytesView front) {
+          return recording::begins_with(front, {'B', 'R'});
+        },
+    .read = [](std::unique_ptr<recording::Source> source) -> Result<std::unique_ptr<recording::RecordingReader>> {
+      return recording::read_ping_log(std::move(source));
+    },
+    .write = recording::write_ping_log,
+}}};
+
+}  // namespace
+
+recording::Codec ping360::codec() {
+  return {.sender = [](const RecordedMessage& message) {
+    return holds(message, {Id::device_data, Id::auto_device_data}) ? one_of(vendor()) : std::nullopt;
+  }};
+}
+recording::Codec surveyor::codec() {
+  return {.framing = &framing, .files = kinds, .sender = [](const RecordedMessage& message) {
+            return holds(message, {Id::atof_point_data, Id::yz_point_data}) ? one_of(vendor()) : std::nullopt;
+          }};
+}
+recording::Codec omniscan::codec() {
+  return {.framing = &framing, .files = kinds, .sender = [](const RecordedMessage& message) {
+            return holds(message, {Id::os_mono_profile}) ? one_of(vendor()) : std::nullopt;
+          }};
+}
+
+}  // namespace sonar::ping

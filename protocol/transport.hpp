@@ -1,0 +1,46 @@
+// The ports of an emulated device, and requests over HTTP.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "protocol/dialogue.hpp"
+
+namespace sonar::protocol {
+
+/// A transport of the device. A vendor may have several of a kind, but one beacon.
+struct Port {
+  enum class Kind {
+    tcp_stream,    // listens at `number`: one Dialogue for each connection; observers have those of the vendor's first
+    udp_beacon,    // sends Vendor::beacon to `number` of the configured addresses: broadcast, multicast or hosts
+    udp_answer,    // passes datagrams that arrive at `number`, broadcast ones too, to Vendor::on_datagram
+    udp_stream,    // sends Vendor::datagrams of each ping from `number` (0: any; may be that of a udp_answer) to the receivers
+    http,          // serves Vendor::on_http at `number`
+    udp_dialogue,  // one Dialogue at `number` with the host that sent the last request; it gets Vendor::datagrams of its pings
+  } kind{};
+  std::uint16_t number = 0;
+  std::chrono::milliseconds period{0};  // of a beacon
+  bool on_change = false;               // of a beacon: also sent at once when a client comes or goes
+  Endpoint group{};        // of a udp_stream: its receiver until SetReceivers, often a multicast group; port 0 = none
+  bool any_group = false;  // of a udp_stream: receivers may be multicast groups that the configuration does not name
+  /// Of a udp_stream: least time between two datagrams of a ping. Of a tcp_stream: pause between the parts of a ping that
+  /// Vendor::datagrams gives and Vendor::frame holds one behind the other.
+  std::chrono::nanoseconds gap{0};
+};
+
+/// One request for a resource of the device, its sizes already limited by the server.
+struct ResourceRequest {
+  std::string method, path, query, content_type, body;  // path without the query: "/api/v1/speed"
+  Ipv4 from{};
+};
+struct ResourceReply {
+  unsigned status = 200;
+  std::string body;
+  std::string content_type = "application/json";
+  std::string allow = {};  // of 405
+  std::vector<Event> events = {};
+};
+
+}  // namespace sonar::protocol

@@ -1,0 +1,40 @@
+// Its messages and files, for recordings.
+#include <array>
+
+#include "protocol/recording/raw_dump.hpp"
+#include "protocol/waterlinked/host.hpp"
+#include "protocol/waterlinked/models.hpp"
+#include "protocol/waterlinked/rip.hpp"
+#include "protocol/waterlinked/sonar_file.hpp"
+
+namespace sonar::waterlinked {
+namespace {
+
+/// Packets do not tell which of them it is.
+std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
+  if (message.by != recording::Carrier::datagram || rip_length(message.bytes) != message.bytes.size()) return std::nullopt;
+  return recording::Sender{models().front()};
+}
+
+constexpr std::array<recording::FileKind, 1> kinds{{{
+    .ending = ".sonar",
+    .name = ".sonar file",
+    .holds = "images of a Sonar 3D-15",
+    .begins =
+        [](BytesView front) {
+          return recording::begins_with(front, {'R', 'I', 'P', '1'}) || recording::begins_with(front, {'R', 'I', 'P', '2'});
+        },
+    .read = [](std::unique_ptr<recording::Source> source) -> Result<std::unique_ptr<recording::RecordingReader>> {
+      return recording::read_sonar_file(std::move(source));
+    },
+    .write =
+        [](std::unique_ptr<recording::Sink> sink) {  // its datagrams, back to back
+          return recording::write_raw_dump(std::move(sink), recording::Carrier::datagram);
+        },
+}}};
+
+}  // namespace
+
+recording::Codec codec() { return {.files = kinds, .sender = sender_of}; }
+
+}  // namespace sonar::waterlinked
