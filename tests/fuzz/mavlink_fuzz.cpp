@@ -54,7 +54,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::size_t at = 1;
   Time now{};
   while (at + 2 <= size) {
-    const std::size_t length = std::min<std::size_t>(data[at] | data[at + 1] << 8, size - at - 2);
+    const std::size_t length = std::min<std::size_t>(data[at] + 256u * data[at + 1], size - at - 2);
     const auto bytes = std::as_bytes(std::span(data + at + 2, length));
     mavlink::Bytes datagram(bytes.begin(), bytes.end());
     mend(datagram);

@@ -64,31 +64,31 @@ struct Record {
   bool pass;
 };
 
-void keep(const Record& r, const std::source_location& where) {
+void keep(const Record& r, Place where) {
   std::ostringstream line;
   line << "{\"oracle\": " << r.number << ", \"what\": " << quoted(r.what) << ", \"kind\": \"" << r.kind
        << "\", \"expected\": " << number_text(r.expected) << ", \"measured\": " << number_text(r.measured)
        << ", \"tolerance\": " << number_text(r.tolerance) << ", \"unit\": " << quoted(r.unit)
        << ", \"pass\": " << (r.pass ? "true" : "false") << ", \"test\": " << quoted(running_test()) << "}";
   append(r.number, line.str());
-  if (!r.pass) ADD_FAILURE_AT(where.file_name(), static_cast<int>(where.line())) << "oracle out of tolerance: " << line.str();
+  if (!r.pass) ADD_FAILURE_AT(where.file, where.line) << "oracle out of tolerance: " << line.str();
 }
 
 }  // namespace
 
 void record_oracle(int number, const std::string& what, double expected, double measured, double tolerance,
-                   const std::string& unit, std::source_location where) {
+                   const std::string& unit, Place where) {
   const bool pass = std::abs(measured - expected) <= tolerance;
   keep({number, what, "equal", expected, measured, tolerance, unit, pass}, where);
 }
 
 void record_at_least(int number, const std::string& what, double bound, double measured, const std::string& unit,
-                     std::source_location where) {
+                     Place where) {
   keep({number, what, "at_least", bound, measured, 0, unit, measured >= bound}, where);
 }
 
 void record_below(int number, const std::string& what, double bound, double measured, const std::string& unit,
-                  std::source_location where) {
+                  Place where) {
   keep({number, what, "below", bound, measured, 0, unit, measured < bound}, where);
 }
 

@@ -148,6 +148,7 @@ class Device final : public SessionParent {
     Role role = Role::client;
   };
   struct TcpPort {
+    TcpPort(const protocol::Port* p, Listener l) : port(p), listener(std::move(l)) {}
     const protocol::Port* port;
     Listener listener;
   };

@@ -185,7 +185,9 @@ TEST_F(LoadMesh, BinaryStlThatEndsBeforeItsLastTriangleIsRefused) {
 TEST_F(LoadMesh, TrianglesThatChangeBetweenThePassesAreRefused) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   // How many triangles the second pass gives, and a coordinate of the last.
-  for (const auto& [count, x] : {std::pair{2, 1.0}, {1, 1.0}, {3, 1.0}, {2, nan}, {2, 9.0}}) {
+  for (const auto& given : {std::pair{2, 1.0}, {1, 1.0}, {3, 1.0}, {2, nan}, {2, 9.0}}) {
+    const int count = given.first;
+    const double x = given.second;
     int pass = 0;
     const auto mesh = clean_triangles([&](const TriangleSink& take) {
       const bool second = pass++ > 0;

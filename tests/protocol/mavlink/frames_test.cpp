@@ -105,7 +105,6 @@ TEST(MavlinkFrames, EveryTruncationIsSeen) {
 }
 
 TEST(MavlinkFrames, Version1MustHaveTheMessagesLength) {
-  Sender v;
   Bytes shorter{std::byte{0xFE},         std::byte{2}, std::byte{0}, std::byte{1}, std::byte{1},
                 std::byte{Attitude::id}, std::byte{9}, std::byte{9}};
   const std::uint16_t crc = checksum(std::array{std::byte{Attitude::crc_extra}}, checksum(BytesView(shorter).subspan(1)));

@@ -214,7 +214,7 @@ TEST(SonarInVirtualTime, AnExceptionEndsTheConnectionItHappensIn) {
   SonarConfig config = time.config.sonars[0];
   config.profile.vendor = &vendor;
   Sonar sonar({time.config, time.world}, config, 0, start);
-  for (const ConnectionId id : {1, 2}) sonar.on_connect(id, Role::client, {"client", {}}, start);
+  for (const ConnectionId id : {1u, 2u}) sonar.on_connect(id, Role::client, {"client", {}}, start);
   const Actions of_bytes = sonar.on_bytes(1, fire(), start);
   ASSERT_THAT(of_bytes, SizeIs(2));
   EXPECT_EQ(std::get<Report>(of_bytes[0]).line.phrase, "internal fault: no such luck");

@@ -68,7 +68,6 @@ TEST(Stepped, WaitsForEveryClient) {
   std::uint32_t last = 0;
   for (auto ping = reader.next_ping(); ping; ping = reader.next_ping(milliseconds(500))) last = ping->head.fixed.ping_id;
   ASSERT_GT(last, 0u) << "the kernel's buffers take a few";
-  oculus::PingSequence ids;
   for (std::uint32_t i = 1; i <= last + 3; ++i) {
     const auto ping = sleeper.next_ping();
     ASSERT_TRUE(ping);
