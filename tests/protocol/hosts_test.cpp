@@ -8,6 +8,8 @@
 #include <deque>
 #include <random>
 
+#include "core/image/draw_picture.hpp"
+
 namespace sonar::protocol::hosts_test {
 namespace {
 
@@ -185,6 +187,14 @@ TEST_P(Hosts, SetWhatIsWantedAndGetPings) {
     EXPECT_EQ(picture->samples.size(), picture->rows * picture->beams);
     EXPECT_EQ(picture->azimuth_rad.size(), picture->beams);
   }
+  const auto drawing = drawing_of(ping);
+  ASSERT_TRUE(drawing) << drawing.error().text;
+  EXPECT_EQ(drawing->kind, make.picture);
+  EXPECT_NEAR(drawing->range_m(), ping.facts.range_m, 0.01);
+  const FanStyle style{200, *find_colour_map("gray"), true};
+  const auto raster = PicturePainter(style).draw(*drawing);
+  ASSERT_TRUE(raster) << raster.error().text;
+  EXPECT_EQ(raster->height, picture_height(*drawing, style));
 }
 
 TEST_P(Hosts, ReadTheSameHoweverAStreamIsSplit) {
