@@ -53,6 +53,8 @@ Result<void> use_product(Config& config, std::string_view profile) {
   sonar.options = *std::move(options);
   sonar.max_clients = found->vendor->default_max_clients();
   sonar.max_observers = default_max_observers(*found->vendor);
+  if (found->vendor->name() == "aris")
+    sonar.mount.orientation = quat_from_rpy({0, 40 * pi / 180, 0});  // its window ends at 3.4 m
   if (found->vendor->name() == "surveyor240") sonar.mount.orientation = quat_from_rpy({0, pi / 2, 0});        // it looks down
   if (found->vendor->name() == "omniscan450") sonar.mount.orientation = quat_from_rpy({0, pi / 6, -pi / 2});  // to starboard
   return {};

@@ -106,6 +106,7 @@ Bytes descriptor_set(const std::string& name) {
   // Names what is looked up by name only, so that the linker keeps it.
   fg::RawImage::descriptor();
   v1::PingGeometry::descriptor();
+  v1::Picture::descriptor();
   v1::DaemonStatus::descriptor();
   const pb::Descriptor* const message = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(name);
   if (message == nullptr) return {};
@@ -272,6 +273,20 @@ Bytes geometry(const Ping& ping, std::uint32_t number) {
   message.set_full_scale(s.format.max_code);
   message.mutable_azimuth_rad()->Add(ping.beam_azimuth_rad.begin(), ping.beam_azimuth_rad.end());
   message.mutable_row_gain()->Add(ping.row_gain.begin(), ping.row_gain.end());
+  return bytes_of(message);
+}
+
+Bytes picture(const SonarPicture& picture) {
+  v1::Picture message;
+  message.set_kind(std::string(name_of(picture.kind)));
+  message.set_range_start_m(picture.image.start_m);
+  message.set_range_m(picture.range_m());
+  if (!picture.image.azimuth_rad.empty()) {
+    message.set_port_rad(picture.image.azimuth_rad.front());
+    message.set_starboard_rad(picture.image.azimuth_rad.back());
+  }
+  message.set_head_rad(picture.head_rad);
+  message.set_elevation_rad(picture.elevation_rad);
   return bytes_of(message);
 }
 

@@ -13,6 +13,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
+#include "core/image/sonar_picture.hpp"
 #include "core/sonar/ping.hpp"
 #include "protocol/doctor/finding.hpp"
 #include "protocol/foxglove/foxglove_words.hpp"
@@ -82,6 +83,8 @@ Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> point
 
 /// sonar.v1.PingGeometry. `number` = 0: to compare geometries of different pings.
 Bytes geometry(const Ping& ping, std::uint32_t number);
+/// sonar.v1.Picture.
+Bytes picture(const SonarPicture& picture);
 /// sonar.v1.Findings.
 Bytes findings(std::span<const doctor::Finding> all);
 }  // namespace sonar::foxglove

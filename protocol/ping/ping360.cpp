@@ -78,7 +78,7 @@ class Ping360Vendor final : public protocol::Vendor {
               ping360::apply_override({.range_m = 10, .rate_hz = {}, .gain_percent = {}, .mode = {}, .beams = {}}, device))
         s = settings_from(usual->vendor_settings.get());
     constexpr std::uint32_t half = grads / 2;
-    const std::uint32_t place = number % grads;
+    const std::uint32_t place = (number - 1) % grads;
     s.ping.angle = static_cast<std::uint16_t>((grads - half / 2 + std::min(place, grads - place)) % grads);
     s.ping.transmit = 1;
     return ScanStep{{.head_rad = head_rad(s.ping.angle, device.options), .with = std::make_shared<HeldSettings>(s)},

@@ -130,7 +130,7 @@ class Channels(unittest.TestCase):
             viewer.greeted()
             topics = {channel["topic"] for channel in viewer.channels.values()}
             self.assertEqual(topics, {"/tf", "/scene", "/swath", "/log", "/status", "/faults", "/doctor",
-                                      *(f"/front/{name}" for name in ("image", "geometry", "ping", "figures", "fan", "cloud"))})
+                                      *(f"/front/{name}" for name in ("image", "geometry", "ping", "figures", "fan", "picture", "cloud"))})
             viewer.subscribe(*sorted(topics))
             pings = {}
 

@@ -235,7 +235,7 @@ class Live(PageChecks, unittest.TestCase):
 
     @staticmethod
     def trouble(name):
-        return f"[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === '{name}')"
+        return f"document.querySelector('[data-trouble={name.lower().replace(' ', '_')}]')"
 
     def circle(self):
         """A file with a circle about the middle of the demo's scene in 90 s, looking inwards."""
