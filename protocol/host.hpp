@@ -15,7 +15,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
-#include "core/image/polar_image.hpp"
+#include "core/image/sonar_picture.hpp"
 #include "protocol/recording/codec.hpp"
 #include "protocol/vendor.hpp"
 
@@ -41,11 +41,15 @@ struct PingFacts {
 struct HostPing {
   PingFacts facts;
   std::function<Result<PolarImage>()> picture;    // of a mechanical scan: the sector as scanned so far
-  bool is_whole = true;                           // of a mechanical scan: the sector was scanned once
+  bool is_whole = true;                           // of pictures of many pings: there are enough of them
   std::vector<std::string> errors = {};           // of identities and sequence
   std::vector<std::string> echo_mismatches = {};  // settings that do not have the requested value yet
   std::optional<double> fired_s = {};             // by the clock of the device
+  /// What people look at; unset: a fan of `picture`.
+  std::function<SonarPicture()> drawing = {};
 };
+/// Of any make.
+Result<SonarPicture> drawing_of(const HostPing& ping);
 
 /// Bytes for a port of the host, counted from 0.
 struct HostSend {
@@ -141,6 +145,7 @@ struct Make {
   bool own_numbers = false;                     // of pings: not those of sonard's events
   bool scans = false;                           // pings come as fast as its head turns
   std::optional<RollPitchYaw> demo_mount = {};  // in the demo; nullopt: it looks ahead
+  PictureKind picture = PictureKind::fan;
 
   std::string_view name() const { return device->name(); }
 };

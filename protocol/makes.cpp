@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/text/format.hpp"
 #include "core/text/nearest.hpp"
 #include "protocol/aris/aris.hpp"
 #include "protocol/aris/host.hpp"
@@ -90,14 +91,16 @@ std::span<const Make> makes() {
        .ports = aris::host_ports,
        .host = aris::make_host,
        .codec = aris::codec(),
-       .own_numbers = true},
+       .own_numbers = true,
+       .demo_mount = RollPitchYaw{0, 40 * pi / 180, 0}},  // its window ends at 3.4 m
       {.device = &waterlinked::vendor(),
        .title = "a Sonar 3D-15",
        .request = "request",
        .remedy = "post true to /acoustics/enabled and a mode to /udp, below /api/v1/integration",
        .ports = waterlinked::host_ports,
        .host = waterlinked::make_host,
-       .codec = waterlinked::codec()},
+       .codec = waterlinked::codec(),
+       .picture = PictureKind::range_image},
       {.device = &ping::ping360::vendor(),
        .title = "a Ping360",
        .request = "request",
@@ -106,7 +109,8 @@ std::span<const Make> makes() {
        .host = ping::ping360::make_host,
        .codec = ping::ping360::codec(),
        .own_numbers = true,
-       .scans = true},
+       .scans = true,
+       .picture = PictureKind::sweep},
       {.device = &ping::surveyor::vendor(),
        .title = "a Surveyor",
        .request = "request",
@@ -115,7 +119,8 @@ std::span<const Make> makes() {
        .host = ping::surveyor::make_host,
        .codec = ping::surveyor::codec(),
        .own_numbers = true,
-       .demo_mount = RollPitchYaw{0, pi / 2, 0}},  // it looks down
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
+       .picture = PictureKind::points},
       {.device = &ping::omniscan::vendor(),
        .title = "an Omniscan",
        .request = "request",
@@ -124,7 +129,8 @@ std::span<const Make> makes() {
        .host = ping::omniscan::make_host,
        .codec = ping::omniscan::codec(),
        .own_numbers = true,
-       .demo_mount = RollPitchYaw{0, pi / 6, -pi / 2}},  // to starboard
+       .demo_mount = RollPitchYaw{0, pi / 6, -pi / 2},  // to starboard
+       .picture = PictureKind::waterfall},
   }};
   return all;
 }
@@ -133,6 +139,30 @@ const Make* find_make(std::string_view name) {
   for (const Make& make : makes())
     if (make.name() == name) return &make;
   return nullptr;
+}
+
+std::vector<DriverAddress> driver_addresses(const Vendor& vendor, Ipv4 ip, std::span<const Endpoint> status_to) {
+  std::vector<DriverAddress> all;
+  for (const Port& port : vendor.ports()) {
+    using Kind = Port::Kind;
+    if (port.kind == Kind::tcp_stream) all.push_back({"tcp", {ip, port.number}});
+    if (port.kind == Kind::udp_dialogue || port.kind == Kind::udp_answer) all.push_back({"udp", {ip, port.number}});
+    if (port.kind == Kind::http) all.push_back({"http", {ip, port.number}});
+    if (port.kind == Kind::udp_stream && port.group.port != 0) all.push_back({"multicast", port.group, true});
+    if (port.kind == Kind::udp_beacon)
+      for (const Endpoint& to : status_to) all.push_back({"status", to, true});
+  }
+  return all;
+}
+
+std::string line_of(std::string_view protocol, std::string_view at, bool sonar_speaks_first) {
+  return text::format("%-10.*s %-26.*s %s speaks first", static_cast<int>(protocol.size()), protocol.data(),
+                      static_cast<int>(at.size()), at.data(), sonar_speaks_first ? "the sonar" : "the driver");
+}
+
+Result<SonarPicture> drawing_of(const HostPing& ping) {
+  if (ping.drawing) return ping.drawing();
+  return ping.picture().map([](PolarImage image) { return SonarPicture{.image = std::move(image)}; });
 }
 
 const Make& make_of_profile(std::string_view profile) {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocol/dialogue.hpp"
@@ -28,6 +29,13 @@ struct Port {
   /// Of a udp_stream: least time between two datagrams of a ping. Of a tcp_stream: pause between the parts of a ping that
   /// Vendor::datagrams gives and Vendor::frame holds one behind the other.
   std::chrono::nanoseconds gap{0};
+};
+
+/// Where a driver meets a sonar.
+struct DriverAddress {
+  std::string_view protocol;  // "tcp", "udp", "http", "multicast", "status": status messages, by UDP
+  Endpoint at;
+  bool sonar_speaks_first = false;  // else the driver does
 };
 
 /// One request for a resource of the device, its sizes already limited by the server.

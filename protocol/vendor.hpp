@@ -72,6 +72,15 @@ class Vendor {
   /// The gain as SettingsOverride::gain_percent has it: 0 to 100 of what a client can turn it.
   virtual double gain_percent(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;
+  /// Of a mechanical scan: the ping of that number, from 1, as a usual host requests it. Others: nothing.
+  struct ScanStep {
+    RequestPing aim;
+    PingSettings settings;
+  };
+  virtual std::optional<ScanStep> scan_step(std::uint32_t number, const DeviceState& device) const {
+    static_cast<void>(number), static_cast<void>(device);
+    return std::nullopt;
+  }
   /// Empty when the vendor has no beacon.
   virtual Bytes beacon(const DeviceState& device, Time now) const = 0;
   /// Of a port of kind udp_answer. Any bytes; each reply is one datagram to the sender.
@@ -136,5 +145,10 @@ struct Profile {
   std::shared_ptr<const SonarModel> model;
 };
 Result<Profile> find_profile(std::string_view profile);
+
+/// Of a sonar at `ip`, port by port; `status_to`: where its status messages go.
+std::vector<DriverAddress> driver_addresses(const Vendor& vendor, Ipv4 ip, std::span<const Endpoint> status_to);
+/// "tcp        127.0.0.2:52100            the driver speaks first"
+std::string line_of(std::string_view protocol, std::string_view at, bool sonar_speaks_first);
 
 }  // namespace sonar::protocol

@@ -55,7 +55,7 @@ struct ViewOptions {
   std::size_t ping = 0;                    // which of a recording's, from 0
   FanStyle style;
 };
-Result<void> view(const ViewOptions& options);
+Result<void> view(ViewOptions options);
 
 struct StatsOptions {
   SourceOptions source;

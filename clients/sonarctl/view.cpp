@@ -12,22 +12,23 @@ using Clock = std::chrono::steady_clock;
 double now_s() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
 
 Result<void> check(const ViewOptions& o) {
-  if (o.png.empty() && !o.terminal) return failure(ErrorKind::usage, "choose an output: --png FILE, or --term for the terminal");
+  if (o.png.empty() && !o.terminal)
+    return failure(ErrorKind::usage, "choose an output: --png FILE, or --term, which is usual on a terminal");
   if (o.live && !o.source.recording.empty())
     return failure(ErrorKind::usage, "--live is for devices; of a recording, choose a ping with --ping");
   if (o.pings > 0 && !o.live) return failure(ErrorKind::usage, "--pings goes with --live");
   return {};
 }
 
-Result<Raster> write_picture(const ViewOptions& options, FanPainter& painter, const PolarImage& image) {
-  Result<Raster> fan = painter.draw(image);
-  if (!fan) return fan;
-  if (Result<void> written = write_png(*fan, options.png); !written) return tl::unexpected(written.error());
-  return fan;
+Result<Raster> write_picture(const ViewOptions& options, PicturePainter& painter, const SonarPicture& picture) {
+  Result<Raster> raster = painter.draw(picture);
+  if (!raster) return raster;
+  if (Result<void> written = write_png(*raster, options.png); !written) return tl::unexpected(written.error());
+  return raster;
 }
 
 /// The picture as lines that fit the terminal above `lines_kept` others.
-Result<std::vector<std::string>> lines_of(const ViewOptions& options, const PolarImage& image, int lines_kept) {
+Result<std::vector<std::string>> lines_of(const ViewOptions& options, const SonarPicture& picture, int lines_kept) {
   const TerminalSize size = terminal_size();
   TerminalStyle style;
   style.columns = size.columns;
@@ -35,23 +36,24 @@ Result<std::vector<std::string>> lines_of(const ViewOptions& options, const Pola
   style.colours = options.colours.value_or(choose_colours(terminal_facts()));
   style.map = options.style.colours;
   style.labels = options.style.rings;
-  return draw_terminal_fan(image, style);
+  return draw_terminal_picture(picture, style);
 }
 
 Result<void> view_one(const ViewOptions& options) {
   const Result<HostPing> ping = fetch_ping(options.source, options.ping);
   if (!ping) return tl::unexpected(ping.error());
-  const Result<PolarImage> image = ping->picture();
-  if (!image) return tl::unexpected(image.error());
+  const Result<SonarPicture> picture = protocol::drawing_of(*ping);
+  if (!picture) return tl::unexpected(picture.error());
   if (!options.png.empty()) {
-    FanPainter painter(options.style);
-    const Result<Raster> fan = write_picture(options, painter, *image);
-    if (!fan) return tl::unexpected(fan.error());
-    std::printf("%s: %d x %d pixels, %zu rows x %zu beams, %.2f m\n", options.png.c_str(), fan->width, fan->height, image->rows,
-                image->beams, image->range_m());
+    PicturePainter painter(options.style);
+    const Result<Raster> raster = write_picture(options, painter, *picture);
+    if (!raster) return tl::unexpected(raster.error());
+    std::printf("%s: %d x %d pixels, %zu rows x %zu beams, %.2f m%s\n", options.png.c_str(), raster->width, raster->height,
+                picture->image.rows, picture->image.beams, picture->range_m(),
+                picture->kind == PictureKind::fan ? "" : (", " + std::string(name_of(picture->kind))).c_str());
   }
   if (!options.terminal) return {};
-  const auto lines = lines_of(options, *image, 2);
+  const auto lines = lines_of(options, *picture, 2);
   if (!lines) return tl::unexpected(lines.error());
   for (const std::string& line : *lines) std::puts(line.c_str());
   ViewCaption caption;
@@ -103,16 +105,16 @@ class LiveView {
   /// False when the output was closed.
   Result<bool> show(const HostPing& ping, const LiveScreen& screen) {
     figures_.add(ping, stream_.host().counts(), now_s());
-    const Result<PolarImage> image = ping.picture();
-    if (!image) return tl::unexpected(image.error());
+    const Result<SonarPicture> picture = protocol::drawing_of(ping);
+    if (!picture) return tl::unexpected(picture.error());
     if (!options_.png.empty())
-      if (const Result<Raster> fan = write_picture(options_, painter_, *image); !fan) return tl::unexpected(fan.error());
+      if (const Result<Raster> drawn = write_picture(options_, painter_, *picture); !drawn) return tl::unexpected(drawn.error());
     if (!options_.terminal) {
       const bool overwrites = terminal_facts().is_terminal;  // one line that changes, or one line per ping
       std::printf(overwrites ? "\r\x1b[K%s  %s" : "%s  %s\n", options_.png.c_str(), figures_.text().c_str());
       return std::fflush(stdout) == 0;
     }
-    auto lines = lines_of(options_, *image, 1);
+    auto lines = lines_of(options_, *picture, 1);
     if (!lines) return tl::unexpected(lines.error());
     lines->push_back(figures_.text());
     return screen.show(*lines);
@@ -120,7 +122,7 @@ class LiveView {
 
   const ViewOptions& options_;
   PingStream stream_;
-  FanPainter painter_;
+  PicturePainter painter_;
   ViewCaption figures_;
   std::vector<std::string> notices_;
 };
@@ -137,7 +139,8 @@ Result<void> view_live(const ViewOptions& options) {
 
 }  // namespace
 
-Result<void> view(const ViewOptions& options) {
+Result<void> view(ViewOptions options) {
+  options.terminal = options.terminal || (options.png.empty() && terminal_facts().is_terminal);
   if (Result<void> sound = check(options); !sound) return sound;
   return options.live ? view_live(options) : view_one(options);
 }

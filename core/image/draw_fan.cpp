@@ -10,8 +10,6 @@
 namespace sonar {
 namespace {
 
-constexpr Rgb background{13, 17, 23}, ring_colour{150, 160, 170}, text_colour{190, 198, 206};
-
 /// Place in the beam table, fractional; beam k spans [k - 0.5, k + 0.5]. Nothing outside the fan.
 std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azimuth) {
   const auto next = std::lower_bound(azimuth_rad.begin(), azimuth_rad.end(), azimuth, std::greater<>());
@@ -59,7 +57,7 @@ void draw_rings(Raster& raster, const PolarImage& image, const FanLayout& layout
     std::snprintf(label, sizeof label, "%g m", ring * spacing);
     const int x = static_cast<int>(layout.apex_x - radius * std::sin(from)) + 3 * scale;
     const int y = static_cast<int>(layout.apex_y - radius * std::cos(from)) - scale;
-    draw_text(raster, std::min(x, layout.width - text_width(label, scale) - 1), y, label, text_colour, scale);
+    draw_text(raster, std::min(x, layout.width - text_width(label, scale) - 1), y, label, label_colour, scale);
   }
 }
 
@@ -73,8 +71,8 @@ Result<void> check(const PolarImage& image, const FanStyle& style) {
   for (std::size_t i = 1; i < image.beams; ++i)
     if (image.azimuth_rad[i] >= image.azimuth_rad[i - 1])
       return failure(ErrorKind::bad_data, "the bearing table does not run from port to starboard at beam " + std::to_string(i));
-  if (image.azimuth_rad.front() > pi / 2 || image.azimuth_rad.back() < -pi / 2)
-    return failure(ErrorKind::bad_data, "the bearing table covers more than half a circle");
+  if (image.azimuth_rad.front() > pi + 1e-6 || image.azimuth_rad.back() < -pi - 1e-6)
+    return failure(ErrorKind::bad_data, "the bearing table covers more than a circle");
   return {};
 }
 
@@ -85,12 +83,13 @@ FanLayout fan_layout(const PolarImage& image, const FanStyle& style) {
   const double margin = style.rings ? 28 : 4;
   FanLayout layout;
   layout.width = style.width_px;
-  layout.metres_per_pixel = 2 * image.range_m() * std::sin(half_aperture) / (style.width_px - 2 * margin);
+  layout.metres_per_pixel = 2 * image.range_m() * std::sin(std::min(half_aperture, pi / 2)) / (style.width_px - 2 * margin);
   // A very narrow fan would be very tall.
   layout.metres_per_pixel = std::max(layout.metres_per_pixel, image.range_m() / (4.0 * style.width_px));
   layout.apex_x = style.width_px / 2.0;
   layout.apex_y = margin + image.range_m() / layout.metres_per_pixel;
-  layout.height = static_cast<int>(std::ceil(layout.apex_y + margin));
+  const double below = std::max(0.0, -std::cos(half_aperture)) * image.range_m() / layout.metres_per_pixel;
+  layout.height = static_cast<int>(std::ceil(layout.apex_y + below + margin));
   return layout;
 }
 
@@ -155,7 +154,7 @@ Result<Raster> FanPainter::draw(const PolarImage& image) {
   Raster raster(layout_.width, layout_.height);
   for (std::size_t i = 0; i < footprints_.size(); ++i)
     raster.pixels[i] =
-        footprints_[i].is_outside() ? background : style_.colours.colour(mean(image, footprints_[i]) / image.full_scale);
+        footprints_[i].is_outside() ? outside_colour : style_.colours.colour(mean(image, footprints_[i]) / image.full_scale);
   if (style_.rings) draw_rings(raster, image, layout_);
   return raster;
 }

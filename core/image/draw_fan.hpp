@@ -12,6 +12,8 @@
 
 namespace sonar {
 
+inline constexpr Rgb outside_colour{13, 17, 23}, ring_colour{150, 160, 170}, label_colour{190, 198, 206};  // of all pictures
+
 struct FanStyle {
   int width_px = 1000;  // 64..8000
   ColourMap colours;
@@ -26,8 +28,7 @@ struct FanLayout {
 /// Layout of the fan of an image that draw_fan does not refuse.
 FanLayout fan_layout(const PolarImage& image, const FanStyle& style);
 
-/// Refuses an image without rows or beams, with a bearing table that does not run from port to starboard, or a fan wider than
-/// half a circle.
+/// Refuses an image without rows or beams, or with a bearing table that does not run from port to starboard within a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 
 /// Draws one ping after another as draw_fan does, in a third of the time: where the footprint of each pixel lies is kept until

@@ -6,8 +6,6 @@
 #include <cstdlib>
 #include <optional>
 
-#include "core/image/draw_fan.hpp"
-
 namespace sonar {
 namespace {
 
@@ -137,7 +135,8 @@ std::string text_of(Grid& grid, int line, TerminalColours colours) {
 
 }  // namespace
 
-Result<std::vector<std::string>> draw_terminal_fan(const PolarImage& image, const TerminalStyle& style) {
+Result<std::vector<std::string>> draw_terminal_picture(const SonarPicture& picture, const TerminalStyle& style) {
+  const PolarImage& image = picture.image;
   if (style.columns < fewest_columns || style.lines < fewest_lines)
     return failure(ErrorKind::usage, "the terminal is too small for a picture: " + std::to_string(style.columns) +
                                          " columns and " + std::to_string(style.lines) + " lines, at least 24 and 8 are needed");
@@ -146,15 +145,15 @@ Result<std::vector<std::string>> draw_terminal_fan(const PolarImage& image, cons
   drawing.colours = style.colours == TerminalColours::none ? *find_colour_map("gray") : style.map;
   const int room = style.columns - (style.labels ? label_columns : 0);
   drawing.width_px = std::clamp(dots * room, 64, 8000);
-  if (image.beams >= 2 && image.rows >= 1) {  // else draw_fan says what is wrong
-    const int needed = fan_layout(image, drawing).height;
-    const int available = 2 * dots * style.lines;
-    if (needed > available) drawing.width_px = std::max(64, drawing.width_px * available / needed / dots * dots);
+  Result<Raster> raster = PicturePainter(drawing).draw(picture);
+  const int available = 2 * dots * style.lines;
+  if (raster && raster->height > available) {
+    drawing.width_px = std::max(64, drawing.width_px * available / raster->height / dots * dots);
+    raster = PicturePainter(drawing).draw(picture);
   }
-  const Result<Raster> raster = draw_fan(image, drawing);
   if (!raster) return tl::unexpected(raster.error());
   Grid grid = grid_from(*raster, (drawing.width_px + dots - 1) / dots + (style.labels ? label_columns : 0));
-  if (style.labels) put_labels(grid, image, fan_layout(image, drawing));
+  if (style.labels && picture.is_polar()) put_labels(grid, image, fan_layout(image, drawing));
   std::vector<std::string> lines;
   for (int line = 0; line < std::min(grid.lines, style.lines); ++line) lines.push_back(text_of(grid, line, style.colours));
   return lines;

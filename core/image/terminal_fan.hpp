@@ -1,5 +1,5 @@
-// The fan as lines of text for a terminal: half blocks in colour, two picture points a character cell, or letters where there are
-// no colours. Built on draw_fan; sonarctl view --term prints it.
+// A sonar's picture as lines of text for a terminal: half blocks in colour, two picture points a character cell, or letters where
+// there are no colours. Built on PicturePainter; sonarctl view --term prints it.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 #include "core/base/result.hpp"
 #include "core/image/colour_map.hpp"
-#include "core/image/polar_image.hpp"
+#include "core/image/draw_picture.hpp"
 
 namespace sonar {
 
@@ -26,7 +26,7 @@ struct TerminalStyle {
 
 /// Lines without their newline, each leaving the terminal's colours as they were. Refuses what draw_fan refuses, and room for
 /// less than 24 columns and 8 lines.
-Result<std::vector<std::string>> draw_terminal_fan(const PolarImage& image, const TerminalStyle& style);
+Result<std::vector<std::string>> draw_terminal_picture(const SonarPicture& picture, const TerminalStyle& style);
 
 /// The nearest of xterm's colours 16 to 255.
 int palette_index(Rgb colour);

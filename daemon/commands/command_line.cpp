@@ -179,7 +179,7 @@ std::string complaint(const RunCommand& run) {
   if (run.demo && !file.empty()) return "--demo runs the built-in demo, not " + file + ": leave out one of the two";
   if (!known)
     return "there is no demo \"" + run.demo_of +
-           "\"; there are oculus, blueview, aris, 3d15, ping360 and surveyor, and --profile NAME for any product";
+           "\"; there are oculus, blueview, aris, 3d15, ping360, surveyor and omniscan, and --profile NAME for any product";
   if (!run.profile.empty() && !file.empty())
     return "--profile chooses the demo's sonar, and " + file + " says itself what its sonars are: leave out one of the two";
   if (!run.profile.empty() && !run.demo_of.empty())

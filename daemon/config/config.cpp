@@ -277,7 +277,9 @@ Result<Config> parse_config(std::string_view yaml, const std::string& name, cons
 
 Result<Config> demo_config() {
   auto config = parse_config(demo_yaml, "demo", {});
-  if (config) config->scene = {"demo.yaml", true};  // whatever files there are
+  if (!config) return config;
+  config->scene = {"demo.yaml", true};  // whatever files there are
+  config->previews = config->faults.armed = true;
   return config;
 }
 

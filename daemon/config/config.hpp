@@ -163,6 +163,7 @@ struct Config {
   EngineConfig engine;
   ClockMode clock = ClockMode::realtime;
   std::string clock_place;  // file:line:col: clock, for errors found with the command line
+  bool previews = false;    // of the demo: a viewer sees pings while no driver is connected (docs/live-view.md)
   LogOptions log;
 };
 

@@ -39,7 +39,7 @@ class Keeper {
   }
   void all(const Config& now, Config& next) {
     const auto& [source, scene, seed, origin, water, allow_hot, vehicles, objects, sonars, of_poses, of_control, of_limits,
-                 recording, faults, of_engine, clock, clock_place, of_log] = now;
+                 recording, faults, of_engine, clock, clock_place, previews, of_log] = now;
     poses(of_poses, next.poses);
     keep("world.origin", origin, next.origin);
     control(of_control, next.control);

@@ -106,6 +106,7 @@ Bytes descriptor_set(const std::string& name) {
   // Names what is looked up by name only, so that the linker keeps it.
   fg::RawImage::descriptor();
   v1::PingGeometry::descriptor();
+  v1::Picture::descriptor();
   v1::DaemonStatus::descriptor();
   const pb::Descriptor* const message = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(name);
   if (message == nullptr) return {};
@@ -284,6 +285,20 @@ Bytes truth(const Ping& ping) {
   for (const BeamTruth& beam : ping.truth) message.add_range_m(beam.object == BeamTruth::nothing ? 0.0f : beam.range_m);
   message.set_range_start_m(s.range_start_m);
   message.set_range_end_m(s.range_m);
+  return bytes_of(message);
+}
+
+Bytes picture(const SonarPicture& picture) {
+  v1::Picture message;
+  message.set_kind(std::string(name_of(picture.kind)));
+  message.set_range_start_m(picture.image.start_m);
+  message.set_range_m(picture.range_m());
+  if (!picture.image.azimuth_rad.empty()) {
+    message.set_port_rad(picture.image.azimuth_rad.front());
+    message.set_starboard_rad(picture.image.azimuth_rad.back());
+  }
+  message.set_head_rad(picture.head_rad);
+  message.set_elevation_rad(picture.elevation_rad);
   return bytes_of(message);
 }
 

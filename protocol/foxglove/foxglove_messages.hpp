@@ -13,6 +13,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
+#include "core/image/sonar_picture.hpp"
 #include "core/sonar/ping.hpp"
 #include "protocol/doctor/finding.hpp"
 #include "protocol/foxglove/foxglove_words.hpp"
@@ -84,6 +85,8 @@ Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> point
 Bytes geometry(const Ping& ping, std::uint32_t number);
 /// sonar.v1.PingTruth of a ping that was made with SimulationSwitches::keep_truth.
 Bytes truth(const Ping& ping);
+/// sonar.v1.Picture.
+Bytes picture(const SonarPicture& picture);
 /// sonar.v1.Findings.
 Bytes findings(std::span<const doctor::Finding> all);
 }  // namespace sonar::foxglove

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <tuple>
 
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
+#include "protocol/ping/surveyor.hpp"
 
 namespace sonar::ping {
 namespace {
@@ -17,8 +20,12 @@ using text::format;
 
 constexpr double sample_unit_s = 25e-9, sound_mps = 1500;
 constexpr int grads = 400, sector = 201, first_grad = 300;  // of a scan: half a circle, port to starboard
+constexpr int astern = 200;                                 // where the beams of a turn begin
+constexpr double shown_db = 60;                             // of a waterfall, below its strongest echo
 constexpr double usual_range_m = 10;
 constexpr std::size_t point_rows = 300;  // of a picture of points
+
+using Line = std::vector<float>;  // of one beam
 
 /// 0: as the device likes.
 double period_ms_of(const protocol::SettingsOverride& wanted) {
@@ -69,6 +76,10 @@ std::optional<BytesView> read_front(const Frame& frame, M& message) {
 
 HostPing points_of(const YzPointData& data, BytesView rest) {
   HostPing found;
+  SonarPicture seen{.kind = PictureKind::points, .image = {}};
+  const double half_rad = static_cast<double>(surveyor::vendor().models().front()->modes.front().horizontal_aperture_rad) / 2;
+  seen.image = {
+      point_rows, 2, static_cast<double>(data.end_m) / point_rows, {half_rad, -half_rad}, std::vector<float>(2 * point_rows)};
   std::vector<std::pair<double, double>> polar;  // azimuth, range
   wire::Reader reader(rest);
   for (int i = 0; i < data.points; ++i) {
@@ -102,10 +113,27 @@ HostPing points_of(const YzPointData& data, BytesView rest) {
     if (image.beams >= 2) return image;
     return failure(ErrorKind::usage, "a picture takes two points at least: sonarctl listen prints those of a Surveyor");
   };
+  seen.points = std::move(polar);
+  found.drawing = [seen = std::move(seen)] { return seen; };
   return found;
 }
 
-HostPing profile_of(const OsMonoProfile& data, BytesView rest) {
+SonarPicture picture_of(const std::deque<std::shared_ptr<const Line>>& waterfall, double start_m, double row_m) {
+  SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};
+  seen.image.rows = waterfall.size();
+  seen.image.beams = waterfall.front()->size();
+  seen.image.row_spacing_m = row_m;
+  seen.image.start_m = start_m;
+  float most_db = -1000;
+  for (const auto& profile : waterfall) most_db = std::max(most_db, *std::max_element(profile->begin(), profile->end()));
+  for (const auto& profile : waterfall)
+    for (const float db : *profile)
+      seen.image.samples.push_back(std::clamp(255 * (1 + (db - most_db) / static_cast<float>(shown_db)), 0.0f, 255.0f));
+  return seen;
+}
+
+/// `waterfall`: the profiles before it, the newest first, each [dB]; this one is added.
+HostPing profile_of(const OsMonoProfile& data, BytesView rest, std::deque<std::shared_ptr<const Line>>& waterfall) {
   HostPing found;
   std::vector<std::uint16_t> powers;
   wire::Reader reader(rest);
@@ -123,9 +151,17 @@ HostPing profile_of(const OsMonoProfile& data, BytesView rest) {
                  static_cast<double>(data.hz),
                  0};
   found.picture = []() -> Result<PolarImage> {
-    return failure(ErrorKind::usage, "one beam makes no picture: sonarctl listen prints the profiles of an Omniscan");
+    return failure(ErrorKind::usage, "one ping of one beam makes no picture: sonarctl listen prints the profiles of an Omniscan");
   };
   if (powers.empty()) return found;
+  auto profile = std::make_shared<Line>();
+  for (const std::uint16_t power : powers)
+    profile->push_back(data.lowest_db + static_cast<float>(power) / 65535 * (data.highest_db - data.lowest_db));
+  if (!waterfall.empty() && waterfall.front()->size() != profile->size()) waterfall.clear();
+  waterfall.push_front(std::move(profile));
+  if (waterfall.size() > waterfall_rows) waterfall.pop_back();
+  found.is_whole = waterfall.size() >= waterfall_fewest_rows;
+  found.drawing = [waterfall, start_m, row_m] { return picture_of(waterfall, start_m, row_m); };
   const auto top = std::max_element(powers.begin(), powers.end());
   const double db = static_cast<double>(data.lowest_db) +
                     static_cast<double>(*top) / 65535 * static_cast<double>(data.highest_db - data.lowest_db);
@@ -197,7 +233,47 @@ class OmniscanHost final : public PingHost {
   std::optional<HostPing> ping_from(const Frame& frame) override {
     OsMonoProfile data;
     const auto rest = frame.header.id == Id::os_mono_profile ? read_front(frame, data) : std::nullopt;
-    return rest ? std::optional(profile_of(data, *rest)) : std::nullopt;
+    if (!rest) return std::nullopt;
+    if (data.start_mm != start_mm_ || data.length_mm != length_mm_) waterfall_.clear();
+    std::tie(start_mm_, length_mm_) = std::tie(data.start_mm, data.length_mm);
+    return profile_of(data, *rest, waterfall_);
+  }
+
+  std::deque<std::shared_ptr<const Line>> waterfall_;
+  std::uint32_t start_mm_ = 0, length_mm_ = 0;
+};
+
+/// Of beam 0, which looks astern, over port to the last.
+double bearing_rad(std::size_t beam) { return (grads / 2 - static_cast<double>(beam)) * 2 * pi / grads; }
+
+/// What was scanned of a turn so far. Cheap to copy.
+struct Turn {
+  static constexpr std::size_t first = first_grad + astern - grads, end = first + sector;  // the half ahead
+  std::size_t rows = 0;
+  double row_m = 0;
+  std::vector<std::shared_ptr<const Line>> lines = std::vector<std::shared_ptr<const Line>>(grads);
+
+  bool lacks(std::size_t from, std::size_t to) const {
+    return std::any_of(lines.begin() + static_cast<std::ptrdiff_t>(from), lines.begin() + static_cast<std::ptrdiff_t>(to),
+                       [](const auto& line) { return line == nullptr; });
+  }
+  /// The half ahead as long as nothing else was scanned.
+  PolarImage shown() const {
+    bool only_ahead = true;
+    for (std::size_t beam = 0; beam < grads; ++beam)
+      only_ahead = only_ahead && (lines[beam] == nullptr || (beam >= first && beam < end));
+    const std::size_t begin = only_ahead ? first : 0;
+    PolarImage image;
+    image.rows = rows;
+    image.beams = only_ahead ? sector : grads;
+    image.row_spacing_m = row_m;
+    image.samples.resize(rows * image.beams);
+    for (std::size_t beam = 0; beam < image.beams; ++beam) {
+      image.azimuth_rad.push_back(bearing_rad(begin + beam));
+      if (const auto& line = lines[begin + beam])
+        for (std::size_t row = 0; row < rows; ++row) image.samples[row * image.beams + beam] = (*line)[row];
+    }
+    return image;
   }
 };
 
@@ -232,33 +308,26 @@ class Ping360Host final : public PingHost {
 
   HostPing line(std::uint16_t angle, unsigned period, unsigned khz, BytesView samples) {
     const double row_m = period * sample_unit_s * sound_mps / 2;
-    if (sector_.rows != samples.size() || sector_.row_spacing_m != row_m) {
-      sector_ = {};
-      sector_.rows = samples.size();
-      sector_.beams = sector;
-      sector_.row_spacing_m = row_m;
-      for (int i = 0; i < sector; ++i) sector_.azimuth_rad.push_back((sector / 2 - i) * 2 * pi / grads);
-      sector_.samples.resize(sector_.rows * sector_.beams);
-      scanned_.assign(sector, false);
-    }
-    const auto beam = static_cast<std::size_t>((angle + grads - first_grad) % grads);
-    if (beam < sector_.beams) {
-      scanned_[beam] = true;
-      for (std::size_t row = 0; row < sector_.rows; ++row)
-        sector_.samples[row * sector_.beams + beam] = static_cast<float>(std::to_integer<int>(samples[row]));
-    }
+    if (turn_.rows != samples.size() || turn_.row_m != row_m) turn_ = {samples.size(), row_m};
+    const auto beam = static_cast<std::size_t>((angle + astern) % grads);
+    auto line = std::make_shared<Line>();
+    for (const std::byte sample : samples) line->push_back(static_cast<float>(std::to_integer<int>(sample)));
+    turn_.lines[beam] = std::move(line);
     HostPing ping;
-    ping.facts = {++pings_, 1, static_cast<unsigned>(samples.size()), 8, row_m, sector_.range_m(), 1e3 * khz, 0};
+    ping.facts = {++pings_,  1, static_cast<unsigned>(samples.size()), 8, row_m, row_m * static_cast<double>(samples.size()),
+                  1e3 * khz, 0};
     ping.facts.note = "angle " + std::to_string(angle) + " grad";
-    ping.picture = [image = sector_]() -> Result<PolarImage> { return image; };
-    ping.is_whole = std::find(scanned_.begin(), scanned_.end(), false) == scanned_.end();
+    ping.picture = [turn = turn_]() -> Result<PolarImage> { return turn.shown(); };
+    ping.drawing = [turn = turn_, head_rad = bearing_rad(beam)] {
+      return SonarPicture{.kind = PictureKind::sweep, .image = turn.shown(), .head_rad = head_rad};
+    };
+    ping.is_whole = !turn_.lacks(Turn::first, Turn::end);
     return ping;
   }
 
   bool is_open_ = false;
-  PolarImage sector_;          // as scanned so far
-  std::vector<bool> scanned_;  // which beams of it
-  std::uint32_t pings_ = 0;    // which a Ping360 does not number
+  Turn turn_;
+  std::uint32_t pings_ = 0;  // which a Ping360 does not number
 };
 
 template <class Product>

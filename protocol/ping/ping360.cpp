@@ -70,6 +70,20 @@ class Ping360Vendor final : public protocol::Vendor {
   }
   bool pings_over_tcp() const override { return false; }
   bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
+  /// To and fro over the half circle ahead, 10 m far unless other settings were requested.
+  std::optional<ScanStep> scan_step(std::uint32_t number, const protocol::DeviceState& device) const override {
+    Settings s = settings_from(device.settings.get());
+    if (HeldSettings(s).equals(HeldSettings(Settings{})))
+      if (const auto usual =
+              ping360::apply_override({.range_m = 10, .rate_hz = {}, .gain_percent = {}, .mode = {}, .beams = {}}, device))
+        s = settings_from(usual->vendor_settings.get());
+    constexpr std::uint32_t half = grads / 2;
+    const std::uint32_t place = (number - 1) % grads;
+    s.ping.angle = static_cast<std::uint16_t>((grads - half / 2 + std::min(place, grads - place)) % grads);
+    s.ping.transmit = 1;
+    return ScanStep{{.head_rad = head_rad(s.ping.angle, device.options), .with = std::make_shared<HeldSettings>(s)},
+                    ping_settings(s, device)};
+  }
   protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
   bool is_request(const protocol::Port&, protocol::BytesView datagram) const override { return holds_frame(datagram); }
   protocol::Reaction on_datagram(const protocol::Port&, protocol::BytesView datagram, const protocol::DeviceState& device,

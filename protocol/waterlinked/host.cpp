@@ -17,6 +17,7 @@ using Json = nlohmann::json;
 using protocol::HostActions;
 
 constexpr std::size_t picture_rows = 300;
+constexpr double darkest = 0.85;  // of a range image: how much less bright the farthest is than the nearest
 constexpr std::size_t most_pixels = 1 << 20;
 constexpr std::string_view title = "a Sonar 3D-15", api = "/api/v1/integration";
 
@@ -44,6 +45,11 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
   image.beams = width;
   image.row_spacing_m = far_m / picture_rows;
   image.samples.resize(image.rows * image.beams);
+  SonarPicture seen{.kind = PictureKind::range_image, .image = {}, .elevation_rad = high / 2};
+  seen.image.rows = height;
+  seen.image.beams = width;
+  seen.image.row_spacing_m = far_m / static_cast<double>(height);
+  seen.image.samples.resize(width * height);
   std::size_t returns = 0;
   double nearest_m = far_m, farthest_m = 0;
   for (std::size_t column = 0; column < width; ++column) {
@@ -55,6 +61,8 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
       ++returns;
       nearest_m = std::min(nearest_m, range_m);
       farthest_m = std::max(farthest_m, range_m);
+      seen.image.samples[(height - 1 - row) * width + column] =
+          static_cast<float>(255 * (1 - darkest * std::min(1.0, range_m / far_m)));
       const double elevation = high * (static_cast<double>(row) / static_cast<double>(height - 1) - 0.5);
       const double at = range_m * std::cos(elevation) / image.row_spacing_m;
       if (!(at >= 0 && at < static_cast<double>(picture_rows))) continue;
@@ -67,7 +75,9 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
   found.facts.note =
       returns == 0 ? "no returns" : text::format("%zu returns from %.2f to %.2f m", returns, nearest_m, farthest_m);
   if (strengths == nullptr) found.facts.note += ", without their strengths";
+  seen.image.azimuth_rad = image.azimuth_rad;
   found.picture = [image = std::move(image)]() -> Result<PolarImage> { return image; };
+  found.drawing = [seen = std::move(seen)] { return seen; };
   return found;
 }
 

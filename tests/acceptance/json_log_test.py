@@ -22,7 +22,7 @@ class JsonLog(unittest.TestCase):
             self.assertEqual(daemon.stop()[0], 0)
             messages = [line["message"] for line in objects(self, daemon.log())]
         self.assertRegex(messages[0], r"^sonard \d+\.\d+")
-        for start in ["config ", "scene ", "sonar ", "data ", "pose ", "control ", "seed ", "ready in ", "resident memory "]:
+        for start in ["config ", "scene ", "sonar ", "tcp ", "status ", "pose ", "control ", "seed ", "ready in ", "resident memory "]:
             self.assertTrue(any(m.startswith(start) for m in messages), f"{start}: {messages}")
 
     def test_standard_output_holds_what_it_held(self):
@@ -49,7 +49,7 @@ control: {{stream: off, http: off}}
                 if arguments:
                     objects(self, text)
                 else:
-                    self.assertRegex(text, r"(?m)^  data    tcp ")
+                    self.assertRegex(text, r"(?m)^  tcp +127")
                     self.assertRegex(text, r"(?m)^resident memory ")
 
     def test_complaints_too(self):

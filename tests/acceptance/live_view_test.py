@@ -131,7 +131,7 @@ class Channels(unittest.TestCase):
             viewer.greeted()
             topics = {channel["topic"] for channel in viewer.channels.values()}
             self.assertEqual(topics, {"/tf", "/scene", "/swath", "/log", "/status", "/faults", "/doctor",
-                                      *(f"/front/{name}" for name in ("image", "geometry", "ping", "figures", "fan", "cloud", "truth"))})
+                                      *(f"/front/{name}" for name in ("image", "geometry", "ping", "figures", "fan", "picture", "cloud", "truth"))})
             viewer.subscribe(*sorted(topics))
             pings = {}
 

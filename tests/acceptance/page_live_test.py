@@ -216,6 +216,30 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("document.body.dataset.situation === 'fine'")
             self.assert_quiet(page, url_of(daemon))
 
+    def test_the_page_records(self):
+        with Sonard(mount=MOUNT, more="recording: {folder: .}") as daemon, Driver(daemon.address, range_m=2, beams=256):
+            page = self.open(daemon)
+            shown(page)
+            page.run("document.querySelector('#record').focus()")
+            page.press("Enter")
+            page.wait("document.querySelector('#record').innerText === 'Stop recording' && /running/.test(document.querySelector('#recordings').innerText)")
+            self.patiently(lambda: int(ask(daemon, "status")["recordings"][0].get("pings", 0)) > 2)
+            page.run("document.querySelector('#record').focus()")
+            page.press("Enter")
+            page.wait("document.querySelector('#record').innerText === 'Record' && !/running/.test(document.querySelector('#recordings').innerText)")
+            (recorded,) = pathlib.Path(daemon.folder.name).glob("front-*.mcap")
+            self.assertIn(recorded.name, page.text("#recordings"))
+            self.assert_quiet(page, url_of(daemon))
+
+    def test_without_a_folder_the_page_says_why_it_does_not_record(self):
+        with Sonard(mount=MOUNT) as daemon:
+            page = self.open(daemon)
+            page.wait("document.querySelector('#record')?.disabled === false")
+            page.run("document.querySelector('#record').focus()")
+            page.press("Enter")
+            page.wait("document.querySelector('#refusal').offsetWidth > 0")
+            self.assertIn("recording: {folder: DIR}", page.text("#refusal"))
+
     def test_everything_at_once(self):
         """Two drivers, one of them slow, a trajectory and a fault: the pictures of docs/live-view.md."""
         trajectory = f"{{file: {self.circle()}, loop: true}}"
@@ -235,7 +259,7 @@ class Live(PageChecks, unittest.TestCase):
 
     @staticmethod
     def trouble(name):
-        return f"[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === '{name}')"
+        return f"document.querySelector('[data-trouble={name.lower().replace(' ', '_')}]')"
 
     def circle(self):
         """A file with a circle about the middle of the demo's scene in 90 s, looking inwards."""

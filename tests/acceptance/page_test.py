@@ -139,10 +139,25 @@ class Page(PageChecks, unittest.TestCase):
     def test_faults_begin_and_are_cleared(self):
         page = self.open()
         page.wait("document.querySelectorAll('#troubles button').length > 5")
-        page.run("[...document.querySelectorAll('#troubles button')].find((b) => b.innerText === 'Thin tether').click()")
+        page.press_mouse("[data-trouble=thin_tether]")
         page.wait("document.querySelector('.fault-card .left')?.innerText.startsWith('0:')")
         self.assertIn(("/faults/thin_tether", 20), self.mock.set_calls)
         self.assertEqual(page.text("#fault-count"), "1")
+        self.assertIn("The tether is slow and late.", page.text(".fault-card"))
+        page.click("#clear-faults")
+        page.wait("!document.querySelector('.fault-card')")
+
+    def test_faults_say_what_they_do_wait_for_and_cannot(self):
+        page = self.open()
+        page.wait("document.querySelector('[data-trouble=lease_renewal] small')?.innerText")
+        self.assertEqual(page.text("[data-trouble=lease_renewal] small"),
+                         "The address is withdrawn and returns. Cannot act here: the sonar needs two network namespaces: sonarctl lab.")
+        self.assertTrue(page.run("document.querySelector('[data-trouble=lease_renewal]').disabled"))
+        self.assertIn("Lasts 21 s.", page.text("[data-trouble=power_cycle]"))
+        self.assertIn("Does not put back the settings that it changed.", page.text("[data-trouble=second_operator]"))
+        self.assertIn("Begins with a ping.", page.text("[data-trouble=bad_connector]"))
+        page.press_mouse("[data-trouble=bad_connector]")
+        page.wait("document.querySelector('.fault-card .left')?.innerText === 'waits for a ping'")
         page.click("#clear-faults")
         page.wait("!document.querySelector('.fault-card')")
 
@@ -167,7 +182,7 @@ class Page(PageChecks, unittest.TestCase):
         page = self.open(1100, 760, script="HTMLCanvasElement.prototype.getContext = ((old) => function (kind, ...rest) {"
                          " return kind === 'webgl2' ? null : old.call(this, kind, ...rest); })(HTMLCanvasElement.prototype.getContext)")
         page.wait("document.querySelector('#no-scene').offsetWidth > 0")
-        page.wait("document.querySelector('#fan').width === 720", 60)  # as sonard has drawn it
+        page.wait("document.querySelector('#drawn').offsetWidth > 0 && document.querySelector('#drawn').width === 720", 60)  # as sonard has drawn it
         self.picture(page, "no-webgl")
         page.run("1")
         self.assertEqual(page.errors, [])

@@ -305,7 +305,7 @@ class Tools(unittest.TestCase):
                 self.assertRegex(without_port.stdout, line, without_port.stderr)
                 picture = pathlib.Path(folder) / "fan.png"
                 viewed = run(SONARCTL, "view", at, "--png", picture, "--range", 4)
-                self.assertEqual((viewed.returncode == 0, picture.exists()), (profile != "omniscan-450",) * 2, viewed.stderr)
+                self.assertEqual((viewed.returncode, picture.exists()), (0, True), viewed.stderr)
 
 
 @unittest.skipIf(shark.why_not(), shark.why_not())

@@ -24,7 +24,7 @@ FLOORS = {
     "core/pipeline/arithmetic": ["core/base/", "core/sonar/", "core/pipeline/arithmetic/"],
     "core/paper": ["core/base/", "core/sonar/", "core/scene/", "core/pipeline/", "core/paper/"],
     "cuda": ["core/base/", "core/sonar/", "core/scene/", "core/pipeline/", "cuda/"],
-    "protocol": ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/"],
+    "protocol": ["core/base/", "core/image/polar_image.hpp", "core/image/sonar_picture.hpp", "core/sonar/", "core/text/", "protocol/"],
     "protocol/wire": ["core/base/", "protocol/wire/"],
     "protocol/control": ["core/base/", "protocol/control/"],
     "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/", "protocol/host.hpp"],

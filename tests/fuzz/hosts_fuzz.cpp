@@ -2,6 +2,7 @@
 // a port of kind http a piece is the body of a reply.
 #include <cstdlib>
 
+#include "core/image/draw_picture.hpp"
 #include "protocol/host.hpp"
 
 namespace {
@@ -17,6 +18,9 @@ void check(const protocol::HostActions& actions, std::size_t ports) {
     const auto picture = ping->picture();
     if (picture && (picture->samples.size() != picture->rows * picture->beams || picture->azimuth_rad.size() != picture->beams))
       std::abort();
+    const auto drawing = protocol::drawing_of(*ping);
+    if (drawing && drawing->image.samples.size() != drawing->image.rows * drawing->image.beams) std::abort();
+    if (drawing) static_cast<void>(PicturePainter({.width_px = 64}).draw(*drawing));
   }
 }
 

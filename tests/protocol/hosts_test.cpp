@@ -10,6 +10,7 @@
 #include <map>
 #include <random>
 
+#include "core/image/draw_picture.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/recording/raw_dump.hpp"
@@ -192,6 +193,14 @@ TEST_P(Hosts, SetWhatIsWantedAndGetPings) {
     EXPECT_EQ(picture->samples.size(), picture->rows * picture->beams);
     EXPECT_EQ(picture->azimuth_rad.size(), picture->beams);
   }
+  const auto drawing = drawing_of(ping);
+  ASSERT_TRUE(drawing) << drawing.error().text;
+  EXPECT_EQ(drawing->kind, make.picture);
+  EXPECT_NEAR(drawing->range_m(), ping.facts.range_m, 0.01);
+  const FanStyle style{200, *find_colour_map("gray"), true};
+  const auto raster = PicturePainter(style).draw(*drawing);
+  ASSERT_TRUE(raster) << raster.error().text;
+  EXPECT_EQ(raster->height, picture_height(*drawing, style));
 }
 
 TEST_P(Hosts, ReadTheSameHoweverAStreamIsSplit) {

@@ -55,7 +55,8 @@ std::string fault_list_text(const v1::FaultReport& report) {
   for (const v1::FaultStatus& f : report.faults()) {
     text += format("%-16s %-4s %-16s %-12s %-8s %6" PRIu64 " injection%s", f.name().c_str(), f.code().c_str(), f.do_().c_str(),
                    f.sonar().c_str(), f.state().c_str(), f.injections(), f.injections() == 1 ? "" : "s");
-    text += (f.expires_s() > 0 ? format("  ends in %.1f s", f.expires_s()) : std::string()) + "\n";
+    if (f.expires_s() > 0) text += format("  ends in %.1f s", f.expires_s());
+    text += (f.waits_for().empty() ? "" : "  waits for " + f.waits_for()) + "\n";
   }
   return text;
 }

@@ -5,6 +5,7 @@
 #include "clients/sonarctl/control/fault_text.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
+#include "protocol/vendor.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -32,11 +33,11 @@ std::string settings_text(const v1::SonarStatus& s) {
 
 std::string sonar_text(const v1::SonarStatus& s) {
   std::string text = line("sonar", s.name() + "  " + s.profile() + "  " + settings_text(s));
-  std::string links = "tcp " + s.listens();
-  if (!s.advertised().empty() && !s.listens().starts_with(s.advertised() + ":")) links += "  advertised as " + s.advertised();
-  for (const std::string& to : s.status_to()) links += "  status -> " + to;
-  if (!s.observers().empty()) links += format("  observers at %s (%u now)", s.observers().c_str(), s.observing());
-  text += line("  links", links);
+  for (const v1::SonarAddress& a : s.addresses())
+    text += "          " + protocol::line_of(a.protocol(), a.address(), a.sonar_speaks_first()) + "\n";
+  if (!s.advertised().empty() && !s.listens().empty() && !s.listens().starts_with(s.advertised() + ":"))
+    text += line("", "advertised as " + s.advertised());
+  if (!s.observers().empty()) text += line("", format("observers at %s (%u now)", s.observers().c_str(), s.observing()));
   text += line("  place", place_text(control::pose_of(s)));
   const v1::SonarFigures& f = s.figures();
   text += line("  pings", format("%llu simulated, %llu served, %llu dropped, %llu refused, %llu ticks skipped", wide(f.pings()),

@@ -14,7 +14,6 @@ export class Facts {
     this.logCount = 0;
     this.sonar = '';
     this.connection = 'connecting';  // connecting, open, lost, token
-    this.problems = new Map();       // status messages of the daemon, by id
     this.clear();
   }
 
@@ -23,9 +22,11 @@ export class Facts {
     this.status = null;
     this.findings = null;
     this.faults = [];
+    this.troubles = new Map();  // by name: what is said of each
     this.frames = new Map();  // child -> {parent, translation, rotation}
     this.ping = null;
     this.geometry = new Map();  // by sonar
+    this.pictures = new Map();  // by sonar: what its /fan shows
     this.events = new Map();    // log time -> ping event
     this.clientPings = new Counters();
     this.clientBytes = new Counters();
@@ -51,8 +52,9 @@ export class Facts {
     this.maySteer = meta['sonard.may_steer'] !== 'false';
     this.clock = meta['sonard.clock'] ?? 'realtime';
     if (!same) this.clear();
+    this.previews = meta['sonard.previews'] === 'true';  // by itself, without a driver
+    this.openedAt = now_s();
     this.parameters.clear();
-    this.problems.clear();
   }
 
   get realtime() {
@@ -60,6 +62,18 @@ export class Facts {
   }
   get sonarStatus() {
     return this.status?.sonars.find((s) => s.name === this.sonar) ?? null;
+  }
+  /// A driver is connected, or a group of receivers gets the pings.
+  get listened() {
+    const sonar = this.sonarStatus;
+    return Boolean(sonar && (sonar.clients.length > 0 || sonar.receivers?.length > 0));
+  }
+  /// "fan" and others: pictures of many pings, or of another shape, are sonard's to draw.
+  get pictureKind() {
+    return this.pictures.get(this.sonar)?.kind ?? 'fan';
+  }
+  get preview() {
+    return !this.listened && Boolean(this.sonarStatus?.preview || this.of('preview'));
   }
   /// The vehicle that carries the sonar: by the frames, else the only one.
   get vehicle() {
@@ -103,6 +117,7 @@ export class Facts {
       case '/faults':
         this.faults = value.faults.filter((f) => f.state !== 'over').map((f) => ({ ...f, ends_ns: f.expires_s > 0 ? ns + f.expires_s * 1e9 : 0 }));
         this.armed = value.armed;
+        this.troubles = new Map(value.troubles.map((t) => [t.name, t]));
         return;
       case '/log':
         this.log.push({ ...value, ns });
@@ -116,7 +131,8 @@ export class Facts {
     const [, sonar, kind] = topic.split('/');
     if (kind === 'geometry') this.geometry.set(sonar, { ...value, ns });
     if (kind === 'ping' && sonar === this.sonar) this.pingEvent(value, ns);
-    if (kind === 'image' && sonar === this.sonar) this.image(value, ns);
+    if (kind === 'picture') this.pictures.set(sonar, value);
+    if ((kind === 'image' || kind === 'fan') && sonar === this.sonar) this.image(value, ns, kind === 'fan');
   }
 
   pingEvent(event, ns) {
@@ -125,20 +141,23 @@ export class Facts {
     if (this.ping?.ns === ns) this.count(this.ping, event);
   }
 
-  image(image, ns) {
+  /// `drawn`: a picture that sonard has drawn, not the ping's samples.
+  image(image, ns, drawn) {
     const geometry = this.geometry.get(this.sonar);
-    if (!geometry) return;
+    if (!geometry && !drawn) return;
     this.receivedBytes += image.data.length;
     this.received.add(now_s(), this.receivedBytes);
-    this.ping = { image, geometry, ns, at: now_s() };
-    const event = this.events.get(ns) ?? (geometry.ns === ns ? geometry : null);  // newcomers get the last picture without its event
+    this.ping = { image, geometry, ns, at: now_s(), about: drawn ? this.pictures.get(this.sonar) ?? {} : null };
+    const event = this.events.get(ns) ?? (geometry?.ns === ns ? geometry : null);  // newcomers get the last picture without its event
     if (event) this.count(this.ping, event);
   }
 
   /// A picture has no number: the event of the same time has, and comes before it or after it.
   count(ping, event) {
     ping.number = event.number;
-    if (event.number > this.lastNumber + 1 && event.number - this.lastNumber < 1000) this.missed += event.number - this.lastNumber - 1;
+    if (Boolean(event.preview) !== this.wasPreview) this.lastNumber = Infinity;  // they have numbers of their own
+    this.wasPreview = Boolean(event.preview);
+    if (!ping.about && event.number > this.lastNumber + 1 && event.number - this.lastNumber < 1000) this.missed += event.number - this.lastNumber - 1;
     this.lastNumber = event.number;
   }
 

@@ -5,12 +5,14 @@ import { Facts } from './facts.js';
 import { Fan } from './fan/fan.js';
 import { LogPane } from './panels/log.js';
 import { Notice } from './panels/notice.js';
+import { Refusals } from './panels/refusals.js';
 import { Scene } from './scene/scene.js';
 import { Timeline } from './panels/timeline.js';
 import { drawConnections } from './panels/connections.js';
 import { drawDoctor } from './panels/doctor.js';
 import { drawFaults } from './panels/faults.js';
 import { drawHead } from './panels/head.js';
+import { drawRecordings, toggleRecording } from './panels/recordings.js';
 import { drawSettings } from './panels/settings.js';
 import { fixed } from './numbers.js';
 import { listenToKeys } from './keys.js';
@@ -42,47 +44,57 @@ const connection = new Connection({
     facts.message(topic, value, ns);
     if (topic === '/scene') scene.update(value);
     if (topic === '/swath') scene.swath(value);
+    if (topic === `/${facts.sonar}/cloud`) scene.cloud(value);
     if (topic === '/status') choose();
-    if (topic === `/${facts.sonar}/fan`) fan.showFlat(value);
+    if (topic === `/${facts.sonar}/picture` && facts.pictureKind !== chosenKind) choose();
   },
   time: (ns) => facts.setTime(ns),
   parameters: (list) => facts.setParameters(list),
-  status(status) {
-    facts.problems.set(status.id ?? status.message, status);
-    setTimeout(() => facts.problems.get(status.id ?? status.message) === status && facts.problems.delete(status.id ?? status.message), 10000);
+  status({ id, message }) {
+    if (id?.startsWith('param:')) refusals.show(id, message, id.slice('param:'.length));
   },
-  removeStatus: (ids) => ids.forEach((id) => facts.problems.delete(id)),
 });
+const refusals = new Refusals();
 
 const steering = {
-  set: (name, value) => connection.set(name, value, facts.parameters.get(name)?.type),
-  start: (name, seconds) => connection.set(name, Number(seconds), 'float64'),
+  set(name, value, type = facts.parameters.get(name)?.type) {
+    refusals.note(`param:${name}`);
+    connection.set(name, value, type);
+  },
+  call(service, request) {
+    refusals.note(service);
+    return connection.call(service, request).catch((error) => refusals.show(service, error.message));
+  },
+  start: (name, seconds) => steering.set(name, Number(seconds), 'float64'),
   clear(fault) {
     if (!fault.name.startsWith('view.')) {  // another's: ended by its name
       for (const one of facts.faults)
         if (one.do === fault.do && one.sonar === fault.sonar && (fault.do || one.name === fault.name))
-          connection.call('/sonard/end_faults', { name: one.name }).catch((error) => facts.problems.set('call', { id: 'call', level: 2, message: error.message }));
+          steering.call('/sonard/end_faults', { name: one.name });
       return;
     }
     const trouble = (fault.do || fault.name).replace(/-/g, '_');
     const name = [`/faults/${fault.sonar}/${trouble}`, `/faults/${trouble}`].find((n) => facts.parameters.has(n));
-    if (name) connection.set(name, 0, 'float64');
-    else connection.set('/faults/clear_all', true);
+    if (name) steering.set(name, 0, 'float64');
+    else steering.set('/faults/clear_all', true);
   },
 };
 const notice = new Notice(facts, connection, steering);
 const timeline = new Timeline(facts, steering);
 const log = new LogPane(facts);
 
+let chosenKind = '';
 /// Subscribes to what is looked at: no pictures while the page is hidden.
 function choose() {
   if (!facts.sonar) {
     const first = [...connection.byTopic.keys()].find((topic) => /^\/[^/]+\/image$/.test(topic));
     if (first) facts.sonar = first.split('/')[1];
   }
+  chosenKind = facts.pictureKind;
   const topics = ['/status', '/doctor', '/faults', '/log'];
   const own = (name) => `/${facts.sonar}/${name}`;
-  if (!document.hidden) topics.push(own('geometry'), own('ping'), own(fan.flat ? 'fan' : 'image'), '/tf', '/scene', '/swath');
+  if (!document.hidden) topics.push(own('geometry'), own('ping'), own('picture'), own(fan.drawn ? 'fan' : 'image'), ...(facts.pictureKind === 'range image' ? [own('cloud')] : []), '/tf', '/scene', '/swath');
+  if (facts.pictureKind === 'range image' && facts.maySteer && facts.connection === 'open') connection.set(own('view/cloud_threshold'), 0, 'float64');  // every echo is one
   facts.judged = connection.byTopic.has('/doctor');
   if (!document.hidden && !connection.topics.has('/scene')) scene.removeObjects();  // those that went meanwhile are not named
   connection.want(topics);
@@ -91,12 +103,13 @@ function choose() {
 function draw() {
   fan.show(facts.ping);
   const now = notice.draw();
-  fan.setMood(`${now ? now.picture : 'fresh'}${fan.flat ? ' flat' : ''}`);
+  fan.setMood(now ? now.picture : 'fresh');
   drawHead(facts);
   drawConnections(facts);
   drawDoctor(facts, steering);
   drawFaults(facts, steering);
   drawSettings(facts, steering);
+  drawRecordings(facts);
   timeline.draw();
   log.draw();
   setText($('fps'), facts.drawn.rate === undefined || !facts.ping ? '–' : `${fixed(facts.drawn.rate, 0)} fps`);
@@ -168,8 +181,9 @@ $('png').onclick = () => fan.save();
 $('freeze').onclick = freeze;
 $('theme').onclick = toggleTheme;
 $('help-button').onclick = () => $('help').showModal();
+$('record').onclick = () => toggleRecording(facts, steering.call);
 $('sonar').onchange = () => (facts.select($('sonar').value), choose());
-$('clear-faults').onclick = () => connection.set('/faults/clear_all', true);
+$('clear-faults').onclick = () => steering.set('/faults/clear_all', true);
 for (const button of $('tabs').children) button.onclick = () => showTab(button.dataset.tab);
 for (const button of document.querySelectorAll('.maximise')) button.onclick = () => maximise(button.dataset.pane);
 document.addEventListener('visibilitychange', choose);

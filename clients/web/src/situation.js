@@ -2,7 +2,14 @@
 import { fixed, short } from './numbers.js';
 
 const stands_after_s = 2;
+const preview_begins_s = 5;  // where it begins by itself
 const now_s = () => performance.now() / 1000;
+
+/// The first address at which a driver speaks first: "udp 127.0.0.2:12345"; of older daemons the host.
+function whereToConnect(sonar) {
+  const found = sonar.addresses?.find((a) => !a.sonar_speaks_first);
+  return found ? `${found.protocol} ${found.address}` : host(sonar.listens) || sonar.advertised;
+}
 
 /// The part of an address that a user knows: without the port.
 const host = (address) => address?.replace(/:\d+$/, '') ?? '';
@@ -33,11 +40,12 @@ export function situationOf(facts, connection) {
   if (facts.connection !== 'open') return { kind: 'lost', picture: 'old', text: lost(facts, connection) };
   const sonar = facts.sonarStatus;
   if (!sonar) return facts.status ? { kind: 'no-sonar', picture: 'none', text: 'This sonard has no sonar.' } : null;
-  if (sonar.clients.length === 0 && !facts.of('preview')) {
+  if (!facts.listened && !facts.preview) {
+    if (facts.previews && now_s() - facts.openedAt < preview_begins_s) return null;
     return {
       kind: 'no-client',
       picture: 'old',
-      text: `No driver is connected. Nothing is simulated without one. Point a driver at ${host(sonar.listens)}.`,
+      text: `No driver is connected. Nothing is simulated without one. Point a driver at ${whereToConnect(sonar)}.`,
       button: facts.parameters.has(`/${sonar.name}/preview`) ? { label: 'Preview at 5 Hz', parameter: `/${sonar.name}/preview`, value: true } : undefined,
     };
   }
@@ -60,7 +68,7 @@ export function badgesOf(facts) {
   const out = [];
   const sonar = facts.sonarStatus;
   if (facts.connection !== 'open' || !sonar) return out;
-  if (facts.of('preview')) out.push({ text: 'PREVIEW', level: 'note', title: 'for viewers only; it ends when a driver connects' });
+  if (facts.preview) out.push({ text: 'PREVIEW', level: 'note', title: 'for viewers only; it ends when a driver connects' });
   if (!sonar.transmits) out.push({ text: 'transmit is off: noise only', level: 'warning', title: 'see the settings' });
   const vehicle = facts.vehicle;
   if (vehicle?.stale) {

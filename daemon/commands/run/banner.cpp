@@ -43,17 +43,12 @@ std::string sonar_lines(const Device& device) {
                      text::frequency_text(static_cast<double>(mode.centre_hz)) +
                      format("  %d beams  %g m", s.beam_count, s.range_m) +
                      (s.rate_hz > 0 && !s.triggered ? format("  %g Hz\n", static_cast<double>(s.rate_hz)) : "\n");
-  const Endpoint data = device.data_endpoint();
-  text += data.port == 0 ? "  data    by datagrams" : "  data    tcp " + text_of(data);
-  const protocol::Port* const beacon = device.sonar().vendor().port(protocol::Port::Kind::udp_beacon);
-  for (const udp::endpoint& to : device.status_destinations())
-    text += format("      status udp -> %s:%d (%g Hz)", to.address().to_string().c_str(), to.port(),
-                   1e3 / static_cast<double>(beacon->period.count()));
+  for (const protocol::DriverAddress& address : device.addresses())
+    text += "  " + protocol::line_of(address.protocol, text_of(address.at), address.sonar_speaks_first) + "\n";
   if (device.sonar().state().advertise_ip != device.config().bind_ip)
-    text += "      advertised as " + text_of(device.sonar().state().advertise_ip);
-  text += "\n";
+    text += "  advertised as " + text_of(device.sonar().state().advertise_ip) + "\n";
   if (device.config().profile.vendor->name() == "blueview")
-    text += blueview_lines(text_of(device.sonar().state().advertise_ip), data.port);
+    text += blueview_lines(text_of(device.sonar().state().advertise_ip), device.data_endpoint().port);
   return text;
 }
 
@@ -124,8 +119,11 @@ std::string banner(const App& app, const BannerFacts& facts) {
 }
 
 std::string ready_line(const App& app, double seconds) {
-  return format("ready in %.2f s. Connect your driver to %s.   Ctrl-C stops.\n", seconds,
-                text_of(app.config().sonars.front().advertise_ip).c_str());
+  std::string to;
+  for (const SonarConfig& sonar : app.config().sonars)
+    to +=
+        (to.empty() ? "" : ", ") + text_of(sonar.advertise_ip) + (app.config().sonars.size() > 1 ? " (" + sonar.name + ")" : "");
+  return format("ready in %.2f s. Connect your driver to %s.   Ctrl-C stops.\n", seconds, to.c_str());
 }
 
 std::string summary(const App& app) {

@@ -205,15 +205,15 @@ PingNumber Sonar::next_number() {
 }
 
 /// The request without its number.
-PingRequest Sonar::request_at(Time at) const {
+PingRequest Sonar::request_at(Time at, const protocol::RequestPing& aim) const {
   const Config& config = around_.config;
   const bool stale = around_.world.is_stale(config_.vehicle, at);
-  const Pose head{{}, quat_from_rpy({0, 0, aim_.head_rad})};
-  const Pose mount = aim_.head_rad == 0 ? config_.mount : compose(config_.mount, head);
+  const Pose head{{}, quat_from_rpy({0, 0, aim.head_rad})};
+  const Pose mount = aim.head_rad == 0 ? config_.mount : compose(config_.mount, head);
   PingRequest request = ping_request(config, around_.world, config_.vehicle, mount, at);
   request.model = state_.model;
   request.settings = settings_;
-  request.vendor_settings = aim_.with ? aim_.with : state_.settings;
+  request.vendor_settings = aim.with ? aim.with : state_.settings;
   request.sonar_id = index_;
   request.blank = (stale && config.poses.on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
   return request;
@@ -221,7 +221,9 @@ PingRequest Sonar::request_at(Time at) const {
 
 std::optional<PingRequest> Sonar::preview_request(PingNumber number, Time at) const {
   if (waits_for_pose(at)) return std::nullopt;
-  PingRequest request = request_at(at);
+  const auto step = vendor_.scan_step(static_cast<std::uint32_t>(number), state_);
+  PingRequest request = request_at(at, step ? step->aim : aim_);
+  if (step) request.settings = step->settings;
   request.number = number;
   request.sonar_id = ~index_;
   return request;
@@ -234,7 +236,7 @@ void Sonar::request_ping(Time at, Actions& actions) {
   }
   update_depth(at);
   follow_water();
-  PingRequest request = request_at(at);
+  PingRequest request = request_at(at, aim_);
   request.number = next_number();
   request.settings.gain_db = gain_assist_.gain_db(settings_, at);
   busy_settings_ = state_.settings;

@@ -185,7 +185,7 @@ class Sonar {
   void use_initial_settings();
   void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
   bool waits_for_pose(Time at) const;
-  PingRequest request_at(Time at) const;
+  PingRequest request_at(Time at, const protocol::RequestPing& aim) const;
   void request_ping(Time at, Actions& actions);
   PingNumber next_number();
   void queue_ping(const PingOutcome& outcome, Time now, Actions& actions);

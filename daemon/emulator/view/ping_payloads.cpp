@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/image/draw_fan.hpp"
 #include "core/sonar/range_image.hpp"
 #include "protocol/foxglove/foxglove_messages.hpp"
 
@@ -141,17 +140,18 @@ FanStyle view_fan_style() {
   return {.width_px = fan_width_px, .colours = find_colour_map("gray").value_or(ColourMap{}), .rings = false};
 }
 
-ViewPayloadPointer fan_payload(const std::string& sonar, const Ping& ping, FanPainter& painter) {
-  if (ping.request.settings.beam_count < 2) return nullptr;
-  const auto fan = painter.draw(polar_image_of(ping));
+ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPicture& seen, PicturePainter& painter) {
+  const auto fan = painter.draw(seen);
   if (!fan) return nullptr;
   auto samples = std::make_shared<wire::Bytes>();
   samples->reserve(fan->pixels.size());
   for (const Rgb& p : fan->pixels)  // what is outside has a colour, which the map has not
     samples->push_back(static_cast<std::byte>(p.r == p.g && p.g == p.b ? p.r : 0));
-  return picture(ping.request.fired_at, sonar,
+  return picture(at, sonar,
                  {static_cast<std::uint32_t>(fan->width), static_cast<std::uint32_t>(fan->height), "mono8", 1, samples});
 }
+
+ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture) { return view_payload(at, foxglove::picture(picture)); }
 
 ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold) {
   if (const RangeImageSettings* const range_image = range_image_of(ping.request))

@@ -5,8 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "core/image/draw_fan.hpp"
-#include "core/image/polar_image.hpp"
+#include "core/image/draw_picture.hpp"
 #include "core/sonar/ping.hpp"
 #include "daemon/emulator/view/viewer.hpp"
 
@@ -25,8 +24,10 @@ ViewPayloadPointer truth_payload(const Ping& ping);
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);
 /// Gray, without rings.
 FanStyle view_fan_style();
-/// As `painter` of view_fan_style() draws it, 0 outside. Takes long. Null: the ping has no fan.
-ViewPayloadPointer fan_payload(const std::string& sonar, const Ping& ping, FanPainter& painter);
+/// As `painter` of view_fan_style() draws it, 0 outside. Takes long. Null: it cannot be drawn.
+ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPicture& picture, PicturePainter& painter);
+/// How fan_payload lies among its axes: sonar.v1.Picture.
+ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture);
 /// The samples above `threshold` of the full scale in the plane of the fan, the 20,000 brightest. Takes long.
 ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold);
 

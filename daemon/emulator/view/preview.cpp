@@ -10,11 +10,15 @@ std::string Preview::why_over(const Sonar& sonar, Time now) const {
   return {};
 }
 
+std::chrono::nanoseconds Preview::period(const Sonar& sonar) {
+  const PingSettings& s = sonar.settings();
+  return std::max<std::chrono::nanoseconds>(s.beam_count > 1 ? shortest_period : shortest_of_one_beam, ping_period(s));
+}
+
 /// A sonar in standby shows what it would see.
 std::optional<PingRequest> Preview::due(const Sonar& sonar, Time now) {
   if (!on() || busy_) return std::nullopt;
-  const auto period = std::max<std::chrono::nanoseconds>(shortest_period, ping_period(sonar.settings()));
-  if (fired_at_ && now < *fired_at_ + period) return std::nullopt;
+  if (fired_at_ && now < *fired_at_ + period(sonar)) return std::nullopt;
   auto request = sonar.preview_request(PingNumber(number_ + 1), now);
   if (!request) return std::nullopt;
   ++number_;

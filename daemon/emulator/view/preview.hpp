@@ -1,5 +1,6 @@
-// Pings for viewers while no driver is connected: at most 5 a second, with numbers and noise of their own, so that the first
-// driver gets what it would have got without them. Pure: the caller computes what is due, and asks whether it must end.
+// Pings for viewers while no driver is connected: at most 5 a second, of one beam 25, with numbers and noise of their own, so
+// that the first driver gets what it would have got without them. Pure: the caller computes what is due, and asks whether it must
+// end.
 #pragma once
 
 #include <chrono>
@@ -12,12 +13,14 @@ namespace sonar {
 
 class Preview {
  public:
-  static constexpr std::chrono::milliseconds shortest_period{200};
+  static constexpr std::chrono::milliseconds shortest_period{200}, shortest_of_one_beam{40};
   static constexpr std::chrono::seconds longest{600};
 
   void begin(Time now) { until_ = now + longest; }
   void end() { until_.reset(); }
   bool on() const { return until_.has_value(); }
+  /// Of pings of this sonar.
+  static std::chrono::nanoseconds period(const Sonar& sonar);
   /// Why it must end now, for the log; empty = it may go on.
   std::string why_over(const Sonar& sonar, Time now) const;
   /// The ping that is due. One at a time: done() comes before the next.

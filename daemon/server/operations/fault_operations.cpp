@@ -39,6 +39,38 @@ void fill(v1::FaultKind& out, const FaultKind& kind) {
       (*out.mutable_without_effect())[std::string(vendor->name())] = why;
 }
 
+/// The event that a fault waits for when it was requested without a trigger of its own; empty = nothing.
+std::string awaited(const Fault& fault) {
+  constexpr std::array<const char*, occasion_names.size()> words = {"a connection", "new settings", "a status message",
+                                                                    "the end of a connection"};
+  if (fault.on) return words[static_cast<std::size_t>(*fault.on)];
+  return fault.kind->per_ping() && fault.kind->effect != FaultEffect::power_cycle ? "a ping" : "";
+}
+
+void fill(v1::Trouble& out, const Trouble& trouble, const Fleet& fleet) {
+  out.set_name(std::string(trouble.name));
+  out.set_sentence(std::string(trouble.sentence));
+  control::FaultRecord record;
+  record.what = trouble.name;
+  const auto faults = check_fault(record, true);
+  if (!faults) return;
+  for (const Fault& fault : *faults) {
+    out.add_codes(std::string(fault.kind->code));
+    if (out.waits_for().empty()) out.set_waits_for(awaited(fault));
+    if (fault.kind->effect == FaultEffect::power_cycle)
+      out.set_own_s(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
+    if (fault.kind->effect == FaultEffect::change_settings) out.set_stays("the settings that it changed");
+  }
+  for (const Device& device : fleet.devices()) {
+    std::string why;
+    const bool acts = std::any_of(faults->begin(), faults->end(), [&](const Fault& fault) {
+      why = why_without_effect(*fault.kind, device.sonar().vendor());
+      return why.empty();
+    });
+    if (!acts) (*out.mutable_cannot_act())[device.config().name] = why;
+  }
+}
+
 void fill(v1::FaultStatus& out, const Faults::Listed& listed, const std::string& sonar, Time now) {
   out.set_name(listed.fault->name);
   out.set_do_(listed.fault->what);
@@ -46,7 +78,8 @@ void fill(v1::FaultStatus& out, const Faults::Listed& listed, const std::string&
   out.set_sonar(sonar);
   out.set_state(listed.over ? "over" : listed.active ? "active" : "waiting");
   out.set_injections(listed.injections);
-  if (!listed.over && listed.expires != Time::max()) out.set_expires_s(seconds(listed.expires - now));
+  if (listed.active && listed.expires != Time::max()) out.set_expires_s(seconds(listed.expires - now));
+  if (!listed.active && !listed.over) out.set_waits_for(awaited(*listed.fault));
 }
 
 }  // namespace
@@ -107,16 +140,9 @@ OperationResult FaultOperations::report(const control::GetFaults& asked) const {
   for (v1::FaultStatus& status : fault_statuses(fleet_, clock_.now(), true)) *report->add_faults() = std::move(status);
   for (const auto& entry : journal_.entries())
     if (entry->seq() > asked.journal_after) *report->add_journal() = *entry;
-  if (asked.kinds) {
+  for (const Trouble& trouble : troubles()) fill(*report->add_troubles(), trouble, fleet_);
+  if (asked.kinds)
     for (const FaultKind& kind : fault_kinds()) fill(*report->add_kinds(), kind);
-    for (const Trouble& trouble : troubles()) {
-      v1::Trouble& out = *report->add_troubles();
-      out.set_name(std::string(trouble.name));
-      out.set_sentence(std::string(trouble.sentence));
-      for (const Trouble::Part& part : trouble.parts)
-        if (!part.code.empty()) out.add_codes(std::string(part.code));
-    }
-  }
   OperationResult result;
   result.faults = std::move(report);
   return result;

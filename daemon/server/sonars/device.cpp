@@ -108,6 +108,12 @@ Result<void> Device::open_observers() {
 
 Endpoint Device::data_endpoint() const { return tcp_ports_.empty() ? Endpoint{} : tcp_ports_.front().listener.at(); }
 
+std::vector<protocol::DriverAddress> Device::addresses() const {
+  std::vector<Endpoint> status_to;
+  for (const udp::endpoint& to : status_destinations()) status_to.push_back({to.address().to_v4().to_bytes(), to.port()});
+  return protocol::driver_addresses(sonar_.vendor(), config().bind_ip, status_to);
+}
+
 void Device::start() {
   started_ = true;
   const auto fault = [this](const std::string& what) { on_fault(what); };

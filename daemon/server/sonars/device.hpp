@@ -104,6 +104,7 @@ class Device final : public SessionParent {
   /// The vendor's first TCP port; port 0 when it has none.
   Endpoint data_endpoint() const;
   std::vector<udp::endpoint> status_destinations() const { return beacon_.destinations(); }
+  std::vector<protocol::DriverAddress> addresses() const;
 
   // Control (device_control.cpp).
   v1::SonarStatus status(Time now) const;

@@ -62,6 +62,12 @@ v1::SonarStatus Device::status(Time now) const {
   s.set_name(config().name);
   s.set_profile(state.model->profile);
   if (!tcp_ports_.empty()) s.set_listens(text_of(data_endpoint()));
+  for (const protocol::DriverAddress& address : addresses()) {
+    v1::SonarAddress& out = *s.add_addresses();
+    out.set_protocol(std::string(address.protocol));
+    out.set_address(text_of(address.at));
+    out.set_sonar_speaks_first(address.sonar_speaks_first);
+  }
   s.set_advertised(text_of(state.advertise_ip));
   for (const udp::endpoint& to : status_destinations())
     s.add_status_to(to.address().to_string() + ":" + std::to_string(to.port()));
@@ -79,6 +85,8 @@ v1::SonarStatus Device::status(Time now) const {
   s.set_preview(preview_.on());
   for (const Connection& c : sonar_.connections().all()) {
     if (c.role == Role::observer && c.requests > 0) s.set_asking_observer(c.peer.name);
+    if (c.role == Role::stream)
+      for (const Endpoint& to : sonar_.connections().receivers(c)) s.add_receivers(text_of(to));
     if (c.role != Role::client || c.state != Connection::State::served) continue;
     fill(*s.add_clients(), c, session_of(c.id).get());
   }

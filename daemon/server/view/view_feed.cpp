@@ -123,6 +123,7 @@ std::string ViewFeed::server_info(const Viewer& viewer) const {
                    {"sonard.config", of_.config.source},
                    {"sonard.scene", of_.config.scene.name()},
                    {"sonard.clock", std::string(name_of(of_.config.clock))},
+                   {"sonard.previews", of_.config.previews ? "true" : "false"},
                    {"sonard.may_steer", viewer.may_steer() ? "true" : "false"}};
   info.session = session_;
   return foxglove::text_of(info);
@@ -139,7 +140,8 @@ void ViewFeed::on_subscribed(Viewer& viewer, std::uint32_t channel) {
   else
     give(viewer, channel, current(viewer, channel));
   for (SonarView& sonar : sonars_)
-    if (channel == sonar.fan.channel || channel == sonar.cloud.channel) begin_slow_ones(sonar);
+    if (channel == sonar.fan.channel || channel == sonar.about.channel || channel == sonar.cloud.channel) begin_slow_ones(sonar);
+  drive_previews();
 }
 
 /// What newcomers get; null = nothing.
@@ -159,7 +161,7 @@ ViewPayloadPointer ViewFeed::current(const Viewer& viewer, std::uint32_t channel
     if (!sonar.last) continue;
     if (channel == sonar.image) return sonar.picture ? sonar.picture : image_payload(sonar.name, sonar.last);
     if (channel == sonar.geometry) return geometry_payload(*sonar.last);
-    for (const Slow* slow : {&sonar.fan, &sonar.cloud})
+    for (const Slow* slow : {&sonar.fan, &sonar.about, &sonar.cloud})
       if (channel == slow->channel)
         if (const auto made = slow->made.find(threshold_of(viewer, *slow)); made != slow->made.end()) return made->second;
   }
@@ -232,6 +234,7 @@ void ViewFeed::sync_sonars() {
     sonar.geometry = add_channel("/" + name + "/geometry", "sonar.v1.PingGeometry", ChannelKind::last_value);
     sonar.ping = add_channel("/" + name + "/ping", "sonar.v1.PingEvent", ChannelKind::event, ping_hz);
     sonar.fan.channel = add_channel("/" + name + "/fan", "foxglove.RawImage", ChannelKind::picture, fan_hz);
+    sonar.about.channel = add_channel("/" + name + "/picture", "sonar.v1.Picture", ChannelKind::last_value, fan_hz);
     sonar.cloud.channel = add_channel("/" + name + "/cloud", "foxglove.PointCloud", ChannelKind::picture, cloud_hz);
     sonar.cloud.threshold = "/" + name + "/view/cloud_threshold";
     sonar.truth = add_channel("/" + name + "/truth", "sonar.v1.PingTruth", ChannelKind::last_value, image_hz);
@@ -249,8 +252,8 @@ void ViewFeed::sync_sonars() {
 }
 
 void ViewFeed::remove(const SonarView& sonar) {
-  const std::vector<std::uint32_t> gone{sonar.image, sonar.geometry,    sonar.ping,         sonar.figures,
-                                        sonar.truth, sonar.fan.channel, sonar.cloud.channel};
+  const std::vector<std::uint32_t> gone{sonar.image, sonar.geometry,    sonar.ping,          sonar.figures,
+                                        sonar.truth, sonar.fan.channel, sonar.about.channel, sonar.cloud.channel};
   for (const std::uint32_t id : gone) channels_.erase(id);
   session_ = session_.substr(0, session_.find('-')) + "-" + std::to_string(++sessions_);
   each([&](ViewConnection& c) {
@@ -281,7 +284,10 @@ void ViewFeed::on_log(LogLevel level, const std::string& line, const std::vector
 
 void ViewFeed::arm() {
   if (stopping_ || std::exchange(armed_, true)) return;
-  timer_.expires_after(tick_period);
+  const auto& devices = of_.fleet.devices();
+  const bool is_quick = std::any_of(devices.begin(), devices.end(),
+                                    [](const Device& d) { return d.preview().on() && Preview::period(d.sonar()) < tick_period; });
+  timer_.expires_after(is_quick ? Preview::shortest_of_one_beam : tick_period);
   timer_.async_wait([this](const error_code& ec) {
     armed_ = false;
     if (!ec && !stopping_) tick();
@@ -298,6 +304,7 @@ void ViewFeed::tick() {
   for (const std::string& who : gone) of_.log.info("viewer gone", {{"from", who}});
   drive_previews();
   if (connections_.empty()) {
+    no_preview_.clear();
     of_.fleet.tap_pings({});
     for (SonarView& sonar : sonars_) {  // the next viewer gets geometry and swath anew
       sonar.last.reset();
@@ -305,7 +312,9 @@ void ViewFeed::tick() {
       sonar.shape.clear();
       sonar.volume.clear();
       sonar.painter.reset();
-      for (Slow* slow : {&sonar.fan, &sonar.cloud}) slow->made.clear(), slow->of = Time::min();
+      sonar.driver.reset();
+      sonar.drawing = nullptr;
+      for (Slow* slow : {&sonar.fan, &sonar.about, &sonar.cloud}) slow->made.clear(), slow->of = Time::min();
     }
     shapes_.clear();
     return;

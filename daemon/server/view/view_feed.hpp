@@ -7,10 +7,12 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "daemon/config/config.hpp"
+#include "daemon/emulator/view/driver_picture.hpp"
 #include "daemon/emulator/view/playback_watch.hpp"
 #include "daemon/emulator/view/viewer.hpp"
 #include "daemon/emulator/world/world.hpp"
@@ -79,17 +81,20 @@ class ViewFeed final : public ViewerHost {
   struct SonarView {
     std::string name;
     std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0, truth = 0;
-    Slow fan{}, cloud{};
+    Slow fan{}, about{}, cloud{};  // about: sonar.v1.Picture of the fan
     std::shared_ptr<const Ping> last = nullptr;
-    ViewPayloadPointer picture = nullptr;           // of last, once it was wanted
-    wire::Bytes shape = {};                         // of last, without its number
-    std::string volume = {};                        // what the swath depends on
-    std::shared_ptr<FanPainter> painter = nullptr;  // for the view thread alone
+    ViewPayloadPointer picture = nullptr;               // of last, once it was wanted
+    wire::Bytes shape = {};                             // of last, without its number
+    std::string volume = {};                            // what the swath depends on
+    std::shared_ptr<PicturePainter> painter = nullptr;  // for the view thread alone
+    std::unique_ptr<DriverPicture> driver = nullptr;
+    DriverPicture::Drawing drawing = nullptr;  // of last
   };
 
   void on_ping(const Device& of, const PingQueued& queued);
   std::string set_preview(Viewer& viewer, Device& device, bool on);
   void end_preview(Device& device, const std::string& why);
+  bool previews_by_itself(const Device& device);
   void drive_previews();
   void on_preview(const std::string& sonar, const PingOutcome& outcome);
   void make_slowly(SonarView& sonar, Slow SonarView::*which, Make make);
@@ -142,6 +147,7 @@ class ViewFeed final : public ViewerHost {
   std::list<SonarView> sonars_;
   std::map<std::string, PlaybackWatch> watches_;                     // by vehicle that viewers look at
   std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // who asked, by sonar
+  std::set<std::string> no_preview_;                                 // sonars whose preview a viewer has switched off
   SceneShapes shapes_;
   ViewDoctor doctor_{of_.operations, of_.clock};
   std::deque<ViewPayloadPointer> lines_;

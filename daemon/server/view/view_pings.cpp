@@ -16,6 +16,9 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   const Ping& ping = *queued.ping;
   watch_playback();
   sonar->last = queued.ping;
+  if (sonar->driver == nullptr)
+    sonar->driver = std::make_unique<DriverPicture>(protocol::make_of_profile(of.config().profile.model->profile));
+  if (auto drawing = sonar->driver->after(queued.ping, of.sonar().state())) sonar->drawing = std::move(drawing);
   ping_at_ = Steady::now();
   if (wanted(sonar->geometry))
     if (wire::Bytes shape = foxglove::geometry(ping, 0); shape != sonar->shape) {
@@ -39,10 +42,14 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
 
 void ViewFeed::begin_slow_ones(SonarView& sonar) {
   if (sonar.last == nullptr) return;
-  if (sonar.painter == nullptr) sonar.painter = std::make_shared<FanPainter>(view_fan_style());
-  make_slowly(sonar, &SonarView::fan, [name = sonar.name, ping = sonar.last, painter = sonar.painter](double) {
-    return fan_payload(name, *ping, *painter);
-  });
+  const Time at = sonar.last->request.fired_at;
+  if (sonar.painter == nullptr) sonar.painter = std::make_shared<PicturePainter>(view_fan_style());
+  if (sonar.drawing) {
+    make_slowly(sonar, &SonarView::about, [at, draw = sonar.drawing](double) { return picture_payload(at, draw()); });
+    make_slowly(sonar, &SonarView::fan, [name = sonar.name, at, draw = sonar.drawing, painter = sonar.painter](double) {
+      return fan_payload(name, at, draw(), *painter);
+    });
+  }
   make_slowly(sonar, &SonarView::cloud,
               [name = sonar.name, ping = sonar.last](double threshold) { return cloud_payload(name, *ping, threshold); });
 }

@@ -7,6 +7,7 @@ std::string ViewFeed::set_preview(Viewer& viewer, Device& device, bool on) {
   const std::string& name = device.config().name;
   Preview& preview = device.preview();
   if (!on) {
+    no_preview_.insert(name);
     end_preview(device, "by request of " + viewer.who());
     return {};
   }
@@ -14,6 +15,7 @@ std::string ViewFeed::set_preview(Viewer& viewer, Device& device, bool on) {
   if (device.sonar().connections().has_audience()) return "a driver is connected; its pings are shown";
   if (!preview.on()) of_.log.info("preview begins: pings for viewers only", {{"sonar", name}, {"client", viewer.who()}});
   preview.begin(now);
+  no_preview_.erase(name);
   previewers_[name] = connection_of(viewer);
   drive_previews();
   return {};
@@ -26,15 +28,29 @@ void ViewFeed::end_preview(Device& device, const std::string& why) {
   of_.log.info("preview ends", {{"sonar", device.config().name}, {"why", why}});
 }
 
+/// In the demo: while a viewer looks at its pings and no driver is connected.
+bool ViewFeed::previews_by_itself(const Device& device) {
+  const std::string& name = device.config().name;
+  if (!of_.config.previews || of_.clock.stepped() || no_preview_.contains(name)) return false;
+  const SonarView* const sonar = find(name);
+  return sonar != nullptr && (wanted(sonar->image) || wanted(sonar->fan.channel) || wanted(sonar->cloud.channel)) &&
+         !device.sonar().connections().has_audience();
+}
+
 /// Begins what is due, and ends what must end.
 void ViewFeed::drive_previews() {
   const Time now = of_.clock.now();
   for (Device& device : of_.fleet.devices()) {
-    if (!device.preview().on()) continue;
     const std::string& name = device.config().name;
+    const bool by_itself = previews_by_itself(device);
+    if (by_itself) {
+      if (!device.preview().on()) of_.log.info("preview begins: pings for viewers until a driver connects", {{"sonar", name}});
+      device.preview().begin(now);
+    }
+    if (!device.preview().on()) continue;
     const auto previewer = previewers_[name].lock();
     std::string why = device.preview().why_over(device.sonar(), now);
-    if (!previewer || previewer->over()) why = "its viewer left";
+    if (!by_itself && why.empty() && (!previewer || previewer->over())) why = "its viewer left";
     if (!why.empty())
       end_preview(device, why);
     else if (auto request = device.preview().due(device.sonar(), now))

@@ -154,6 +154,24 @@ class Page:
         self.wait(f"!!document.querySelector({json.dumps(selector)})")
         self.run(f"document.querySelector({json.dumps(selector)}).click()")
 
+    def place(self, selector):
+        """The middle of an element, which is scrolled into view."""
+        self.wait(f"document.querySelector({json.dumps(selector)})?.offsetWidth")
+        return self.run(f"((e) => (e.scrollIntoView({{block: 'nearest'}}), (({{x, y, width, height}}) => [x + width / 2, y + height / 2])"
+                        f"(e.getBoundingClientRect())))(document.querySelector({json.dumps(selector)}))")
+
+    def press_mouse(self, selector):
+        """As a mouse does: what lies over the element gets it."""
+        x, y = self.place(selector)
+        for kind in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def touch(self, selector):
+        """As a finger does."""
+        x, y = self.place(selector)
+        self.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
     def picture(self, path):
         data = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
         with open(path, "wb") as file:

@@ -29,6 +29,11 @@ TOPICS = {"/front/image": "foxglove.RawImage", "/front/fan": "foxglove.RawImage"
           "/doctor": "sonar.v1.Findings", "/faults": "sonar.v1.FaultReport"}
 TROUBLES = ["bad_connector", "thin_tether", "power_cycle", "wrong_subnet", "second_operator", "other_firmware", "overheating",
             "clock_step", "electrical_noise", "lease_renewal"]
+# What the report of faults says of troubles.
+ABOUT = {"thin_tether": {"sentence": "The tether is slow and late."}, "power_cycle": {"own_s": 21},
+         "second_operator": {"stays": "the settings that it changed"}, "bad_connector": {"waits_for": "a ping"},
+         "lease_renewal": {"sentence": "The address is withdrawn and returns.",
+                           "cannot_act": [{"key": "front", "value": "needs two network namespaces: sonarctl lab"}]}}
 DURATION_S = 90.0
 DRIVER, SLOW = "192.0.2.7:49210", "192.0.2.9:51544"
 OK, WARNING, ERROR = 0, 1, 2
@@ -171,9 +176,10 @@ class MockDaemon:
     def fault_report(self):
         now = time.time()
         self.faults = {name: end for name, end in self.faults.items() if end > now}
-        return {"armed": True, "faults": [
-            {"name": f"{name}.{i}", "do": name, "code": code, "sonar": "front", "state": "active", "expires_s": end - now}
-            for name, end in self.faults.items() for i, code in enumerate(("L13", "L14"), 1)]}
+        return {"armed": True, "troubles": [{"name": name.replace("_", "-"), **ABOUT.get(name, {"sentence": "x"})} for name in TROUBLES],
+                "faults": [{"name": f"{name}.{i}", "do": name, "code": code, "sonar": "front",
+                            **({"state": "waiting", "waits_for": "a ping"} if name == "bad-connector" else {"state": "active", "expires_s": end - now})}
+                           for name, end in self.faults.items() for i, code in enumerate(("L13", "L14"), 1)]}
 
     # ---- HTTP
 

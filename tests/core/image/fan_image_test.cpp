@@ -110,7 +110,7 @@ TEST(Fan, APainterDrawsPingsOfChangingShapesAsOneByOne) {
   spread.azimuth_rad[3] += 0.001;
   for (const PolarImage& image : {speckle(40, 60, 1), speckle(40, 60, 2), speckle(50, 60, 3), speckle(50, 40, 4), later, spread})
     EXPECT_EQ(painter.draw(image)->pixels, draw_fan(image, plain_gray(300))->pixels);
-  EXPECT_FALSE(painter.draw(black_fan(10, 16, 120)));
+  EXPECT_FALSE(painter.draw(black_fan(10, 16, 190)));
   const PolarImage first = speckle(40, 60, 1);
   EXPECT_EQ(painter.draw(first)->pixels, draw_fan(first, plain_gray(300))->pixels) << "after one that it refused";
 }
@@ -121,7 +121,7 @@ TEST(Fan, RefusesWhatCannotBeDrawn) {
   PolarImage twisted = black_fan(10, 16, 60);
   std::swap(twisted.azimuth_rad[3], twisted.azimuth_rad[4]);
   EXPECT_THAT(draw_fan(twisted, plain_gray()).error().text, testing::HasSubstr("bearing table"));
-  EXPECT_THAT(draw_fan(black_fan(10, 16, 120), plain_gray()).error().text, testing::HasSubstr("half a circle"));
+  EXPECT_THAT(draw_fan(black_fan(10, 16, 190), plain_gray()).error().text, testing::HasSubstr("more than a circle"));
   EXPECT_EQ(draw_fan(black_fan(10, 16, 60), plain_gray(10)).error().kind, ErrorKind::usage);
 }
 

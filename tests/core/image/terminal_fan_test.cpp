@@ -30,7 +30,7 @@ PolarImage two_patches() {
 TerminalStyle small(TerminalColours colours) { return {24, 8, colours, *find_colour_map("gray"), true}; }
 
 TEST(TerminalFan, DrawsLettersAndMetres) {
-  const auto lines = draw_terminal_fan(two_patches(), small(TerminalColours::none));
+  const auto lines = draw_terminal_picture({.image = two_patches()}, small(TerminalColours::none));
   ASSERT_TRUE(lines);
   EXPECT_THAT(*lines, ElementsAre("        =+=-.",          //
                                   "        @@@@@@*. 10 m",  //
@@ -44,7 +44,7 @@ TEST(TerminalFan, DrawsLettersAndMetres) {
 
 TEST(TerminalFan, LeavesTheTerminalsColoursAsTheyWere) {
   for (const TerminalColours colours : {TerminalColours::palette_256, TerminalColours::true_colour}) {
-    const auto lines = draw_terminal_fan(two_patches(), small(colours));
+    const auto lines = draw_terminal_picture({.image = two_patches()}, small(colours));
     ASSERT_TRUE(lines);
     for (const std::string& line : *lines) {
       const std::size_t last = line.rfind("\x1b[");
@@ -57,8 +57,8 @@ TEST(TerminalFan, LeavesTheTerminalsColoursAsTheyWere) {
 }
 
 TEST(TerminalFan, UsesTheCodesOfItsColours) {
-  const auto palette = draw_terminal_fan(two_patches(), small(TerminalColours::palette_256));
-  const auto exact = draw_terminal_fan(two_patches(), small(TerminalColours::true_colour));
+  const auto palette = draw_terminal_picture({.image = two_patches()}, small(TerminalColours::palette_256));
+  const auto exact = draw_terminal_picture({.image = two_patches()}, small(TerminalColours::true_colour));
   std::string palette_text, exact_text;
   for (const std::string& line : *palette) palette_text += line;
   for (const std::string& line : *exact) exact_text += line;
@@ -72,7 +72,7 @@ TEST(TerminalFan, FitsItsRoomAndKeepsItsShape) {
   for (const auto& [columns, rows] : {std::pair{80, 24}, {200, 30}, {30, 60}}) {
     TerminalStyle style = small(TerminalColours::none);
     style.columns = columns, style.lines = rows;
-    const auto lines = draw_terminal_fan(two_patches(), style);
+    const auto lines = draw_terminal_picture({.image = two_patches()}, style);
     ASSERT_TRUE(lines);
     EXPECT_LE(std::ssize(*lines), rows);
     std::size_t widest = 0;
@@ -86,10 +86,10 @@ TEST(TerminalFan, FitsItsRoomAndKeepsItsShape) {
 TEST(TerminalFan, RefusesRoomForNothing) {
   TerminalStyle style = small(TerminalColours::none);
   style.columns = 10;
-  const auto refused = draw_terminal_fan(two_patches(), style);
+  const auto refused = draw_terminal_picture({.image = two_patches()}, style);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().text, HasSubstr("10 columns and 8 lines"));
-  EXPECT_FALSE(draw_terminal_fan(PolarImage{}, small(TerminalColours::none)));
+  EXPECT_FALSE(draw_terminal_picture({.image = PolarImage{}}, small(TerminalColours::none)));
 }
 
 TEST(TerminalFan, FindsTheNearestOfXtermsColours) {

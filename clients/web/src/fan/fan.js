@@ -1,7 +1,7 @@
 // The fan's pane: draws each ping, its marks, and what lies under the cursor.
 import { $, setClass, setHidden, setText } from '../dom.js';
-import { beamTable, exactLayout, fittedLayout, polarOf, samplesOf, under } from './layout.js';
-import { bearingText, drawMarks } from './marks.js';
+import { beamTable, drawnLayout, exactLayout, fittedLayout, polarOf, samplesOf, under } from './layout.js';
+import { bearingText, drawAxes, drawMarks } from './marks.js';
 import { colourTable, mapNames } from './colours.js';
 import { drawFlat } from './flat.js';
 import { fixed, short, whole } from '../numbers.js';
@@ -11,6 +11,12 @@ import { makeRemembered } from '../remember.js';
 const background = [13, 17, 23];
 const slow_ms = 40;
 const very_slow_ms = 80;
+const kinds = {  // what is said of pictures that sonard draws
+  points: "points as sent, over the model's own water column",
+  sweep: 'sweep',
+  'range image': 'range image: near is bright',
+  waterfall: 'waterfall: the newest ping on top',
+};
 const empty_grid = { rows: 500, beams: 2, spacing_m: 0.02, start_m: 0, range_m: 10, azimuth_rad: [Math.PI / 6, -Math.PI / 6] };
 
 export class Fan {
@@ -18,6 +24,7 @@ export class Fan {
     this.facts = facts;
     this.exact = exact;  // for tests: the layout of `sonarctl view --png --no-rings`, so many pixels wide; else 0
     this.canvas = $('fan');
+    this.drawnCanvas = $('drawn');
     this.marks = $('fan-marks');
     this.painter = makeFanPainter(this.canvas);
     this.remembered = makeRemembered('fan', { map: 'copper', rings: true });
@@ -33,8 +40,9 @@ export class Fan {
     this.marks.addEventListener('pointerleave', () => this.point(null));
   }
 
-  get flat() {
-    return !this.painter;
+  /// sonard draws the picture: it is no fan, or there is no WebGL2.
+  get drawn() {
+    return !this.painter || this.facts.pictureKind !== 'fan';
   }
 
   useMap(name) {
@@ -74,6 +82,8 @@ export class Fan {
       this.polar = null;
       return this.redraw();
     }
+    if (ping.about) return this.showDrawn(ping);
+    this.shape = '';
     const geometry = ping.geometry;
     if (geometry !== this.geometry) {
       this.geometry = geometry;
@@ -81,19 +91,23 @@ export class Fan {
     }
     const before = this.polar;
     this.polar = polarOf(ping.image, geometry);
-    if (before?.range_m !== this.polar.range_m || before?.azimuth_rad.length !== this.polar.azimuth_rad.length) this.layout = null;
-    if (this.painter) {
-      const { samples, full_scale } = samplesOf(ping.image);
-      [this.samples, this.full_scale] = [samples, full_scale];
-      this.painter.load(ping.image, samples, this.table, full_scale);
-    }
+    if (!this.samples || before?.range_m !== this.polar.range_m || before?.azimuth_rad.length !== this.polar.azimuth_rad.length) this.layout = null;
+    const { samples, full_scale } = samplesOf(ping.image);
+    [this.samples, this.full_scale] = [samples, full_scale];
+    this.painter?.load(ping.image, samples, this.table, full_scale);
     this.paint();
     this.facts.pingDrawn();
   }
 
-  /// A scan-converted picture of the daemon, where there is no WebGL2.
-  showFlat(image) {
-    if (this.flat && !this.frozen) drawFlat(this.canvas, image, this.map, this.gain);
+  showDrawn({ image, about }) {
+    const is_polar = about.starboard_rad !== about.port_rad && about.kind !== 'range image';
+    this.polar = is_polar ? { start_m: about.range_start_m, range_m: about.range_m, azimuth_rad: [about.port_rad, about.starboard_rad], beams: 2 } : null;
+    this.samples = null;
+    const shape = JSON.stringify([image.width, image.height, this.polar]);
+    if (shape !== this.shape) this.layout = null;
+    this.shape = shape;
+    this.paint();
+    this.facts.pingDrawn();
   }
 
   redraw() {
@@ -106,23 +120,30 @@ export class Fan {
     const width = this.exact || pane.clientWidth;
     const height = pane.clientHeight;
     if (width < 40 || height < 40) return;
+    const about = this.ping?.about;
     const polar = this.polar ?? empty_grid;
     if (!this.layout) this.arrange(polar, width, height);
-    const layout = this.layout;
-    if (this.painter && this.polar) this.paintPicture();
-    setHidden(this.canvas, !this.polar && !this.flat);
-    if (!this.flat) drawMarks(this.marks, polar, layout, { rings: this.rings, cursor: this.cursor, ratio: this.ratio });
+    const { layout } = this;  // painting may ask for another
+    const marked = { rings: this.rings, cursor: this.cursor, ratio: this.ratio, head_rad: about?.kind === 'sweep' ? about.head_rad : undefined };
+    setHidden(this.drawnCanvas, !about);
+    setHidden(this.canvas, Boolean(about) || !this.polar || !this.painter);
+    if (about) drawFlat(this.drawnCanvas, this.ping.image, this.map, this.gain);
+    else if (this.painter && this.polar) this.paintPicture();
+    if (about && !this.polar) drawAxes(this.marks, about, layout, marked);
+    else drawMarks(this.marks, polar, layout, marked);
     this.caption();
   }
 
   arrange(polar, width, height) {
     const margins = { left: 36, right: 46, top: $('fan-top').offsetHeight + 20, bottom: $('fan-controls').offsetHeight + 18 };
-    this.layout = this.exact ? exactLayout(polar, width, 4) : fittedLayout(polar, width, height, margins);
+    const image = this.ping?.about && this.ping.image;
+    this.layout = image ? drawnLayout(image, this.polar, width, height, margins) : this.exact ? exactLayout(polar, width, 4) : fittedLayout(polar, width, height, margins);
     this.ratio = this.exact ? 1 : Math.min(2, devicePixelRatio || 1);
     const scale = this.exact ? 1 : this.quality === 0 ? this.ratio / 2 : this.ratio;
     this.scale = scale;
+    const { box } = this.layout;
+    if (box) for (const side of ['left', 'top', 'width', 'height']) this.drawnCanvas.style[side] = `${box[side]}px`;
     for (const [canvas, s] of [[this.canvas, scale], [this.marks, this.ratio]]) {
-      if (canvas === this.canvas && this.flat) continue;
       canvas.width = Math.round(this.layout.width * s);
       canvas.height = Math.round(this.layout.height * s);
       canvas.style.width = `${this.layout.width}px`;
@@ -159,7 +180,7 @@ export class Fan {
   }
 
   point(event) {
-    this.cursor = event && this.polar && this.layout ? under(this.polar, this.layout, event.offsetX, event.offsetY) : null;
+    this.cursor = event && this.polar && this.layout?.apex_x ? under(this.polar, this.layout, event.offsetX, event.offsetY) : null;
     this.redraw();
   }
 
@@ -168,12 +189,16 @@ export class Fan {
     if (!ping || ping.number) setText($('ping-number'), whole(ping?.number));
     const bits = { mono8: 8, mono16: 16 }[ping?.image.encoding] ?? 32;
     setHidden($('ping-size'), !ping);
-    setText($('ping-size'), ping ? `${ping.image.width} × ${ping.image.height} · ${bits} bit` : '–');
+    const kind = ping?.about?.kind;
+    setText($('ping-size'), kinds[kind] ?? (ping && !ping.about ? `${ping.image.width} × ${ping.image.height} · ${bits} bit` : '–'));
+    $('fan-glass').dataset.kind = this.facts.pictureKind;
+    const label = kinds[kind] ? `The sonar's picture: ${kinds[kind]}` : "The sonar's picture";
+    if (this.drawnCanvas.getAttribute('aria-label') !== label) this.drawnCanvas.setAttribute('aria-label', label);
     const c = this.cursor;
     setHidden($('cursor'), !c);
-    if (!c || !this.samples) return;
-    const value = this.samples[c.row * this.polar.beams + c.beam];
-    setText($('cursor'), `${fixed(c.range_m, 2)} m  ${bearingText(c.azimuth_rad, 1)}  sample ${short(value, 3)}`);
+    if (!c) return;
+    const sample = this.samples ? `  sample ${short(this.samples[c.row * this.polar.beams + c.beam], 3)}` : '';
+    setText($('cursor'), `${fixed(c.range_m, 2)} m  ${bearingText(c.azimuth_rad, 1)}${sample}`);
   }
 
   setMood(picture) {
@@ -186,7 +211,10 @@ export class Fan {
     whole_picture.width = this.marks.width;
     whole_picture.height = this.marks.height;
     const g = whole_picture.getContext('2d');
-    for (const canvas of [this.canvas, this.marks]) g.drawImage(canvas, 0, 0, whole_picture.width, whole_picture.height);
+    const { box } = this.layout;
+    const at = this.ping?.about ? [box.left, box.top, box.width, box.height].map((v) => v * this.ratio) : [0, 0, whole_picture.width, whole_picture.height];
+    g.drawImage(this.ping?.about ? this.drawnCanvas : this.canvas, ...at);
+    g.drawImage(this.marks, 0, 0);
     whole_picture.toBlob((blob) => {
       const link = document.createElement('a');
       link.href = URL.createObjectURL(blob);

@@ -1,10 +1,10 @@
-// Without WebGL2: the fan that the daemon has drawn (/SONAR/fan, mono8; 0 = outside), coloured here.
+// Pictures that sonard has drawn (/SONAR/fan, mono8; 0 = outside), coloured here: of sonars whose picture is no fan of the last ping, and
+// of all without WebGL2.
 
 const outside = new Uint32Array(new Uint8Array([13, 17, 23, 255]).buffer)[0];
 
 export function drawFlat(canvas, image, map, gain) {
-  canvas.width = image.width;
-  canvas.height = image.height;
+  if (canvas.width !== image.width || canvas.height !== image.height) [canvas.width, canvas.height] = [image.width, image.height];
   const g = canvas.getContext('2d');
   const out = g.createImageData(image.width, image.height);
   const pixels = new Uint32Array(out.data.buffer);

@@ -19,7 +19,8 @@ export function exactLayout(polar, width, margin) {
   const half = Math.max(Math.abs(polar.azimuth_rad[0]), Math.abs(polar.azimuth_rad.at(-1)));
   const metres_per_pixel = Math.max((2 * polar.range_m * Math.sin(Math.min(half, Math.PI / 2))) / (width - 2 * margin), polar.range_m / (4 * width));
   const apex_y = margin + polar.range_m / metres_per_pixel;
-  return { width, height: Math.ceil(apex_y + margin), apex_x: width / 2, apex_y, metres_per_pixel };
+  const below = (Math.max(0, -Math.cos(half)) * polar.range_m) / metres_per_pixel;
+  return { width, height: Math.ceil(apex_y + below + margin), apex_x: width / 2, apex_y, metres_per_pixel };
 }
 
 /// The largest fan that fits between the margins {left, right, top, bottom} of a pane.
@@ -30,6 +31,17 @@ export function fittedLayout(polar, width, height, margins) {
   const metres_per_pixel = Math.max((2 * polar.range_m * Math.sin(half)) / Math.max(wide, 40), polar.range_m / Math.max(tall, 40));
   const used = polar.range_m / metres_per_pixel;
   return { width, height, apex_x: margins.left + wide / 2, apex_y: margins.top + tall / 2 + used / 2, metres_per_pixel };
+}
+
+/// Where a picture that sonard has drawn lies between the margins, and its polar layout when it has one.
+export function drawnLayout(image, polar, width, height, margins) {
+  const scale = Math.min((width - margins.left - margins.right) / image.width, (height - margins.top - margins.bottom) / image.height);
+  const box = { width: image.width * scale, height: image.height * scale };
+  box.left = margins.left + (width - margins.left - margins.right - box.width) / 2;
+  box.top = margins.top + (height - margins.top - margins.bottom - box.height) / 2;
+  if (!polar) return { width, height, box };
+  const { apex_x, apex_y, metres_per_pixel } = exactLayout(polar, image.width, 4);
+  return { width, height, box, apex_x: box.left + apex_x * scale, apex_y: box.top + apex_y * scale, metres_per_pixel: metres_per_pixel / scale };
 }
 
 /// Distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.

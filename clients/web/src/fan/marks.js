@@ -53,7 +53,7 @@ function drawBearings(g, polar, layout, port, starboard) {
     g.stroke();
   }
   const marks = [];
-  for (let d = Math.ceil(degrees(starboard) / step) * step; d <= degrees(port) + 1e-6; d += step) marks.push((d * Math.PI) / 180);
+  for (let d = Math.ceil(degrees(Math.max(starboard, -3.1)) / step) * step; d <= degrees(port) + 1e-6; d += step) marks.push((d * Math.PI) / 180);
   g.textAlign = 'center';
   for (const azimuth of marks) {
     const tick = 5 * layout.metres_per_pixel;
@@ -67,6 +67,17 @@ function drawBearings(g, polar, layout, port, starboard) {
   }
 }
 
+/// Where the head of a sweep looks.
+function drawHead(g, polar, layout, head_rad) {
+  g.strokeStyle = 'rgba(79, 184, 255, 0.9)';
+  g.lineWidth = 2;
+  g.beginPath();
+  g.moveTo(layout.apex_x, layout.apex_y);
+  g.lineTo(...place(layout, polar.range_m, head_rad));
+  g.stroke();
+  g.lineWidth = 1;
+}
+
 /// What is under the cursor is marked with its range and direction.
 function drawCursor(g, polar, layout, cursor, port, starboard) {
   g.strokeStyle = 'rgba(79, 184, 255, 0.8)';
@@ -77,18 +88,47 @@ function drawCursor(g, polar, layout, cursor, port, starboard) {
   g.stroke();
 }
 
-/// `canvas` has layout.width x layout.height CSS pixels.
-export function drawMarks(canvas, polar, layout, { rings, cursor, ratio }) {
+function cleared(canvas, layout, ratio) {
   const g = canvas.getContext('2d');
   g.setTransform(ratio, 0, 0, ratio, 0, 0);
   g.clearRect(0, 0, layout.width, layout.height);
   g.font = font;
   g.fillStyle = words;
   g.lineWidth = 1;
+  return g;
+}
+
+/// `canvas` has layout.width x layout.height CSS pixels.
+export function drawMarks(canvas, polar, layout, { rings, cursor, ratio, head_rad }) {
+  const g = cleared(canvas, layout, ratio);
   const [port, starboard] = [polar.azimuth_rad[0], polar.azimuth_rad.at(-1)];
   if (rings) {
     drawRings(g, polar, layout, port, starboard);
     drawBearings(g, polar, layout, port, starboard);
   }
+  if (head_rad !== undefined) drawHead(g, polar, layout, head_rad);
   if (cursor) drawCursor(g, polar, layout, cursor, port, starboard);
+}
+
+/// Of a rectangle: bearings below and elevations beside a range image, ranges above a waterfall.
+export function drawAxes(canvas, about, { box, width, height }, { rings, ratio }) {
+  const g = cleared(canvas, { width, height }, ratio);
+  if (!rings) return;
+  const line = (low, high, step, text, upright) => {
+    for (let v = Math.ceil(Math.min(low, high) / step - 1e-9) * step; v <= Math.max(low, high) + 1e-9; v += step) {
+      const part = (v - low) / (high - low);
+      const [x, y] = [box.left + part * box.width, box.top + part * box.height];
+      g.beginPath();
+      g.moveTo(upright ? x : box.left, upright ? box.top : y);
+      g.lineTo(upright ? x : box.left + box.width, upright ? box.top + box.height : y);
+      g.stroke();
+      g.textAlign = upright ? 'center' : 'left';
+      g.fillText(text(v), upright ? x : box.left + box.width + 4, upright ? box.top - 5 : y + 4);
+    }
+  };
+  g.strokeStyle = ring;
+  if (about.kind === 'waterfall') return line(about.range_start_m, about.range_m, ringSpacing_m(about.range_m), (v) => `${short(v)} m`, true);
+  const [port, elevation] = [degrees(about.port_rad), degrees(about.elevation_rad)];
+  line(-port, -degrees(about.starboard_rad), bearingStep(2 * port), (v) => `${short(v)}°`, true);
+  line(elevation, -elevation, bearingStep(2 * elevation), (v) => `${short(v)}°`, false);
 }

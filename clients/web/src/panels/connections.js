@@ -28,6 +28,10 @@ function rowsOf(facts) {
       });
     }
   }
+  for (const sonar of sonars)
+    for (const to of sonar.receivers ?? [])
+      if (!sonar.clients.some((client) => client.address === to))
+        rows.push({ key: `${sonar.name} ${to}`, who: to, title: 'receives the datagrams', dot: 'ok', hz: dash, megabits: dash, dropped: dash });
   const seen = facts.connection === 'open';
   const bytes = facts.received.rate;
   rows.push({
@@ -45,7 +49,7 @@ function rowsOf(facts) {
 
 export function drawConnections(facts) {
   const rows = rowsOf(facts);
-  const drivers = rows.length - 1;
+  const drivers = (facts.status?.sonars ?? []).reduce((sum, sonar) => sum + sonar.clients.length, 0);
   const viewers = facts.status?.viewers?.length ?? 0;  // of daemons that tell
   setText($('connection-count'), facts.status ? many(drivers, 'driver') + (viewers ? `, ${many(viewers, 'viewer')}` : '') : dash);
   const body = $('clients');
@@ -62,6 +66,9 @@ export function drawConnections(facts) {
     setText(dropped, row.dropped + (row.rising ? ' !' : ''));
     setClass(dropped, row.rising ? 'rising' : '');
   });
+  const addresses = facts.sonarStatus?.addresses ?? [];
+  showList($('addresses'), addresses, () =>
+    addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), ` · the ${a.sonar_speaks_first ? 'sonar' : 'driver'} speaks first`)));
   drawHistory($('history'), facts);
 }
 

@@ -14,7 +14,8 @@ export function activeTroubles(facts) {
     const key = `${troubleOf(fault)} ${fault.sonar}`;
     const group = groups.get(key) ?? { trouble: troubleOf(fault), sonar: fault.sonar, names: [], ends_ns: 0, by: fault.by ?? '', waiting: true };
     group.names.push(fault.name);
-    group.ends_ns = Math.max(group.ends_ns, fault.ends_ns);
+    if (fault.state === 'active') group.ends_ns = Math.max(group.ends_ns, fault.ends_ns);
+    else group.waits_for ||= fault.waits_for;
     group.waiting &&= fault.state === 'waiting';
     groups.set(key, group);
   }
@@ -35,13 +36,33 @@ function offered(facts) {
 
 const wholes = new Map();  // {ends_ns, whole_s} of each trouble, for its bar; ends that messages tell differ by less than a second
 
-function card(group) {
+function card(group, about) {
   return make(
     'li',
     { class: 'fault-card' },
     make('div', {}, make('b', {}, titleOf(group.trouble)), make('span', { class: 'left' })),
+    about && make('div', {}, about.sentence),
+    about?.stays && make('div', { class: 'dim' }, `At its end it does not put back ${about.stays}.`),
     make('div', { class: 'dim' }, [group.sonar || 'every sonar', group.by && `asked by ${group.by}`].filter(Boolean).join(' · ')),
     make('progress', { max: 1, 'aria-label': 'time left' }),
+  );
+}
+
+/// Begins a trouble; says what it does, or why it cannot.
+function button({ name, trouble }, facts, able, steering) {
+  const about = facts.troubles.get(trouble.replace(/_/g, '-'));
+  const cannot = about?.cannot_act.find((entry) => entry.key === facts.sonar)?.value;
+  const notes = [
+    about?.sentence,
+    cannot ? `Cannot act here: the sonar ${cannot}.` : about?.waits_for && `Begins with ${about.waits_for}.`,
+    about?.own_s && !cannot ? `Lasts ${about.own_s} s.` : '',
+    about?.stays && !cannot ? `Does not put back ${about.stays}.` : '',
+  ];
+  return make(
+    'button',
+    { 'data-trouble': trouble, onclick: () => steering.start(name, $('fault-seconds').value), disabled: !able || Boolean(cannot), title: able ? '' : 'this page may only look' },
+    make('b', {}, titleOf(trouble)),
+    make('small', {}, notes.filter(Boolean).join(' ')),
   );
 }
 
@@ -50,12 +71,13 @@ export function drawFaults(facts, steering) {
   setText($('armed'), armed === undefined ? '–' : !armed ? 'not armed' : facts.maySteer ? 'armed' : 'look only');
   const groups = activeTroubles(facts);
   const list = $('active-faults');
-  showList(list, groups.map((g) => [g.trouble, g.sonar, g.by]), () => groups.map(card));
+  showList(list, groups.map((g) => [g.trouble, g.sonar, g.by, facts.troubles.size]), () => groups.map((g) => card(g, facts.troubles.get(g.trouble))));
   groups.forEach((group, i) => {
     const left_s = group.ends_ns && facts.time_ns !== null ? (group.ends_ns - facts.time_ns) / 1e9 : NaN;
     const key = `${group.trouble} ${group.sonar}`;
     if (!Number.isNaN(left_s) && !(Math.abs(wholes.get(key)?.ends_ns - group.ends_ns) < 1e9)) wholes.set(key, { ends_ns: group.ends_ns, whole_s: left_s });
-    setText(list.children[i].querySelector('.left'), group.waiting ? 'waits' : Number.isNaN(left_s) ? 'acts' : countdown(left_s));
+    const waits = group.waits_for ? `waits for ${group.waits_for}` : 'waits';
+    setText(list.children[i].querySelector('.left'), group.waiting ? waits : Number.isNaN(left_s) ? 'acts' : countdown(left_s));
     const bar = list.children[i].querySelector('progress');
     setHidden(bar, Number.isNaN(left_s));
     bar.value = Number.isNaN(left_s) ? 0 : Math.max(0, Math.min(1, left_s / wholes.get(key).whole_s));
@@ -63,14 +85,11 @@ export function drawFaults(facts, steering) {
 
   const troubles = armed ? offered(facts) : [];
   const able = facts.maySteer && facts.connection === 'open';
-  showList($('troubles'), [troubles, able, armed], () => {
+  showList($('troubles'), [troubles, able, armed, [...facts.troubles.values()]], () => {
     if (armed === undefined) return [];
     if (!armed) return [make('p', { class: 'dim' }, 'To begin faults from here, start sonard with --faults.')];
-    return troubles.map(({ name, trouble }) =>
-      make('button', { onclick: () => steering.start(name, $('fault-seconds').value), disabled: !able, title: able ? '' : 'this page may only look' }, titleOf(trouble)));
+    return troubles.map((offer) => button(offer, facts, able, steering));
   });
-  const seconds = $('fault-seconds').selectedOptions[0].textContent;
-  if (able) for (const button of $('troubles').querySelectorAll('button')) button.title = `begins now, ends in ${seconds}`;
   $('troubles').classList.toggle('single', !armed);
   setHidden($('fault-row'), !armed);
   $('clear-faults').disabled = !able || groups.length === 0;

@@ -5,11 +5,12 @@ import { dash, fixed, frequency } from '../numbers.js';
 function rateOf(facts) {
   const sonar = facts.sonarStatus;
   if (facts.connection !== 'open' || !sonar) return { word: { lost: 'lost', token: 'token wanted' }[facts.connection] ?? 'connecting', dot: 'error', rate: dash };
-  if (sonar.clients.length === 0 && !facts.of('preview')) return { word: 'no driver', dot: 'warning', rate: '' };
+  if (facts.preview) return { word: 'preview', dot: 'note', rate: facts.drawn.rate === undefined ? dash : `${fixed(facts.drawn.rate, 1)} Hz` };
+  if (!facts.listened) return { word: 'no driver', dot: 'warning', rate: '' };
   if (sonar.rate_hz === 0) return { word: 'standby', dot: 'warning', rate: '0 Hz' };
-  if (!sonar.pinging && !facts.of('preview')) return { word: 'silent', dot: 'warning', rate: dash };
+  if (!sonar.pinging) return { word: 'silent', dot: 'warning', rate: dash };
   const slow = facts.rate !== undefined && facts.rate < 0.9 * sonar.rate_hz && facts.realtime;
-  return { word: facts.of('preview') ? 'preview' : 'pinging', dot: slow ? 'warning' : 'ok', rate: facts.rate === undefined ? dash : `${fixed(facts.rate, 1)} Hz` };
+  return { word: 'pinging', dot: slow ? 'warning' : 'ok', rate: facts.rate === undefined ? dash : `${fixed(facts.rate, 1)} Hz` };
 }
 
 /// The product's short name: "oculus-m1200d" -> "M1200d".

@@ -12,15 +12,10 @@ export class Notice {
     });
   }
 
-  async act() {
+  act() {
     const button = this.now?.button;
-    if (!button) return;
-    if (button.parameter) return this.steering.set(button.parameter, button.value);
-    try {
-      await this.connection.call(button.service, button.request);
-    } catch (error) {
-      this.facts.problems.set('call', { id: 'call', level: 2, message: error.message });
-    }
+    if (button?.parameter) this.steering.set(button.parameter, button.value);
+    else if (button) this.steering.call(button.service, button.request);
   }
 
   /// The situation, or null.

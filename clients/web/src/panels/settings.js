@@ -1,5 +1,5 @@
 // Settings of the sonar and the water: what holds, and a field for each that may be changed.
-import { $, make, setHidden, setText, showList } from '../dom.js';
+import { $, make, setText, showList } from '../dom.js';
 import { dash, fixed, short } from '../numbers.js';
 
 const numbers = [
@@ -61,8 +61,7 @@ export function drawSettings(facts, steering) {
   const names = [...facts.parameters.keys()].filter((n) => n.startsWith(`/${facts.sonar}/`) || n.startsWith('/water/'));
   const able = facts.maySteer && facts.connection === 'open';
   showList(box, [facts.sonar, names, names.length ? facts.of('mode') > 1 : facts.sonarStatus?.range_m], () => {
-    const rows = names.length ? rowsOf(facts, steering) : plainRows(facts.sonarStatus);
-    return [...rows, make('p', { class: 'setting refused', id: 'refusal', role: 'alert', hidden: true })];
+    return names.length ? rowsOf(facts, steering) : plainRows(facts.sonarStatus);
   });
   for (const field of box.querySelectorAll('input, select')) {
     field.disabled = !able;
@@ -73,7 +72,4 @@ export function drawSettings(facts, steering) {
   }
   const by = facts.sonarStatus?.asked_by;
   setText($('asked-by'), by ? `last asked by ${by === facts.info?.metadata?.['sonard.viewer'] ? 'this page' : by}` : '');
-  const refusal = [...facts.problems.values()].filter((p) => String(p.id ?? '').startsWith('param:')).at(-1);
-  setHidden($('refusal'), !refusal);
-  setText($('refusal'), refusal?.message ?? '');
 }

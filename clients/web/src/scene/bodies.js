@@ -1,7 +1,7 @@
 // What the page itself adds to the scene: vehicle, trail, the fan's plane with the last ping on it, beam edges, grid.
 import {
   BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, DataTexture, DoubleSide, EdgesGeometry, FloatType, GridHelper, Group, Line,
-  LineBasicMaterial, LineSegments, Mesh, MeshPhongMaterial, GreaterDepth, NearestFilter, RGBAFormat, RedFormat, ShaderMaterial, UnsignedByteType, Vector2,
+  LineBasicMaterial, LineSegments, Mesh, MeshPhongMaterial, GreaterDepth, NearestFilter, Points, PointsMaterial, RGBAFormat, RedFormat, ShaderMaterial, UnsignedByteType, Vector2,
 } from 'three.module.js';
 import { table_entries } from '../fan/layout.js';
 
@@ -56,6 +56,18 @@ export function makeLines(lines) {
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(new Float32Array(points), 3));
   return new LineSegments(geometry, new LineBasicMaterial({ color: 0x4fb8ff, transparent: true, opacity: 0.65 }));
+}
+
+/// A PointCloud, whose points begin with x, y and z.
+export function makePoints({ point_stride, data }) {
+  const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
+  const places = [];
+  for (let at = 0; at + point_stride <= data.byteLength; at += point_stride) for (const byte of [0, 4, 8]) places.push(view.getFloat32(at + byte, true));
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new BufferAttribute(new Float32Array(places), 3));
+  const points = new Points(geometry, new PointsMaterial({ color: 0xffc36b, size: 2, sizeAttenuation: false }));
+  points.frustumCulled = false;
+  return points;
 }
 
 const vertex = `

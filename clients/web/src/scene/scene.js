@@ -3,7 +3,7 @@ import { $, setHidden, setText } from '../dom.js';
 import { Camera, drawCompass } from './camera.js';
 import { Color, DirectionalLight, DoubleSide, FogExp2, Group, HemisphereLight, Mesh, MeshPhongMaterial, Raycaster, Scene as Graph, Vector2, Vector3, WebGLRenderer } from 'three.module.js';
 import { fixed } from '../numbers.js';
-import { makeFanPlane, makeGrid, makeLines, makeTrail, makeVehicle } from './bodies.js';
+import { makeFanPlane, makeGrid, makeLines, makePoints, makeTrail, makeVehicle } from './bodies.js';
 import { readGlb } from './glb.js';
 
 const water = 0x0b2233;
@@ -55,7 +55,8 @@ export class Scene {
     if (this.missing) return;
     this.removeObjects();
     this.lines?.parent?.remove(this.lines);
-    this.lines = null;
+    this.points?.parent?.remove(this.points);
+    this.lines = this.points = null;
     this.trail.clear();
     this.camera.placed = false;
   }
@@ -120,6 +121,16 @@ export class Scene {
     this.stale = true;
   }
 
+  /// The echoes of the last ping in space.
+  cloud(message) {
+    if (this.missing) return;
+    this.points?.parent?.remove(this.points);
+    this.points?.geometry.dispose();
+    this.points = makePoints(message);
+    this.frame(message.frame_id).add(this.points);
+    this.stale = true;
+  }
+
   /// Places the frames as the last ping's poses have them.
   place() {
     for (const [name, { translation: t, rotation: r }] of this.facts.frames) {
@@ -138,6 +149,7 @@ export class Scene {
     }
     const sonar = this.frame(this.facts.sonar);
     if (sonar !== this.graph && this.plane.mesh.parent !== sonar) sonar.add(this.plane.mesh);
+    if (this.points) this.points.visible = this.points.parent === sonar;  // not those of a sonar that was looked at before
     this.graph.updateMatrixWorld();
   }
 

@@ -7,7 +7,7 @@ const subprotocols = ['foxglove.sdk.v1', 'foxglove.websocket.v1'];
 
 export class Connection {
   /// `on`: functions open(info), lost(), needsToken(), message(topic, value, ns), time(ns), parameters(list), status(status),
-  /// removeStatus(ids), topics().
+  /// topics().
   constructor(on) {
     this.on = on;
     this.tries = 0;
@@ -113,9 +113,6 @@ export class Connection {
         break;
       case 'status':
         this.on.status(word);
-        break;
-      case 'removeStatus':
-        this.on.removeStatus(word.statusIds);
         break;
       case 'advertiseServices':
         for (const service of word.services) this.services.set(service.name, service.id);

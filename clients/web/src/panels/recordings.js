@@ -1,0 +1,30 @@
+// Recordings of the sonar: one button, and those that run or have ended, as the status has them.
+import { $, make, setText, showList } from '../dom.js';
+import { fixed, whole } from '../numbers.js';
+
+const running = (facts) => facts.status?.recordings.find((r) => r.running && r.sonar === facts.sonar);
+
+const nameOf = (recording) => recording.file.replace(/^.*\//, '');  // as it was started
+
+/// The name of a new file: "front-20261128-010203.mcap", of now.
+function newName(sonar) {
+  const digits = new Date().toISOString().replace(/\D/g, '');
+  return `${sonar}-${digits.slice(0, 8)}-${digits.slice(8, 14)}.mcap`;
+}
+
+/// The button was pressed: `call(service, request)`.
+export function toggleRecording(facts, call) {
+  const one = running(facts);
+  if (one) call('/sonard/stop_recording', { file: nameOf(one) });
+  else call('/sonard/start_recording', { file: newName(facts.sonar), sonar: facts.sonar });
+}
+
+export function drawRecordings(facts) {
+  const all = facts.status?.recordings ?? [];
+  const one = running(facts);
+  setText($('record'), one ? 'Stop recording' : 'Record');
+  $('record').setAttribute('aria-pressed', String(Boolean(one)));
+  $('record').disabled = !facts.maySteer || facts.connection !== 'open' || !facts.sonar;
+  showList($('recordings'), all, () => all.map((r) => make('li', {}, make('b', { title: r.file }, nameOf(r)), make('small', {},
+    ` ${r.sonar} · ${whole(r.pings)} pings · ${fixed(r.bytes / 1e6, 1)} MB · ${r.running ? 'running' : r.why || 'ended'}`))));
+}

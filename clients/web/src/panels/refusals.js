@@ -1,0 +1,41 @@
+// What sonard refuses, said beside the control that asked for it, whichever panel or tab that is in.
+import { $, setHidden, setText } from '../dom.js';
+
+const lasts_ms = 10000;
+const gap_px = 6;
+
+export class Refusals {
+  constructor() {
+    this.asked = new Map();  // id of a request -> where its control was
+    for (const kind of ['pointerdown', 'keydown'])
+      document.addEventListener(kind, (event) => {
+        this.touched = event.target;
+        if (kind === 'pointerdown' || event.key === 'Escape') this.hide();
+      }, true);
+  }
+
+  hide() {
+    clearTimeout(this.timer);
+    setHidden($('refusal'), true);
+  }
+
+  /// The control that was touched last asks for something.
+  note(id) {
+    const control = this.touched?.closest?.('button, input, select') ?? document.activeElement;
+    this.asked.set(id, control.getBoundingClientRect());
+  }
+
+  /// `name` in front of the text is the parameter's, which the place tells.
+  show(id, text, name = '') {
+    const box = $('refusal');
+    const at = this.asked.get(id);
+    setText(box, text.startsWith(`${name}: `) ? text.slice(name.length + 2) : text);
+    setHidden(box, false);
+    const place = at ?? { left: 0, top: innerHeight / 2, bottom: innerHeight / 2 };
+    const below = place.bottom + gap_px + box.offsetHeight < innerHeight;
+    box.style.left = `${Math.max(gap_px, Math.min(place.left, innerWidth - box.offsetWidth - gap_px))}px`;
+    box.style.top = `${below ? place.bottom + gap_px : Math.max(gap_px, place.top - gap_px - box.offsetHeight)}px`;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.hide(), lasts_ms);
+  }
+}

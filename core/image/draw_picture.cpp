@@ -1,0 +1,120 @@
+#include "core/image/draw_picture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr Rgb head_colour{79, 184, 255};
+constexpr double waterfall_shape = 0.75;  // height over width
+
+/// Cells [first, last) of `cells` that lie under pixel `at` of `pixels`: at least one.
+std::pair<std::size_t, std::size_t> cells_under(int at, int pixels, std::size_t cells) {
+  const auto first = static_cast<std::size_t>(at) * cells / static_cast<std::size_t>(pixels);
+  return {first, std::max(first + 1, static_cast<std::size_t>(at + 1) * cells / static_cast<std::size_t>(pixels))};
+}
+
+float mean_of(const PolarImage& image, std::pair<std::size_t, std::size_t> rows, std::pair<std::size_t, std::size_t> columns) {
+  float sum = 0;
+  for (std::size_t row = rows.first; row < rows.second; ++row)
+    for (std::size_t column = columns.first; column < columns.second; ++column) sum += image.at(row, column);
+  return sum / static_cast<float>((rows.second - rows.first) * (columns.second - columns.first));
+}
+
+/// A rectangle of cells; `rows` of them fill the height, and the image may have fewer.
+Raster draw_cells(const PolarImage& image, std::size_t rows, const FanStyle& style, int height) {
+  Raster raster(style.width_px, height);
+  for (int y = 0; y < height; ++y) {
+    const auto [first, last] = cells_under(y, height, rows);
+    for (int x = 0; x < style.width_px; ++x)
+      raster.at(x, y) = first >= image.rows ? outside_colour
+                                            : style.colours.colour(mean_of(image, {first, std::min(last, image.rows)},
+                                                                           cells_under(x, style.width_px, image.beams)) /
+                                                                   image.full_scale);
+  }
+  return raster;
+}
+
+/// Upright lines at multiples of `step`, from `left` to `right` across the picture.
+void draw_axis(Raster& raster, double left, double right, double step, const char* unit) {
+  const int scale = std::max(1, raster.width / 400);
+  const double low = std::min(left, right), high = std::max(left, right);
+  for (double at = std::ceil(low / step) * step; at <= high + 1e-9; at += step) {
+    const int x = static_cast<int>((at - left) / (right - left) * (raster.width - 1));
+    for (int y = 0; y < raster.height; ++y) blend(raster, x, y, ring_colour, 0.12f);
+    char label[32];
+    std::snprintf(label, sizeof label, "%g%s", at == 0 ? 0 : at, unit);
+    draw_text(raster, std::clamp(x + 2 * scale, 0, std::max(0, raster.width - text_width(label, scale) - 1)), 2 * scale, label,
+              label_colour, scale);
+  }
+}
+
+void draw_head(Raster& raster, const SonarPicture& picture, const FanLayout& layout) {
+  const double length = picture.range_m() / layout.metres_per_pixel;
+  for (double r = 0; r < length; r += 0.5)
+    blend(raster, static_cast<int>(layout.apex_x - r * std::sin(picture.head_rad)),
+          static_cast<int>(layout.apex_y - r * std::cos(picture.head_rad)), head_colour, 0.6f);
+}
+
+void draw_points(Raster& raster, const SonarPicture& picture, const FanLayout& layout, Rgb colour) {
+  const int radius = std::max(1, raster.width / 240);
+  for (const auto& [azimuth, range_m] : picture.points) {
+    if (!(range_m >= 0 && range_m <= picture.range_m())) continue;
+    const int x = static_cast<int>(layout.apex_x - range_m / layout.metres_per_pixel * std::sin(azimuth));
+    const int y = static_cast<int>(layout.apex_y - range_m / layout.metres_per_pixel * std::cos(azimuth));
+    for (int dy = -radius; dy <= radius; ++dy)
+      for (int dx = -radius; dx <= radius; ++dx)
+        if (dx * dx + dy * dy <= radius * radius) blend(raster, x + dx, y + dy, colour, 1);
+  }
+}
+
+Result<void> check_cells(const SonarPicture& picture, const FanStyle& style) {
+  const PolarImage& image = picture.image;
+  if (style.width_px < 64 || style.width_px > 8000)
+    return failure(ErrorKind::usage, "a picture " + std::to_string(style.width_px) + " pixels wide: choose 64 to 8000");
+  const bool has_sides = picture.kind == PictureKind::waterfall
+                             ? image.row_spacing_m > 0
+                             : image.azimuth_rad.size() == image.beams && picture.elevation_rad > 0 &&
+                                   picture.elevation_rad < pi && image.azimuth_rad.front() > image.azimuth_rad.back();
+  if (image.rows >= 1 && image.beams >= 2 && has_sides && image.samples.size() == image.rows * image.beams) return {};
+  return failure(ErrorKind::bad_data, "the ping has no picture: " + std::to_string(image.rows) + " rows of " +
+                                          std::to_string(image.beams) + " cells, nothing to draw");
+}
+
+}  // namespace
+
+int picture_height(const SonarPicture& picture, const FanStyle& style) {
+  if (picture.is_polar()) return fan_layout(picture.image, style).height;
+  const double shape = picture.kind == PictureKind::waterfall
+                           ? waterfall_shape
+                           : 2 * picture.elevation_rad / (picture.image.azimuth_rad.front() - picture.image.azimuth_rad.back());
+  return std::max(1, static_cast<int>(std::lround(style.width_px * std::min(shape, 4.0))));
+}
+
+Result<Raster> PicturePainter::draw(const SonarPicture& picture) {
+  const PolarImage& image = picture.image;
+  if (picture.is_polar()) {
+    Result<Raster> raster = fan_.draw(image);
+    if (!raster) return raster;
+    const FanLayout layout = fan_layout(image, style_);
+    if (picture.kind == PictureKind::sweep && style_.rings) draw_head(*raster, picture, layout);
+    draw_points(*raster, picture, layout, style_.colours.colour(1));
+    return raster;
+  }
+  if (Result<void> sound = check_cells(picture, style_); !sound) return tl::unexpected(sound.error());
+  const bool falls = picture.kind == PictureKind::waterfall;
+  const std::size_t rows = falls ? std::clamp(image.rows, waterfall_fewest_rows, waterfall_rows) : image.rows;
+  Raster raster = draw_cells(image, rows, style_, picture_height(picture, style_));
+  if (!style_.rings) return raster;
+  if (falls)
+    draw_axis(raster, image.start_m, picture.range_m(), ring_spacing_m(picture.range_m()), " m");
+  else
+    draw_axis(raster, -deg_from_rad(image.azimuth_rad.front()), -deg_from_rad(image.azimuth_rad.back()), 15, "");
+  return raster;
+}
+
+}  // namespace sonar

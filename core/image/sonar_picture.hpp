@@ -1,0 +1,45 @@
+// The picture of a sonar for people: for most products a fan of the last ping, for others what their pings add up to. Made by
+// protocol/<vendor>/host.cpp, drawn by PicturePainter (draw_picture.hpp) for `sonarctl view`, the page and other viewers alike.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/image/polar_image.hpp"
+
+namespace sonar {
+
+enum class PictureKind {
+  fan,          // the last ping, by bearing and range
+  points,       // places by bearing and range, over a fan
+  sweep,        // a fan or a full circle, scanned beam by beam by a head that turns
+  range_image,  // a pixel for each azimuth and elevation: near is bright
+  waterfall,    // one beam: a row for each ping, the newest on top, by range
+};
+inline constexpr std::array<std::string_view, 5> picture_kind_names = {"fan", "points", "sweep", "range image", "waterfall"};
+inline constexpr std::string_view name_of(PictureKind kind) { return picture_kind_names[static_cast<std::size_t>(kind)]; }
+
+struct SonarPicture {
+  PictureKind kind = PictureKind::fan;
+  /// A range image has a row for each elevation, the highest first. A waterfall has a row for each ping and a column for each
+  /// range: `row_spacing_m` apart from `start_m` on, without bearings.
+  PolarImage image;
+  double head_rad = 0;                                 // sweep: where the head looks, positive to port
+  double elevation_rad = 0;                            // range image: of its highest row; its lowest looks as far down
+  std::vector<std::pair<double, double>> points = {};  // points: azimuth, range
+
+  bool is_polar() const { return kind == PictureKind::fan || kind == PictureKind::points || kind == PictureKind::sweep; }
+  /// Far end of the ranges shown.
+  double range_m() const {
+    return kind == PictureKind::waterfall ? image.start_m + static_cast<double>(image.beams) * image.row_spacing_m
+                                          : image.range_m();
+  }
+};
+
+/// Rows of a waterfall: what is older is not shown. One of fewer pings leaves the rest empty.
+inline constexpr std::size_t waterfall_rows = 300, waterfall_fewest_rows = 100;
+
+}  // namespace sonar

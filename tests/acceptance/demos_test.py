@@ -1,0 +1,176 @@
+"""Each demo at once: it previews by itself while a viewer looks, hands over to a driver and takes over again, and shows echoes; the page has
+its picture, of the product's own kind, with nothing over it, and all its controls can be reached and used by keys.
+
+The page's part is skipped without browser or page. SONARD_SHOTS names a folder for pictures.
+"""
+import pathlib
+import subprocess
+import sys
+import time
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
+
+from browser import Browser  # noqa: E402
+from foxglove_viewer import Viewer  # noqa: E402
+from page_checks import WHY_NOT, PageChecks, shown  # noqa: E402
+from running_sonard import SONARCTL, SONARD, Daemon, eventually, run  # noqa: E402
+
+HTTP, SONAR = "127.0.0.1", "127.0.0.2"
+# Of the demo: its picture, the pings that make one, and the port of its driver.
+DEMOS = {"oculus": ("fan", 1, 52100), "blueview": ("fan", 1, 14750), "aris": ("fan", 1, 56888), "3d15": ("range image", 1, 80),
+         "ping360": ("sweep", 200, 12345), "surveyor": ("points", 1, 62312), "omniscan": ("waterfall", 20, 51200)}
+MOST_NOISE = 0.95        # of samples that are noise lie below what counts as an echo
+LEAST_ECHOES = 0.2
+
+# What the middle of the picture shows is the picture, and nothing lies over it.
+UNCOVERED = """(() => {
+  const canvas = [...document.querySelectorAll('#fan, #drawn')].find((c) => c.offsetWidth);
+  const box = canvas.getBoundingClientRect();
+  return [0.3, 0.5, 0.7].every((part) => {
+    const over = document.elementFromPoint(box.left + box.width / 2, box.top + part * box.height);
+    return over?.closest('#fan-glass');
+  }) && !document.querySelector('#notice').offsetWidth;
+})()"""
+# Controls that can be used now, by how a test names them.
+CONTROLS = """[...document.querySelectorAll('button, select, input, summary, [tabindex="0"]')]
+  .filter((e) => e.offsetWidth && !e.disabled && e.tabIndex >= 0).map((e) => e.id || e.name || e.dataset.trouble || e.dataset.tab || e.className + e.textContent)"""
+FOCUSED = "((e) => e === document.body ? '' : e.id || e.name || e.dataset.trouble || e.dataset.tab || e.className + e.textContent)(document.activeElement)"
+
+
+def demo(maker):
+    return Daemon(None, str(SONARD), [maker])
+
+
+def rows_of(image):
+    """Of a RawImage, as lists of numbers."""
+    size = {"mono8": 1, "mono16": 2, "32FC1": 4}[image["encoding"]]
+    data, step = image["data"], image["step"]
+    values = list(data) if size == 1 else [int.from_bytes(data[i:i + size], "little") for i in range(0, len(data), size)]
+    return [values[i:i + step // size] for i in range(0, len(values), step // size)]
+
+
+def echoes(rows, noise):
+    """Share of the samples that stand out of the noise of their own range."""
+    loudest = [sorted(row)[int(MOST_NOISE * (len(row) - 1))] for row in noise]
+    return sum(v > most for row, most in zip(rows, loudest) for v in row) / sum(len(row) for row in rows)
+
+
+class Preview(unittest.TestCase):
+    @staticmethod
+    def rows(viewer, pings):
+        """Of so many pings that are fired from now on, those of one range together."""
+        images, begin_ns = [], time.time_ns()
+        while len(images) < pings:
+            topic, ns, data = viewer.wait_for(lambda kind, _: kind == "message")
+            if topic == "/front/image" and ns > begin_ns:
+                images.append(rows_of(viewer.decode(topic, data)))
+        return [[v for row in rows for v in row] for rows in zip(*images)]
+
+    def test_every_demo_shows_echoes_at_once(self):
+        for maker, (kind, pings, _) in DEMOS.items():
+            with self.subTest(demo=maker), demo(maker) as daemon, Viewer(HTTP) as viewer:
+                viewer.greeted().subscribe("/front/image", "/front/picture")
+                self.assertEqual(viewer.first_of("/front/picture", 120)["kind"], kind)
+                seen = self.rows(viewer, pings)
+                if kind == "range image":
+                    share = echoes(seen, [[0] for _ in seen])  # a pixel without an echo is 0
+                else:
+                    self.assertEqual(run(SONARCTL, "set", "sonar", "front", "--transmit", "off").returncode, 0)
+                    share = echoes(seen, self.rows(viewer, pings))
+                print(f"\n  {maker}: echoes in {100 * share:.0f} % of the picture", end="", file=sys.stderr)
+                self.assertGreater(share, LEAST_ECHOES, daemon.log())
+
+    def test_a_driver_takes_over_and_the_preview_comes_back(self):
+        with demo("oculus") as daemon, Viewer(HTTP) as viewer:
+            viewer.greeted().subscribe("/front/ping", "/status")
+            viewer.subscribe("/front/image")
+            viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/ping" and viewer.decode(*value[::2]).get("preview"))
+            with subprocess.Popen([SONARCTL, "listen", SONAR, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
+                numbers = []
+                while len(numbers) < 5:
+                    event = viewer.decode(*viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/ping")[::2])
+                    if not event.get("preview"):
+                        numbers.append(event["number"])
+                    else:
+                        self.assertEqual(numbers, [], "no preview beside a driver")
+                self.assertEqual(numbers[0], 1, "the first driver gets what it would have got")
+                driver.terminate()
+            viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/ping" and viewer.decode(*value[::2]).get("preview"))
+            viewer.socket.close()
+            eventually(lambda: "preview ends" in daemon.log().rpartition("preview begins")[2])
+
+    def test_faults_are_armed(self):
+        with demo("oculus"):
+            self.assertEqual(run(SONARCTL, "fault", "list").stdout, "no faults\n")
+
+
+@unittest.skipIf(WHY_NOT, WHY_NOT)
+class Pages(PageChecks, unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.browser = cls.enterClassContext(Browser())
+
+    def test_each_demo(self):
+        for maker, (kind, _, _) in DEMOS.items():
+            with demo(maker):
+                for width, height, theme in ((1600, 1000, "light"), (390, 844, "dark")):
+                    with self.subTest(demo=maker, width=width):
+                        page = self.opened(self.browser.open(f"http://{HTTP}:8088/", width, height, touch=width < 800, theme=theme))
+                        begin = time.monotonic()
+                        shown(page)
+                        took_s = time.monotonic() - begin
+                        page.wait(f"document.querySelector('#fan-glass').dataset.kind === '{kind}'")
+                        page.wait(UNCOVERED)
+                        print(f"\n  {maker}, {width} wide: picture after {took_s:.1f} s", end="", file=sys.stderr)
+                        self.assertLess(took_s, 30)
+                        word = "pinging" if maker == "3d15" else "preview"  # which has a multicast group to send to
+                        page.wait(f"document.querySelector('#rate-word').textContent === '{word}'")
+                        self.every_control_can_be_reached(page, width)
+                        page.run("document.querySelector('#tabs [data-tab=fan]').click()")
+                        self.picture(page, f"demo-{maker}-{width}", 8)
+                        self.assert_quiet(page, f"http://{HTTP}:8088/")
+                        page.close()
+
+    def every_control_can_be_reached(self, page, width):
+        for tab in ("fan", "scene", "clients", "faults", "log") if width < 820 else ("",):
+            if tab:
+                page.touch(f"#tabs [data-tab={tab}]")
+                page.wait(f"document.body.dataset.tab === '{tab}'")
+            page.run("document.activeElement.blur()")
+            wanted, seen = set(page.run(CONTROLS)), set()
+            for _ in range(2 * len(wanted) + 10):
+                page.press("Tab")
+                focused = page.run(FOCUSED)
+                if focused in seen and wanted <= seen:
+                    break
+                seen.add(focused)
+            self.assertEqual(wanted - seen, set(), f"Tab does not come there; tab {tab}")
+
+    def test_a_setting_by_keys_and_a_refusal_beside_it(self):
+        for width, height in ((1600, 1000), (390, 844)):
+            with self.subTest(width=width), demo("oculus"):
+                page = self.opened(self.browser.open(f"http://{HTTP}:8088/", width, height, touch=width < 800))
+                shown(page)
+                if width < 800:
+                    page.touch("#tabs [data-tab=clients]")
+                field = "document.querySelector('[name=\"/front/range_m\"]')"
+                page.wait("!!" + field)
+                page.run(field + ".focus(), document.activeElement.select()")
+                for key in ("4", "Enter"):
+                    page.press(key)
+                page.wait(field + ".value === '4'")
+                eventually(lambda: "4 m" in run(SONARCTL, "status").stdout)
+                page.run("document.activeElement.select()")
+                for key in ("9", "9", "9", "Enter"):
+                    page.press(key)
+                page.wait("document.querySelector('#refusal').offsetWidth")
+                gap = page.run(f"((a, b) => Math.max(a.top - b.bottom, b.top - a.bottom))(document.querySelector('#refusal').getBoundingClientRect(), {field}.getBoundingClientRect())")
+                self.assertLess(abs(gap), 20)
+                self.assertLessEqual(page.run("document.querySelector('#refusal').getBoundingClientRect().right"), width)
+                page.press("Escape")
+                page.wait("!document.querySelector('#refusal').offsetWidth")
+
+
+if __name__ == "__main__":
+    unittest.main()

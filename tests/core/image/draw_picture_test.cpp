@@ -1,0 +1,90 @@
+// Pictures that are no fan of one ping: what lies where, and what is refused.
+#include "core/image/draw_picture.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::draw_picture_test {
+namespace {
+
+FanStyle style(bool rings = false) { return {360, *find_colour_map("gray"), rings}; }
+
+PolarImage cells(std::size_t rows, std::size_t columns) {
+  PolarImage image;
+  image.rows = rows;
+  image.beams = columns;
+  image.row_spacing_m = 0.1;
+  image.samples.assign(rows * columns, 0);
+  return image;
+}
+
+/// A full turn, one bright beam.
+SonarPicture sweep(std::size_t bright) {
+  SonarPicture picture{.kind = PictureKind::sweep, .image = cells(100, 40)};
+  for (std::size_t beam = 0; beam < 40; ++beam)
+    picture.image.azimuth_rad.push_back((20 - static_cast<double>(beam)) * 2 * pi / 40);
+  for (std::size_t row = 0; row < 100; ++row) picture.image.samples[row * 40 + bright] = 255;
+  return picture;
+}
+
+TEST(SonarPicture, ASweepOfAFullTurnShowsWhatIsAsternBelow) {
+  const SonarPicture port = sweep(10), astern = sweep(39);
+  const Raster left = *PicturePainter(style()).draw(port), below = *PicturePainter(style()).draw(astern);
+  EXPECT_EQ(left.height, picture_height(port, style()));
+  EXPECT_NEAR(left.height, left.width, 2) << "a circle";
+  EXPECT_GT(left.at(60, 180).r, 200);
+  EXPECT_LT(left.at(300, 180).r, 50);
+  EXPECT_LT(left.at(180, 60).r, 50);
+  EXPECT_GT(below.at(192, 300).r, 200) << "a little to starboard";
+}
+
+TEST(SonarPicture, RingsShowWhereTheHeadLooks) {
+  SonarPicture picture = sweep(10);
+  picture.head_rad = -pi / 2;
+  const Raster with = *PicturePainter(style(true)).draw(picture), without = *PicturePainter(style()).draw(picture);
+  EXPECT_GT(with.at(300, with.height / 2).b, 100) << "to starboard";
+  EXPECT_LT(without.at(300, without.height / 2).b, 100);
+}
+
+TEST(SonarPicture, ARangeImageHasItsHighestRowOnTopAndPortLeft) {
+  SonarPicture picture{.kind = PictureKind::range_image, .image = cells(4, 8), .elevation_rad = pi / 8};
+  for (std::size_t column = 0; column < 8; ++column)
+    picture.image.azimuth_rad.push_back(pi / 4 * (1 - static_cast<double>(column) / 3.5));
+  picture.image.samples[1] = 255;
+  const Raster raster = *PicturePainter(style()).draw(picture);
+  EXPECT_EQ(raster.height, 180) << "as wide as its bearings, as high as its elevations";
+  EXPECT_EQ(raster.at(60, 20).r, 255);
+  EXPECT_EQ(raster.at(20, 20).r, 0);
+  EXPECT_EQ(raster.at(60, 60).r, 0);
+  picture.elevation_rad = 0;
+  EXPECT_THAT(PicturePainter(style()).draw(picture).error().text, testing::HasSubstr("nothing to draw"));
+}
+
+TEST(SonarPicture, AWaterfallBeginsOnTopAndIsEmptyBelow) {
+  SonarPicture picture{.kind = PictureKind::waterfall, .image = cells(50, 20)};
+  picture.image.samples[15] = 255;
+  const Raster raster = *PicturePainter(style()).draw(picture);
+  EXPECT_EQ(raster.height, 270);
+  EXPECT_EQ(raster.at(280, 1).r, 255) << "the newest ping, at three quarters of its range";
+  EXPECT_EQ(raster.at(280, 100).r, 0);
+  EXPECT_NE(raster.at(280, 200).r, raster.at(280, 200).g) << "fewer pings than rows: what is outside";
+  EXPECT_NEAR(picture.range_m(), 2, 1e-9);
+  picture.image.samples.pop_back();
+  EXPECT_FALSE(PicturePainter(style()).draw(picture));
+}
+
+TEST(SonarPicture, PointsLieOverTheFan) {
+  SonarPicture picture{.kind = PictureKind::points, .image = cells(100, 2), .points = {{0.3, 5}, {0, 99}}};
+  picture.image.azimuth_rad = {0.7, -0.7};
+  const Raster raster = *PicturePainter(style()).draw(picture);
+  const FanLayout layout = fan_layout(picture.image, style());
+  const auto x = static_cast<int>(layout.apex_x - 5 / layout.metres_per_pixel * std::sin(0.3));
+  const auto y = static_cast<int>(layout.apex_y - 5 / layout.metres_per_pixel * std::cos(0.3));
+  EXPECT_EQ(raster.at(x, y).r, 255);
+  EXPECT_EQ(raster.at(raster.width - x, y).r, 0);
+}
+
+}  // namespace
+}  // namespace sonar::draw_picture_test

@@ -1,0 +1,63 @@
+// The picture that viewers see of each make, made by its own host from its pings.
+#include "daemon/emulator/view/driver_picture.hpp"
+
+#include <gtest/gtest.h>
+
+#include "daemon/emulator/view/ping_payloads.hpp"
+
+namespace sonar::driver_picture_test {
+namespace {
+
+class DriverPictures : public testing::TestWithParam<protocol::Make> {};
+INSTANTIATE_TEST_SUITE_P(OfEveryMake, DriverPictures, testing::ValuesIn(protocol::makes().begin(), protocol::makes().end()),
+                         [](const auto& of) { return std::string(of.param.name()); });
+
+std::shared_ptr<const Ping> ping_of(const protocol::Vendor& vendor, const protocol::DeviceState& state, std::uint32_t number) {
+  auto ping = std::make_shared<Ping>();
+  const protocol::ChangeSettings first = vendor.initial_settings(state);
+  ping->request.model = state.model;
+  ping->request.number = PingNumber(number);
+  ping->request.settings = first.settings;
+  ping->request.vendor_settings = first.vendor_settings;
+  if (const auto step = vendor.scan_step(number, state)) {
+    ping->request.settings = step->settings;
+    ping->request.vendor_settings = step->aim.with;
+  }
+  const PingSettings& s = ping->request.settings;
+  const auto beams = static_cast<std::size_t>(s.beam_count), rows = static_cast<std::size_t>(s.range_bin_count);
+  for (std::size_t i = 0; i < beams; ++i)
+    ping->beam_azimuth_rad.push_back(beams < 2 ? 0.0f : 0.5f - static_cast<float>(i) / static_cast<float>(beams - 1));
+  for (std::size_t i = 0; i < beams * rows * static_cast<std::size_t>(s.format.bits / 8); ++i)
+    ping->samples.push_back(static_cast<std::byte>(i * 7 % 251));
+  return ping;
+}
+
+TEST_P(DriverPictures, AreOfItsKindAndCanBeDrawn) {
+  const protocol::Make& make = GetParam();
+  protocol::DeviceState state;
+  state.name = "front";
+  state.model = make.device->models().front();
+  state.options = *protocol::check_options(*make.device, {});
+  state.water = {12, 30, 8.0, 0};
+  DriverPicture pictures(make);
+  DriverPicture::Drawing last;
+  for (std::uint32_t number = 1; number <= 250; number += make.picture == PictureKind::fan ? 100 : 1)
+    if (auto drawing = pictures.after(ping_of(*make.device, state, number), state)) last = drawing;
+  ASSERT_TRUE(last);
+  const SonarPicture picture = last();
+  EXPECT_EQ(picture.kind, make.picture);
+  PicturePainter painter(view_fan_style());
+  EXPECT_NE(fan_payload("front", Time{}, picture, painter), nullptr);
+  if (make.picture == PictureKind::sweep) {
+    EXPECT_EQ(picture.image.beams, 201u) << "the half circle ahead";
+    EXPECT_NEAR(picture.range_m(), 10, 0.3);
+    EXPECT_NEAR(picture.head_rad, -51 * 2 * pi / 400, 1e-9) << "it came back from starboard";
+    for (std::size_t beam = 0; beam < picture.image.beams; ++beam) EXPECT_GT(picture.image.at(10, beam), 0) << beam;
+  }
+  if (make.picture == PictureKind::waterfall) {
+    EXPECT_EQ(picture.image.rows, 250u);
+  }
+}
+
+}  // namespace
+}  // namespace sonar::driver_picture_test
