@@ -21,7 +21,8 @@ constexpr int cells_a_packet = RayPacket::size / rays_around;
 // and the cells that they cross get as many rays as `most_close_rays` for all of them allow: the share of a cell that a pole
 // fills is as exact as its rays are close.
 constexpr double thin_share = 0.4;
-constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15, most_thin_cells = 1024;
+constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15;
+constexpr std::size_t most_thin_cells = 512, most_probed_cells = 2048;  // a net over the view: what the few rays meet will do
 
 /// Where in a cell a ray is, -0.5 to 0.5, along an axis in one of `of` strata: multiples of the golden ratio shift it from line
 /// to line through the grid, so that level and upright edges meet every part of a cell; where the lines begin is random, so that
@@ -123,6 +124,7 @@ void RangeReturns::trace_middles(int row, std::vector<RangeReturn>& middles) con
         RangeReturn& middle = middles[static_cast<std::size_t>(from + i)];
         middle = met(p, i, {1, 1});
         middle.speckle = speckle_of(p, i);
+        middle.rays = 0;  // counted are those round it
       }
   }
 }
@@ -284,14 +286,18 @@ void RangeReturns::for_each_hit(Cell cell, Lattice lattice, F f) const {
 std::vector<RangeReturns::Cell> RangeReturns::crossed_cells(Parallel& pool) const {
   std::vector<std::uint8_t> is_thin(scene_.scene().objects.size());
   std::vector<Cell> edge = thin_cells(is_thin), crossed = edge;
+  if (crossed.size() > most_thin_cells) return {};
   std::vector<std::uint8_t> is_known(rows_.size() * static_cast<std::size_t>(grid_.columns));
   for (const Cell& cell : edge) is_known[index(cell)] = 1;
-  while (!edge.empty() && crossed.size() < most_thin_cells) {
+  std::size_t probed = 0;
+  while (!edge.empty() && crossed.size() <= most_thin_cells) {
     std::vector<Cell> beside;
     for (const Cell& cell : edge)
       for_each_neighbour(cell, [&](Cell n) {
         if (!std::exchange(is_known[index(n)], std::uint8_t{1})) beside.push_back(n);
       });
+    probed += beside.size();
+    if (probed > most_probed_cells) break;
     std::vector<std::uint8_t> is_crossed(beside.size());
     pool.for_each(beside.size(), [&](std::size_t n, int) {
       int met = 0;
@@ -310,7 +316,7 @@ std::vector<RangeReturns::Cell> RangeReturns::crossed_cells(Parallel& pool) cons
 /// Sees the cells that thin things cross again, through many rays.
 void RangeReturns::look_closer(Parallel& pool) {
   const std::vector<Cell> cells = crossed_cells(pool);
-  if (cells.empty()) return;
+  if (cells.empty() || cells.size() > most_thin_cells) return;
   const double for_each = std::sqrt(static_cast<double>(most_close_rays) / static_cast<double>(cells.size()));
   const int across = std::clamp(static_cast<int>(for_each) / 4 * 4, 8, most_across);  // whole packets
   std::vector<std::vector<RangeReturn>> seen(cells.size());
