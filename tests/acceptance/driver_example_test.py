@@ -22,7 +22,7 @@ def run_example(test, **more):
 class DriverExample(unittest.TestCase):
     def test_a_driver_that_ends_is_noticed_at_once_with_what_it_said(self):
         begin = time.monotonic()
-        run = run_example("test_driver.DriverTest.test_numbers_go_up_by_one",
+        run = run_example("test_driver.DriverTest.test_numbers_go_up",
                           DRIVER="sh -c 'echo starting; echo no such device >&2; exit 3'")
         self.assertEqual(run.returncode, 1, run.stdout)
         self.assertIn("the driver ended with code 3 after 0 of 20 pings", run.stdout)

@@ -20,7 +20,7 @@ void check(const protocol::HostActions& actions, std::size_t ports) {
       std::abort();
     const auto drawing = protocol::drawing_of(*ping);
     if (drawing && drawing->image.samples.size() != drawing->image.rows * drawing->image.beams) std::abort();
-    if (drawing) static_cast<void>(PicturePainter({.width_px = 64, .colours = {}}).draw(*drawing));
+    if (drawing) static_cast<void>(PicturePainter({.width_px = 64, .colours = colour_maps().front()}).draw(*drawing));
   }
 }
 
