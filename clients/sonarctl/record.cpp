@@ -205,7 +205,7 @@ Result<void> convert(const RecordOptions& options) {
   nothing.as_it_is = true;
   const auto host = by->make->host(nothing);
   if (!host) return tl::unexpected(host.error());
-  auto files = RecordFiles::create(options, *by->make, {}, name.empty() ? "sonar" : name);
+  auto files = RecordFiles::create(options, *by->make, recording::usual_ends(*by->make), name.empty() ? "sonar" : name);
   if (!files) return tl::unexpected(files.error());
   Result<void> written;
   std::optional<Time> first;
