@@ -27,6 +27,7 @@ struct SourceOptions {
   Wanted wanted;
   double connect_patience_s = 2;
   double silence_limit_s = 10;  // longest time without a byte
+  double picture_limit_s = 30;  // longest time for a picture of many pings, from the first on: a Ping360 scans 180 degrees in it
   bool observe = false;         // occupy no client slot, request nothing
   bool keeps_messages = false;  // PingStream::Item::messages
   std::string control;  // HOST:PORT of sonard's control stream, which reports the address for observers; empty = its default
@@ -52,14 +53,14 @@ struct ViewOptions {
   bool live = false;                       // every ping until interrupted, or so many
   std::uint64_t pings = 0;                 // 0 = no limit
   std::optional<TerminalColours> colours;  // nullopt = what the terminal supports
-  std::size_t ping = 0;                    // which of a recording's, from 0
+  std::optional<std::size_t> ping;         // which of a recording's, from 0; nullopt: the first that is whole
   FanStyle style;
 };
 Result<void> view(ViewOptions options);
 
 struct StatsOptions {
   SourceOptions source;
-  std::size_t ping = 0;
+  std::optional<std::size_t> ping;   // as ViewOptions::ping
   std::string window;                // rows and beams of the speckle statistics; empty = all
   std::string shadow, surroundings;  // two windows to compare
   bool json = false;

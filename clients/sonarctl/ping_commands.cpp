@@ -97,7 +97,8 @@ Run add_view(CLI::App& app) {
   command.add_flag("--ascii", arguments->ascii, "with --term: letters, no colours (default for files, pipes and NO_COLOR)");
   command.add_flag("--live", options.live, "draw every ping, until Ctrl-C");
   command.add_option("--pings", options.pings, "with --live: stop after this number of pings")->check(whole_number());
-  command.add_option("--ping", options.ping, "which ping of a recording, from 0")->check(whole_number())->capture_default_str();
+  command.add_option("--ping", options.ping, "which ping of a recording, from 0 (default: the first that makes a whole picture)")
+      ->check(whole_number());
   arguments->style.add_to(command);
   return [arguments]() -> Result<void> {
     auto source = arguments->source.finish();
@@ -126,7 +127,8 @@ Run add_stats(CLI::App& app) {
   const auto arguments = std::make_shared<Arguments>();
   StatsOptions& options = arguments->options;
   arguments->source.add_to(command, true);
-  command.add_option("--ping", options.ping, "which ping of a recording, from 0")->check(whole_number())->capture_default_str();
+  command.add_option("--ping", options.ping, "which ping of a recording, from 0 (default: the first that makes a whole picture)")
+      ->check(whole_number());
   command.add_option("--rows", options.window, "window of the speckle statistics, ROW:ROW or ROW:ROW,BEAM:BEAM");
   CLI::Option* shadow = command.add_option("--shadow", options.shadow, "window in a shadow");
   command.add_option("--surroundings", options.surroundings, "window beside it")->needs(shadow);

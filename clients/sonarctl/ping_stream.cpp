@@ -346,20 +346,28 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
   return {};
 }
 
-Result<std::vector<HostPing>> read_recording(const std::filesystem::path& file, const std::string& sonar) {
+Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar) {
   auto opened = recording::open_recording(file, sonar);
   if (!opened) return tl::unexpected(opened.error());
   const auto by = recording::find_sender(*opened->reader);
-  std::vector<HostPing> pings;
+  std::optional<HostPing> last;
+  std::size_t count = 0;
   if (const auto host = by ? by->make->host(nothing_wanted()) : failure(ErrorKind::bad_data, ""); host) {
     while (const auto message = opened->reader->next()) {
       const auto port = recording::host_port(*by->make, message->by);
       if (!port || message->from != recording::Origin::device) continue;
-      for (protocol::HostAction& action : (*host)->on_bytes(*port, message->bytes, message->at))
-        if (auto* ping = std::get_if<HostPing>(&action)) pings.push_back(std::move(*ping));
+      for (protocol::HostAction& action : (*host)->on_bytes(*port, message->bytes, message->at)) {
+        auto* const ping = std::get_if<HostPing>(&action);
+        if (ping == nullptr) continue;
+        if (number ? count++ == *number : ping->is_whole) return std::move(*ping);
+        last = std::move(*ping);
+      }
     }
   }
-  if (!pings.empty()) return pings;
+  if (last && !number) return *std::move(last);
+  if (last)
+    return failure(ErrorKind::usage,
+                   file.string() + " holds pings 0 to " + std::to_string(count - 1) + ", not " + std::to_string(*number));
   const auto damage = opened->reader->damage();
   return failure(ErrorKind::bad_data, file.string() + " holds no ping of a known sonar" + (damage ? ": " + damage->text : ""));
 }

@@ -96,8 +96,9 @@ class PingStream {
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };
 
-/// Every ping of a recording of any kind. `sonar`: selects one of several.
-Result<std::vector<HostPing>> read_recording(const std::filesystem::path& file, const std::string& sonar = {});
+/// Ping `number` of a recording of any kind, from 0; nullopt: the first that is whole, else the last. `sonar`: selects one of
+/// several. usage: there are fewer pings.
+Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar = {});
 
 /// Waits for the beacon of a device, of a make whose hosts connect to the address in it.
 struct Discovered {

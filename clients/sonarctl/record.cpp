@@ -9,6 +9,7 @@
 #include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/record_files.hpp"
 #include "clients/sonarctl/source.hpp"
+#include "core/text/ipv4.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/recording/recording.hpp"
 
@@ -21,6 +22,8 @@ using recording::Origin;
 using recording::RecordedMessage;
 
 constexpr int most_status_at_once = 32;
+
+Time unix_now() { return Time(std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())); }
 
 /// The sonard that serves the device: name of the sonar and a subscription to its pings.
 struct Steering {
@@ -90,7 +93,7 @@ class Recorder {
     print_notices(item.notices);
     for (const RecordedMessage& message : item.messages) {
       if (Result<void> written = files_.write(message); !written) return written;
-      last_ = message.at;
+      last_ = std::max(last_, message.at);
     }
     return item.ping ? files_.write_ping(last_, *item.ping) : Result<void>{};
   }
@@ -101,13 +104,21 @@ class Recorder {
       std::array<std::byte, 2048> bytes;
       const Datagram datagram = receive_from(*status_, bytes, 0ms);
       if (datagram.what != Wait::data) return {};
-      if (ntohl(datagram.ip) != device_ip_) continue;
+      if (!is_of_device(datagram, std::span(bytes).first(datagram.size))) continue;
+      last_ = std::max(last_, unix_now());
       if (Result<void> written =
               files_.write({last_, Origin::device, Carrier::datagram, {bytes.begin(), bytes.begin() + datagram.size}});
           !written)
         return written;
     }
     return {};
+  }
+
+  /// By its sender, or by the address in it: a sonar that listens at every address may send from another one.
+  bool is_of_device(const Datagram& datagram, std::span<const std::byte> status) const {
+    if (ntohl(datagram.ip) == device_ip_) return true;
+    const auto announced = stream_.make().announced != nullptr ? stream_.make().announced(status) : std::nullopt;
+    return announced && text::number_from_ipv4(announced->address) == device_ip_;
   }
 
   Result<void> take_poses() {
@@ -135,7 +146,7 @@ class Recorder {
   RecordFiles& files_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double last_heard_s_ = 0;
-  Time last_ = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());  // of the last message
+  Time last_ = unix_now();  // of what was recorded last
 };
 
 void report(const RecordFiles& files, double seconds) {
@@ -205,7 +216,7 @@ Result<void> convert(const RecordOptions& options) {
   nothing.as_it_is = true;
   const auto host = by->make->host(nothing);
   if (!host) return tl::unexpected(host.error());
-  auto files = RecordFiles::create(options, *by->make, {}, name.empty() ? "sonar" : name);
+  auto files = RecordFiles::create(options, *by->make, recording::usual_ends(*by->make), name.empty() ? "sonar" : name);
   if (!files) return tl::unexpected(files.error());
   Result<void> written;
   std::optional<Time> first;

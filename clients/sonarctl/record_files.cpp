@@ -28,12 +28,16 @@ Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const Make
   RecordFiles files;
   files.make_ = &make;
   Result<void> made;
+  const auto& kinds = make.codec.files;
   for (const auto& [ending, path] : options.files) {
-    const auto& kinds = make.codec.files;
     if (std::none_of(kinds.begin(), kinds.end(), [&ending](const auto& kind) { return kind.ending == ending; }))
       return failure(ErrorKind::usage, path.string() + ": such files do not hold the messages of " + std::string(make.title) +
                                            ": --mcap and --pcap hold those of every sonar");
   }
+  if (!options.raw.empty() && make.codec.framing == nullptr &&
+      std::none_of(kinds.begin(), kinds.end(), [](const recording::FileKind& kind) { return kind.is_raw_dump; }))
+    return failure(ErrorKind::usage, options.raw.string() + ": a raw dump of " + std::string(make.title) +
+                                         " cannot be read back: --mcap and --pcap hold its messages");
   const auto add = [&](const std::filesystem::path& path, const auto& writer_of) {
     if (path.empty() || !made) return;
     auto sink = recording::create_sink(path);

@@ -17,14 +17,6 @@ namespace {
 constexpr int stale_pings = 4;
 constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without a free slot closes at once
 
-Result<HostPing> fetch_recorded(const SourceOptions& source, std::size_t number) {
-  auto pings = read_recording(source.recording, source.sonar);
-  if (!pings) return tl::unexpected(pings.error());
-  if (number < pings->size()) return std::move((*pings)[number]);
-  return failure(ErrorKind::usage, source.recording.string() + " holds pings 0 to " + std::to_string(pings->size() - 1) +
-                                       ", not " + std::to_string(number));
-}
-
 /// The address for observers, as reported by the sonard that serves the device.
 Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& device) {
   auto control = ControlClient::open({source.control, source.token_file});
@@ -64,13 +56,14 @@ Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device
   return OpenedStream{*std::move(stream), now, true};
 }
 
-Result<HostPing> fetch_live(const SourceOptions& source) {
+Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
   const Result<Endpoint> device = find_device(source, false);
   if (!device) return tl::unexpected(device.error());
   auto opened = open_stream(source, *device);
   if (!opened) return tl::unexpected(opened.error());
   PingStream* const stream = &opened->stream;
   auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
+  std::optional<std::chrono::steady_clock::time_point> whole_by;
   bool received = !stream->host().counts();  // of which other messages are not told from junk
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
@@ -90,8 +83,10 @@ Result<HostPing> fetch_live(const SourceOptions& source) {
     }
     received = received || item.what == Wait::data;
     if (!item.ping) continue;
-    if (!item.ping->is_whole) {
-      give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
+    const auto now = std::chrono::steady_clock::now();
+    if (!whole_by) whole_by = now + milliseconds_from(source.picture_limit_s);
+    if (!item.ping->is_whole && now < *whole_by && (!of_samples || item.ping->picture())) {
+      give_up = now + milliseconds_from(source.silence_limit_s);
       continue;
     }
     if (item.ping->echo_mismatches.empty() || ++stale > stale_pings) return *std::move(item.ping);
@@ -147,8 +142,8 @@ Result<Endpoint> find_device(const SourceOptions& source, bool say) {
   return found->device;
 }
 
-Result<HostPing> fetch_ping(const SourceOptions& source, std::size_t number) {
-  return source.recording.empty() ? fetch_live(source) : fetch_recorded(source, number);
+Result<HostPing> fetch_ping(const SourceOptions& source, std::optional<std::size_t> number, bool of_samples) {
+  return source.recording.empty() ? fetch_live(source, of_samples) : read_ping(source.recording, number, source.sonar);
 }
 
 }  // namespace sonar::clients

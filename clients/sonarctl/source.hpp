@@ -30,7 +30,9 @@ void print_notices(const std::vector<std::string>& notices);
 Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
               const std::string& hint);
 
-/// Ping `number` of a recording, or the first of a device that was made with the requested settings.
-Result<HostPing> fetch_ping(const SourceOptions& source, std::size_t number);
+/// read_ping() of a recording, or the first ping of a device that was made with the requested settings. A picture of many pings
+/// is waited for until it is whole or source.picture_limit_s is over; where single pings make no picture: `of_samples`, not at
+/// all.
+Result<HostPing> fetch_ping(const SourceOptions& source, std::optional<std::size_t> number, bool of_samples = false);
 
 }  // namespace sonar::clients

@@ -49,7 +49,7 @@ void print_plain(const nlohmann::json& stats, const std::string& prefix) {
 }  // namespace
 
 Result<void> stats(const StatsOptions& options) {
-  const Result<HostPing> ping = fetch_ping(options.source, options.ping);
+  const Result<HostPing> ping = fetch_ping(options.source, options.ping, true);
   if (!ping) return tl::unexpected(ping.error());
   const Result<PolarImage> image = ping->picture();
   if (!image) return tl::unexpected(image.error());

@@ -18,10 +18,45 @@ using recording::RecordedMessage;
 
 constexpr std::size_t longest_payload = 65535;
 
-std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool) {
+bool is_known(Id id) {
+  switch (id) {
+    case Id::ack:
+    case Id::nack:
+    case Id::ascii_text:
+    case Id::device_information:
+    case Id::protocol_version:
+    case Id::general_request:
+    case Id::json_wrapper:
+    case Id::utc_request:
+    case Id::utc_response:
+    case Id::set_net_info:
+    case Id::set_device_id:
+    case Id::set_sound_speed:
+    case Id::water_stats:
+    case Id::attitude_report:
+    case Id::set_sound_speed_before:
+    case Id::ping360_set_device_id:
+    case Id::os_ping_params:
+    case Id::os_mono_profile:
+    case Id::device_data:
+    case Id::auto_device_data:
+    case Id::reset:
+    case Id::transducer:
+    case Id::auto_transmit:
+    case Id::motor_off:
+    case Id::yz_point_data:
+    case Id::atof_point_data:
+    case Id::set_ping_parameters:
+      return true;
+  }
+  return false;
+}
+
+std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
   Header header;
   wire::Reader reader(bytes);
   fields(reader, header);
+  if (strict && !is_known(header.id)) return std::nullopt;
   return reader.ok() ? std::optional(header_size + header.length + sum_size) : std::nullopt;
 }
 

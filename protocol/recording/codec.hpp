@@ -30,6 +30,7 @@ struct FileKind {
   bool (*begins)(BytesView) = nullptr;  // whether a file begins so; 16 bytes, fewer of a shorter file
   Result<std::unique_ptr<RecordingReader>> (*read)(std::unique_ptr<Source>) = nullptr;
   std::unique_ptr<RecordingWriter> (*write)(std::unique_ptr<Sink>) = nullptr;
+  bool is_raw_dump = false;  // the same bytes as those of a raw dump, which it reads
 };
 
 /// The device that sent a message, as far as the message tells.

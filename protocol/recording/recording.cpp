@@ -112,7 +112,10 @@ std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by) {
     return by == Carrier::datagram ? by_udp : port.kind == Kind::tcp;
   };
   const auto found = std::find_if(make.ports.begin(), make.ports.end(), takes);
-  return found != make.ports.end() ? std::optional(static_cast<std::size_t>(found - make.ports.begin())) : std::nullopt;
+  if (found != make.ports.end()) return static_cast<std::size_t>(found - make.ports.begin());
+  const protocol::Port* const dialogue = make.device->port(protocol::Port::Kind::udp_dialogue);
+  const bool by_either = by == Carrier::datagram && dialogue != nullptr && dialogue->number == make.ports.front().number;
+  return by_either ? std::optional<std::size_t>(0) : std::nullopt;
 }
 
 }  // namespace sonar::recording

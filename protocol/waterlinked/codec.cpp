@@ -31,6 +31,7 @@ constexpr std::array<recording::FileKind, 1> kinds{{{
         [](std::unique_ptr<recording::Sink> sink) {  // its datagrams, back to back
           return recording::write_raw_dump(std::move(sink), recording::Carrier::datagram);
         },
+    .is_raw_dump = true,
 }}};
 
 }  // namespace

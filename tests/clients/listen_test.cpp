@@ -114,9 +114,13 @@ TEST(Listen, IsSatisfiedByASoundDeviceAndDrawsIt) {
   const Result<void> done = listen(options);
   EXPECT_TRUE(done) << done.error().text;
   EXPECT_TRUE(std::filesystem::remove(options.png));
-  const auto recorded = read_recording(options.record);
-  ASSERT_TRUE(recorded) << recorded.error().text;
-  EXPECT_EQ(recorded->size(), 5u);
+  const auto first = read_ping(options.record, std::nullopt), last = read_ping(options.record, 4);
+  ASSERT_TRUE(first && last);
+  EXPECT_EQ(first->facts.number, 1u);
+  EXPECT_EQ(last->facts.number, 5u);
+  const auto none = read_ping(options.record, 5);
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().text, HasSubstr("holds pings 0 to 4, not 5"));
   std::filesystem::remove(options.record);
 }
 

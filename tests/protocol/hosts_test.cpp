@@ -11,6 +11,7 @@
 #include <random>
 
 #include "core/image/draw_picture.hpp"
+#include "core/text/ipv4.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/recording/raw_dump.hpp"
@@ -342,8 +343,7 @@ TEST_P(Hosts, ReadTheSamePingsFromEveryKindOfFile) {
   talk.run(6);
   ASSERT_FALSE(talk.pings.empty());
   const bool by_tcp = make.device->pings_over_tcp();
-  recording::PcapConversation ends;
-  ends.device.port = make.ports.front().number;
+  const recording::PcapConversation ends = recording::usual_ends(make);
   std::map<std::string, std::function<std::unique_ptr<recording::RecordingWriter>(std::unique_ptr<recording::Sink>)>> kinds;
   kinds["mcap"] = [&](auto sink) { return std::make_unique<recording::McapSession>(std::move(sink), "front", make); };
   kinds["pcap"] = [&](auto sink) { return recording::write_pcap(std::move(sink), ends); };
@@ -357,6 +357,27 @@ TEST_P(Hosts, ReadTheSamePingsFromEveryKindOfFile) {
     for (const recording::RecordedMessage& message : messages_of(talk)) ASSERT_TRUE(writer->write(message));
     ASSERT_TRUE(writer->close());
     EXPECT_EQ(samples_of(read_back(make, file)), samples_of(talk.pings));
+  }
+}
+
+TEST_P(Hosts, HavePortsOfTheirMakeInACapture) {
+  const Make& make = GetParam();
+  const bool by_tcp = make.ports.front().kind == HostPort::Kind::tcp;
+  const recording::PcapConversation ends = recording::usual_ends(make, 0x0A000001, 0x0A000002);
+  EXPECT_EQ(ends.device, (recording::IpEnd{0x0A000001, make.ports.front().number}));
+  EXPECT_EQ(ends.client.address, 0x0A000002u);
+  EXPECT_EQ(ends.status_from.address, 0x0A000001u);
+  if (make.ports.front().kind == HostPort::Kind::udp) {
+    EXPECT_EQ(ends.status_from, ends.device);
+    EXPECT_EQ(ends.status_to, ends.client);
+  }
+  for (const HostPort& port : make.ports)
+    if (port.group != Ipv4{}) {
+      EXPECT_EQ(ends.status_to, (recording::IpEnd{text::number_from_ipv4(port.group), port.number}));
+    }
+  const Port* const beacon = make.device->port(Port::Kind::udp_beacon);
+  if (by_tcp && make.ports.size() == 1 && beacon != nullptr) {
+    EXPECT_EQ(ends.status_to.port, beacon->number);
   }
 }
 

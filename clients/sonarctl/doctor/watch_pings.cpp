@@ -105,10 +105,13 @@ class Watch {
 };
 
 /// Of a failed connection or greeting of a head.
-Outcome outcome_of(const Error& error, const Endpoint& at) {
+Outcome outcome_of(const Error& error, const Endpoint& at, const Make& make) {
+  using Kind = protocol::HostPort::Kind;
+  const Kind first = make.ports.front().kind;
   if (error.kind == ErrorKind::io) return Outcome::closed_without_a_byte;
   if (error.kind == ErrorKind::bad_data) return Outcome::no_ping;
-  return refuses(at) ? Outcome::refused : Outcome::unreachable;
+  const bool by_tcp = first == Kind::tcp || first == Kind::http;
+  return by_tcp && refuses(at) ? Outcome::refused : Outcome::unreachable;
 }
 
 void set_latency(SonarFacts& sonar, const std::vector<double>& delays_s, ControlFacts& clocks) {
@@ -133,7 +136,7 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
       PingStream::open(sonar.at, sonar.make, wanted, std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
   if (!stream) {
     facts.error = stream.error().text;
-    facts.outcome = outcome_of(stream.error(), sonar.at);
+    facts.outcome = outcome_of(stream.error(), sonar.at, *sonar.make);
     return;
   }
   facts.own = stream->own();

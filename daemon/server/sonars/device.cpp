@@ -111,7 +111,8 @@ Endpoint Device::data_endpoint() const { return tcp_ports_.empty() ? Endpoint{} 
 std::vector<protocol::DriverAddress> Device::addresses() const {
   std::vector<Endpoint> status_to;
   for (const udp::endpoint& to : status_destinations()) status_to.push_back({to.address().to_v4().to_bytes(), to.port()});
-  return protocol::driver_addresses(sonar_.vendor(), config().bind_ip, status_to);
+  const Ipv4 ip = config().bind_ip == Ipv4{} ? sonar_.state().advertise_ip : config().bind_ip;
+  return protocol::driver_addresses(sonar_.vendor(), ip, status_to);
 }
 
 void Device::start() {

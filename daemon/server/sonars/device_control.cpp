@@ -123,13 +123,15 @@ std::string Device::problem() const {
 }
 
 RecordedSonar Device::recorded() const {
+  const protocol::Make* const make = protocol::find_make(sonar_.vendor().name());
   RecordedSonar sonar{config().name, std::string(sonar_.vendor().name()), {}};
-  sonar.ends.device = {text::number_from_ipv4(sonar_.state().advertise_ip), data_endpoint().port};
-  sonar.ends.status_from.address = sonar.ends.device.address;
+  const Connection* const client = sonar_.connections().oldest_client();
+  const Ipv4 host = client != nullptr ? client->peer.ip : Ipv4{127, 0, 0, 1};
+  sonar.ends = recording::usual_ends(make != nullptr ? *make : protocol::makes().front(),
+                                     text::number_from_ipv4(sonar_.state().advertise_ip), text::number_from_ipv4(host));
+  if (!tcp_ports_.empty()) sonar.ends.device.port = data_endpoint().port;
   const auto first = sonar_.vendor().initial_settings(sonar_.state());
   sonar.has_range_images = dynamic_cast<const RangeImageSettings*>(first.vendor_settings.get()) != nullptr;
-  if (const Connection* const client = sonar_.connections().oldest_client())
-    sonar.ends.client.address = text::number_from_ipv4(client->peer.ip);
   return sonar;
 }
 

@@ -126,7 +126,7 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
     const std::size_t n = co_await socket_.async_write_some(asio::buffer(bytes.data() + done, bytes.size() - done), into(ec));
     if (over_) co_return false;
     if (ec) {
-      over(reason(ec));
+      over_after(ec);
       co_return false;
     }
     if (setup_.digest) digest_.add(bytes.subspan(done, n));

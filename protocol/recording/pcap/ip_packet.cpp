@@ -81,6 +81,11 @@ bool is_known_link_type(std::uint32_t link_type) {
   return std::find(std::begin(known), std::end(known), link_type) != std::end(known);
 }
 
+bool begins_fragments(std::uint32_t link_type, BytesView packet) {
+  const auto ip = ip_packet(link_type, packet);
+  return ip && ip->size() >= 20 && u8_at(*ip, 0) >> 4 == 4 && (u16_at(*ip, 6) & 0x3FFFu) == 0x2000;
+}
+
 std::optional<Segment> parse_packet(std::uint32_t link_type, BytesView packet) {
   const auto ip = ip_packet(link_type, packet);
   if (!ip || ip->size() < 20 || u8_at(*ip, 0) >> 4 != 4) return std::nullopt;

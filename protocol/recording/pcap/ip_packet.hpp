@@ -33,6 +33,9 @@ struct Segment {
 /// IPv6, fragments, cut headers.
 std::optional<Segment> parse_packet(std::uint32_t link_type, wire::BytesView packet);
 
+/// The first fragment of an IPv4 datagram that was sent in several.
+bool begins_fragments(std::uint32_t link_type, wire::BytesView packet);
+
 /// True for link types that parse_packet supports.
 bool is_known_link_type(std::uint32_t link_type);
 

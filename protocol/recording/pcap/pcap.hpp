@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "protocol/host.hpp"
 #include "protocol/recording/byte_source.hpp"
 #include "protocol/recording/pcap/ip_packet.hpp"
 #include "protocol/recording/recorded_message.hpp"
@@ -24,6 +25,8 @@ struct PcapConversation {
   IpEnd status_from{0x7F000002, 52102}, status_to{0xFFFFFFFF, 52102};
   std::uint32_t first_device_sequence = 1'000'000, first_client_sequence = 2'000'000;
 };
+/// The ends of a sonar of this make and of its usual host.
+PcapConversation usual_ends(const protocol::Make& make, std::uint32_t device = 0x7F000002, std::uint32_t client = 0x7F000001);
 /// Classic pcap, nanoseconds, raw IP. One connection from its SYN to its FIN; messages in segments of at most 65,495 bytes.
 std::unique_ptr<RecordingWriter> write_pcap(std::unique_ptr<Sink> sink, const PcapConversation& conversation);
 

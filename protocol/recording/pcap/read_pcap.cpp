@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <deque>
 #include <map>
 #include <set>
@@ -33,12 +34,19 @@ struct Found {
   std::string note;
 };
 
+bool pings_by_datagram(const Make& make) {
+  const auto ports = make.device->ports();
+  return std::any_of(ports.begin(), ports.end(), [](const protocol::Port& port) {
+    return port.kind == protocol::Port::Kind::udp_stream || port.kind == protocol::Port::Kind::udp_dialogue;
+  });
+}
+
 /// Of a device, or of a client that sends such messages too. Streams: that of the usual port, else the first.
 const Make* make_of(const Segment& segment) {
   const Make* found = nullptr;
   if (!segment.tcp) {
     const auto by = sender_of({{}, Origin::device, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});
-    return by && !by->make->device->pings_over_tcp() ? by->make : nullptr;
+    return by && pings_by_datagram(*by->make) ? by->make : nullptr;
   }
   for (const Make& make : protocol::makes()) {
     const Framing* const framing = make.codec.framing;
@@ -53,8 +61,10 @@ Result<Found> find_device(Source& source, const PcapReading& reading) {
   if (!packets) return tl::unexpected(packets.error());
   std::map<SenderEnd, Sent> senders;
   std::set<std::uint32_t> unknown_links;
+  std::uint64_t fragmented = 0;
   while (const auto packet = packets->next()) {
     if (!is_known_link_type(packet->link_type) && unknown_links.size() < 16) unknown_links.insert(packet->link_type);
+    if (begins_fragments(packet->link_type, packet->bytes)) ++fragmented;
     const auto segment = parse_packet(packet->link_type, packet->bytes);
     if (!segment || segment->payload.empty()) continue;
     const SenderEnd from{segment->source, segment->tcp};
@@ -75,6 +85,7 @@ Result<Found> find_device(Source& source, const PcapReading& reading) {
   if (!best) {
     std::string why = source.name() + " holds no pings of a sonar" + (reading.device ? " with that address" : "");
     for (const std::uint32_t type : unknown_links) why += "; packets of link type " + std::to_string(type) + " are not read";
+    if (fragmented > 0) why += "; " + std::to_string(fragmented) + " datagrams are in IP fragments, which are not read";
     if (packets->damages().any()) why += "; " + packets->damages().first();
     return failure(ErrorKind::bad_data, why);
   }
@@ -153,8 +164,8 @@ class PcapReader final : public RecordingReader {
     };
     const bool from_device = segment.source.address == found_.device.at.address;
     if (!found_.device.tcp) {
-      if (from_device) return take(Origin::device);
-      if (segment.target == found_.device.at) take(Origin::client);
+      if (segment.target == found_.device.at) return take(Origin::client);  // first: both ends may have one address
+      if (from_device) take(Origin::device);
       return;
     }
     const protocol::Port* const beacon = found_.make->device->port(protocol::Port::Kind::udp_beacon);

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "core/text/ipv4.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 
 namespace sonar::recording {
@@ -218,6 +219,27 @@ class PcapWriter final : public RecordingWriter {
 };
 
 }  // namespace
+
+PcapConversation usual_ends(const protocol::Make& make, std::uint32_t device, std::uint32_t client) {
+  using Kind = protocol::HostPort::Kind;
+  PcapConversation ends;
+  ends.device = {device, make.ports.front().number};
+  ends.client.address = client;
+  ends.status_from.address = device;
+  if (const auto* const beacon = make.device->port(protocol::Port::Kind::udp_beacon))
+    ends.status_from.port = ends.status_to.port = beacon->number;
+  if (make.device->port(protocol::Port::Kind::udp_dialogue) != nullptr) {
+    ends.status_from = ends.device;
+    ends.status_to = ends.client;
+  }
+  for (const protocol::HostPort& port : make.ports) {
+    if (port.kind != Kind::udp_listen) continue;
+    const bool in_group = port.group != protocol::Ipv4{};
+    ends.status_to.address = in_group ? text::number_from_ipv4(port.group) : client;
+    ends.status_from.port = ends.status_to.port = port.number != 0 ? port.number : ends.client.port;
+  }
+  return ends;
+}
 
 std::unique_ptr<RecordingWriter> write_pcap(std::unique_ptr<Sink> sink, const PcapConversation& conversation) {
   return std::make_unique<PcapWriter>(std::move(sink), conversation);

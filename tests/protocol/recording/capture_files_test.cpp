@@ -1,4 +1,5 @@
 // Captures as other programs write them: every link type, segments lost, twice and out of order, both byte orders, pcapng.
+#include "protocol/ping/messages.hpp"
 #include "protocol/recording/pcap/packets.hpp"
 #include "protocol/recording/pcap/tcp_stream.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
@@ -209,6 +210,54 @@ TEST(CaptureFiles, OneOfSeveralSonars) {
   EXPECT_THAT(open_bytes(pcap_of(frames, 101), "10.0.0.10").error().text, HasSubstr("with that address"));
   EXPECT_EQ(open_bytes(pcap_of(frames, 101), "10.0.0").error().kind, ErrorKind::usage);
   EXPECT_EQ(open_bytes(pcap_of(frames, 101), "10.0.0.1x").error().kind, ErrorKind::usage);
+}
+
+constexpr std::uint16_t host_port_number = 40000;
+Bytes udp_packet(const Bytes& payload, std::uint16_t from, std::uint16_t to, std::uint32_t fragment = 0) {
+  const auto size = static_cast<std::uint32_t>(8 + payload.size());
+  return numbers(wire::Endian::big, {{2, 0x4500},
+                                     {2, 20 + size},
+                                     {2, 0},
+                                     {2, fragment},
+                                     {2, 0x4011},
+                                     {2, 0},
+                                     {4, device_ip},
+                                     {4, device_ip},
+                                     {2, from},
+                                     {2, to},
+                                     {2, size},
+                                     {2, 0}}) +
+         payload;
+}
+
+TEST(CaptureFiles, BothEndsOfDatagramsAtOneAddress) {
+  const std::pair<std::uint16_t, ping::Id> sonars[] = {
+      {12345, ping::Id::device_data}, {62312, ping::Id::yz_point_data}, {51200, ping::Id::os_mono_profile}};
+  for (const auto& [port, id] : sonars) {
+    const Bytes request = ping::framed(ping::Id::general_request, 0, Bytes(2)), pinged = ping::framed(id, 1, Bytes(60));
+    auto opened = open_bytes(pcap_of({udp_packet(request, host_port_number, port), udp_packet(pinged, port, host_port_number),
+                                      udp_packet(request, host_port_number, port)},
+                                     101));
+    ASSERT_TRUE(opened) << port << ": " << opened.error().text;
+    std::vector<std::pair<Origin, Bytes>> found;
+    for (const RecordedMessage& message : read_all(*opened->reader)) found.emplace_back(message.from, message.bytes);
+    const std::vector<std::pair<Origin, Bytes>> sent{
+        {Origin::client, request}, {Origin::device, pinged}, {Origin::client, request}};
+    EXPECT_EQ(found, sent) << port;
+    opened->reader->rewind();
+    const auto by = find_sender(*opened->reader);
+    ASSERT_TRUE(by);
+    EXPECT_EQ(host_port(*by->make, Carrier::datagram), 0u) << port;
+  }
+}
+
+TEST(CaptureFiles, DatagramsInFragmentsAreCounted) {
+  const Bytes half(600);
+  const std::uint32_t more = 0x2000, behind = 75;
+  const std::vector<Bytes> frames{udp_packet(half, 12345, host_port_number, more),
+                                  udp_packet(half, 12345, host_port_number, behind),
+                                  udp_packet(half, 12345, host_port_number, more)};
+  EXPECT_THAT(read(pcap_of(frames, 101)).damage, HasSubstr("; 2 datagrams are in IP fragments, which are not read"));
 }
 
 TEST(CaptureFiles, SaysWherePacketsEnd) {

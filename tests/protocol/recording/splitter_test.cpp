@@ -1,5 +1,6 @@
 // The splitter loses no byte that is not part of a broken message, however the stream is cut.
 #include "protocol/oculus/host.hpp"
+#include "protocol/ping/messages.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::tests {
@@ -55,6 +56,19 @@ TEST(MessageSplitter, MissingBytesCostTheMessagesTheyBelongTo) {
   EXPECT_EQ(drain(splitter), std::vector<Bytes>{next});
   EXPECT_EQ(splitter.losses(), 1u);
   EXPECT_EQ(splitter.lost_bytes(), ping.size() - 200);
+}
+
+TEST(MessageSplitter, BehindLostBytesOnlyKnownFramesOfThePingProtocolCount) {
+  const Framing& framing = *protocol::find_make("surveyor240")->codec.framing;
+  const Bytes unknown = ping::framed(static_cast<ping::Id>(7777), 1, Bytes(9)), known = ping::framed(ping::Id::ack, 1, Bytes(2));
+  MessageSplitter splitter(Origin::device, framing);
+  splitter.append(start, unknown);
+  EXPECT_EQ(drain(splitter), std::vector<Bytes>{unknown}) << "a message that is not known yet";
+  splitter.break_off();
+  splitter.append(start, unknown);
+  splitter.append(start, known);
+  EXPECT_EQ(drain(splitter), std::vector<Bytes>{known});
+  EXPECT_EQ(splitter.lost_bytes(), unknown.size());
 }
 
 TEST(MessageSplitter, AnUnfinishedMessageIsNotGiven) {

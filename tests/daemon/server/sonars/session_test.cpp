@@ -163,6 +163,19 @@ TEST_F(SessionShapes, SaysThatTheClientLeft) {
   EXPECT_TRUE(parent.client_left);
 }
 
+TEST_F(SessionShapes, SaysThatTheClientLeftWhileAMessageIsWritten) {
+  start({shaped(std::string(16u << 20, 'x'), {})});  // more than the kernels hold
+  session->read_from_client(false);
+  client.send(std::string("x"));  // the reader waits with it: only the writer sees the end
+  io.restart();
+  while (io.run_one_for(milliseconds(100)) > 0) continue;
+  EXPECT_EQ(parent.why, "");
+  client.close();
+  for (int turns = 0; parent.why.empty() && turns < 1000; ++turns) io.run_one_for(milliseconds(10));
+  EXPECT_NE(parent.why, "");
+  EXPECT_TRUE(parent.client_left) << parent.why;
+}
+
 TEST_F(SessionShapes, AnEmptyMessageEndsAtABoundary) {
   start({shaped("abc", {}), shaped("", {{}, Outbox::Shape::End::reset})});
   EXPECT_EQ(joined(read_until_end_or(100)), "abc");
