@@ -33,7 +33,7 @@ bool ViewFeed::previews_by_itself(const Device& device) {
   const std::string& name = device.config().name;
   if (!of_.config.previews || of_.clock.stepped() || no_preview_.contains(name)) return false;
   const SonarView* const sonar = find(name);
-  return sonar != nullptr && (wanted(sonar->image) || wanted(sonar->fan.channel) || wanted(sonar->cloud.channel)) &&
+  return sonar != nullptr && (wanted(sonar->image) || wanted(sonar->fan) || wanted(sonar->cloud)) &&
          !device.sonar().connections().has_audience();
 }
 
