@@ -155,6 +155,7 @@ class ViewFeed final : public ViewerHost {
   std::map<std::string, PlaybackWatch> watches_;                     // by vehicle that viewers look at
   std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // who asked, by sonar
   std::set<std::string> no_preview_;                                 // sonars whose preview a viewer has switched off
+  std::map<std::string, Steady::time_point> preview_failed_at_;      // by sonar
   SceneShapes shapes_;
   ViewDoctor doctor_{of_.operations, of_.clock};
   std::deque<ViewPayloadPointer> lines_;
