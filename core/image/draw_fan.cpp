@@ -10,14 +10,17 @@
 namespace sonar {
 namespace {
 
-/// Place in the beam table, fractional; beam k spans [k - 0.5, k + 0.5]. Nothing outside the fan.
+/// Place in the beam table, fractional; beam k spans [k - 0.5, k + 0.5]. Nothing outside the fan; a full turn has no outside.
 std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azimuth) {
   const auto next = std::lower_bound(azimuth_rad.begin(), azimuth_rad.end(), azimuth, std::greater<>());
   const auto right = std::clamp<std::ptrdiff_t>(next - azimuth_rad.begin(), 1, std::ssize(azimuth_rad) - 1);
   const double a = azimuth_rad[static_cast<std::size_t>(right - 1)], b = azimuth_rad[static_cast<std::size_t>(right)];
   const double beam = static_cast<double>(right - 1) + (a - azimuth) / (a - b);
-  if (beam < -0.5 || beam > static_cast<double>(azimuth_rad.size()) - 0.5) return std::nullopt;
-  return beam;
+  const auto beams = static_cast<double>(azimuth_rad.size());
+  if (beam >= -0.5 && beam <= beams - 0.5) return beam;
+  const double span = azimuth_rad.front() - azimuth_rad.back(), step = span / (beams - 1);
+  if (span + 1.001 * step < 2 * pi) return std::nullopt;
+  return std::clamp(beam < 0 ? beam + beams : beam - beams, -0.5, beams - 0.5);
 }
 
 struct Interval {

@@ -264,6 +264,20 @@ class Reload(unittest.TestCase):
                     viewer.first_of(topic)
             self.assertTrue(viewer.times)
 
+    def test_a_sonar_that_becomes_another_make_gets_the_picture_of_that_make(self):
+        with Sonard(profile="ping360") as daemon, Viewer(daemon.address) as viewer:
+            viewer.greeted().subscribe("/front/fan", "/front/picture")
+            self.assertEqual(Steering.set(viewer, "/front/preview", True), True)
+            self.assertEqual(viewer.first_of("/front/picture")["kind"], "sweep")
+            config = pathlib.Path(daemon.folder.name) / "sonard.yaml"
+            text = config.read_text(encoding="utf-8")
+            config.write_text(text.replace("profile: ping360", "profile: surveyor-240"), encoding="utf-8")
+            daemon.process.send_signal(signal.SIGHUP)
+            eventually(lambda: "reloaded: " in daemon.log())
+            self.assertEqual(Steering.set(viewer, "/front/preview", True), True)
+            viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/picture"
+                            and viewer.decode(*value[::2])["kind"] == "points")
+
 
 class Steering(unittest.TestCase):
     @staticmethod

@@ -30,6 +30,7 @@ const connection = new Connection({
   open(info) {
     facts.opened(info);
     scene.forget();
+    allEchoesOf = '';
     choose();
   },
   lost() {
@@ -84,6 +85,7 @@ const timeline = new Timeline(facts, steering);
 const log = new LogPane(facts);
 
 let chosenKind = '';
+let allEchoesOf = '';  // the sonar whose cloud shows every echo
 /// Subscribes to what is looked at: no pictures while the page is hidden.
 function choose() {
   if (!facts.sonar) {
@@ -94,10 +96,17 @@ function choose() {
   const topics = ['/status', '/doctor', '/faults', '/log'];
   const own = (name) => `/${facts.sonar}/${name}`;
   if (!document.hidden) topics.push(own('geometry'), own('ping'), own('picture'), own(fan.drawn ? 'fan' : 'image'), ...(facts.pictureKind === 'range image' ? [own('cloud')] : []), '/tf', '/scene', '/swath');
-  if (facts.pictureKind === 'range image' && facts.maySteer && facts.connection === 'open') connection.set(own('view/cloud_threshold'), 0, 'float64');  // every echo is one
+  showAllEchoes(own('view/cloud_threshold'));
   facts.judged = connection.byTopic.has('/doctor');
   if (!document.hidden && !connection.topics.has('/scene')) scene.removeObjects();  // those that went meanwhile are not named
   connection.want(topics);
+}
+
+/// Once for each sonar that makes range images and each connection.
+function showAllEchoes(threshold) {
+  const wanted = facts.pictureKind === 'range image' && facts.maySteer && facts.connection === 'open' ? facts.sonar : '';
+  if (wanted && wanted !== allEchoesOf) steering.set(threshold, 0, 'float64');
+  allEchoesOf = wanted;
 }
 
 function draw() {

@@ -17,27 +17,44 @@ std::vector<protocol::Bytes> messages_of(const Ping& ping, const protocol::Vendo
   return {};
 }
 
+std::unique_ptr<protocol::Host> host_of(const protocol::Make& make) {
+  protocol::Wanted wanted;
+  wanted.as_it_is = true;
+  auto host = make.host(wanted);
+  return host ? *std::move(host) : nullptr;
+}
+
+/// Null: the host shows nothing of this ping.
+DriverPicture::Drawing read_by(protocol::Host& host, const protocol::Make& make, const Ping& ping,
+                               const protocol::DeviceState& state) {
+  DriverPicture::Drawing drawing;
+  for (const protocol::Bytes& message : messages_of(ping, *make.device, state))
+    for (const protocol::HostAction& action : host.on_bytes(make.ports.size() - 1, message, ping.request.fired_at))
+      if (const auto* const read = std::get_if<protocol::HostPing>(&action)) drawing = read->drawing;
+  return drawing;
+}
+
+SonarPicture picture_of_one(const protocol::Make& make, const Ping& ping, const protocol::DeviceState& state) {
+  const auto host = host_of(make);
+  const auto drawing = host ? read_by(*host, make, ping, state) : nullptr;
+  SonarPicture picture = drawing ? drawing() : SonarPicture{.kind = make.picture, .image = {}};
+  if (make.picture != PictureKind::points) return picture;
+  picture.image = polar_image_of(ping);  // the water column is the model's own
+  picture.image.full_scale /= dimmed;
+  return picture;
+}
+
 }  // namespace
 
 DriverPicture::DriverPicture(const protocol::Make& make) : make_(make) {
-  if (make.picture == PictureKind::fan) return;
-  protocol::Wanted wanted;
-  wanted.as_it_is = true;
-  if (auto host = make.host(wanted)) host_ = *std::move(host);
+  if (make.picture == PictureKind::sweep || make.picture == PictureKind::waterfall) host_ = host_of(make);
 }
 
 DriverPicture::Drawing DriverPicture::after(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state) {
-  if (host_ == nullptr) return [ping] { return SonarPicture{.image = polar_image_of(*ping)}; };
-  Drawing drawing;
-  for (const protocol::Bytes& message : messages_of(*ping, *make_.device, state))
-    for (const protocol::HostAction& action : host_->on_bytes(make_.ports.size() - 1, message, ping->request.fired_at))
-      if (const auto* const read = std::get_if<protocol::HostPing>(&action)) drawing = read->drawing;
-  if (make_.picture != PictureKind::points) return drawing;
-  return [drawing, ping] {  // the water column is the model's own
-    SonarPicture picture = drawing ? drawing() : SonarPicture{.kind = PictureKind::points, .image = {}};
-    picture.image = polar_image_of(*ping);
-    picture.image.full_scale /= dimmed;
-    return picture;
+  if (make_.picture == PictureKind::fan) return [ping] { return SonarPicture{.image = polar_image_of(*ping)}; };
+  if (host_) return read_by(*host_, make_, *ping, state);
+  return [&make = make_, ping, state = std::make_shared<const protocol::DeviceState>(state)] {
+    return picture_of_one(make, *ping, *state);
   };
 }
 

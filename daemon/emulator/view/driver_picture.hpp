@@ -17,13 +17,14 @@ class DriverPicture {
 
   explicit DriverPicture(const protocol::Make& make);
   PictureKind kind() const { return make_.picture; }
-  /// Of pings in order; `state`: of the device that fired them. What it returns takes long to call, which any thread may do.
-  /// Null: there is nothing to see yet.
+  /// Of pings in order; `state`: of the device that fired them. Quick, whatever the make: a picture of one ping is encoded and
+  /// decoded by the drawing, which takes long to call; any thread may do that, also when this is gone. Null: there is nothing to
+  /// see yet.
   Drawing after(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state);
 
  private:
   const protocol::Make& make_;
-  std::unique_ptr<protocol::Host> host_;  // of a make whose picture is more than its last ping
+  std::unique_ptr<protocol::Host> host_;  // of a make whose picture adds up many pings
 };
 
 }  // namespace sonar

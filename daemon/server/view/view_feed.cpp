@@ -140,7 +140,7 @@ void ViewFeed::on_subscribed(Viewer& viewer, std::uint32_t channel) {
   else
     give(viewer, channel, current(viewer, channel));
   for (SonarView& sonar : sonars_)
-    if (channel == sonar.fan.channel || channel == sonar.about.channel || channel == sonar.cloud.channel) begin_slow_ones(sonar);
+    if (channel == sonar.fan || channel == sonar.about || channel == sonar.cloud) begin_slow_ones(sonar);
   drive_previews();
 }
 
@@ -161,9 +161,9 @@ ViewPayloadPointer ViewFeed::current(const Viewer& viewer, std::uint32_t channel
     if (!sonar.last) continue;
     if (channel == sonar.image) return sonar.picture ? sonar.picture : image_payload(sonar.name, sonar.last);
     if (channel == sonar.geometry) return geometry_payload(*sonar.last);
-    for (const Slow* slow : {&sonar.fan, &sonar.about, &sonar.cloud})
-      if (channel == slow->channel)
-        if (const auto made = slow->made.find(threshold_of(viewer, *slow)); made != slow->made.end()) return made->second;
+    for (const Slow* slow : {&sonar.drawn, &sonar.points})
+      if (const auto made = slow->made.find({channel, threshold_of(viewer, *slow)}); made != slow->made.end())
+        return made->second;
   }
   return nullptr;
 }
@@ -196,7 +196,9 @@ void ViewFeed::give(Viewer& viewer, std::uint32_t channel, const ViewPayloadPoin
     viewer.offer(channel, in_time_of(viewer, channel, payload), ViewConnection::now());
 }
 
-void ViewFeed::give(Viewer& viewer, const Slow& slow) { give(viewer, slow.channel, current(viewer, slow.channel)); }
+void ViewFeed::give(Viewer& viewer, const Slow& slow) {
+  for (const std::uint32_t channel : slow.channels) give(viewer, channel, current(viewer, channel));
+}
 
 // ---- channels
 
@@ -216,6 +218,22 @@ bool ViewFeed::wants_truth(const std::string& sonar) {
   return found != nullptr && wanted(found->truth);
 }
 
+void ViewFeed::SonarView::forget() {
+  last.reset();
+  picture.reset();
+  shape.clear();
+  volume.clear();
+  painter.reset();
+  driver.reset();
+  drawing = nullptr;
+  for (Slow* slow : {&drawn, &points}) slow->made.clear(), slow->of = Time::min();
+}
+
+void ViewFeed::SonarView::be_of(const Device& device) {
+  const protocol::Make& now = protocol::make_of_profile(device.config().profile.model->profile);
+  if (std::exchange(make, &now) != &now) forget();
+}
+
 /// Sonars come and go with the configuration.
 void ViewFeed::sync_sonars() {
   const auto& devices = of_.fleet.devices();
@@ -227,16 +245,21 @@ void ViewFeed::sync_sonars() {
   std::vector<foxglove::Channel> added;
   for (const Device& device : devices) {
     const std::string& name = device.config().name;
-    if (find(name) != nullptr) continue;
+    if (SonarView* const known = find(name)) {
+      known->be_of(device);
+      continue;
+    }
     const std::uint32_t before = last_channel_;
     SonarView sonar{name};
     sonar.image = add_channel("/" + name + "/image", "foxglove.RawImage", ChannelKind::picture, image_hz);
     sonar.geometry = add_channel("/" + name + "/geometry", "sonar.v1.PingGeometry", ChannelKind::last_value);
     sonar.ping = add_channel("/" + name + "/ping", "sonar.v1.PingEvent", ChannelKind::event, ping_hz);
-    sonar.fan.channel = add_channel("/" + name + "/fan", "foxglove.RawImage", ChannelKind::picture, fan_hz);
-    sonar.about.channel = add_channel("/" + name + "/picture", "sonar.v1.Picture", ChannelKind::last_value, fan_hz);
-    sonar.cloud.channel = add_channel("/" + name + "/cloud", "foxglove.PointCloud", ChannelKind::picture, cloud_hz);
-    sonar.cloud.threshold = "/" + name + "/view/cloud_threshold";
+    sonar.fan = add_channel("/" + name + "/fan", "foxglove.RawImage", ChannelKind::picture, fan_hz);
+    sonar.about = add_channel("/" + name + "/picture", "sonar.v1.Picture", ChannelKind::last_value, fan_hz);
+    sonar.cloud = add_channel("/" + name + "/cloud", "foxglove.PointCloud", ChannelKind::picture, cloud_hz);
+    sonar.drawn.channels = {sonar.fan, sonar.about};
+    sonar.points.channels = {sonar.cloud};
+    sonar.points.threshold = "/" + name + "/view/cloud_threshold";
     sonar.truth = add_channel("/" + name + "/truth", "sonar.v1.PingTruth", ChannelKind::last_value, image_hz);
     sonar.figures = add_channel("/" + name + "/figures", "", ChannelKind::event, ping_hz);
     channels_.at(sonar.figures).advertised.encoding = "cdr";
@@ -252,8 +275,8 @@ void ViewFeed::sync_sonars() {
 }
 
 void ViewFeed::remove(const SonarView& sonar) {
-  const std::vector<std::uint32_t> gone{sonar.image, sonar.geometry,    sonar.ping,          sonar.figures,
-                                        sonar.truth, sonar.fan.channel, sonar.about.channel, sonar.cloud.channel};
+  const std::vector<std::uint32_t> gone{sonar.image, sonar.geometry, sonar.ping,  sonar.figures,
+                                        sonar.truth, sonar.fan,      sonar.about, sonar.cloud};
   for (const std::uint32_t id : gone) channels_.erase(id);
   session_ = session_.substr(0, session_.find('-')) + "-" + std::to_string(++sessions_);
   each([&](ViewConnection& c) {
@@ -306,16 +329,7 @@ void ViewFeed::tick() {
   if (connections_.empty()) {
     no_preview_.clear();
     of_.fleet.tap_pings({});
-    for (SonarView& sonar : sonars_) {  // the next viewer gets geometry and swath anew
-      sonar.last.reset();
-      sonar.picture.reset();
-      sonar.shape.clear();
-      sonar.volume.clear();
-      sonar.painter.reset();
-      sonar.driver.reset();
-      sonar.drawing = nullptr;
-      for (Slow* slow : {&sonar.fan, &sonar.about, &sonar.cloud}) slow->made.clear(), slow->of = Time::min();
-    }
+    for (SonarView& sonar : sonars_) sonar.forget();  // the next viewer gets geometry and swath anew
     shapes_.clear();
     return;
   }

@@ -68,20 +68,22 @@ class ViewFeed final : public ViewerHost {
 
  private:
   using Steady = std::chrono::steady_clock;
-  using Make = std::function<ViewPayloadPointer(double threshold)>;
-  /// Made on the thread from the newest ping; what it shows may be some pings old.
+  using MakePayload = std::function<ViewPayloadPointer(std::uint32_t channel, double threshold)>;
+  /// Made on the thread from the newest ping, the same for all its channels; what it shows may be some pings old.
   struct Slow {
-    std::uint32_t channel = 0;
+    std::vector<std::uint32_t> channels{};
     std::string threshold = {};  // the parameter that it depends on; empty = on none
     bool under_way = false;
     Steady::time_point begun_at{};
-    Time of{Time::min()};                         // the ping's
-    std::map<double, ViewPayloadPointer> made{};  // by threshold
+    Time of{Time::min()};                                                   // the ping's
+    std::map<std::pair<std::uint32_t, double>, ViewPayloadPointer> made{};  // by channel and threshold
   };
   struct SonarView {
     std::string name;
-    std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0, truth = 0;
-    Slow fan{}, about{}, cloud{};  // about: sonar.v1.Picture of the fan
+    std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0, truth = 0, cloud = 0;
+    std::uint32_t fan = 0, about = 0;  // about: sonar.v1.Picture of the fan
+    Slow drawn{}, points{};            // fan and about; cloud
+    const protocol::Make* make = nullptr;
     std::shared_ptr<const Ping> last = nullptr;
     ViewPayloadPointer picture = nullptr;               // of last, once it was wanted
     wire::Bytes shape = {};                             // of last, without its number
@@ -89,6 +91,11 @@ class ViewFeed final : public ViewerHost {
     std::shared_ptr<PicturePainter> painter = nullptr;  // for the view thread alone
     std::unique_ptr<DriverPicture> driver = nullptr;
     DriverPicture::Drawing drawing = nullptr;  // of last
+
+    /// All that pings have left.
+    void forget();
+    /// Pings of another make are forgotten: a reload may give a sonar another profile.
+    void be_of(const Device& device);
   };
 
   void on_ping(const Device& of, const PingQueued& queued);
@@ -97,7 +104,7 @@ class ViewFeed final : public ViewerHost {
   bool previews_by_itself(const Device& device);
   void drive_previews();
   void on_preview(const std::string& sonar, const PingOutcome& outcome);
-  void make_slowly(SonarView& sonar, Slow SonarView::*which, Make make);
+  void make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload make);
   void begin_slow_ones(SonarView& sonar);
   void on_log(LogLevel level, const std::string& line, const std::vector<LogField>& fields);
   void arm();
@@ -148,6 +155,7 @@ class ViewFeed final : public ViewerHost {
   std::map<std::string, PlaybackWatch> watches_;                     // by vehicle that viewers look at
   std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // who asked, by sonar
   std::set<std::string> no_preview_;                                 // sonars whose preview a viewer has switched off
+  std::map<std::string, Steady::time_point> preview_failed_at_;      // by sonar
   SceneShapes shapes_;
   ViewDoctor doctor_{of_.operations, of_.clock};
   std::deque<ViewPayloadPointer> lines_;

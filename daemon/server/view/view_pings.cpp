@@ -1,6 +1,7 @@
 // What viewers see of a ping: what is offered when one comes, what is made on the thread of the live view, and where all stands.
 #include <algorithm>
 #include <new>
+#include <optional>
 #include <utility>
 
 #include "daemon/emulator/view/ping_payloads.hpp"
@@ -15,9 +16,9 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   if (sonar == nullptr) return;
   const Ping& ping = *queued.ping;
   watch_playback();
+  sonar->be_of(of);
   sonar->last = queued.ping;
-  if (sonar->driver == nullptr)
-    sonar->driver = std::make_unique<DriverPicture>(protocol::make_of_profile(of.config().profile.model->profile));
+  if (sonar->driver == nullptr) sonar->driver = std::make_unique<DriverPicture>(*sonar->make);
   if (auto drawing = sonar->driver->after(queued.ping, of.sonar().state())) sonar->drawing = std::move(drawing);
   ping_at_ = Steady::now();
   if (wanted(sonar->geometry))
@@ -44,41 +45,45 @@ void ViewFeed::begin_slow_ones(SonarView& sonar) {
   if (sonar.last == nullptr) return;
   const Time at = sonar.last->request.fired_at;
   if (sonar.painter == nullptr) sonar.painter = std::make_shared<PicturePainter>(view_fan_style());
-  if (sonar.drawing) {
-    make_slowly(sonar, &SonarView::about, [at, draw = sonar.drawing](double) { return picture_payload(at, draw()); });
-    make_slowly(sonar, &SonarView::fan, [name = sonar.name, at, draw = sonar.drawing, painter = sonar.painter](double) {
-      return fan_payload(name, at, draw(), *painter);
-    });
-  }
-  make_slowly(sonar, &SonarView::cloud,
-              [name = sonar.name, ping = sonar.last](double threshold) { return cloud_payload(name, *ping, threshold); });
+  if (sonar.drawing)
+    make_slowly(sonar, &SonarView::drawn,
+                [name = sonar.name, about = sonar.about, at, draw = sonar.drawing, painter = sonar.painter,
+                 picture = std::optional<SonarPicture>()](std::uint32_t channel, double) mutable {
+                  if (!picture) picture = draw();
+                  return channel == about ? picture_payload(at, *picture) : fan_payload(name, at, *picture, *painter);
+                });
+  make_slowly(sonar, &SonarView::points, [name = sonar.name, ping = sonar.last](std::uint32_t, double threshold) {
+    return cloud_payload(name, *ping, threshold);
+  });
 }
 
 /// Pings that come meanwhile are skipped, but for the last: it is made when this one is done. Once for each threshold.
-void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, Make make) {
+void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload make) {
   Slow& slow = sonar.*which;
   const auto now = Steady::now();
   const Time at = sonar.last->request.fired_at;
-  const double most_hz = channels_.at(slow.channel).most_hz;
+  const double most_hz = channels_.at(slow.channels.front()).most_hz;
   if (slow.under_way || now < slow.begun_at + nanoseconds_from(1 / most_hz)) return;
-  std::map<double, ViewPayloadPointer> made;
+  decltype(slow.made) made;
   each([&](const ViewConnection& c) {
-    if (c.viewer().subscribes(slow.channel)) made[threshold_of(c.viewer(), slow)];
+    for (const std::uint32_t channel : slow.channels)
+      if (c.viewer().subscribes(channel)) made[{channel, threshold_of(c.viewer(), slow)}];
   });
   const auto is_there = [&slow](const auto& one) { return slow.made.contains(one.first); };
   if (made.empty() || (slow.of == at && std::all_of(made.begin(), made.end(), is_there))) return;
   slow.under_way = true;
   slow.begun_at = now;
-  asio::post(thread_, [this, name = sonar.name, which, at, make = std::move(make), made = std::move(made)]() mutable {
+  asio::post(thread_, [this, name = sonar.name, of = sonar.make, which, at, make = std::move(make), made]() mutable {
     try {
-      for (auto& [threshold, payload] : made) payload = make(threshold);
+      for (auto& [key, payload] : made) payload = make(key.first, key.second);
     } catch (const std::bad_alloc&) {  // there will be other pings
     }
-    asio::post(of_.io, [this, name, which, at, made = std::move(made)] {
+    asio::post(of_.io, [this, name, of, which, at, made = std::move(made)] {
       SonarView* const found = find(name);
       if (found == nullptr || stopping_) return;
       Slow& done = found->*which;
       done.under_way = false;
+      if (found->make != of) return;
       done.of = at;
       done.made = made;
       each([&](ViewConnection& c) {

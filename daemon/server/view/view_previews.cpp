@@ -2,6 +2,11 @@
 #include "daemon/server/view/view_feed.hpp"
 
 namespace sonar {
+namespace {
+
+constexpr std::chrono::seconds rest_after_failure{30};  // of previews that begin by themselves
+
+}  // namespace
 
 std::string ViewFeed::set_preview(Viewer& viewer, Device& device, bool on) {
   const std::string& name = device.config().name;
@@ -32,8 +37,11 @@ void ViewFeed::end_preview(Device& device, const std::string& why) {
 bool ViewFeed::previews_by_itself(const Device& device) {
   const std::string& name = device.config().name;
   if (!of_.config.previews || of_.clock.stepped() || no_preview_.contains(name)) return false;
+  if (const auto failed = preview_failed_at_.find(name);
+      failed != preview_failed_at_.end() && Steady::now() < failed->second + rest_after_failure)
+    return false;
   const SonarView* const sonar = find(name);
-  return sonar != nullptr && (wanted(sonar->image) || wanted(sonar->fan.channel) || wanted(sonar->cloud.channel)) &&
+  return sonar != nullptr && (wanted(sonar->image) || wanted(sonar->fan) || wanted(sonar->cloud)) &&
          !device.sonar().connections().has_audience();
 }
 
@@ -63,7 +71,10 @@ void ViewFeed::on_preview(const std::string& sonar, const PingOutcome& outcome) 
   Device* const device = of_.fleet.find(sonar);
   if (stopping_ || device == nullptr) return;
   device->preview().done();
-  if (!outcome.ping) return end_preview(*device, "the ping failed: " + outcome.failure);
+  if (!outcome.ping) {
+    preview_failed_at_[sonar] = Steady::now();
+    return end_preview(*device, "the ping failed: " + outcome.failure);
+  }
   if (!device->preview().on() || device->sonar().connections().has_audience()) return;
   on_ping(*device, {outcome.ping, nullptr, {}, outcome.seconds, true});
 }

@@ -46,7 +46,7 @@ ParameterSource ViewFeed::source() const { return {of_.config, of_.clock, of_.wo
 
 std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer& viewer, const std::vector<std::string>& names) {
   std::vector<foxglove::Parameter> all = parameters_of(source());
-  for (const SonarView& sonar : sonars_) all.push_back({sonar.cloud.threshold, threshold_of(viewer, sonar.cloud)});
+  for (const SonarView& sonar : sonars_) all.push_back({sonar.points.threshold, threshold_of(viewer, sonar.points)});
   if (!names.empty())
     std::erase_if(all,
                   [&](const foxglove::Parameter& p) { return std::find(names.begin(), names.end(), p.name) == names.end(); });
@@ -55,7 +55,7 @@ std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer& viewer, cons
 
 std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Parameter& wanted) {
   for (SonarView& sonar : sonars_) {
-    if (wanted.name != sonar.cloud.threshold) continue;
+    if (wanted.name != sonar.points.threshold) continue;
     const auto part = number_of(wanted.value);
     if (!part || !(*part >= 0 && *part <= 1)) return "takes a number from 0 to 1";
     viewer.choose(wanted.name, *part);

@@ -89,6 +89,32 @@ TEST(Fan, ShowsNothingNearerThanItsStart) {
   EXPECT_EQ(grey_at(5.1).b, 50);
 }
 
+/// One step from the last bearing leads to the first: of a head that turns on and on.
+PolarImage full_turn(std::size_t beams, double first_rad) {
+  PolarImage image = black_fan(10, beams, 180);
+  for (std::size_t i = 0; i < beams; ++i)
+    image.azimuth_rad[i] = first_rad - 2 * pi * static_cast<double>(i) / static_cast<double>(beams);
+  image.samples.assign(10 * beams, 200);
+  return image;
+}
+
+TEST(Fan, AFullTurnHasNoGap) {
+  for (const double first_rad : {pi, pi - 2 * pi / 16}) {
+    const Raster fan = *draw_fan(full_turn(16, first_rad), plain_gray());
+    const double pixel_m = 20.0 / (400 - 8);
+    for (int degrees = 0; degrees < 360; ++degrees) {
+      const double bearing = rad_from_deg(degrees + 0.5);
+      const int x = static_cast<int>(200 - 8 / pixel_m * std::sin(bearing));
+      const int y = static_cast<int>(4 + (10 - 8 * std::cos(bearing)) / pixel_m);
+      EXPECT_EQ(fan.at(x, y).r, 200) << "bearing " << degrees;
+    }
+  }
+  PolarImage gap = full_turn(16, pi);
+  for (double& azimuth : gap.azimuth_rad) azimuth *= 0.9;  // 36 degrees are missing, less the half beams
+  const Raster fan = *draw_fan(gap, plain_gray());
+  EXPECT_EQ(fan.at(195, fan.height - 10).b, outside_colour.b) << "a sector stays one";
+}
+
 TEST(Fan, KeepsTheMeanWhenPixelsAreCoarserThanSamples) {
   PolarImage image = black_fan(1000, 512, 60);
   for (std::size_t i = 0; i < image.samples.size(); ++i) image.samples[i] = i % 2 == 0 ? 200.0f : 100.0f;

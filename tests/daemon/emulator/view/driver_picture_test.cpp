@@ -1,7 +1,10 @@
 // The picture that viewers see of each make, made by its own host from its pings.
 #include "daemon/emulator/view/driver_picture.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
 
 #include "daemon/emulator/view/ping_payloads.hpp"
 
@@ -12,7 +15,7 @@ class DriverPictures : public testing::TestWithParam<protocol::Make> {};
 INSTANTIATE_TEST_SUITE_P(OfEveryMake, DriverPictures, testing::ValuesIn(protocol::makes().begin(), protocol::makes().end()),
                          [](const auto& of) { return std::string(of.param.name()); });
 
-std::shared_ptr<const Ping> ping_of(const protocol::Vendor& vendor, const protocol::DeviceState& state, std::uint32_t number) {
+std::shared_ptr<Ping> ping_of(const protocol::Vendor& vendor, const protocol::DeviceState& state, std::uint32_t number) {
   auto ping = std::make_shared<Ping>();
   const protocol::ChangeSettings first = vendor.initial_settings(state);
   ping->request.model = state.model;
@@ -32,13 +35,30 @@ std::shared_ptr<const Ping> ping_of(const protocol::Vendor& vendor, const protoc
   return ping;
 }
 
-TEST_P(DriverPictures, AreOfItsKindAndCanBeDrawn) {
-  const protocol::Make& make = GetParam();
+protocol::DeviceState state_of(const protocol::Make& make) {
   protocol::DeviceState state;
   state.name = "front";
   state.model = make.device->models().front();
   state.options = *protocol::check_options(*make.device, {});
   state.water = {12, 30, 8.0, 0};
+  return state;
+}
+
+TEST_P(DriverPictures, OfOnePingAreMadeOnlyWhenTheyAreDrawn) {
+  const protocol::Make& make = GetParam();
+  if (make.picture == PictureKind::sweep || make.picture == PictureKind::waterfall) GTEST_SKIP() << "adds up pings";
+  const protocol::DeviceState state = state_of(make);
+  const std::shared_ptr<Ping> ping = ping_of(*make.device, state, 1);
+  DriverPicture::Drawing drawing = DriverPicture(make).after(ping, state);
+  ASSERT_TRUE(drawing);
+  EXPECT_THAT(drawing().image.samples, testing::Contains(testing::Gt(0)));
+  std::fill(ping->samples.begin(), ping->samples.end(), std::byte{0});
+  EXPECT_THAT(drawing().image.samples, testing::Each(0));
+}
+
+TEST_P(DriverPictures, AreOfItsKindAndCanBeDrawn) {
+  const protocol::Make& make = GetParam();
+  const protocol::DeviceState state = state_of(make);
   DriverPicture pictures(make);
   DriverPicture::Drawing last;
   for (std::uint32_t number = 1; number <= 250; number += make.picture == PictureKind::fan ? 100 : 1)
