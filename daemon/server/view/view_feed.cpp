@@ -20,7 +20,6 @@ using std::chrono::milliseconds;
 constexpr milliseconds tick_period{100}, status_period{1000}, after_change{200};
 constexpr double image_hz = 30, fan_hz = 10, cloud_hz = 5, places_hz = 30, ping_hz = 50;
 constexpr std::size_t most_advertised = 100;  // in one message
-constexpr int nice_by = 5;
 
 const Sender ourselves{"live view", "live view"};
 
@@ -32,9 +31,7 @@ void advertise(Viewer& viewer, std::span<const foxglove::Channel> channels) {
 }  // namespace
 
 ViewFeed::ViewFeed(const Viewed& of) : of_(of), timer_(of.io) {
-  asio::post(thread_, [] {
-    if (::nice(nice_by) == -1) return;  // costs only smoothness
-  });
+  asio::post(thread_, [] { [[maybe_unused]] const int niceness = ::nice(5); });  // a failure costs only smoothness
   tf_ = add_channel("/tf", "foxglove.FrameTransforms", ChannelKind::last_value, places_hz);
   scene_ = add_channel("/scene", "foxglove.SceneUpdate", ChannelKind::last_value);
   swath_ = add_channel("/swath", "foxglove.SceneUpdate", ChannelKind::last_value);
