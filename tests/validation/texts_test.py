@@ -168,7 +168,7 @@ class Summary(unittest.TestCase):
 
     def test_a_summary_that_is_not_written_is_an_error(self):
         with tempfile.TemporaryDirectory() as folder:
-            tables, page = pathlib.Path(folder), pathlib.Path(folder, "page.md")
+            tables, page = pathlib.Path(folder), pathlib.Path(folder, "page")
             command = [sys.executable, "-B", validate.__file__, "--summary", "--tables", tables, "--page", page]
             without = subprocess.run(command, capture_output=True, text=True, check=False)
             self.assertEqual((without.returncode, without.stderr),
