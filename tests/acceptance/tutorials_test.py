@@ -22,8 +22,9 @@ def follow(name, folder):
         (folder / file).write_text(content, encoding="utf-8")
     commands = "".join(re.findall(r"^```sh\n(.*?)^```", text, re.M | re.S))
     programs = os.pathsep.join(str((BUILD / part).resolve()) for part in ("daemon", "clients"))
-    environment = {**os.environ, "PATH": programs + os.pathsep + os.environ["PATH"], "PYTHONPATH": str(PYTHON), "HOME": str(folder),
+    environment = {**os.environ, "PATH": programs + os.pathsep + os.environ["PATH"], "PYTHON": str(PYTHON), "HOME": str(folder),
                    "PYTHONDONTWRITEBYTECODE": "1", "DOCS": str(ROOT / "docs"), "SCENES": str(ROOT / "scenes")}
+    environment.pop("PYTHONPATH", None)
     # Output goes to a file: a daemon in the background would keep a pipe open.
     with open(folder / "output.txt", "w+", encoding="utf-8") as output:
         done = subprocess.run(["bash", "-eu", "-o", "pipefail", "-c", ENDING + commands], cwd=folder, env=environment,

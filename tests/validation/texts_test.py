@@ -2,6 +2,7 @@
 """The texts behind docs/validation.md and its tables, and that their render files can be rendered. Needs no matplotlib and no numpy."""
 
 import contextlib
+import functools
 import io
 import json
 import os
@@ -9,7 +10,9 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
+from unittest import mock
 
 import coverage
 import oracles
@@ -162,6 +165,34 @@ class Summary(unittest.TestCase):
                 self.assertFalse(validate.write_summary(page, pathlib.Path(folder), without))
             self.assertIn("the tables lack capture", printed.getvalue())
             self.assertEqual(page.read_text(encoding="utf-8"), "before")
+
+    def test_a_summary_that_is_not_written_is_an_error(self):
+        with tempfile.TemporaryDirectory() as folder:
+            tables, page = pathlib.Path(folder), pathlib.Path(folder, "page")
+            command = [sys.executable, "-B", validate.__file__, "--summary", "--tables", tables, "--page", page]
+            without = subprocess.run(command, capture_output=True, text=True, check=False)
+            self.assertEqual((without.returncode, without.stderr),
+                             (1, f"validate.py: no {validate.tables_in(tables)}: run validate.sh without --summary first\n"))
+            validate.write_tables(tables, {"tank": "text\n"})
+            self.assertEqual(subprocess.run(command, capture_output=True, check=False).returncode, 1)
+            validate.write_tables(tables, self.chapters())
+            self.assertEqual(subprocess.run(command, capture_output=True, check=False).returncode, 0)
+
+    def test_tables_made_without_a_summary_are_an_error(self):
+        runs = types.SimpleNamespace(Sonard=lambda program: types.SimpleNamespace(pings=0))
+        for chapters, code in (({"tank": "text\n"}, 1), (self.chapters(), None)):
+            makers = {name: functools.partial(str, text) for name, text in chapters.items()}
+            with self.subTest(code=code), tempfile.TemporaryDirectory() as folder, mock.patch.dict(sys.modules, runs=runs), \
+                    mock.patch.object(validate, "makers_of", lambda *_: makers), contextlib.redirect_stdout(io.StringIO()), \
+                    mock.patch.object(sys, "argv", ["validate.py", "--program", "sonard", "--tables", folder, "--page", folder + "/page.md",
+                                                    "--only", *(name for name in makers if name != "oracles")]):
+                # The table of oracles is kept: it is not made here.
+                validate.write_tables(pathlib.Path(folder), {name: chapters[name] for name in chapters if name == "oracles"})
+                end = self.assertRaises(SystemExit) if code else contextlib.nullcontext()
+                with end:
+                    validate.main()
+                if code:
+                    self.assertEqual(end.exception.code, code)
 
     def test_every_oracle_that_is_built_is_in_one_group(self):
         grouped = [n for _, numbers in summary.GROUPS if numbers != "+" for n in numbers]

@@ -9,6 +9,7 @@ usage: validate.py --program SONARD [--oracles FOLDER] [--partial] [--tables FOL
   --page      the summary, written when the tables have every chapter of it; its picture goes into the folder `validation` beside it
   --only      make these chapters, keep the others
   --summary   rewrite the summary from the tables as they are; no program is run
+Exit code 1: the summary was not written, as tables lack chapters of it.
 Needs python3-matplotlib; tests/validation/validate.sh installs it, builds, and starts this.
 """
 
@@ -133,7 +134,14 @@ def make(options):
         chapters[name] = made if made is not None else before[name]
     write_tables(options.tables, chapters)
     print(f"{tables}: written, {sonard.pings} pings rendered", flush=True)
-    write_summary(options.page, options.tables, chapters)
+    return write_summary(options.page, options.tables, chapters)
+
+
+def summarise(options):
+    tables = tables_in(options.tables)
+    if not tables.is_file():
+        raise RuntimeError(f"no {tables}: run validate.sh without --summary first")
+    return write_summary(options.page, options.tables, chapters_of(tables.read_text(encoding="utf-8")))
 
 
 def main():
@@ -146,13 +154,10 @@ def main():
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--summary", action="store_true")
     options = parser.parse_args()
-    if options.summary:
-        if not write_summary(options.page, options.tables, chapters_of(tables_in(options.tables).read_text(encoding="utf-8"))):
-            sys.exit(1)
-    elif options.program is None:
+    if not options.summary and options.program is None:
         parser.error("--program is needed, except with --summary")
-    else:
-        make(options)
+    if not (summarise if options.summary else make)(options):
+        sys.exit(1)
 
 
 if __name__ == "__main__":

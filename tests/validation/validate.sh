@@ -4,7 +4,7 @@
 # Chapters: tank two-cylinders local-search differences coverage cost parts capture tell-apart oracles. Costs need an otherwise idle machine.
 # Takes under fifteen minutes on two cores; --summary rewrites the summary from the tables in a moment. The table of oracles is that
 # of the last ./test.sh, complete unless --partial is given; capture and tell-apart need SONARD_CAPTURES. Chapters without data are
-# kept; the summary is written when there are all.
+# kept; the summary is written when there are all, else the exit code is 1.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh

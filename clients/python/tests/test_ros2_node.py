@@ -7,6 +7,7 @@ import json
 import math
 import pathlib
 import socket
+import struct
 import sys
 import tempfile
 import threading
@@ -15,7 +16,7 @@ from unittest import mock
 
 from ros_stand_ins import BRIDGE, ExternalShutdown, Message, Ros, launch_modules
 
-from sonard_bridge import polling
+from sonard_bridge import live_view, polling
 from sonard_bridge.live_view import Transform
 from sonard_bridge.parameters import PARAMETERS, BadParameter, checked
 
@@ -161,6 +162,78 @@ class Poses(WithNode):
             ros.subscribed["/odom"](odometry())
             return [text for text in ros.logged if "does not listen" in text]
         self.wait_for(refused)
+
+
+class Fails:
+    """A publisher's method that raises the first time, then appends."""
+
+    def __init__(self, sent):
+        self.sent, self.calls = sent, 0
+
+    def __call__(self, message):
+        self.calls += 1
+        if self.calls == 1:
+            raise RuntimeError("publisher's handle is invalid")
+        self.sent.append(message)
+
+
+class Helpers(WithNode):
+    """Threads that go on after errors."""
+
+    def connections(self, *streams):
+        """Stands in for the live view's connections, one after the other; the last one stays open. Returns those made."""
+        made, self.may_go_on = [], threading.Event()
+        may_go_on = self.may_go_on
+
+        class Connection:
+            def __init__(self, *_):
+                made.append(self)
+                self.messages = list(streams[min(len(made), len(streams)) - 1])
+                self.stream = Message(close=lambda: None)
+
+            def receive(self):
+                may_go_on.wait(PATIENCE_S)
+                return self.messages.pop(0) if self.messages else threading.Event().wait(0.01) or None
+
+        for name, stand_in in (("Connection", Connection), ("RETRY_S", 0)):
+            patch = mock.patch.object(live_view, name, stand_in)
+            patch.start()
+            self.addCleanup(patch.stop)
+        return made
+
+    def test_a_status_after_a_publisher_that_fails(self):
+        server = self.server(may_answer=False)
+        ros = self.bridge(http=server.at, truth_rate_hz=100, truth="/truth")
+        ros.node.truth.publish = Fails(ros.published["/truth"])
+        server.may_answer.set()
+        self.wait_for(lambda: ros.published["/truth"])
+        self.assertEqual([text for text in ros.logged if "invalid" in text],
+                         ["""not published: RuntimeError("publisher's handle is invalid")"""])
+
+    def test_a_message_of_the_view_after_a_publisher_that_fails(self):
+        server_info = json.dumps({"op": "serverInfo", "metadata": {"sonard.clock": "stepped"}}).encode()
+        made = self.connections([(live_view.TEXT, server_info),
+                                 *((live_view.BINARY, struct.pack("<BQ", 2, ns)) for ns in (1, 2))])
+        ros = self.bridge(clock=True)
+        ros.node.clock_topic.publish = Fails(ros.published["/clock"])
+        self.may_go_on.set()
+        self.wait_for(lambda: ros.published["/clock"])
+        self.assertEqual([message.clock.nanosec for message in ros.published["/clock"]], [2])
+        self.assertEqual(len([text for text in ros.logged if text.startswith("not published: ")]), 1)
+        self.assertEqual(len(made), 1)
+
+    def test_a_view_after_a_message_of_another_shape(self):
+        self.connections([(live_view.TEXT, b"[]")], [(live_view.BINARY, struct.pack("<BQ", 2, 7))])
+        troubles, times = [], []
+        view = live_view.LiveView(("127.0.0.1", 1), "", lambda topic: True, lambda topic, ns, payload: times.append(ns),
+                                  troubles.append)
+        view.start()
+        self.may_go_on.set()
+        self.addCleanup(view.join)
+        self.addCleanup(view.stop)
+        self.assertEqual(self.wait_for(lambda: times), [7])
+        self.assertEqual(len(troubles), 1)
+        self.assertIn("the live view cannot be read: AttributeError", troubles[0])
 
 
 class Transforms(WithNode):

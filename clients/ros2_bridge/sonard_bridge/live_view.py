@@ -232,9 +232,10 @@ class LiveView(threading.Thread):
                     self._look(connection)
                 finally:
                     connection.stream.close()
-            except (OSError, ValueError, LookupError, struct.error) as error:
+            except Exception as error:  # whatever it is, the thread goes on
                 if not self.over.is_set():
-                    self.on_trouble(str(error))
+                    self.on_trouble(str(error) if isinstance(error, (OSError, ValueError)) else
+                                    f"the live view cannot be read: {error!r}")
             self.over.wait(RETRY_S)
 
     def _look(self, connection: Connection) -> None:

@@ -94,13 +94,12 @@ class Bridge(Node):
             self.get_logger().warning(text)
 
     def while_running(self, call):
-        """For a helper's thread, which may publish while the context ends."""
+        """For a helper's thread: it goes on after an error, which is reported unless the context ends."""
         def guarded(*arguments):
             try:
                 call(*arguments)
-            except Exception:  # rclpy's own classes differ between releases
-                if self.context.ok():
-                    raise
+            except Exception as error:  # rclpy's own classes differ between releases
+                self.warn(f"not published: {error!r}")
         return guarded
 
     # ---- poses to sonard

@@ -30,12 +30,13 @@ class StatusPoll(threading.Thread):
                     status = json.load(answer)
                 if not isinstance(status, dict):
                     raise ValueError("the answer is not an object of JSON")
+                self.on_status(status)
             except urllib.error.HTTPError as error:
                 self.on_trouble(WANTS_TOKEN if error.code == 401 else f"no status of sonard: {error}")
             except (OSError, ValueError, http.client.HTTPException) as error:
                 self.on_trouble(f"no status of sonard: {error}")
-            else:
-                self.on_status(status)
+            except Exception as error:  # whatever it is, the thread goes on
+                self.on_trouble(f"no status of sonard: {error!r}")
 
     def stop(self) -> None:
         self.over.set()
