@@ -219,15 +219,14 @@ Command parse_command_line(int argc, char** argv) {
     app.footer(
         "examples:\n"
         "  sonard                           the configuration found in the usual places, else the demo\n"
-        "  sonard --demo blueview           the demo with a BlueView head; aris, 3d15, ping360, surveyor, omniscan; --profile NAME: with "
-        "any product\n"
+        "  sonard --demo blueview           the demo with a BlueView head; aris, 3d15, ping360, surveyor, omniscan; --profile "
+        "NAME: with any product\n"
         "  sonard my.yaml --log-level debug\n"
         "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, dataset JOB --out DIR, worker --out DIR, "
         "farm, "
         "replay FILE; each has --help.\n"
-        "Oculus, ARIS, Water Linked, Ping360, Surveyor and Omniscan sonars are wire-compatible. BlueView sonars are compatible with the "
-        "vendor's SDK by libraries of our "
-        "own, not on "
+        "Oculus, ARIS, Water Linked, Ping360, Surveyor and Omniscan sonars are wire-compatible. BlueView sonars are compatible "
+        "with the vendor's SDK by libraries of our own, not on "
         "the wire. Not affiliated with any vendor.");
   } else {
     app.require_subcommand(1);

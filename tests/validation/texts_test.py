@@ -184,8 +184,9 @@ class Summary(unittest.TestCase):
             makers = {name: functools.partial(str, text) for name, text in chapters.items()}
             with self.subTest(code=code), tempfile.TemporaryDirectory() as folder, mock.patch.dict(sys.modules, runs=runs), \
                     mock.patch.object(validate, "makers_of", lambda *_: makers), contextlib.redirect_stdout(io.StringIO()), \
-                    mock.patch.object(sys, "argv", ["validate.py", "--program", "sonard", "--tables", folder, "--page", folder + "/page.md",
-                                                    "--only", *(name for name in makers if name != "oracles")]):
+                    mock.patch.object(sys, "argv", ["validate.py", "--program", "sonard", "--tables", folder,
+                                                    "--page", f"{folder}/{validate.PAGE.name}", "--only",
+                                                    *(name for name in makers if name != "oracles")]):
                 # The table of oracles is kept: it is not made here.
                 validate.write_tables(pathlib.Path(folder), {name: chapters[name] for name in chapters if name == "oracles"})
                 end = self.assertRaises(SystemExit) if code else contextlib.nullcontext()
