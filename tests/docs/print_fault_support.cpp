@@ -1,4 +1,5 @@
-// Prints which fault takes effect on which make, as a Markdown table: `ninja -C build/release docs` writes it into the build folder.
+// Prints which fault takes effect on which make, as a Markdown table: `ninja -C build/release docs` writes it into the build
+// folder.
 #include <iostream>
 
 #include "daemon/config/faults/kinds.hpp"

@@ -82,13 +82,11 @@ void record_oracle(int number, const std::string& what, double expected, double 
   keep({number, what, "equal", expected, measured, tolerance, unit, pass}, where);
 }
 
-void record_at_least(int number, const std::string& what, double bound, double measured, const std::string& unit,
-                     Place where) {
+void record_at_least(int number, const std::string& what, double bound, double measured, const std::string& unit, Place where) {
   keep({number, what, "at_least", bound, measured, 0, unit, measured >= bound}, where);
 }
 
-void record_below(int number, const std::string& what, double bound, double measured, const std::string& unit,
-                  Place where) {
+void record_below(int number, const std::string& what, double bound, double measured, const std::string& unit, Place where) {
   keep({number, what, "below", bound, measured, 0, unit, measured < bound}, where);
 }
 
