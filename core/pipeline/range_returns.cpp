@@ -286,7 +286,6 @@ void RangeReturns::for_each_hit(Cell cell, Lattice lattice, F f) const {
 std::vector<RangeReturns::Cell> RangeReturns::crossed_cells(Parallel& pool) const {
   std::vector<std::uint8_t> is_thin(scene_.scene().objects.size());
   std::vector<Cell> edge = thin_cells(is_thin), crossed = edge;
-  if (crossed.size() > most_thin_cells) return {};
   std::vector<std::uint8_t> is_known(rows_.size() * static_cast<std::size_t>(grid_.columns));
   for (const Cell& cell : edge) is_known[index(cell)] = 1;
   std::size_t probed = 0;
