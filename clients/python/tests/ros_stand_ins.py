@@ -2,6 +2,7 @@
 import contextlib
 import importlib
 import sys
+import threading
 import types
 from unittest import mock
 
@@ -9,6 +10,16 @@ from common import ROOT
 
 BRIDGE = ROOT / "clients/ros2_bridge"
 sys.path.insert(0, str(BRIDGE))
+PATIENCE_S = 60
+
+
+def wait_for(found):
+    """Waits until found() gives something, and returns it."""
+    for _ in range(100 * PATIENCE_S):
+        if result := found():
+            return result
+        threading.Event().wait(0.01)
+    raise AssertionError("did not come")
 
 
 class Message:

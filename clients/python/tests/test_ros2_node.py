@@ -14,14 +14,13 @@ import threading
 import unittest
 from unittest import mock
 
-from ros_stand_ins import BRIDGE, ExternalShutdown, Message, Ros, launch_modules
+from ros_stand_ins import BRIDGE, PATIENCE_S, ExternalShutdown, Message, Ros, launch_modules, wait_for
 
 from sonard_bridge import live_view, polling
 from sonard_bridge.live_view import Transform
 from sonard_bridge.parameters import PARAMETERS, BadParameter, checked
 
 HALF = math.sqrt(0.5)
-PATIENCE_S = 60
 STATUS = {"now_ns": "7500000000", "vehicles": [{"name": "rov", "position": {"x": 1, "z": -3}, "orientation": {"w": 1}}]}
 
 
@@ -104,15 +103,6 @@ class WithNode(unittest.TestCase):
     def line(self):
         return json.loads(self.there.recv(4096))
 
-    @staticmethod
-    def wait_for(found):
-        """What found() gives once it is something."""
-        for _ in range(100 * PATIENCE_S):
-            if found():
-                return found()
-            threading.Event().wait(0.01)
-        raise AssertionError("did not come")
-
 
 class Poses(WithNode):
     def test_odometry_becomes_a_datagram(self):
@@ -145,7 +135,7 @@ class Poses(WithNode):
                 self.assertEqual(self.line()["position"][0], i)
             self.assertEqual((server.requests, server.answered), (1, 0))
             server.may_answer.set()
-            truth = self.wait_for(lambda: ros.published["~/vehicle_pose"])[0]
+            truth = wait_for(lambda: ros.published["~/vehicle_pose"])[0]
         self.assertEqual((truth.pose.position.x, truth.pose.position.z, truth.pose.orientation.w), (1, -3, 1))
         self.assertEqual((truth.header.frame_id, truth.header.stamp.sec, truth.header.stamp.nanosec), ("world", 7, 500000000))
 
@@ -153,15 +143,15 @@ class Poses(WithNode):
         server = self.server(may_answer=False)
         with mock.patch.object(polling, "LIMIT_S", 0.05):
             ros = self.bridge(odometry="/odom", truth_rate_hz=50.0, http=server.at)
-            self.wait_for(lambda: any("no status of sonard" in text for text in ros.logged))
-            self.wait_for(lambda: server.requests >= 3)
+            wait_for(lambda: any("no status of sonard" in text for text in ros.logged))
+            wait_for(lambda: server.requests >= 3)
 
     def test_a_closed_port_is_said(self):
         ros = self.bridge(odometry="/odom", sonard="127.0.0.1:9")
         def refused():
             ros.subscribed["/odom"](odometry())
             return [text for text in ros.logged if "does not listen" in text]
-        self.wait_for(refused)
+        wait_for(refused)
 
 
 class Fails:
@@ -206,7 +196,7 @@ class Helpers(WithNode):
         ros = self.bridge(http=server.at, truth_rate_hz=100, truth="/truth")
         ros.node.truth.publish = Fails(ros.published["/truth"])
         server.may_answer.set()
-        self.wait_for(lambda: ros.published["/truth"])
+        wait_for(lambda: ros.published["/truth"])
         self.assertEqual([text for text in ros.logged if "invalid" in text],
                          ["""not published: RuntimeError("publisher's handle is invalid")"""])
 
@@ -217,7 +207,7 @@ class Helpers(WithNode):
         ros = self.bridge(clock=True)
         ros.node.clock_topic.publish = Fails(ros.published["/clock"])
         self.may_go_on.set()
-        self.wait_for(lambda: ros.published["/clock"])
+        wait_for(lambda: ros.published["/clock"])
         self.assertEqual([message.clock.nanosec for message in ros.published["/clock"]], [2])
         self.assertEqual(len([text for text in ros.logged if text.startswith("not published: ")]), 1)
         self.assertEqual(len(made), 1)
@@ -231,7 +221,7 @@ class Helpers(WithNode):
         self.may_go_on.set()
         self.addCleanup(view.join)
         self.addCleanup(view.stop)
-        self.assertEqual(self.wait_for(lambda: times), [7])
+        self.assertEqual(wait_for(lambda: times), [7])
         self.assertEqual(len(troubles), 1)
         self.assertIn("the live view cannot be read: AttributeError", troubles[0])
 
@@ -316,13 +306,13 @@ class Token(WithNode):
             file = pathlib.Path(folder) / "token"
             file.write_text(server.token + "\n", encoding="utf-8")
             ros = self.bridge(odometry="/odom", truth_rate_hz=100.0, http=server.at, token_file=str(file))
-        self.wait_for(lambda: ros.published["~/vehicle_pose"])
+        wait_for(lambda: ros.published["~/vehicle_pose"])
 
     def test_that_one_is_missing_is_said(self):
         server = self.server()
         server.token = "0123456789abcdef"
         ros = self.bridge(odometry="/odom", truth_rate_hz=100.0, http=server.at)
-        self.wait_for(lambda: any("set the parameter token_file" in text for text in ros.logged))
+        wait_for(lambda: any("set the parameter token_file" in text for text in ros.logged))
 
 
 class Parameters(unittest.TestCase):

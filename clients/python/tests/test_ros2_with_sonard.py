@@ -9,12 +9,11 @@ import threading
 import unittest
 
 from common import ROOT, SONARD, config
-from ros_stand_ins import Ros
+from ros_stand_ins import PATIENCE_S, Ros, wait_for
 
 from sonard_bridge import conversions as c
 from sonard_client import Control, Daemon, OculusClient
 
-PATIENCE_S = 60
 SONARCTL = SONARD.parents[1] / "clients/sonarctl"
 A, B, C = (4.0, 20.0), (4.0, -10.0), (7.0, 8.0)  # m and degrees, positive to port: spheres of 0.1 m in scenes/l-targets.yaml
 RANGE_IMAGES = """
@@ -63,13 +62,6 @@ class WithSonard(unittest.TestCase):
         reader.start()
         self.addCleanup(client.close)
 
-    def wait_for(self, found):
-        for _ in range(100 * PATIENCE_S):
-            if found():
-                return found()
-            threading.Event().wait(0.01)
-        raise AssertionError("did not come")
-
 
 class ATargetToPort(WithSonard):
     def test_the_static_transform_of_the_image_frame(self):
@@ -93,7 +85,7 @@ class ATargetToPort(WithSonard):
         daemon = self.start(config())
         ros = self.bridge(daemon, scans=True)
         self.drive(daemon)
-        scan = self.wait_for(lambda: ros.published.get("~/front/scan"))[0]
+        scan = wait_for(lambda: ros.published.get("~/front/scan"))[0]
         self.assertEqual(scan.header.frame_id, "front")
         self.assertGreater(scan.header.stamp.sec, 1_600_000_000)
         self.assertAlmostEqual(scan.angle_min, -scan.angle_max, delta=0.01)
@@ -109,7 +101,7 @@ class ATargetToPort(WithSonard):
     def test_clouds_of_range_images(self):
         daemon = self.start(RANGE_IMAGES)
         ros = self.bridge(daemon, clouds=True, cloud_threshold=0)
-        cloud = self.wait_for(lambda: [m for m in ros.published.get("~/front/cloud", []) if m.width])[0]
+        cloud = wait_for(lambda: [m for m in ros.published.get("~/front/cloud", []) if m.width])[0]
         self.assertEqual((cloud.header.frame_id, cloud.height, cloud.row_step), ("front", 1, len(cloud.data)))
         self.assertEqual([(f.name, f.offset, f.datatype) for f in cloud.fields],
                          [("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("intensity", 12, 2)])
@@ -130,13 +122,13 @@ class ASurveyor(WithSonard):
                                 stdout=subprocess.DEVNULL)
         self.addCleanup(host.wait)
         self.addCleanup(host.terminate)
-        cloud = self.wait_for(lambda: [m for m in ros.published.get("~/down/cloud", []) if m.width])[0]
-        scan = self.wait_for(lambda: ros.published.get("~/down/scan"))[0]
+        cloud = wait_for(lambda: [m for m in ros.published.get("~/down/cloud", []) if m.width])[0]
+        scan = wait_for(lambda: ros.published.get("~/down/scan"))[0]
         straight_down = scan.ranges[round(-scan.angle_min / scan.angle_increment)]
         self.assertLess(straight_down, math.inf)
         points = [struct.unpack_from("<3f", cloud.data, i * cloud.point_step) for i in range(cloud.width)]
         self.assertLess(min(math.dist(point, (straight_down, 0, 0)) for point in points), 0.3)
-        mount = self.wait_for(lambda: ros.static)[0][0].transform.rotation
+        mount = wait_for(lambda: ros.static)[0][0].transform.rotation
         down = c.rotate(c.wxyz((mount.x, mount.y, mount.z, mount.w)), (1, 0, 0))  # x of its fan
         self.assertAlmostEqual(down[2], -1)
 
@@ -145,10 +137,10 @@ class Mounts(WithSonard):
     def test_they_follow_the_daemon(self):
         daemon = self.start(config())
         ros = self.bridge(daemon, tf_static=True, base_frame="base_link")
-        mount = self.wait_for(lambda: ros.static)[0][0]
+        mount = wait_for(lambda: ros.static)[0][0]
         self.assertEqual((mount.header.frame_id, mount.child_frame_id, mount.transform.rotation.w), ("base_link", "front", 1))
         Control(daemon.address).mount_sonar("front", position=(0.5, 0.2, 0), rpy_deg=(0, 30, 0), frame="FLU")
-        mount = self.wait_for(lambda: ros.static[1:])[0][0]
+        mount = wait_for(lambda: ros.static[1:])[0][0]
         self.assertAlmostEqual(mount.transform.translation.y, 0.2)
         ahead = c.rotate(c.wxyz([getattr(mount.transform.rotation, axis) for axis in "xyzw"]), (1, 0, 0))
         self.assertAlmostEqual(ahead[2], -0.5)  # bow down, as FLU has a positive pitch
@@ -161,15 +153,15 @@ class TheClock(WithSonard):
         control = Control(daemon.address)
         for dt_s, end_ns in ((0.1, 100_000_000), (0.25, 350_000_000)):
             self.assertEqual(int(control.step(dt_s)["now_ns"]), end_ns)
-            self.wait_for(lambda end_ns=end_ns: ros.node.last_clock_ns == end_ns)
+            wait_for(lambda end_ns=end_ns: ros.node.last_clock_ns == end_ns)
         last = ros.published["/clock"][-1]
         self.assertEqual((last.clock.sec, last.clock.nanosec), (0, 350_000_000))
-        self.wait_for(lambda: any(pose.header.stamp.nanosec == 350_000_000 for pose in ros.published["~/vehicle_pose"]))
+        wait_for(lambda: any(pose.header.stamp.nanosec == 350_000_000 for pose in ros.published["~/vehicle_pose"]))
 
     def test_real_time_needs_none(self):
         daemon = self.start(config())
         ros = self.bridge(daemon, clock=True)
-        self.wait_for(lambda: any("sonard's clock is realtime" in text for text in ros.logged))
+        wait_for(lambda: any("sonard's clock is realtime" in text for text in ros.logged))
         self.assertEqual(ros.published["/clock"], [])
 
 
@@ -181,9 +173,9 @@ class Token(WithSonard):
             token.chmod(0o600)
             daemon = self.start(config(more=f", token_file: {token}"))
             without = self.bridge(daemon, tf_static=True)
-            self.wait_for(lambda: any("token_file" in text for text in without.logged))
+            wait_for(lambda: any("token_file" in text for text in without.logged))
             ros = self.bridge(daemon, tf_static=True, truth_rate_hz=20.0, token_file=str(token))
-            self.wait_for(lambda: ros.static and ros.published["~/vehicle_pose"])
+            wait_for(lambda: ros.static and ros.published["~/vehicle_pose"])
 
 
 if __name__ == "__main__":
