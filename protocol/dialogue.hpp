@@ -1,5 +1,5 @@
-// One client's conversation with the emulated device, and what comes of it for the device. Pure: bytes and time in, replies and
-// events out.
+// One client's conversation with the emulated device, and its effects on the device. Pure: bytes and time in, replies and events
+// out.
 #pragma once
 
 #include <chrono>

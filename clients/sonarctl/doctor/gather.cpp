@@ -19,7 +19,7 @@ const Endpoint usual_http{"127.0.0.1", 8088};
 constexpr auto short_patience = 700ms, own_patience = 200ms;
 constexpr auto search_patience = 400ms, search_patience_here = 100ms;  // for an answer to discovery
 
-/// Of the sonars that announce themselves by status messages.
+/// Port of the sonars that announce themselves by status messages.
 const std::uint16_t usual_port = protocol::makes().front().ports.front().number;
 
 class Gathering {

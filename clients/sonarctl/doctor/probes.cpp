@@ -65,7 +65,7 @@ std::string line_of(const std::string& file) {
   return line;
 }
 
-/// Of that address, or of its network.
+/// Whether an interface has that address, or one of its network.
 bool has_interface(const std::string& ipv4, bool same_network) {
   const auto asked = address_of({ipv4, 0});
   ifaddrs* interfaces = nullptr;

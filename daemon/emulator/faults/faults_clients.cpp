@@ -1,4 +1,4 @@
-// Faults of clients: whom they concern, admission, the outcome of requests.
+// Faults of clients: which clients they act on, admission, outcomes of requests.
 #include "daemon/emulator/faults/faults.hpp"
 
 namespace sonar {

@@ -161,7 +161,7 @@ class Page:
                         f"(e.getBoundingClientRect())))(document.querySelector({json.dumps(selector)}))")
 
     def press_mouse(self, selector):
-        """As a mouse does: what lies over the element gets it."""
+        """Clicks as a mouse does: the topmost element at that place gets the click."""
         x, y = self.place(selector)
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)

@@ -1,4 +1,4 @@
-// Pictures that are no fan of one ping: what lies where, and what is refused.
+// Pictures other than the fan of one ping: positions of what is drawn, and refusals.
 #include "core/image/draw_picture.hpp"
 
 #include <gmock/gmock.h>
