@@ -107,6 +107,8 @@ FORBIDDEN = [
     ("global random", r"core/", None, r"\bstd::(mt19937|random_device|default_random_engine)|\bs?rand\s*\(", "random numbers are counter-based, core/base/random.hpp"),
     ("test namespace", r"tests/", None, r"\bnamespace\s+(\w+::)*testing\b(?!_)", "it hides GoogleTest's from files compiled together: name it tests"),
     ("quiet grep", r"", None, r"\| *gr" + r"ep -\w*q", "it ends before its input does, and under pipefail the pipe then fails: test \"$(command)\" instead"),
+    ("precompiled header", r"", None, r"target_precompile_headers\(\w+ (PRIVATE|PUBLIC|INTERFACE)[^)]*\s[^<\s)][^)]*\)",
+     "name headers of other packages, <...>: a compiler cache may return the precompiled header of an older comment of ours"),
     ("mark", r"", None, r"\b(TO" + r"DO|FIX" + r"ME|X" + r"XX)\b", "finish it, or write an issue"),
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]

@@ -80,6 +80,7 @@ class Planted(unittest.TestCase):
                 ("daemon/a.cpp", "int x;  // TO" + "DO later", "mark"),
                 ("tests/a_test.cpp", "namespace sonar::test" + "ing {\n}\n", "test namespace"),
                 ("a.sh", "list | gr" + "ep -iq word", "quiet grep"),
+                ("daemon/CMakeLists.txt", "target_precompile_headers(d PRIV" + "ATE <utility> server/asio.hpp)", "precompiled header"),
                 (PAGE, "run it in " + SLASH + "ho" + "me/me/sonard", "machine path"),
                 ("tests/daemon/a.cpp", 'open("' + SLASH + "t" + 'mp/x");', "machine path")]:
             with self.subTest(name=name, line=line):

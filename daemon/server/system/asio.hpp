@@ -7,10 +7,6 @@
 #include <string>
 #include <utility>
 
-#if defined(__clang__)  // Boost 1.74 knows Clang's coroutines from before the standard only
-#define BOOST_ASIO_HAS_CO_AWAIT 1
-#define BOOST_ASIO_HAS_STD_COROUTINE 1
-#endif
 #include <boost/asio.hpp>
 
 namespace sonar {
