@@ -30,7 +30,7 @@ Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const Make
   Result<void> made;
   const auto& kinds = make.codec.files;
   for (const auto& [ending, path] : options.files) {
-    if (std::none_of(kinds.begin(), kinds.end(), [&ending](const auto& kind) { return kind.ending == ending; }))
+    if (std::none_of(kinds.begin(), kinds.end(), [&wanted = ending](const auto& kind) { return kind.ending == wanted; }))
       return failure(ErrorKind::usage, path.string() + ": such files do not hold the messages of " + std::string(make.title) +
                                            ": --mcap and --pcap hold those of every sonar");
   }
