@@ -136,7 +136,7 @@ LONGEST_FILE = 400  # lines; tests may be longer
 FRAGMENT = re.compile(r"[ \t]*//+<?[ \t]*(Of|What|Nothing:)(?=[\s,])")
 PERSONS = re.compile(r"\b(to" + r"ld|no" + r"body|some" + r"body|who" + r"ever|ow" + r"ed)\b", re.I)
 # Rooms that still have some; a room leaves the list when it is clean.
-WITH_FRAGMENTS = ("protocol/", "clients/ros2_bridge/", "clients/sonarctl/", "clients/web/", "daemon/emulator/view/", "daemon/server/view/")
+WITH_FRAGMENTS = ("protocol/",)
 
 
 def tracked_files(root):

@@ -30,7 +30,7 @@ class ViewDoctor {
  private:
   using Steady = std::chrono::steady_clock;
   void look();
-  /// What shows a driver on a wrong address.
+  /// Signs of a driver on a wrong address.
   doctor::Elsewhere look_elsewhere();
 
   Operations& operations_;
