@@ -48,7 +48,7 @@ class ArisDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  private:
-  /// What commands change: the settings commanded last, which a fault may hold back, or others that replaced them.
+  /// The settings that the next command changes: those commanded last, which a fault may hold back, or others that replaced them.
   Settings base() {
     if (device_.settings != seen_) {
       const auto applied = std::find(waiting_.begin(), waiting_.end(), device_.settings);
