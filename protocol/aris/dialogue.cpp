@@ -110,7 +110,7 @@ class ArisDialogue final : public protocol::Dialogue {
       if (wanted.port == 0 || wanted.port > 65535) return notice(reaction, "ignored a receiver without a port");
       if (!wanted.ip.empty()) {
         const auto ip = text::parse_ipv4(wanted.ip);
-        if (!ip) return notice(reaction, "ignored a receiver whose address is none");
+        if (!ip) return notice(reaction, "ignored SET_FRAMESTREAM_RECEIVER: not an IPv4 address");
         to.ip = *ip;
         const bool own = *ip == device_.connected_client || is_multicast(*ip);
         if (!own && text_option(device_.options, option_name::receivers) == "controller")

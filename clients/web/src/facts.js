@@ -148,7 +148,7 @@ export class Facts {
     this.receivedBytes += image.data.length;
     this.received.add(now_s(), this.receivedBytes);
     this.ping = { image, geometry, ns, at: now_s(), about: drawn ? this.pictures.get(this.sonar) ?? {} : null };
-    const event = this.events.get(ns) ?? (geometry?.ns === ns ? geometry : null);  // newcomers get the last picture without its event
+    const event = this.events.get(ns) ?? (geometry?.ns === ns ? geometry : null);  // a new subscriber gets the last picture without its event
     if (event) this.count(this.ping, event);
   }
 

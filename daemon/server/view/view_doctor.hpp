@@ -22,7 +22,7 @@ class ViewDoctor {
   /// Both outlive it.
   ViewDoctor(Operations& operations, const Clock& clock) : operations_(operations), clock_(clock) {}
 
-  /// The findings for newcomers: no older than the period. Null: there is no status.
+  /// The findings for a new subscriber, no older than the period. Null: there is no status.
   ViewPayloadPointer newest();
   /// The same, null when all who have subscribed know it.
   ViewPayloadPointer news();
