@@ -23,6 +23,8 @@ constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hos
 
 bool is_multicast(protocol::Ipv4 ip) { return ip[0] >= 224 && ip[0] < 240; }
 
+/// One controller's conversation (docs/protocols/aris.md, "Session"). The device never answers over TCP: its state is in beacons
+/// and frame headers. Frames flow once acoustic settings were valid and a receiver is set, in any order of the two.
 class ArisDialogue final : public protocol::Dialogue {
  public:
   explicit ArisDialogue(const DeviceState& device) : device_(device), seen_(device.settings), first_ping_(device.last_ping) {}
@@ -30,6 +32,7 @@ class ArisDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
+    // All commands of a call become one change of settings, as the last of them leaves it.
     settings_ = base();
     settings_.streaming |= streaming_;
     settings_.first_ping = std::min(settings_.first_ping, first_ping_);  // of the controller that connected first
@@ -95,12 +98,13 @@ class ArisDialogue final : public protocol::Dialogue {
   }
 
   void on_date_time(const Command& command, Time now, Reaction& reaction) {
-    const auto told = parse_date_time(command.date_time ? command.date_time->text : std::string());
-    if (!told) return notice(reaction, "ignored a date and time that cannot be read");
-    settings_.clock_offset = *told - now;
+    const auto date_time = parse_date_time(command.date_time ? command.date_time->text : std::string());
+    if (!date_time) return notice(reaction, "ignored a date and time that cannot be read");
+    settings_.clock_offset = *date_time - now;
     changed_ = true;
   }
 
+  /// An empty address stands for the controller's own, 0.0.0.0 in the event; the address 0.0.0.0 stops the frames.
   void on_receiver(const Command& command, Reaction& reaction) {
     const Receiver wanted = command.receiver.value_or(Receiver{});
     protocol::SetReceivers receivers;
