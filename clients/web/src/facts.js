@@ -1,4 +1,4 @@
-// What the page knows of the daemon: messages come in, panels read. No drawing here.
+// The page's knowledge of the daemon: messages come in, panels read. No drawing here.
 import { Counter, Counters } from './rates.js';
 
 const log_lines = 500;
