@@ -189,7 +189,7 @@ class DeviceEngine final : public PingEngine {
         continue;
       }
       if (const std::string why = why_by_cpu(wanted_[i].request); !why.empty()) {
-        if (told_.insert(why).second) say("CUDA: " + why);
+        if (reported_.insert(why).second) say("CUDA: " + why);
         compute_by_cpu(wanted_[i++]);
         continue;
       }
@@ -358,7 +358,7 @@ class DeviceEngine final : public PingEngine {
   std::deque<Call> calls_;         // that were not collected, in order
   std::deque<WantedPing> wanted_;  // theirs
   Workspace work_;                 // of the CPU
-  std::set<std::string> told_;
+  std::set<std::string> reported_;
   PingStatistics statistics_;
   std::vector<PingStatistics> each_;   // of the last call that was collected
   bool one_room_ = false;              // for lack of memory: nothing is prepared while the device computes

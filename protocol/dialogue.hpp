@@ -54,7 +54,7 @@ struct RequestPing {   // one ping now (network trigger, BlueView)
   double head_rad = 0;
   std::shared_ptr<const VendorSettings> with = nullptr;
 };
-/// What a client wrote as the device's address; stored, never applied.
+/// The device's address as a client wrote it; stored, never applied.
 struct StoredAddress {
   std::uint32_t ip = 0, netmask = 0;
   bool dhcp = false;
@@ -91,11 +91,11 @@ class Dialogue {
   virtual Time next_tick() const = 0;
   /// Time of the next ping that on_tick() will request by itself. Stepped time advances to it, but not for keep-alives alone.
   virtual std::optional<Time> next_ping_request() const { return std::nullopt; }
-  /// A client that says nothing for longer has gone. By the wall's clock, whatever the time is that the dialogue is told of:
-  /// clients live by theirs. Nothing: it may be silent.
+  /// A client that is silent for longer has gone. Counted in wall time, because clients run in wall time even where that of
+  /// on_bytes() and on_tick() is simulated. Nothing: it may be silent.
   virtual std::optional<std::chrono::milliseconds> longest_silence() const { return std::nullopt; }
-  /// Of one with longest_silence() by datagrams: known hosts say nothing while they get pings, so that a computer which answers
-  /// for the host is as good as a word.
+  /// Whether known hosts send nothing while they get pings. Then, with longest_silence() and datagrams, an answer of the host's
+  /// computer counts as a message of the host.
   virtual bool hosts_fall_silent() const { return false; }
   /// A ping was put into this client's outbox: keep-alives only fill silence.
   virtual void on_ping_queued(Time now) = 0;

@@ -48,7 +48,7 @@ struct HostPing {
   /// What people look at; unset: a fan of `picture`.
   std::function<SonarPicture()> drawing = {};
 };
-/// Of any make.
+/// Draws a ping of any make.
 Result<SonarPicture> drawing_of(const HostPing& ping);
 
 /// Bytes for a port of the host, counted from 0.
@@ -102,7 +102,7 @@ class Host {
   virtual bool is_open() const { return true; }
   /// "an ARIS", "a BlueView P900-90, serial 7001"
   virtual std::string about() const = 0;
-  /// Of a wire whose messages can be told from other bytes and are numbered.
+  /// Counts on a wire whose messages are numbered and differ from other bytes.
   struct Counts {
     std::uint64_t messages = 0, dummies = 0, junk_bytes = 0, missing_pings = 0;
   };
@@ -111,7 +111,7 @@ class Host {
   virtual bool expects_echo() const { return false; }
 };
 
-/// What a beacon says to hosts.
+/// The content of a beacon for hosts.
 struct Announcement {
   Ipv4 address{}, client{};  // where hosts connect; who is connected, 0.0.0.0: no one
   std::uint32_t device_id = 0;

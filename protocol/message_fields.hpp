@@ -7,7 +7,7 @@
 
 namespace sonar::protocol {
 
-/// What a field of a message means, whatever a vendor calls it.
+/// The meaning of a message's field, whatever a vendor calls it.
 enum class FieldName {
   magic,
   source_id,
@@ -56,7 +56,7 @@ static_assert(field_names.size() == static_cast<std::size_t>(FieldName::mac) + 1
 
 /// The message that carries a ping, as a client receives it, prefix included; the beacon.
 enum class Part { ping, beacon };
-/// Of a ping: what every message begins with, the other fields, the table of the beams' directions, the samples.
+/// Regions of a ping: the header that every message has, the other fields, the table of the beams' directions, the samples.
 enum class Region { header, metadata, bearings, image };
 inline constexpr std::array<std::string_view, 4> region_names{"header", "metadata", "bearings", "image"};
 

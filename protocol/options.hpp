@@ -35,7 +35,7 @@ inline std::string_view text_option(const OptionValues& values, std::string_view
   return found == values.end() ? std::string_view{} : std::string_view(found->second);
 }
 
-/// Nothing: a word stands for the number.
+/// The option's number; nothing if it is a word.
 inline std::optional<double> given_number(const OptionValues& values, std::string_view name) {
   const std::string_view text = text_option(values, name);
   double value = 0;

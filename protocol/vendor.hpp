@@ -42,7 +42,7 @@ struct DeviceState {
   std::shared_ptr<const VendorSettings> settings;  // now; null = Vendor::initial_settings
   std::uint32_t last_ping = 0;                     // number of the ping that was fired last
   Time framed_at{};                                // stamp of the ping that was framed before; Time{} = there is none
-  std::chrono::nanoseconds skipped{0};             // by which stamps of pings are ahead of the time that dialogues are told
+  std::chrono::nanoseconds skipped{0};             // by which stamps of pings are ahead of the dialogues' time
   bool simulated_time = false;                     // it may stop while clients wait
   StoredAddress stored_address;
 };
@@ -64,7 +64,7 @@ class Vendor {
   /// The model that a device with these (complete) options emulates; asked once, when its configuration is read.
   virtual Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
                                                           const OptionValues& options) const = 0;
-  /// What the device does before any client spoke (its stored configuration).
+  /// The settings before any client has sent some (the device's stored configuration).
   virtual ChangeSettings initial_settings(const DeviceState& device) const = 0;
   /// The settings that a client of this vendor would have requested: those that hold now (DeviceState::settings) with the
   /// override applied. A refusal states what the product can do.
@@ -72,7 +72,7 @@ class Vendor {
   /// The gain as SettingsOverride::gain_percent has it: 0 to 100 of what a client can turn it.
   virtual double gain_percent(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;
-  /// Of a mechanical scan: the ping of that number, from 1, as a usual host requests it. Others: nothing.
+  /// The ping of that number, from 1, of a mechanical scan, as a usual host requests it. Other sonars: nothing.
   struct ScanStep {
     RequestPing aim;
     PingSettings settings;
@@ -83,30 +83,30 @@ class Vendor {
   }
   /// Empty when the vendor has no beacon.
   virtual Bytes beacon(const DeviceState& device, Time now) const = 0;
-  /// Of a port of kind udp_answer. Any bytes; each reply is one datagram to the sender.
+  /// Answers a datagram, of any bytes, at a port of kind udp_answer; each reply is one datagram to the sender.
   virtual Reaction on_datagram(const Port& port, BytesView datagram, const DeviceState& device, Time now) const {
     static_cast<void>(port), static_cast<void>(datagram), static_cast<void>(device), static_cast<void>(now);
     return {};
   }
-  /// Of a port of kind http. Any path, method and body.
+  /// Answers a request, of any path, method and body, at a port of kind http.
   virtual ResourceReply on_http(const Port& port, const ResourceRequest& request, const DeviceState& device, Time now) const {
     static_cast<void>(port), static_cast<void>(request), static_cast<void>(device), static_cast<void>(now);
     return {404, "not found\n", "text/plain"};
   }
-  /// Of a port of kind udp_dialogue: whether a datagram comes from a host that speaks the protocol. Others are dropped, so that
+  /// Whether a datagram at a port of kind udp_dialogue comes from a host that speaks the protocol. Others are dropped, so that
   /// they neither open a dialogue nor take it over.
   virtual bool is_request(const Port& port, BytesView datagram) const {
     static_cast<void>(port), static_cast<void>(datagram);
     return false;
   }
-  /// Of a port of kind tcp_stream or udp_dialogue. The state must outlive the dialogue.
+  /// A new dialogue at a port of kind tcp_stream or udp_dialogue. The state must outlive it.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
   /// Whether pings travel over TCP; else frame() returns null.
   virtual bool pings_over_tcp() const { return true; }
   /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings).
   virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const = 0;
-  /// Of a port of kind udp_stream with receivers, or udp_dialogue: the datagrams of a ping in order, at most 65,507 bytes each.
-  /// Of one of kind tcp_stream with a gap: the parts of frame() between which it pauses.
+  /// The datagrams of a ping in order, at most 65,507 bytes each, for a port of kind udp_stream with receivers, or udp_dialogue.
+  /// For one of kind tcp_stream with a gap: the parts of frame() between which it pauses.
   virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};
@@ -124,7 +124,7 @@ class Vendor {
     static_cast<void>(part), static_cast<void>(name), static_cast<void>(change), static_cast<void>(message);
     return false;
   }
-  /// Of a ping whose fields were changed, of the same size as `before`: makes the checksums of what was changed right again.
+  /// Corrects the checksums of a ping whose fields were changed; it has the size of `before`.
   virtual void reseal(BytesView before, Bytes& message) const { static_cast<void>(before), static_cast<void>(message); }
   /// {offset, size} of a region. Nothing: the vendor has no such region, or the ping is too short. Of an empty `ping`: {0, 0}
   /// when the vendor has such a region.
@@ -146,7 +146,7 @@ struct Profile {
 };
 Result<Profile> find_profile(std::string_view profile);
 
-/// Of a sonar at `ip`, port by port; `status_to`: where its status messages go.
+/// The addresses of a sonar at `ip`, port by port; `status_to`: where its status messages go.
 std::vector<DriverAddress> driver_addresses(const Vendor& vendor, Ipv4 ip, std::span<const Endpoint> status_to);
 /// "tcp        127.0.0.2:52100            the driver speaks first"
 std::string line_of(std::string_view protocol, std::string_view at, bool sonar_speaks_first);

@@ -64,7 +64,7 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
   PingStream* const stream = &opened->stream;
   auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
   std::optional<std::chrono::steady_clock::time_point> whole_by;
-  bool received = !stream->host().counts();  // of which other messages are not told from junk
+  bool received = !stream->host().counts();  // without counts, other messages look like junk
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
     PingStream::Item item = stream->next(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(500)));

@@ -81,7 +81,7 @@ class LiveView {
     const bool has_screen = options_.terminal && terminal_facts().is_terminal;
     const LiveScreen screen(has_screen);
     double heard_s = now_s();
-    bool received = !stream_.host().counts();  // of which other messages are not told from junk
+    bool received = !stream_.host().counts();  // without counts, other messages look like junk
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
       PingStream::Item item = stream_.next(std::chrono::milliseconds(500));
       if (item.what == Wait::closed)

@@ -1,4 +1,4 @@
-// For programs that load what strangers wrote: names in it cannot lead to other files of this machine.
+// For programs that load files of unknown origin: names in them cannot lead to other files of this machine.
 #pragma once
 
 #include <filesystem>

@@ -23,6 +23,8 @@ constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hos
 
 bool is_multicast(protocol::Ipv4 ip) { return ip[0] >= 224 && ip[0] < 240; }
 
+/// One controller's conversation (docs/protocols/aris.md, "Session"). The device never answers over TCP: its state is in beacons
+/// and frame headers. Frames flow once acoustic settings were valid and a receiver is set, in any order of the two.
 class ArisDialogue final : public protocol::Dialogue {
  public:
   explicit ArisDialogue(const DeviceState& device) : device_(device), seen_(device.settings), first_ping_(device.last_ping) {}
@@ -30,6 +32,7 @@ class ArisDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
+    // All commands of a call become one change of settings, as the last of them leaves it.
     settings_ = base();
     settings_.streaming |= streaming_;
     settings_.first_ping = std::min(settings_.first_ping, first_ping_);  // of the controller that connected first
@@ -48,7 +51,7 @@ class ArisDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  private:
-  /// What commands change: the settings commanded last, which a fault may hold back, or others that replaced them.
+  /// The settings that the next command changes: those commanded last, which a fault may hold back, or others that replaced them.
   Settings base() {
     if (device_.settings != seen_) {
       const auto applied = std::find(waiting_.begin(), waiting_.end(), device_.settings);
@@ -95,12 +98,13 @@ class ArisDialogue final : public protocol::Dialogue {
   }
 
   void on_date_time(const Command& command, Time now, Reaction& reaction) {
-    const auto told = parse_date_time(command.date_time ? command.date_time->text : std::string());
-    if (!told) return notice(reaction, "ignored a date and time that cannot be read");
-    settings_.clock_offset = *told - now;
+    const auto date_time = parse_date_time(command.date_time ? command.date_time->text : std::string());
+    if (!date_time) return notice(reaction, "ignored a date and time that cannot be read");
+    settings_.clock_offset = *date_time - now;
     changed_ = true;
   }
 
+  /// An empty address stands for the controller's own, 0.0.0.0 in the event; the address 0.0.0.0 stops the frames.
   void on_receiver(const Command& command, Reaction& reaction) {
     const Receiver wanted = command.receiver.value_or(Receiver{});
     protocol::SetReceivers receivers;
@@ -110,7 +114,7 @@ class ArisDialogue final : public protocol::Dialogue {
       if (wanted.port == 0 || wanted.port > 65535) return notice(reaction, "ignored a receiver without a port");
       if (!wanted.ip.empty()) {
         const auto ip = text::parse_ipv4(wanted.ip);
-        if (!ip) return notice(reaction, "ignored a receiver whose address is none");
+        if (!ip) return notice(reaction, "ignored SET_FRAMESTREAM_RECEIVER: not an IPv4 address");
         to.ip = *ip;
         const bool own = *ip == device_.connected_client || is_multicast(*ip);
         if (!own && text_option(device_.options, option_name::receivers) == "controller")

@@ -33,8 +33,8 @@ Bytes make_beacon(const protocol::DeviceState& device);
 
 /// Vendor::change_integer of a datagram of a frame: ping_id (FrameIndex, which counts from 0) and image_size (total_data_size).
 bool change_part(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& part);
-/// Of a beacon: device_id; connected_address (not 0: a controller is connected); device_status (of an Oculus: 0x4000 too hot,
-/// 0x8000 stopped by heat).
+/// The same of a beacon: device_id; connected_address (not 0: a controller is connected); device_status (bits of an Oculus:
+/// 0x4000 too hot, 0x8000 stopped by heat).
 bool change_beacon(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& beacon);
 
 /// A whole frame, as its parts say.

@@ -57,7 +57,7 @@ Place place_of(BytesView inside, BytesView whole) {
   return {inside.empty() ? whole.size() : static_cast<std::size_t>(inside.data() - whole.data()), inside.size()};
 }
 
-/// Nothing: the part has no frame header.
+/// The first part of a frame; nothing if the part has no frame header.
 std::optional<FramePart> first_of(BytesView first_part) {
   FramePart part;
   return protobuf::read(first_part, part) && part.header ? std::optional(part) : std::nullopt;

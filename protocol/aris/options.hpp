@@ -1,4 +1,4 @@
-// What the public sources leave unknown about an ARIS, as options of a sonar's configuration.
+// Properties of an ARIS that the public sources do not state, as options of a sonar's configuration.
 #pragma once
 
 #include <span>

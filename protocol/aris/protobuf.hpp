@@ -67,7 +67,7 @@ struct RawField {
 class RawReader {
  public:
   explicit RawReader(BytesView message) : rest_(message) {}
-  /// Nothing: the end, or bytes that are no field; see ok().
+  /// The next field; nothing at the end, or at bytes that are no field: see ok().
   std::optional<RawField> next();
   bool ok() const { return ok_; }
 

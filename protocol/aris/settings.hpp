@@ -20,7 +20,7 @@ struct Settings {
   bool valid = false;                                       // a SET_ACOUSTICS was accepted
   bool streaming = false;                                   // a receiver is set
   std::uint32_t applied = 0, constrained = 0, invalid = 0;  // the last cookie of each kind
-  std::uint32_t salinity = 35;                              // 0, 15, 35, as the device was told
+  std::uint32_t salinity = 35;                              // 0, 15, 35, as SET_SALINITY sets it
   bool telephoto = false;
   std::uint32_t focus_from = 0, focus_to = 0;  // 0 to 1000
   Time focus_set_at{};
@@ -39,7 +39,7 @@ Settings initial_settings(const protocol::DeviceState& device);
 /// initial_settings() for null.
 Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device);
 
-/// From the temperature and depth of the water at the device, and the salinity that it was told [m/s].
+/// Sound speed from the temperature and depth of the water at the device, and the salinity that was set [m/s].
 double sound_speed_mps(double temperature_c, double salinity_psu, double depth_m);
 
 /// Highest frame rate with these settings, 1 to 15 [Hz].
@@ -48,7 +48,7 @@ double highest_frame_rate_hz(const Product& product, const Acoustics& acoustics,
 /// Start delay, samples and a rest [us].
 std::uint32_t shortest_cycle_us(const Acoustics& acoustics);
 
-/// What the device makes of a SET_ACOUSTICS.
+/// The device's answer to a SET_ACOUSTICS.
 struct Verdict {
   std::string refusal;  // empty = valid
   Acoustics used;

@@ -129,6 +129,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     return alias ? std::optional<int>(0) : std::nullopt;
   }
 
+  /// Until a HELLO of our version only HELLO and KEEPALIVE are accepted; other requests get error 14004.
   void on_frame(const Frame& frame, Time now, Reaction& reaction) {
     wire::Reader reader(frame.payload);
     switch (frame.header.type) {
@@ -251,6 +252,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reaction.replies.push_back(make_frame(reply_to(FrameType::get), frame.header.request_id, payload));
   }
 
+  /// A trigger waits until on_ping() answers it, or until its time is over: error 18 by on_tick().
   void on_ping_request(const Frame& frame, int head, wire::Reader& reader, Time now, Reaction& reaction) {
     std::uint32_t timeout_ms = 0;
     reader("timeout_ms", timeout_ms);
@@ -264,6 +266,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     ask_for_ping(head, reaction);
   }
 
+  /// A host has one subscription: a new one replaces it, interval 0 ends it.
   void on_subscribe(const Frame& frame, int head, wire::Reader& reader, Time now, Reaction& reaction) {
     std::uint32_t interval_ms = 0;
     reader("interval_ms", interval_ms);
@@ -276,6 +279,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reaction.replies.push_back(make_frame(reply_to(FrameType::subscribe), frame.header.request_id, {}));
   }
 
+  /// Selects the head first, because a ping is made of the active head. It joins a ping in progress that has these settings.
   void ask_for_ping(int head, Reaction& reaction) {
     settings_.active_head = head;
     reaction.events.emplace_back(change());

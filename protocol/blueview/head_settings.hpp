@@ -28,7 +28,7 @@ struct HeadSettings {
   bool operator==(const HeadSettings&) const = default;
 };
 
-/// Of the whole sonar.
+/// Settings of the whole sonar.
 struct SonarSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
 

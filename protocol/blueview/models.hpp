@@ -11,7 +11,7 @@
 
 namespace sonar::blueview {
 
-/// Of one head, beside its FrequencyMode.
+/// Values of one head that its FrequencyMode does not have.
 struct HeadPreset {
   int beams = 512;
   double bin_m = 0.0254;  // range resolution

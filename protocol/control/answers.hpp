@@ -18,7 +18,7 @@ void fill(v1::Quat& out, Quatd q);
 /// Numbers that have been checked; an orientation that is not given is level.
 Pose pose_from(const v1::Vec3& position, const v1::Quat& orientation);
 
-/// Of messages with a position and an orientation in the world, ENU and FLU, metres.
+/// Fills messages that have a position and an orientation in the world, ENU and FLU, metres.
 template <class Message>
 void set_pose(Message& out, const Pose& in_world) {
   fill(*out.mutable_position(), in_world.position_m);

@@ -5,7 +5,7 @@
 namespace sonar::control {
 namespace {
 
-/// Nothing: it does not end within the bytes.
+/// Reads a varint off the front; nothing if it does not end within the bytes.
 std::optional<std::uint64_t> take_varint(BytesView& bytes) {
   std::uint64_t value = 0;
   for (std::size_t i = 0; i < bytes.size() && i < 10; ++i) {

@@ -135,7 +135,7 @@ Result<StopRecording> from(const v1::StopRecording& m) {
 
 Subscribe from(const v1::Subscribe& m) { return {m.pings(), m.clients(), m.poses(), m.scene(), m.faults()}; }
 
-/// Of a parameter; JSON and protobuf give numbers, words and truth values.
+/// A parameter as text; JSON and protobuf give numbers, strings and booleans.
 Result<std::string> text_from(const std::string& key, const google::protobuf::Value& value) {
   if (value.kind_case() == google::protobuf::Value::kStringValue) return checked_text(value.string_value(), key.c_str(), false);
   if (value.kind_case() == google::protobuf::Value::kBoolValue) return std::string(value.bool_value() ? "yes" : "no");

@@ -245,7 +245,7 @@ class SonarJudge {
   std::vector<Finding>& findings_;
 };
 
-/// What time that does not pass by itself waits for.
+/// Finds what time waits for where it does not pass by itself.
 void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, std::vector<Finding>& findings) {
   if (now.clock() == "realtime") return findings.push_back({Level::ok, "clock", "Time runs: clock: realtime", ""});
   const v1::ClientStatus* slowest = nullptr;

@@ -9,7 +9,8 @@
 
 namespace sonar::doctor {
 
-/// What programs of the daemon's computer try, for drivers on a wrong address. Read only while no driver is connected.
+/// Connection attempts of programs on the daemon's computer: they show a driver on a wrong address. Read only while no driver is
+/// connected.
 struct Elsewhere {
   std::vector<SocketLine> tcp;
   std::uint64_t refused = 0;  // connections, in the last seconds

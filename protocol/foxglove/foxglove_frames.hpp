@@ -15,7 +15,7 @@ namespace sonar::foxglove {
 using wire::Bytes;
 using wire::BytesView;
 
-/// What a message of a channel begins with; its payload follows.
+/// The head of a channel's message; its payload follows.
 Bytes message_head(std::uint32_t subscription, Time at);
 Bytes time_frame(Time now);
 
@@ -44,7 +44,8 @@ struct PlaybackControl {
   Time to{};  // of a seek
   std::string request;
 };
-/// Of a viewer. bad_data: shorter than its layout, lengths that do not fit, an opcode that viewers do not have here.
+/// Reads a frame that a viewer sent. bad_data: it is shorter than its layout, its lengths do not fit, or viewers do not send that
+/// opcode here.
 Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView frame);
 
 /// For tests and clients.

@@ -93,7 +93,7 @@ std::string stray_field(const Read& object, std::span<const std::string_view> kn
     if (std::find(known.begin(), known.end(), key) == known.end()) return key.substr(0, 64);
   return {};
 }
-/// Of the messages that are read here, and of the objects in their lists.
+/// The first unknown field of a message or of an object in its lists.
 std::string stray_field(const Read& word) {
   constexpr std::array<std::string_view, 6> fields{"op",        "id", "subscriptions", "subscriptionIds", "parameterNames",
                                                    "parameters"};

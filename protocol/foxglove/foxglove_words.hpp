@@ -33,7 +33,7 @@ struct Service {
   std::string name, type;  // JSON objects both ways
 };
 
-/// Of a parameter. monostate = unset; a value of another type than these is no parameter of ours.
+/// A parameter's value. monostate = unset; OtherValue = of a type that no parameter of ours has.
 struct OtherValue {
   bool operator==(const OtherValue&) const = default;
 };

@@ -48,7 +48,7 @@ std::uint16_t checksum(BytesView bytes, std::uint16_t crc) {
   return crc;
 }
 
-/// Of version 2, as it is written.
+/// The header of version 2, as it is written.
 struct Header2 {
   std::byte magic{};
   std::uint8_t payload_size = 0;

@@ -92,7 +92,7 @@ class MavlinkPoses {
     Pose enu_in_world;  // at the vehicle
     Vec3d ned_mps;
   };
-  /// Of a vehicle without a place, such as a BlueROV2 without DVL.
+  /// The depth of a vehicle that sends no position, such as a BlueROV2 without DVL.
   struct Depth {
     std::int64_t at_ms = 0;
     double down_m = 0, down_mps = 0;

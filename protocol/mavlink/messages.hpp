@@ -126,7 +126,7 @@ constexpr void extensions(V& visit, M& m) {
   visit("time_usec", m.time_us);
 }
 
-/// What a pilot's display shows.
+/// Values for a pilot's display.
 struct VfrHud {
   static constexpr std::uint32_t id = 74;
   static constexpr std::uint8_t crc_extra = 20;

@@ -32,7 +32,7 @@ PlaceReading place_of(const LocalPositionNed& m);
 /// Errors: a latitude or longitude beyond the globe's.
 Result<std::optional<Geodetic>> geodetic_of(const GlobalPositionInt& m);
 Result<std::optional<Geodetic>> geodetic_of(const GpsGlobalOrigin& m);
-/// Of the integers when they are there, else of the floats.
+/// Reads the integers where the message has them, else the floats.
 Result<std::optional<Geodetic>> geodetic_of(const SimState& m);
 
 control::RawPose raw_pose(const AttitudeReading& attitude, const PlaceReading& place);

@@ -22,6 +22,10 @@ using protocol::StoreAddress;
 constexpr std::size_t notices_per_call = 8;               // bounds the log output that a hostile client can cause
 constexpr auto greeting_after = std::chrono::seconds(2);  // without a fire message: drivers that fire by themselves do so at once
 
+/// One client's conversation (docs/protocols/oculus.md, section 1). Three states:
+/// - Until the first valid fire message: a dummy after each period of silence, and the text of 6.1 to a client that stays silent.
+/// - Pinging: no dummies, however long a ping takes. With network trigger they fill the time in which no ping is requested.
+/// - Standby (ping rate 5): a dummy at once, then one after each period of silence.
 class OculusDialogue final : public protocol::Dialogue {
  public:
   OculusDialogue(const DeviceState& device, Time now) : device_(device) {
@@ -101,6 +105,7 @@ class OculusDialogue final : public protocol::Dialogue {
     const bool standby = resolved.settings.rate_hz <= 0;
     const bool repeated = request == last_request_;
     last_request_ = request;
+    // Drivers repeat a fire message for every ping: a repeat is applied again, but its standby is not acknowledged again.
     const bool one_ping = resolved.settings.triggered && !standby;
     is_heard_ = is_heard();
     fired_ = std::make_shared<HeldFire>(*fire);
@@ -135,7 +140,7 @@ class OculusDialogue final : public protocol::Dialogue {
     wire::Reader reader(message);
     fields(reader, config);
     if (!reader.ok()) return notice(reaction, "ignored a user configuration: " + reader.failure_text());
-    const bool write = config.ip_address != 0;
+    const bool write = config.ip_address != 0;  // address 0 reads
     if (write) {
       stored_ = {config.ip_address, config.ip_mask, config.dhcp_enable != 0};
       reaction.events.emplace_back(StoreAddress{stored_});

@@ -15,6 +15,7 @@ namespace {
 /// more.
 constexpr double truncation_guard_cdeg = 1e-3;
 
+/// The short form of versions 0 and 1: without extension and attitude, the start time as a 32-bit counter.
 PingResultV1 version_1(const PingHead& head) {
   const PingResultV2& from = head.fixed;
   PingResultV1 to;
@@ -35,6 +36,7 @@ PingResultV1 version_1(const PingHead& head) {
   return to;
 }
 
+/// Row by row, nearest first: the row's gain, if gains were requested, then its samples from port to starboard.
 void append_image(wire::Bytes& out, const PingBlocks& blocks, std::size_t rows) {
   const std::size_t row_bytes = rows == 0 ? 0 : blocks.samples.size() / rows;
   wire::Writer write(out);
@@ -97,6 +99,8 @@ wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks) {
   PingResultV2& fixed = head.fixed;
   const bool long_form = fixed.header.version >= 2;
   const std::size_t fixed_size = long_form ? ping_v2_size : ping_v1_size;
+  // The image begins at 2048, as in the captured pings. Drivers drop a ping whose sizes do not agree (docs/protocols/oculus.md,
+  // 5.1): payload + 16 = offset + image = the bytes sent.
   const std::size_t offset = std::max<std::size_t>(image_offset, fixed_size + 2 * blocks.bearings_cdeg.size());
   const std::size_t image_size = blocks.samples.size() + 4 * blocks.row_gains.size();
   fixed.header.type = MessageType::ping_result;
@@ -118,6 +122,7 @@ wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks) {
   return out;
 }
 
+/// Truncated towards 0, as in the captured pings (docs/protocols/oculus.md, 5.3). The wire's bearings are positive to starboard.
 std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad) {
   const double bearing_cdeg = -100 * deg_from_rad(azimuth_rad);
   return static_cast<std::int16_t>(std::trunc(bearing_cdeg + std::copysign(truncation_guard_cdeg, bearing_cdeg)));
@@ -126,7 +131,7 @@ std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad) {
 FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, double sound_speed_used_mps) {
   FireSettings echo = asked;
   echo.gain_percent = echoed_gain_percent(asked, gain_echo);
-  if (asked.sound_speed_mps == 0) echo.sound_speed_mps = sound_speed_used_mps;
+  if (asked.sound_speed_mps == 0) echo.sound_speed_mps = sound_speed_used_mps;  // 0 leaves the choice to the device
   return echo;
 }
 

@@ -14,12 +14,12 @@ inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPo
 /// nearest that a fire message can ask for. usage: a mode or setting that it has not.
 Result<FireRequest> fire_from(const protocol::Wanted& wanted);
 
-/// Of a status message.
+/// Reads a status message.
 std::optional<protocol::Announcement> announced(wire::BytesView datagram);
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 
-/// Of its stream.
+/// The framing of an Oculus's stream.
 extern const recording::Framing framing;
 recording::Codec codec();
 

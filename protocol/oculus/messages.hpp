@@ -51,7 +51,7 @@ constexpr void fields(V& visit, M& m) {
   visit("partNumber", m.part_number);
 }
 
-/// What a client asks for; the same bytes are echoed in every ping.
+/// The settings that a client requests; every ping echoes the same bytes.
 struct FireSettings {
   std::uint8_t mode = 1;  // 1 low frequency, 2 high frequency
   PingRate ping_rate = PingRate::hz10;
@@ -76,7 +76,7 @@ constexpr void fields(V& visit, M& m) {
   visit("salinity", m.salinity_ppt);
 }
 
-/// What version 2 adds to the fire message.
+/// The fields that version 2 adds to the fire message.
 struct FireExtension {
   std::uint32_t flags = 0;
   std::array<std::uint32_t, 2> reserved0{};

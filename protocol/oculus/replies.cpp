@@ -38,7 +38,7 @@ wire::Bytes make_status(const protocol::DeviceState& device) {
   status.ip_mask = device.netmask;
   status.connected_ip = device.connected_client;
   status.mac = device.mac;
-  status.temperature_c.fill(device.water.temperature_c);
+  status.temperature_c.fill(device.water.temperature_c);  // all eight: drivers command standby at 35 degrees
   status.pressure_bar = absolute_pressure_bar(device.water, device.depth_m);
   return wire::bytes_of(status);
 }

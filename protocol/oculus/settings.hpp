@@ -47,7 +47,7 @@ bool has_non_finite(const FireSettings& fire);
 /// Index into the model's modes; unknown modes count as 1.
 int mode_index(const SonarModel& model, std::uint8_t wire_mode);
 
-/// What the device computes for itself when 0 is requested [m/s].
+/// The sound speed that the device computes when 0 is requested [m/s].
 double device_sound_speed_mps(const protocol::DeviceState& device, double salinity_ppt);
 
 /// The resulting settings, and a message for each clamped value.

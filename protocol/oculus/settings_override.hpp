@@ -9,7 +9,7 @@ namespace sonar::oculus {
 /// Changes only the fields of the current fire message that are set. Refuses values that the product does not support.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// Of the rates that a fire message can ask for, but standby.
+/// The nearest of the rates that a fire message can request, without standby.
 PingRate nearest_rate(double rate_hz);
 
 }  // namespace sonar::oculus

@@ -1,4 +1,4 @@
-// What a host and any device of the family say to each other: frames, identity, numbers of devices. A product adds its own
+// The conversation that every device of the family has with a host: frames, identity, numbers of devices. A product adds its own
 // requests.
 #pragma once
 

@@ -65,7 +65,7 @@ Bytes ping360_request(const protocol::SettingsOverride& wanted) {
   return framed_message(Id::auto_transmit, 0, t);
 }
 
-/// Of a message that is followed by others of the payload.
+/// Reads a message off the front of the payload; returns the rest.
 template <class M>
 std::optional<BytesView> read_front(const Frame& frame, M& message) {
   wire::Reader reader(frame.payload);
@@ -243,10 +243,10 @@ class OmniscanHost final : public PingHost {
   std::uint32_t start_mm_ = 0, length_mm_ = 0;
 };
 
-/// Of beam 0, which looks astern, over port to the last.
+/// Bearing of a beam: beam 0 looks astern, the next ones over port back to astern.
 double bearing_rad(std::size_t beam) { return (grads / 2 - static_cast<double>(beam)) * 2 * pi / grads; }
 
-/// What was scanned of a turn so far. Cheap to copy.
+/// The scanned part of a turn. Cheap to copy.
 struct Turn {
   static constexpr std::size_t first = first_grad + astern - grads, end = first + sector;  // the half ahead
   std::size_t rows = 0;

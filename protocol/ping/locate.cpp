@@ -64,7 +64,7 @@ std::optional<Field> of_ping360(FieldName name, BytesView frame) {
   }
 }
 
-/// Of a frame that is fields, then samples.
+/// A region of a frame that is fields, then samples.
 std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields_size) {
   if (region == Region::bearings) return std::nullopt;
   if (frame.empty()) return Place{};
@@ -76,7 +76,7 @@ std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields
 
 constexpr std::size_t attitude_size = header_size + wire::wire_size<AttitudeReport>() + sum_size;
 
-/// Of a ping's frames together, or of the datagram that has this one.
+/// Offset of the frame of points (3012) in a ping's frames together, or in the datagram that has it.
 std::optional<std::size_t> atof_frame(BytesView frames) {
   const std::size_t at = frames.empty() || is_of(Id::attitude_report, frames) ? attitude_size : 0;
   const bool there = frames.empty() || (frames.size() > at && is_of(Id::atof_point_data, frames.subspan(at)));

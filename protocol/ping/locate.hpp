@@ -10,15 +10,15 @@ namespace sonar::ping {
 
 using Place = std::pair<std::size_t, std::size_t>;  // offset, size
 
-/// Of the frame of a ping, 2300 or 2301.
+/// The frame is a ping, 2300 or 2301.
 std::optional<protocol::Field> locate_ping360(protocol::FieldName name, protocol::BytesView frame);
 std::optional<Place> locate_ping360(protocol::Region region, protocol::BytesView frame);
 
-/// Of the frames of a ping over TCP: the first is 504.
+/// The frames are those of a ping over TCP: the first is 504.
 std::optional<protocol::Field> locate_surveyor(protocol::FieldName name, protocol::BytesView frames);
 std::optional<Place> locate_surveyor(protocol::Region region, protocol::BytesView frames);
 
-/// Of 2198.
+/// The frame is a ping, 2198.
 std::optional<protocol::Field> locate_omniscan(protocol::FieldName name, protocol::BytesView frame);
 std::optional<Place> locate_omniscan(protocol::Region region, protocol::BytesView frame);
 

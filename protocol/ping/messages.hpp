@@ -95,7 +95,7 @@ class Framer {
   std::optional<Frame> next();
   /// The bytes of the last frame whose sum is right, until append().
   BytesView bytes() const { return BytesView(buffer_).subspan(begin_ - last_size_, last_size_); }
-  /// What is not whole yet.
+  /// Drops a frame that is not whole yet.
   void drop_rest();
   std::size_t waiting_bytes() const { return buffer_.size() - begin_; }
   /// How far the search is, from the first byte of all on.
@@ -111,7 +111,7 @@ class Framer {
   std::uint64_t erased_ = 0;
 };
 
-/// What devices say alone. No answer to it: two devices would answer each other without end.
+/// Messages that only devices send. They are not answered: two devices would answer each other without end.
 constexpr bool is_of_device(Id id) { return id == Id::ack || id == Id::nack || id == Id::ascii_text; }
 
 /// A datagram that holds a whole frame of a host with the right sum.

@@ -39,7 +39,7 @@ SonarModel make_model() {
   return model;
 }
 
-/// Of the middle of the beam, clockwise from north.
+/// Heading of the middle of the beam, clockwise from north.
 double heading_deg(const Pose& sonar_in_world) {
   const Vec3d ahead = rotate(sonar_in_world.orientation, Vec3d{1, 0, 0});
   const double deg = deg_from_rad(std::atan2(ahead.x, ahead.y));

@@ -10,7 +10,7 @@ namespace sonar::ping::omniscan {
 
 std::span<const std::shared_ptr<const SonarModel>> models();
 
-/// What a host has set.
+/// The settings that a host has made.
 struct Settings {
   std::uint8_t id = 0;  // of the device; unknown: its number
   OsPingParams parameters;

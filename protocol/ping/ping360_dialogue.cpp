@@ -99,6 +99,7 @@ class Ping360Dialogue final : public Conversation {
   Bytes message_now(Id wanted, Time now) override { return wanted == Id::device_data ? state_message(now) : Bytes{}; }
 
  private:
+  /// turn: 2300 without samples when the head has arrived. ping: one ping on arrival. scan: ping and turn until another request.
   enum class Task { none, turn, ping, scan };
 
   Settings settings() const { return settings_from(device_.settings.get()); }
@@ -110,6 +111,7 @@ class Ping360Dialogue final : public Conversation {
                           DeviceData{t.mode, t.gain, head_.angle_at(now), t.transmit_us, t.period, t.khz, t.samples, 0});
   }
 
+  /// A valid request replaces the one in progress; a refused one leaves it alone.
   template <class Request>
   void begin(const Frame& frame, const Request& request, Time now, Reaction& reaction) {
     if (const std::string why = complaint(request); !why.empty()) return refuse(frame, why, reaction);
@@ -122,6 +124,7 @@ class Ping360Dialogue final : public Conversation {
     reaction.events.emplace_back(change_to(s, device_));
   }
 
+  /// The head stops where it is, also in the middle of a turn. A ping that still comes is not sent.
   void stop(Time now) {
     task_ = Task::none;
     fired_.reset();

@@ -19,7 +19,7 @@ inline constexpr std::string_view firmware = "firmware", mount_grad = "mount_gra
 std::span<const protocol::Option> options();
 std::span<const std::shared_ptr<const SonarModel>> models();
 
-/// What a host has set: pings echo it. `ping.angle` is where the head looks.
+/// The settings that a host has made; pings echo them. `ping.angle` is where the head looks.
 struct Settings {
   std::uint8_t id = 2;  // of the device
   Transducer ping;

@@ -15,7 +15,7 @@ ping::Id first_id(BytesView message) {
   fields(reader, header);
   return header.id;
 }
-/// Of a device to a host that asked: it may come before the pings, and does not name the product.
+/// Whether this is a device's answer to a host: it may come before the pings, and does not name the product.
 bool is_answer(ping::Id id) {
   using enum ping::Id;
   return ping::is_of_device(id) || id == device_information || id == protocol_version;

@@ -1,5 +1,5 @@
-// What a Surveyor and an Omniscan have in common: a host sets everything in one request and enables pings, which come by TCP or
-// UDP until it disables them.
+// The common part of Surveyor and Omniscan: a host sets everything in one request and enables pings, which come by TCP or UDP
+// until it disables them.
 #pragma once
 
 #include <array>
@@ -68,7 +68,7 @@ class StreamingVendor : public protocol::Vendor {
   }
 
  protected:
-  /// Of a ping, in the order they are sent.
+  /// The frames of a ping, in the order they are sent.
   virtual std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) const = 0;
 };
 

@@ -11,11 +11,11 @@ namespace sonar::ping::surveyor {
 
 std::span<const std::shared_ptr<const SonarModel>> models();
 
-/// What a host has set.
+/// The settings that a host has made.
 struct Settings {
   std::uint8_t id = 0;  // of the device; unknown: its number
   PingParameters parameters;
-  std::optional<std::chrono::nanoseconds> utc_ahead;  // of the device's clock, once a host told the time
+  std::optional<std::chrono::nanoseconds> utc_ahead;  // of the device's clock, once a host has set it
 };
 struct HeldSettings final : VendorSettings {
   explicit HeldSettings(const Settings& s) : settings(s) {}

@@ -1,4 +1,4 @@
-// What recordings need to know of a make: its messages, and the kinds of files that its own programs read. The containers beside
+// The part of a make that recordings need: its messages, and the kinds of files that its own programs read. The containers beside
 // this file (captures, MCAP, raw dumps) hold messages of every make.
 #pragma once
 
@@ -49,9 +49,9 @@ struct Samples {
 struct Codec {
   const Framing* framing = nullptr;  // of its TCP stream; null: nothing tells messages apart
   std::span<const FileKind> files = {};
-  /// Of a message or datagram of a device; nullopt: another make's, or one that does not tell.
+  /// Finds the sender of a device's message or datagram; nullopt: it is another make's, or does not name its sender.
   std::optional<Sender> (*sender)(const RecordedMessage&) = nullptr;
-  /// Of a message that holds a ping's samples as a picture has them. Null: of this make none does.
+  /// Reads the samples of a message that holds them as a picture has them. Null: this make has no such message.
   std::optional<Samples> (*samples)(BytesView message) = nullptr;
 };
 

@@ -9,7 +9,7 @@
 
 namespace sonar::recording {
 
-/// How the messages of a make's stream are told apart.
+/// The boundaries of messages in a make's stream.
 struct Framing {
   std::array<std::uint8_t, 2> magic{};  // the bytes that every message begins with
   std::size_t header_size = 0;
@@ -36,7 +36,7 @@ class MessageSplitter {
   /// Bytes of incomplete messages, and the number of such places.
   std::uint64_t lost_bytes() const { return lost_bytes_; }
   std::uint64_t losses() const { return losses_; }
-  /// Of the unfinished message: bytes that are there.
+  /// The bytes of the unfinished message that have come.
   std::size_t waiting_bytes() const { return buffer_.size() - begin_; }
 
  private:

@@ -29,7 +29,7 @@ class RecordingReader {
   virtual ~RecordingReader() = default;
   /// nullopt at the end.
   virtual std::optional<RecordedMessage> next() = 0;
-  /// What could not be read so far, and where: one sentence, of kind bad_data. Complete once next() returned nullopt.
+  /// One sentence of kind bad_data on what could not be read so far, and where. Complete once next() returned nullopt.
   virtual std::optional<Error> damage() const = 0;
   /// Starts again from the front and forgets the damage.
   virtual void rewind() = 0;

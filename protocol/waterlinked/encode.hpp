@@ -14,7 +14,7 @@ std::uint8_t strength_pixel(std::uint32_t linear);
 
 RangeMessage range_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
 StrengthMessage strength_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
-/// What the inertial sensors measured since the shot before, or, where that is long ago, in one period of the mode.
+/// The inertial samples since the shot before, or, where that is long ago, of one period of the mode.
 ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
 
 /// Range image, strength image and, where it is enabled, IMU samples.

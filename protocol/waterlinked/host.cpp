@@ -101,7 +101,7 @@ class WaterlinkedHost final : public protocol::Host {
     if (!std::exchange(knows_output_, true)) {
       const Json udp = Json::parse(reply.body, nullptr, false);
       if (reply.status != 200 || !udp.is_object())
-        return fail(ErrorKind::bad_data, "is no Sonar 3D-15: " + asked_ + " is answered with " + std::to_string(reply.status));
+        return fail(ErrorKind::bad_data, "is no Sonar 3D-15: " + asked_ + " returned " + std::to_string(reply.status));
       const Json mode = udp.value("mode", Json());
       if (mode == Json(unicast))
         return fail(ErrorKind::usage,

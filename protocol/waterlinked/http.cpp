@@ -28,7 +28,7 @@ struct Call {
   Time now;
   bool synchronised() const { return text_option(device.options, option_name::clock) == "utc"; }
 };
-/// Of a POST: the status, and the answer's JSON or an error's text.
+/// The outcome of a POST: the status, and the answer's JSON or an error's text.
 struct Outcome {
   unsigned status = 204;
   Json body = {};

@@ -14,7 +14,7 @@ namespace sonar::waterlinked {
 using wire::Bytes;
 using wire::BytesView;
 
-/// What both images of a shot say.
+/// The fields that both images of a shot have.
 struct Shot {
   Time at{};
   std::uint32_t sequence = 0;
@@ -45,7 +45,7 @@ Bytes packet_of(const RangeMessage& message);
 Bytes packet_of(const StrengthMessage& message);
 Bytes packet_of(const ImuMessage& message);
 
-/// What a packet holds: one of these, or none when it is of another kind or cannot be read.
+/// The content of a packet: one of these, or none when it is of another kind or cannot be read.
 struct Decoded {
   std::optional<RangeMessage> ranges;
   std::optional<StrengthMessage> strengths;

@@ -1,4 +1,4 @@
-// What the public sources leave unknown about a Sonar 3D-15, as options of a sonar's configuration.
+// Properties of a Sonar 3D-15 that the public sources do not state, as options of a sonar's configuration.
 #pragma once
 
 #include <span>

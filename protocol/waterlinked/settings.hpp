@@ -1,4 +1,4 @@
-// What clients have set over HTTP, and the PingSettings that it means.
+// The settings that clients have made over HTTP, and the PingSettings that they mean.
 #pragma once
 
 #include <string>
@@ -38,7 +38,7 @@ Settings settings_from(const VendorSettings* held, const protocol::DeviceState& 
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
-/// Whom the images go to: none while UDP output is disabled.
+/// The receivers of the images: none while UDP output is disabled.
 protocol::SetReceivers receivers_of(const Settings& settings);
 
 /// Time as the device's clock shows it.

@@ -276,7 +276,7 @@ constexpr std::size_t wire_size() {
   return counter.bytes;
 }
 
-/// Nothing: no field has that name, or `message`, if it is not empty, ends before the field does.
+/// The place of a field; nothing if no field has that name, or `message`, if it is not empty, ends before the field does.
 template <class M>
 constexpr std::optional<Field> locate(std::string_view name, BytesView message = {}) {
   Locator locator(name);

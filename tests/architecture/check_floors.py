@@ -135,8 +135,6 @@ LONGEST_FILE = 400  # lines; tests may be longer
 # A comment is a sentence, or a noun phrase that names the thing: these beginnings are fragments, these words are of persons.
 FRAGMENT = re.compile(r"[ \t]*//+<?[ \t]*(Of|What|Nothing:)(?=[\s,])")
 PERSONS = re.compile(r"\b(to" + r"ld|no" + r"body|some" + r"body|who" + r"ever|ow" + r"ed)\b", re.I)
-# Rooms that still have some; a room leaves the list when it is clean.
-WITH_FRAGMENTS = ("protocol/", "clients/ros2_bridge/", "clients/sonarctl/", "clients/web/", "daemon/emulator/view/", "daemon/server/view/")
 
 
 def tracked_files(root):
@@ -203,8 +201,6 @@ def include_violations(name, code):
 
 def wording_violations(name, text):
     """The first line of a comment must not begin as a fragment; no line may have a word of PERSONS."""
-    if name.startswith(WITH_FRAGMENTS):
-        return
     before = ""
     for number, line in enumerate(comments_of(text).splitlines(), 1):
         if not before.startswith("//") and (match := FRAGMENT.match(line)):

@@ -116,8 +116,7 @@ class Planted(unittest.TestCase):
                 self.expect("core/base/a.cpp", line + "\n", line.count("\n") + 1, words)
         self.assertEqual(found_in({
             "core/base/a.cpp": "/// Statistics of the last ping.\n/// What follows continues a sentence.\nint Of = 1;\n",
-            "core/base/b.cpp": 'f("What to' + 'ld");\n// Whatever comes.\n// Nothing is lost.\n',
-            "protocol/a.cpp": "/// Of a ping.\n"}), [])
+            "core/base/b.cpp": 'f("What to' + 'ld");\n// Whatever comes.\n// Nothing is lost.\n'}), [])
 
     def test_makes_are_named_in_their_folders_only(self):
         for name, line in [("daemon/server/a.cpp", "oculus::Framer framer;"), ("clients/sonarctl/a.cpp", '#include "protocol/ping/messages.hpp"'),

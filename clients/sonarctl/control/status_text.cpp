@@ -59,7 +59,7 @@ std::string water_text(const v1::Environment& e) {
   return text + (speed > 0 ? format(", sound speed %g m/s", speed) : std::string(", sound speed computed"));
 }
 
-/// Of a vehicle or an object.
+/// The trajectory that a vehicle or an object follows.
 std::string trajectory_text(const auto& body) {
   if (!body.has_trajectory()) return {};
   const v1::TrajectoryStatus& t = body.trajectory();

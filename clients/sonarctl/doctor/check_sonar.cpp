@@ -288,7 +288,7 @@ class SonarChecks {
     return found == in.sonars().end() ? nullptr : &*found;
   }
 
-  /// The last status, and in it nothing of our own connection: who left or was turned away is from before.
+  /// The last status without our own connection; clients that left or were refused are those of the first status.
   v1::DaemonStatus without_us() const {
     const v1::DaemonStatus& first = *facts_.control.status;
     v1::DaemonStatus now = facts_.control.latest ? *facts_.control.latest : first;

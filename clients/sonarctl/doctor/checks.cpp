@@ -65,7 +65,7 @@ std::vector<Finding> run_checks(const Facts& facts) {
   return findings;
 }
 
-/// What a make sends to all, and how a driver behind a router, a NAT or a bridge gets it: by the kinds of its ports.
+/// Broadcasts, multicasts and streams that a router, a NAT or a bridge does not pass, by the kinds of a make's ports.
 void check_networks(const Facts& facts, std::vector<Finding>& findings) {
   using Kind = protocol::Port::Kind;
   for (const SonarFacts& sonar : facts.sonars) {

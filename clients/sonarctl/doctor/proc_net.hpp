@@ -17,7 +17,7 @@ using sonar::doctor::listening;
 using sonar::doctor::parse_proc_net;
 using sonar::doctor::SocketLine;
 
-/// Of all sockets, IPv4 and IPv6. Empty where there is no /proc.
+/// All sockets of the computer, IPv4 and IPv6. Empty where there is no /proc.
 std::vector<SocketLine> tcp_sockets();
 std::vector<SocketLine> udp_sockets();
 

@@ -104,7 +104,7 @@ class Watch {
   std::vector<double> behind_stamp_s_;
 };
 
-/// Of a failed connection or greeting of a head.
+/// The outcome that a failed connection, or a failed greeting of a head, stands for.
 Outcome outcome_of(const Error& error, const Endpoint& at, const Make& make) {
   using Kind = protocol::HostPort::Kind;
   const Kind first = make.ports.front().kind;

@@ -1,4 +1,4 @@
-// What the page knows of the daemon: messages come in, panels read. No drawing here.
+// The page's knowledge of the daemon: messages come in, panels read. No drawing here.
 import { Counter, Counters } from './rates.js';
 
 const log_lines = 500;
@@ -148,7 +148,7 @@ export class Facts {
     this.receivedBytes += image.data.length;
     this.received.add(now_s(), this.receivedBytes);
     this.ping = { image, geometry, ns, at: now_s(), about: drawn ? this.pictures.get(this.sonar) ?? {} : null };
-    const event = this.events.get(ns) ?? (geometry?.ns === ns ? geometry : null);  // newcomers get the last picture without its event
+    const event = this.events.get(ns) ?? (geometry?.ns === ns ? geometry : null);  // a new subscriber gets the last picture without its event
     if (event) this.count(this.ping, event);
   }
 

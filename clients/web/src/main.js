@@ -125,15 +125,15 @@ function draw() {
   announce();
 }
 
-/// Findings and faults are told to screen readers, at most once in two seconds.
-let told = '';
-let toldAt = 0;
+/// Findings and faults are announced to screen readers, at most once in two seconds.
+let announced = '';
+let announcedAt = 0;
 function announce() {
   const faults = activeTroubles(facts).map((f) => `fault: ${titleOf(f.trouble)}`);
   const findings = (facts.findings ?? []).filter((f) => f.level > 0).map((f) => f.text);
   const text = [...faults, ...findings].join('. ');
-  if (text === told || performance.now() - toldAt < 2000) return;
-  [told, toldAt] = [text, performance.now()];
+  if (text === announced || performance.now() - announcedAt < 2000) return;
+  [announced, announcedAt] = [text, performance.now()];
   setText($('announce'), text);
 }
 

@@ -21,6 +21,7 @@ void drop_unreceived(Connections& connections) {
 Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port) {
   Actions actions;
   if (port == nullptr) port = vendor_.port(protocol::Port::Kind::tcp_stream);
+  // The slots give the verdict; a fault of clients may replace it; a sonar that stops refuses all.
   Connections::Verdict verdict = stopping_ ? Connections::Verdict::turn_away : connections_.verdict(role);
   const auto admission = role == Role::client && !stopping_ ? faults_.admission() : Faults::Admission::as_configured;
   if (admission == Faults::Admission::wait) verdict = Connections::Verdict::wait;
@@ -39,6 +40,8 @@ Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const
     return actions;
   }
   if (verdict == Connections::Verdict::take_over) {
+    // The oldest client gets its current message whole, and counts as gone from here on: the new one starts from the stored
+    // settings if no other client is left.
     Connection& oldest = *connections_.oldest_client();
     oldest.state = Connection::State::leaving;
     begin_finish(oldest, "another client took over", actions);
@@ -71,6 +74,7 @@ void Sonar::on_membership(Time now, Actions& actions) {
   if (beacon != nullptr && beacon->on_change) actions.emplace_back(Announce{});
 }
 
+/// The pacer runs while pings are wanted, at the requested rate times the factor of faults.
 void Sonar::update_pacer(Time now) {
   PingSettings paced = settings_;
   if (const double factor = faults_.rate_factor(); factor != 1) paced.rate_hz *= static_cast<float>(factor);
@@ -152,6 +156,7 @@ Sonar::HttpAnswer Sonar::on_http(const protocol::Port& port, const protocol::Res
 
 // ---- the end of a connection
 
+/// Accounts for the connection before it is removed; then its slot goes to the client that has waited longest.
 Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool by_client) {
   Actions actions;
   Connection* const connection = connections_.find(id);
@@ -179,6 +184,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool
   return actions;
 }
 
+/// Waiting pings are dropped; the message that is being written and replies are still sent.
 void Sonar::finish(ConnectionId id) {
   Connection* const connection = connections_.find(id);
   if (connection == nullptr || std::exchange(connection->finishing, true)) return;
@@ -219,6 +225,7 @@ Actions Sonar::on_bytes(ConnectionId id, protocol::BytesView bytes, Time now) {
   return actions;
 }
 
+/// Events come before replies, and a Close after both, so that a client that is closed still gets the replies.
 void Sonar::handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions) {
   std::string close_why;
   for (const protocol::Event& event : reaction.events) {
@@ -269,6 +276,7 @@ void Sonar::on_not_sent(ConnectionId id) {
   if (Connection* const to = connections_.find(id)) to->outbox.not_written();
 }
 
+/// The next message to write; those that a fault withholds are counted as dropped on the way.
 Outbox::Message Sonar::next_message(ConnectionId id, Time now) {
   Connection* const to = connections_.find(id);
   if (to == nullptr) return {};
@@ -294,7 +302,7 @@ void Sonar::on_written(ConnectionId id, const Outbox::Message& message, Time now
     c.streamed_bytes += message.size();
   }
   figures_.latency.add(seconds(now - message.fired_at));
-  if (message.ping <= last_served_.ping) return;
+  if (message.ping <= last_served_.ping) return;  // jitter counts a ping once, at its first client
   if (last_served_.ping != 0)
     figures_.jitter.add(std::abs(seconds(now - last_served_.at) - seconds(message.fired_at - last_served_.tick)));
   last_served_ = {message.ping, message.fired_at, now};

@@ -1,5 +1,5 @@
-// What a sonar's picture is to viewers: what its make's own host (protocol/host.hpp), which sonarctl runs too, shows a driver's
-// user. Pure.
+// The picture of a sonar for viewers: they see what the make's own host (protocol/host.hpp), which sonarctl runs too, decodes.
+// Pure.
 #pragma once
 
 #include <functional>
@@ -17,9 +17,9 @@ class DriverPicture {
 
   explicit DriverPicture(const protocol::Make& make);
   PictureKind kind() const { return make_.picture; }
-  /// Of pings in order; `state`: of the device that fired them. Quick, whatever the make: a picture of one ping is encoded and
-  /// decoded by the drawing, which takes long to call; any thread may do that, also when this is gone. Null: there is nothing to
-  /// see yet.
+  /// The drawing after the next ping; pings come in order, `state` is that of the device that fired them. The call is quick for
+  /// every make. Calling the drawing takes long, because it may encode and decode the ping; any thread may do that, also when
+  /// this object is gone. Null: there is nothing to see yet.
   Drawing after(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state);
 
  private:

@@ -1,5 +1,5 @@
-// What viewers see of a ping: made from the ping alone, once for all of them. Those that say so take long enough to be made on a
-// thread of their own. Pure.
+// The messages of a ping for viewers, each made from the ping alone and once for all viewers. Functions that say "takes long"
+// are called on a thread of their own. Pure.
 #pragma once
 
 #include <memory>
@@ -11,14 +11,14 @@
 
 namespace sonar {
 
-/// Bright enough to look at: the full scale of wide samples is that which one sample in a thousand exceeds.
+/// The picture of a ping. The full scale of wide samples is the level that one sample in a thousand exceeds.
 PolarImage polar_image_of(const Ping& ping);
 
 using PingPointer = std::shared_ptr<const Ping>;
 // Stamped with the ping's firing; `sonar` is its frame.
 ViewPayloadPointer image_payload(const std::string& sonar, const PingPointer& ping);
 ViewPayloadPointer geometry_payload(const Ping& ping);
-/// Of a ping with ground truth.
+/// Requires a ping with ground truth.
 ViewPayloadPointer truth_payload(const Ping& ping);
 /// The edges of the volume that the beams cover, to the end of the range.
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);

@@ -1,5 +1,5 @@
-// How a vehicle's trajectory is played, as viewers of it see it (docs/live-view.md): the trajectory's time for a time of the
-// daemon, and what changes by steps: pause, speed, the end, a place that did not follow from the last one. Pure.
+// The state of playback that viewers of a vehicle's trajectory see (docs/live-view.md): the trajectory's time for a time of the
+// daemon, and changes by steps: pause, speed, the end, a jump to another time. Pure.
 #pragma once
 
 #include <optional>
@@ -13,8 +13,8 @@ class PlaybackWatch {
  public:
   PlaybackWatch(const motion::Playback& of, Time now);
 
-  /// What has changed by a step since the last look; nothing: it went on. A round of a loop is a seek. `of`: null = the vehicle
-  /// follows its trajectory no longer, which is a pause.
+  /// The state, if it has changed by a step since the last look; a round of a loop is a seek. Nothing: it was played on as
+  /// before. `of`: null = the vehicle follows its trajectory no longer, which is a pause.
   std::optional<foxglove::PlaybackState> look(const motion::Playback* of, Time now);
   foxglove::PlaybackState state(Time now) const;
   /// The trajectory's time, from 0 to end(). A time before the last seek counts as if it had been played until then.

@@ -19,7 +19,7 @@ class Preview {
   void begin(Time now) { until_ = now + longest; }
   void end() { until_.reset(); }
   bool on() const { return until_.has_value(); }
-  /// Of pings of this sonar.
+  /// The time between two previews of this sonar.
   static std::chrono::nanoseconds period(const Sonar& sonar);
   /// Why it must end now, for the log; empty = it may go on.
   std::string why_over(const Sonar& sonar, Time now) const;

@@ -64,7 +64,7 @@ bool Viewer::has_room_for_message(Moment now) {
   return close_ == CloseCode::none;
 }
 
-/// Of a message that is no message.
+/// Reports a message that cannot be read; after the last permitted one the viewer is closed.
 void Viewer::complain(const std::string& why) {
   say_status(foxglove::StatusLevel::error, why);
   if (++complaints_ >= most_complaints) close_ = CloseCode::policy;
@@ -178,7 +178,8 @@ void Viewer::offer(std::uint32_t channel, const ViewPayloadPointer& payload, Mom
   }
 }
 
-/// What waits for its rate alone is not too slow.
+/// Merges a payload into the waiting one, or replaces that. A replaced one counts as dropped unless it waited for its channel's
+/// rate alone.
 void Viewer::merge(Slot& slot, const ViewPayloadPointer& payload, Moment now) {
   ViewPayloadPointer& waiting = slot.waiting.front();
   if (payload->merges) {

@@ -1,8 +1,8 @@
-// One viewer of the live view, without its socket: what it says becomes requests to its host, what it subscribed to becomes
-// messages to write, and what it is too slow for is replaced. Sans I/O: bytes and time go in, messages come out.
+// One viewer of the live view, without its socket: its messages become requests to its host, its subscriptions become messages
+// to write, and newer messages replace those that it is too slow for. Sans I/O: bytes and time go in, messages come out.
 //
-// Three kinds of messages leave in this order: words (JSON, answers), never dropped; last values, of which a newer one replaces
-// an older one; pictures and events. Pictures have one place; of events 64 wait, the oldest go.
+// Three kinds of messages leave in this order: JSON texts and answers, never dropped; last values, of which a newer one replaces
+// an older one; pictures and events. Of a channel's pictures one waits, the newest; of its events the newest 64.
 #pragma once
 
 #include <chrono>
@@ -25,7 +25,7 @@ namespace sonar {
 
 using ViewBytes = std::shared_ptr<const wire::Bytes>;
 
-/// What all viewers are offered.
+/// A channel that is offered to all viewers.
 struct ViewChannel {
   enum class Kind { last_value, picture, event };
   foxglove::Channel advertised;
@@ -46,7 +46,7 @@ struct ViewPayload {
 };
 using ViewPayloadPointer = std::shared_ptr<const ViewPayload>;
 
-/// What is written as one WebSocket message.
+/// One WebSocket message to write.
 struct ViewMessage {
   bool is_text = false;
   wire::Bytes head;               // all of it, but for channels
@@ -61,13 +61,13 @@ struct ViewerFigures {
 
 class Viewer;
 
-/// What viewers ask for; outlives them. May call the viewer back.
+/// The part of the daemon that answers viewers; outlives them. May call the viewer back.
 class ViewerHost {
  public:
   virtual ~ViewerHost() = default;
   /// Null = there is none of that id.
   virtual const ViewChannel* channel(std::uint32_t id) const = 0;
-  /// Offers what newcomers get.
+  /// Offers the present values of a channel to a new subscriber.
   virtual void on_subscribed(Viewer& viewer, std::uint32_t channel) = 0;
   /// No names = all. Unknown names are left out.
   virtual std::vector<foxglove::Parameter> parameters(const Viewer& viewer, const std::vector<std::string>& names) = 0;
@@ -117,7 +117,7 @@ class Viewer {
   void offer(std::uint32_t channel, const ViewPayloadPointer& payload, Moment now);
   bool subscribes(std::uint32_t channel) const;
   bool subscribes_any() const { return !slots_.empty(); }
-  /// Of channels that are gone.
+  /// Drops a channel that is gone, with its waiting messages.
   void forget(std::uint32_t channel);
   /// The daemon's time, at most 30 times a second, the last one always.
   void set_time(Time now) {

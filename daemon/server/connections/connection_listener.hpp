@@ -1,5 +1,5 @@
 // A listener whose connections hold a slot each: of both control servers and of sonars' HTTP. When all slots are taken, one is
-// closed for the newcomer (connection_slots.hpp says which).
+// closed for the new one (connection_slots.hpp says which).
 // Where a token is required, clients that have not shown it yet share slots of their own, so that they can only evict each
 // other, first those of the address with most connections. The Connection class reads and writes the socket.
 #pragma once

@@ -1,5 +1,5 @@
-// What a viewer's bytes cost beside their number: WebSocket frames, which the library reads in silence when they are empty
-// fragments or control frames (RFC 6455, 5.2). Looks at the heads of frames only, at any split of the stream.
+// The cost of a viewer's bytes beside their number: WebSocket frames. The library reads empty fragments and control frames
+// (RFC 6455, 5.2) without reporting them. Looks at the heads of frames only, at any split of the stream.
 #pragma once
 
 #include <cstddef>

@@ -29,11 +29,12 @@ class SceneShapes {
   /// Takes long; any thread.
   static std::vector<Made> make(const Job& job);
 
-  /// What has changed since the last call: pieces to offer, and what must be made; empty while a job is under way.
+  /// Compares the scene with the last call: returns the pieces to offer, and in `job` what must be made, empty while a job is
+  /// under way.
   std::vector<ViewPayload::Piece> update(const std::shared_ptr<const Scene>& scene, const World& world, Time now, Job& job);
   /// Pieces to offer.
   std::vector<ViewPayload::Piece> take(std::vector<Made> made);
-  /// All that is shown, for a newcomer.
+  /// Everything that is shown, for a new subscriber.
   std::vector<ViewPayload::Piece> all() const;
   void clear() { shown_.clear(); }
 

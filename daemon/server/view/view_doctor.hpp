@@ -22,7 +22,7 @@ class ViewDoctor {
   /// Both outlive it.
   ViewDoctor(Operations& operations, const Clock& clock) : operations_(operations), clock_(clock) {}
 
-  /// The findings for newcomers: no older than the period. Null: there is no status.
+  /// The findings for a new subscriber, no older than the period. Null: there is no status.
   ViewPayloadPointer newest();
   /// The same, null when all who have subscribed know it.
   ViewPayloadPointer news();
@@ -30,7 +30,7 @@ class ViewDoctor {
  private:
   using Steady = std::chrono::steady_clock;
   void look();
-  /// What shows a driver on a wrong address.
+  /// Signs of a driver on a wrong address.
   doctor::Elsewhere look_elsewhere();
 
   Operations& operations_;

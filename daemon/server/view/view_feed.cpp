@@ -141,7 +141,7 @@ void ViewFeed::on_subscribed(Viewer& viewer, std::uint32_t channel) {
   drive_previews();
 }
 
-/// What newcomers get; null = nothing.
+/// The present value of a channel for a new subscriber; null: there is none.
 ViewPayloadPointer ViewFeed::current(const Viewer& viewer, std::uint32_t channel) {
   if (channel == tf_) return places();
   if (channel == status_) return status();
@@ -280,7 +280,7 @@ void ViewFeed::remove(const SonarView& sonar) {
     for (const std::uint32_t id : gone) c.viewer().forget(id);
     c.viewer().say(foxglove::unadvertise(gone));
     c.viewer().say(server_info(c.viewer()));
-    // Viewers forget what they had.
+    // With a new session id viewers clear their state.
     say_time(c.viewer());
     for (const auto& [id, channel] : channels_)
       if (id != log_ && c.viewer().subscribes(id)) on_subscribed(c.viewer(), id);

@@ -28,7 +28,7 @@
 
 namespace sonar {
 
-/// The parts of the daemon that are looked at; they outlive the feed.
+/// The parts of the daemon that the feed reads; they outlive it.
 struct Viewed {
   asio::io_context& io;
   const Config& config;

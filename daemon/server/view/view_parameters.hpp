@@ -1,5 +1,5 @@
-// What viewers may read and set of a running daemon, as parameters of the Foxglove protocol: a write becomes an operation, as if
-// it came by HTTP. Their names are listed in docs/live-view.md.
+// Parameters of the Foxglove protocol, through which viewers read and set values of a running daemon: a write becomes an
+// operation, as if it came by HTTP. Their names are listed in docs/live-view.md.
 #pragma once
 
 #include <optional>
@@ -22,11 +22,11 @@ struct ParameterSource {
   const Fleet& fleet;
 };
 
-/// Nothing: no finite number.
+/// The number of a parameter; nothing if it is no finite number.
 std::optional<double> number_of(const foxglove::Value& value);
-/// All, by name. Unset: what has no value now.
+/// All parameters; unset if they have no value now.
 std::vector<foxglove::Parameter> parameters_of(const ParameterSource& of);
-/// What the write asks for; else a sentence (usage).
+/// The operation that a write requests, or an error of kind usage.
 Result<control::Operation> operation_of(const foxglove::Parameter& wanted, const ParameterSource& of);
 
 }  // namespace sonar

@@ -1,4 +1,5 @@
-// What viewers see of a ping: what is offered when one comes, what is made on the thread of the live view, and where all stands.
+// Pings of the live view: payloads that are offered when a ping comes, payloads that are made on the view's thread, and frame
+// transforms.
 #include <algorithm>
 #include <new>
 #include <optional>

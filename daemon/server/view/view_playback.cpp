@@ -27,7 +27,7 @@ std::string ViewFeed::begin_playback(Viewer& viewer, const std::string& vehicle)
   return {};
 }
 
-/// Tells what has changed, to all but one.
+/// Sends the changed state to all viewers but one.
 void ViewFeed::watch_playback(const Viewer* but) {
   const Time now = of_.clock.now();
   for (auto it = watches_.begin(); it != watches_.end();) {

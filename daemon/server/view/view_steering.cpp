@@ -1,4 +1,4 @@
-// What viewers may ask of the daemon: parameters and services, carried out as requests of control.
+// Requests of viewers: parameters and services, carried out as requests of control.
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -88,7 +88,7 @@ std::string ViewFeed::perform_at_once(const control::Operation& operation, const
   return *why;
 }
 
-/// What has changed since the last time.
+/// Sends the parameters that have changed since the last call to the viewers that watch them.
 void ViewFeed::push_parameters() {
   bool watched = false;
   each([&](const ViewConnection& c) { watched = watched || c.viewer().watches_parameters(); });

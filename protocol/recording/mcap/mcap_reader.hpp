@@ -16,7 +16,7 @@ class Reader {
   static Result<Reader> open(std::unique_ptr<Source> source);
 
   std::optional<Message> next();
-  /// Of the messages given so far.
+  /// The channels of the messages returned so far.
   const std::map<std::uint16_t, Channel>& channels() const { return channels_; }
   const std::map<std::uint16_t, Schema>& schemas() const { return schemas_; }
   std::optional<Error> damage() const { return damages_.error(source_->name()); }

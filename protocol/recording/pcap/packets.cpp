@@ -18,7 +18,7 @@ Time time_of(std::uint64_t ticks, std::uint64_t ticks_per_s) {
   return Time(std::chrono::seconds(whole_s) + std::chrono::nanoseconds(static_cast<std::int64_t>(rest_ns)));
 }
 
-/// Of pcapng: a power of ten, or with the top bit of two. Anything finer than 10^18 a second is damage.
+/// The resolution of pcapng: a power of ten, or of two if the top bit is set. Anything finer than 10^18 a second is damage.
 std::uint64_t ticks_per_s(unsigned resolution) {
   const unsigned base = (resolution & 0x80u) != 0 ? 2 : 10, exponent = resolution & 0x7Fu;
   std::uint64_t ticks = 1;

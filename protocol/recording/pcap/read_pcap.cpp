@@ -41,7 +41,8 @@ bool pings_by_datagram(const Make& make) {
   });
 }
 
-/// Of a device, or of a client that sends such messages too. Streams: that of the usual port, else the first.
+/// The make whose messages a segment begins with; clients may send such messages too. Of the makes whose stream begins so, the
+/// one whose usual port the source has, else the first.
 const Make* make_of(const Segment& segment) {
   const Make* found = nullptr;
   if (!segment.tcp) {

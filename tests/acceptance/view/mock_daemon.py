@@ -414,7 +414,7 @@ class Viewer:
             self.each_second()
 
     def catch_up(self):
-        """What newcomers get."""
+        """The present values of a channel, for a new subscriber."""
         mock, ns = self.mock, self.mock.now_ns()
         for i, entity in enumerate(made_up_scene.entities()):
             self.publish("/scene", {"entities": [entity]}, ns, once=f"/scene {i}")

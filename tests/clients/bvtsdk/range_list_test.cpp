@@ -92,7 +92,7 @@ TEST(RangeList, OfNoiseIsEmptyUnlessTheThresholdIsLowered) {
   EXPECT_NEAR(list_of(noise).range_m[30], 21.05, 1e-4);
 }
 
-TEST(RangeList, StartsWhereItIsTold) {
+TEST(RangeList, BeginsAtTheStartRange) {
   RangeListSettings settings;
   settings.threshold = 1000;
   settings.policy = RangeListSettings::Policy::nearest;

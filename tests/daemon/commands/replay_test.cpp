@@ -591,7 +591,7 @@ class BrokenReader final : public recording::RecordingReader {
   void rewind() override {}
 };
 
-TEST(Replay, AnInternalFaultIsTold) {
+TEST(Replay, AnInternalFaultIsReported) {
   LogOptions quiet;
   quiet.sink = [](LogLevel, const std::string&) {};
   Log log(quiet);

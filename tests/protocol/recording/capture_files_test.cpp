@@ -311,7 +311,7 @@ TEST(CaptureFiles, Pcapng) {
     static_cast<void>(read({file.begin(), file.begin() + static_cast<std::ptrdiff_t>(size)}));
 }
 
-TEST(CaptureFiles, ConnectionsShareWhatMayWait) {
+TEST(CaptureFiles, ConnectionsShareTheLimitOfWaitingBytes) {
   constexpr std::size_t early_bytes = 65'000;
   std::vector<Bytes> frames;
   const auto add = [&frames](std::uint8_t client, const Sent& sent) {

@@ -20,7 +20,7 @@ from .ulog import read_ulog
 FORMATS = ("dataflash", "tlog", "mcap", "rosbag", "db3", "ulog", "nmea")
 RECORDINGS = ("mcap", "rosbag", "db3")  # in metres, their frame not said
 _HEAD_BYTES = 4096
-# What people have and this does not read: the first bytes, what they are, what to do; {} is the file.
+# Common formats that this does not read: the first bytes, what they are, what to do; {} is the file.
 _OTHERS = (
     (b"\x28\xb5\x2f\xfd", "compressed by zstd; unpack it first: zstd -d {}"),
     (b"\x1f\x8b", "compressed by gzip; unpack it first: gunzip -k {}"),

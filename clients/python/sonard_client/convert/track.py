@@ -137,7 +137,7 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
 
 
 def depth_source(attitude: str, attitudes: Stream[Quaternion], depths: Stream[float]) -> Source:
-    """Of a vehicle that knows its depth and no horizontal position, such as a BlueROV2 without DVL."""
+    """The track of a vehicle that knows its depth and no horizontal position, such as a BlueROV2 without DVL."""
     return Source(f"{attitude}+depth", attitudes, [(t, (0.0, 0.0, down)) for t, down in depths], held=True)
 
 

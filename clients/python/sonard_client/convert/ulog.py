@@ -38,7 +38,7 @@ class Layout(NamedTuple):
 
 
 def _layout(text: str) -> Union[Layout, str]:
-    """Of "uint64_t timestamp;float[4] q;": the fields of _READ, or why it cannot be read."""
+    """The fields of _READ in a format such as "uint64_t timestamp;float[4] q;", or why it cannot be read."""
     codes, fields, at, size, read = "<", {}, 0, 0, 1
     for part in filter(None, text.split(";")):
         match = _FIELD.fullmatch(part)

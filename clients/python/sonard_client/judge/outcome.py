@@ -1,4 +1,4 @@
-"""What a case leaves: the content of case.json, with its time line."""
+"""The result of a case: the content of case.json, with its time line."""
 from __future__ import annotations
 
 import itertools

@@ -1,4 +1,4 @@
-"""What the judge leaves: index.json, junit.xml, the summary; reports merged into one. The pages are in pages.py."""
+"""The judge's report: index.json, junit.xml, the summary; reports merged into one. The pages are in pages.py."""
 from __future__ import annotations
 
 import json
@@ -81,7 +81,7 @@ def reasons(row: Json, strict: bool = True) -> List[str]:
 
 
 def causes(rows: Sequence[Json]) -> List[Json]:
-    """What does not hold, each with the cases that fail alike: those with a MUST first, then the largest. One bug of a driver is
+    """The verdicts that do not hold, each with the cases that fail alike: those with a MUST first, then the largest. One bug of a driver is
     one cause, not a red line a case."""
     found: Dict[str, Json] = {}
     for row in rows:

@@ -138,7 +138,7 @@ def _kinds(control: Control) -> Dict[str, Any]:
 
 
 def explanation(scene: Scene) -> str:
-    """What is wrong with a driver that takes no pings, for its developer."""
+    """The reason why a driver takes no pings, for its developer."""
     lines = []
     connections = scene.capture.connections if scene.capture else []
     taken = len(scene.capture.delivered()) if scene.capture and scene.reads_pings else len(scene.status.ping_times)

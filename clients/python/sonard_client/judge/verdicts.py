@@ -17,7 +17,7 @@ WORDS = {"notice_s": "notices within {:g} s", "recover_s": "is back within {:g} 
 
 @dataclasses.dataclass
 class Observation:
-    """What the three eyes saw in one run of a case. Times are monotonic seconds."""
+    """The three eyes' observations in one run of a case. Times are monotonic seconds."""
     began: float
     ended: float                  # of the fault
     watched_until: float
@@ -58,7 +58,7 @@ class Verdict:
         return all(check["holds"] for check in self.should)
 
     def classes(self) -> Tuple[str, str, bool, bool]:
-        """What runs of a case are compared by: no figures, which vary from run to run."""
+        """The part by which runs of a case are compared: no figures, which vary from run to run."""
         return self.data, self.recovery, self.must_holds, self.should_holds
 
     def words(self) -> Tuple[str, str]:

@@ -1,6 +1,6 @@
 // Where a ping's metres lie among the picture's pixels, and where a direction lies among its beams: as core/image/draw_fan.cpp has it.
 
-/// Of a geometry message and an image: {rows, beams, spacing_m, start_m, range_m, azimuth_rad, full_scale}.
+/// The layout of an image by its geometry message: {rows, beams, spacing_m, start_m, range_m, azimuth_rad, full_scale}.
 export function polarOf(image, geometry) {
   const spacing_m = geometry.row_spacing_m;
   const start_m = geometry.range_start_m ?? 0;
@@ -65,7 +65,7 @@ export function beamAt(azimuth_rad, azimuth) {
   return right - 1 + (a - azimuth) / (a - azimuth_rad[right]);
 }
 
-/// What lies under a pixel: {range_m, azimuth_rad, row, beam}, or null outside the fan.
+/// The place under a pixel: {range_m, azimuth_rad, row, beam}, or null outside the fan.
 export function under(polar, layout, x, y) {
   const x_m = (x - layout.apex_x) * layout.metres_per_pixel;
   const y_m = (layout.apex_y - y) * layout.metres_per_pixel;
@@ -103,7 +103,7 @@ export function samplesOf(image) {
   return { samples, full_scale: Math.max(1, brightest(samples, scale + 1, (v) => Math.min(scale, Math.max(0, Math.round(v * scale))))) / scale };
 }
 
-/// What 999 of a thousand samples do not exceed.
+/// The level that 999 of a thousand samples do not exceed.
 function brightest(samples, bins, binOf) {
   const histogram = new Uint32Array(bins);
   for (let i = 0; i < samples.length; i++) histogram[binOf(samples[i])]++;

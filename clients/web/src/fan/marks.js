@@ -78,7 +78,7 @@ function drawHead(g, polar, layout, head_rad) {
   g.lineWidth = 1;
 }
 
-/// What is under the cursor is marked with its range and direction.
+/// Marks the place under the cursor with its range and direction.
 function drawCursor(g, polar, layout, cursor, port, starboard) {
   g.strokeStyle = 'rgba(79, 184, 255, 0.8)';
   g.beginPath();
@@ -110,7 +110,7 @@ export function drawMarks(canvas, polar, layout, { rings, cursor, ratio, head_ra
   if (cursor) drawCursor(g, polar, layout, cursor, port, starboard);
 }
 
-/// Of a rectangle: bearings below and elevations beside a range image, ranges above a waterfall.
+/// Axes of a rectangle: bearings below and elevations beside a range image, ranges above a waterfall.
 export function drawAxes(canvas, about, { box, width, height }, { rings, ratio }) {
   const g = cleared(canvas, { width, height }, ratio);
   if (!rings) return;

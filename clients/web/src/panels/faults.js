@@ -4,7 +4,7 @@ import { countdown } from '../numbers.js';
 
 /// "thin_tether" and "thin-tether" -> "Thin tether".
 export const titleOf = (trouble) => trouble.replace(/[-_]/g, ' ').replace(/^./, (c) => c.toUpperCase());
-/// What was asked for: a trouble or a single kind. Its kinds are separate faults with the same `do`.
+/// The requested fault: a trouble or a single kind. Its kinds are separate faults with the same `do`.
 export const troubleOf = (fault) => fault.do || fault.name;
 
 /// The faults that act, one entry a trouble and sonar: {trouble, sonar, names, ends_ns, by}.

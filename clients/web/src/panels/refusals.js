@@ -1,4 +1,4 @@
-// What sonard refuses, said beside the control that asked for it, whichever panel or tab that is in.
+// Refusals of sonard, shown beside the control that asked, whichever panel or tab that is in.
 import { $, setHidden, setText } from '../dom.js';
 
 const lasts_ms = 10000;

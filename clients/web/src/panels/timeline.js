@@ -57,8 +57,8 @@ export class Timeline {
     const trajectory = this.trajectory;
     const status_s = trajectory.position_s;
     if (trajectory.paused || this.own('paused', false)) return this.own('position_s', status_s);
-    if (status_s !== this.told_s) [this.told_s, this.told_at] = [status_s, performance.now()];
-    const since_s = this.facts.realtime ? Math.min(1.5, (performance.now() - this.told_at) / 1000) : 0;
+    if (status_s !== this.received_s) [this.received_s, this.received_at] = [status_s, performance.now()];
+    const since_s = this.facts.realtime ? Math.min(1.5, (performance.now() - this.received_at) / 1000) : 0;
     return Math.min(trajectory.duration_s, status_s + trajectory.speed * since_s);
   }
 

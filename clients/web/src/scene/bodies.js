@@ -1,4 +1,4 @@
-// What the page itself adds to the scene: vehicle, trail, the fan's plane with the last ping on it, beam edges, grid.
+// Bodies that the page itself adds to the scene: vehicle, trail, the fan's plane with the last ping on it, beam edges, grid.
 import {
   BoxGeometry, BufferAttribute, BufferGeometry, ConeGeometry, DataTexture, DoubleSide, EdgesGeometry, FloatType, GridHelper, Group, Line,
   LineBasicMaterial, LineSegments, Mesh, MeshPhongMaterial, GreaterDepth, NearestFilter, Points, PointsMaterial, RGBAFormat, RedFormat, ShaderMaterial, UnsignedByteType, Vector2,
@@ -105,7 +105,7 @@ export function makeFanPlane() {
   for (const name of ['samples', 'table', 'colours', 'azimuths', 'shape', 'ranges', 'gain']) uniforms[name] = { value: null };
   const material = new ShaderMaterial({ uniforms, vertexShader: vertex, fragmentShader: fragment, transparent: true, side: DoubleSide, depthWrite: false });
   const mesh = new Mesh(new BufferGeometry(), material);
-  // What lies behind the seabed or an object shines through.
+  // Parts behind the seabed or an object shine through.
   const hidden = material.clone();
   hidden.uniforms = { ...uniforms, strength: { value: 0.55 } };
   hidden.depthFunc = GreaterDepth;

@@ -67,7 +67,7 @@ const kinds = {
 /// A field of a message type. `type`: the name of a message's type, with its dots.
 const field = (name, kind, repeated = false, type = '') => ({ name, kind, repeated, type });
 
-// What is needed to read descriptors themselves (google/protobuf/descriptor.proto).
+// The part of descriptors that is needed to read descriptors themselves (google/protobuf/descriptor.proto).
 const ofDescriptors = new Map([
   ['Set', new Map([[1, field('files', 11, true, 'File')]])],
   ['File', new Map([[2, field('package', 9)], [4, field('messages', 11, true, 'Message')]])],

@@ -39,7 +39,7 @@ const std::string point =
     "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10]}}\nengine: {noise: off}\n"
     "water: {temperature_c: 10, salinity_psu: 0, sound_speed_mps: 1500}\n";
 
-TEST(RenderFile, AFileOfPosesThatIsNotThereIsToldWithWhereItWasLookedFor) {
+TEST(RenderFile, TheErrorOfAMissingPosesFileNamesThePathsTried) {
   const auto why = [](const std::string& name, const std::string& folder) {
     return parse_render_file("scene: demo.yaml\nposes: {file: " + name + "}\n", "r.yaml", folder).error().text;
   };
@@ -59,7 +59,7 @@ TEST(RenderFile, AFifoIsRefusedAndNotWaitedFor) {
   EXPECT_THAT(input.error().text, HasSubstr("is a FIFO, not a regular file"));
 }
 
-TEST(RenderFile, WithoutASceneItIsToldToNameOne) {
+TEST(RenderFile, TheErrorOfAMissingSceneAsksForOne) {
   EXPECT_THAT(refusal("sonar: {}\n"), AllOf(HasSubstr("scene"), Not(HasSubstr("no such file"))));
 }
 
@@ -228,7 +228,7 @@ TEST(RenderFile, WhatIsWrongWithASceneIsBadDataWhereverItStands) {
   EXPECT_EQ(kind("scene: no-such-scene.yaml\n"), ErrorKind::config) << "as world.scene of a configuration";
 }
 
-TEST(RenderFile, ARangeThatTheProductDoesNotHaveIsTold) {
+TEST(RenderFile, ARangeThatTheProductDoesNotHaveGetsANote) {
   const auto note = [](const std::string& sonar) { return note_of_range(parsed(point + "sonar: {" + sonar + "}\n").jobs.at(0)); };
   EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: HF, range_m: 10}"), "");
   EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: LF, range_m: 25}"), "");

@@ -165,7 +165,7 @@ TEST_F(OneViewer, ScenesMergeByEntity) {
   EXPECT_EQ(sent, "cb");
 }
 
-TEST_F(OneViewer, SetsParametersAndIsToldWhatHolds) {
+TEST_F(OneViewer, SetsParametersAndGetsTheValuesThatHold) {
   say(R"({"op": "setParameters", "id": "1", "parameters": [{"name": "/front/range_m", "value": 5.5}, {"name": "/nothing", "value": 1}]})");
   const json refusal = next_word(), answer = next_word();
   EXPECT_EQ(refusal["level"], 2);

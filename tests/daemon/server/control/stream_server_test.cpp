@@ -190,7 +190,7 @@ TEST(ControlStream, WithoutTheTokenNoRequestIsServed) {
   EXPECT_EQ(bench.log_text().find("0123456789"), std::string::npos) << "no secret in the log, be it ours or theirs";
 }
 
-TEST(ControlStream, EventsComeToThoseWhoAskedAndLossIsTold) {
+TEST(ControlStream, EventsComeToSubscribersAndLossIsReported) {
   ControlBench bench;
   StreamClient client(bench);
   client.greet();

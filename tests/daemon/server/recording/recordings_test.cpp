@@ -344,7 +344,7 @@ TEST(RecordedDaemon, ClientsGetTheSameBytesAndTheFileHasThemToo) {
   EXPECT_EQ(digests[0], digests[1]);
 }
 
-TEST(RecordedDaemon, IsToldInTheStatusAndStopsWhenAsked) {
+TEST(RecordedDaemon, IsListedInTheStatusAndStopsWhenRequested) {
   const Folder folder;
   Daemon daemon(recording_setup(folder));
   EXPECT_EQ(daemon.ask(control::StartRecording{"run.mcap", "rear"}).text, "no sonar is called \"rear\"; there are: front");
