@@ -86,7 +86,12 @@ void read_sonar(const Node& node, RenderJob& job) {
   job.settings =
       profile.vendor ? device_settings(job) : plain_settings(job.config.water, first_depth_m(job), profile.model->modes.front());
   job.settings.mode = mode;
-  read_ping(ping.map(), *profile.model, !profile.vendor, job.settings);
+  RowsOf rows = profile.vendor ? RowsOf::device : RowsOf::no_device;
+  if (const auto cell_m = range_cell_m(job)) {
+    rows = RowsOf::range_image;
+    job.settings.pulse_width_m = *cell_m;
+  }
+  read_ping(ping.map(), *profile.model, rows, job.settings);
 }
 
 /// The scene's keys inline, or the name of a file. What is wrong with the scene is bad data, as where a file of its own holds it.

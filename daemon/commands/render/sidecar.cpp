@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/pipeline/water_line.hpp"
+#include "core/sonar/range_image.hpp"
 #include "daemon/commands/render/sonar_version.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
@@ -171,6 +172,9 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
   const PingRequest& r = ping.request;
   const PingSettings& s = r.settings;
   const FrequencyMode& mode = ping.mode();
+  const bool of_ranges = range_image_of(r) != nullptr;  // its rows are elevations
+  json settings = json_of(s);
+  if (of_ranges) settings["row_spacing_m"] = nullptr;
   const double depth_m = depth_from_z(r.sonar_in_world.position_m.z);
   return {{"sonard", version},
           {"inputs", digest},
@@ -180,9 +184,9 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
           {"sweep", job.values},
           {"sonar", json_of(*r.model, mode)},
           {"sonar_name", job.sonar().name},
-          {"settings", json_of(s)},
-          {"row_0_m", s.range_of_row(0)},
-          {"row_spacing_m", s.range_bin_m},
+          {"settings", std::move(settings)},
+          {"row_0_m", of_ranges ? json(nullptr) : json(s.range_of_row(0))},
+          {"row_spacing_m", of_ranges ? json(nullptr) : json(s.range_bin_m)},
           {"beam_azimuth_rad", ping.beam_azimuth_rad},
           {"row_gain", ping.row_gain},
           {"water",
