@@ -65,6 +65,7 @@ void read_sonar(const Node& node, RenderJob& job) {
   SonarConfig& sonar = job.sonar();
   sonar.name = keys.optional("name").text_or("sonar", 64);
   sonar.mount = read_mount(keys.optional("mount"));
+  sonar.bearings = read_enum(keys.optional("bearing"), sonar.bearings, bearings_names);
   const Node ping = keys.optional("ping"), model_node = keys.optional("model");
   protocol::Profile& profile = sonar.profile = {nullptr, std::make_shared<const SonarModel>(plain_model())};
   if (profile_node.present()) {

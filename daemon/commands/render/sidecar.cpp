@@ -196,6 +196,7 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
              water["absorption_db_per_m"] = absorption_db_per_m(r.water, depth_m, static_cast<double>(mode.centre_hz));
              return water;
            }()},
+          {"bearing", bearings_names[static_cast<std::size_t>(r.bearings)]},
           {"sonar_in_world", json_of(r.sonar_in_world)},
           {"vehicle_in_world", json_of(r.vehicle_in_world)},
           {"above_sea_surface", is_in_air(r.sonar_in_world, *job.scene)},
@@ -219,7 +220,8 @@ std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictu
     add(hash,
         {json_of(job.settings), json_of(job.config.water), json_of(job.config.engine.switches), job.config.seed, job.sonar_index,
          job.values, static_cast<int>(job.config.engine.simd) + 16 * static_cast<int>(job.config.engine.device),
-         json_of(job.sonar().mount), json_of(job.vehicle().initial_pose), job.vehicle().orbits});
+         json_of(job.sonar().mount), static_cast<int>(job.sonar().bearings), json_of(job.vehicle().initial_pose),
+         job.vehicle().orbits});
     add_way(hash, job.vehicle().plan.trajectory, job.begins_at);
     if (job.snapshots) add(hash, "snapshots");
     const std::vector<BodyStart> bodies = bodies_of(*job.scene, job.config);
