@@ -6,6 +6,7 @@
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/pulses/spectral_columns.hpp"
 #include "core/pipeline/volume.hpp"
+#include "core/sonar/bearings.hpp"
 #include "cuda/fan_steps.hpp"
 
 namespace sonar::cuda {
@@ -13,7 +14,8 @@ namespace sonar::cuda {
 PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
     : model_(request.model),
       seed_(request.seed),
-      plan_(make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings, request.switches)),
+      plan_(make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings, request.switches,
+                      bearing_scale_of(request))),
       memory_(machine, Arena::Where::both, 1u << 20),
       noise_memory_(machine, Arena::Where::both, 0) {
   const PingPlan& p = plan_;

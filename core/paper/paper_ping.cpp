@@ -7,6 +7,7 @@
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/receive.hpp"
+#include "core/sonar/bearings.hpp"
 
 namespace sonar::paper {
 namespace {
@@ -242,7 +243,8 @@ void PaperPing::receive_rows(const BeamSignals& signals, Ping& ping) {
 
 Prepared::Prepared(const PingRequest& request, FrequencySum sum)
     : model(request.model),
-      plan(make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings, request.switches)),
+      plan(make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings, request.switches,
+                     bearing_scale_of(request))),
       fan(make_paper_fan(plan, request.switches.mode, request.switches.fixed_fan)),
       spectrum(make_spectrum(plan)),
       inverse(spectrum) {

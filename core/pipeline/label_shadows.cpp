@@ -5,6 +5,71 @@
 #include "core/pipeline/labels.hpp"
 
 namespace sonar {
+namespace {
+
+/// Samples of a column that hit something, upwards.
+using Upwards = std::vector<const FanScratch::Sample*>;
+
+/// The straight line, 1 / x over the tangent, of what the objects around sample `of` hide: from its last sample below to its
+/// first above. Where nothing is seen above, on from what is seen lowest. None: low and high are equal.
+struct HiddenLine {
+  std::size_t low = 0, high = 0;
+  float tangent = 0, inverse_x = 0, slope = 0;
+
+  HiddenLine(const Upwards& up, std::size_t of) {
+    const auto last_below = [&](std::uint32_t object) {
+      for (std::size_t i = of; i-- > 0;)
+        if (up[i]->surface.object == object) return i;
+      return up.size();
+    };
+    for (std::size_t j = of + 1; j < up.size(); ++j) {
+      const std::uint32_t object = up[j]->surface.object;
+      if (object == up[of]->surface.object) continue;
+      if (const std::size_t i = last_below(object); i < up.size()) {
+        draw(up, i, i, j);
+        high = j;
+        return;
+      }
+    }
+    if (const std::size_t i = last_below(up.front()->surface.object); i > 0 && i < up.size()) {
+      draw(up, i, 0, i);
+      high = slope < 0 ? up.size() : low;
+    }
+  }
+  /// Range at which the line passes the direction of a sample; infinite behind the horizon.
+  float range_m(const FanScratch::Sample& s) const {
+    const float inverse = inverse_x + slope * (s.tangent - tangent);
+    return inverse > 0 ? 1 / (inverse * s.forward) : HUGE_VALF;
+  }
+
+ private:
+  void draw(const Upwards& up, std::size_t from, std::size_t a, std::size_t b) {
+    low = from;
+    tangent = up[low]->tangent, inverse_x = up[low]->surface.inverse_x;
+    slope = (up[b]->surface.inverse_x - up[a]->surface.inverse_x) / (up[b]->tangent - up[a]->tangent);
+  }
+};
+
+/// Calls f(from_m, to_m, object) for the parts of a range behind sample `of`: each is in the shadow of the object that is seen in
+/// its direction, the nearest of those that hide it.
+template <class F>
+void for_each_caster(const Upwards& up, std::size_t of, float from_m, float to_m, F f) {
+  const HiddenLine line(up, of);
+  const std::uint32_t object = up[of]->surface.object;
+  for (std::size_t i = line.low + 1; i < line.high; ++i) {
+    const std::uint32_t seen = up[i]->surface.object;
+    if (seen == object || seen == up[line.low]->surface.object) continue;
+    const float begin = std::max(from_m, line.range_m(*up[i]));
+    const float end = std::min(to_m, i + 1 < up.size() ? line.range_m(*up[i + 1]) : HUGE_VALF);
+    if (!(begin < end)) continue;
+    if (begin > from_m) f(from_m, begin, object);
+    f(begin, end, seen);
+    from_m = end;
+  }
+  if (from_m < to_m) f(from_m, to_m, object);
+}
+
+}  // namespace
 
 void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
   const PingPlan& plan = context_->plan;
@@ -21,14 +86,25 @@ void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
     bool goes_on;  // whether there is something beyond it
   };
   std::vector<Behind> behind;
+  Upwards up;
   for (int k = first; k < last; ++k) {
     std::vector<Gap>& gaps = gaps_[static_cast<std::size_t>(k)];
     const std::int32_t lowest = (k - first) * elevations;
     // Upwards. An object hides what is beyond it: from where that is last seen, below the lower edge, to where it is seen again,
     // above the upper edge. Of an object that stands on something, from the object itself.
     behind.clear();
+    up.clear();
+    for (std::int32_t i = lowest; i >= 0; i = at(i).next)
+      if (is_hit(at(i).surface)) up.push_back(&at(i));
+    std::size_t hits = 0;
+    const auto put = [&](float from_m, float to_m) {
+      for_each_caster(up, hits - 1, from_m, to_m, [&](float from, float to, std::uint32_t object) {
+        gaps.push_back({sample_of(from), std::isfinite(to) ? sample_of(to) : end, object});
+      });
+    };
     for (std::int32_t i = lowest, below = -1; i >= 0; below = i, i = at(i).next) {
       const SurfaceHit& a = at(i).surface;
+      hits += is_hit(a) ? 1 : 0;
       const SurfaceHit under = below < 0 ? SurfaceHit{} : at(below).surface;
       if (is_hit(a) && under.object != a.object) {
         const bool is_first = std::none_of(behind.begin(), behind.end(), [&](const Behind& b) { return b.object == a.object; });
@@ -45,11 +121,11 @@ void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
       const SurfaceHit over = is_last ? SurfaceHit{} : at(at(i).next).surface;
       Behind& b = *std::find_if(behind.begin(), behind.end(), [&](const Behind& x) { return x.object == a.object; });
       if (is_hit(over) && over.range_m > a.range_m)
-        gaps.push_back({sample_of(std::max(a.range_m, b.from_m)), sample_of(over.range_m), a.object});
+        put(std::max(a.range_m, b.from_m), over.range_m);
       else if (is_hit(over) && over.object == a.object)
         gaps.push_back({sample_of(over.range_m), sample_of(a.range_m), a.object});
       else if (!is_hit(over) && b.goes_on)
-        gaps.push_back({sample_of(std::max(a.range_m, b.from_m)), end, a.object});
+        put(std::max(a.range_m, b.from_m), HUGE_VALF);
     }
     std::stable_sort(gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.from < b.from; });
   }

@@ -10,6 +10,7 @@
 #include "core/pipeline/arithmetic/waveform.hpp"
 #include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/pulses/spectral_columns.hpp"
+#include "core/sonar/bearings.hpp"
 
 namespace sonar {
 namespace {
@@ -172,9 +173,9 @@ void lay_out_noise_profile(PingPlan& p) {
   if (!p.switches.uneven || profile.noise_db.empty()) return;
   const double top = half_aperture_sine(p.mode);
   for (int k = 0; k < p.columns.count; ++k) {
-    const double far = power_from_db(at_sine(profile.noise_db, p.columns.sine(k), top));
-    const double near =
-        profile.near_noise_db.empty() ? far : power_from_db(at_sine(profile.near_noise_db, p.columns.sine(k), top));
+    const double reported = p.columns.sine(k) / p.bearing_scale;
+    const double far = power_from_db(at_sine(profile.noise_db, reported, top));
+    const double near = profile.near_noise_db.empty() ? far : power_from_db(at_sine(profile.near_noise_db, reported, top));
     p.noise_profile.far.push_back(static_cast<float>(far));
     p.noise_profile.near_less_far.push_back(static_cast<float>(near - far));
   }
@@ -184,6 +185,14 @@ void lay_out_noise_profile(PingPlan& p) {
     if (decay < least) break;
     p.noise_profile.decay.push_back(static_cast<float>(decay));
   }
+}
+
+/// Delays made for another sound speed steer the beams to other sines, in proportion. Columns, lit as before, go with them.
+void look_elsewhere(PingPlan& p) {
+  p.columns.first_sine *= p.bearing_scale, p.columns.spacing *= p.bearing_scale;
+  for (double& u : p.beam_sine) u = std::clamp(u * p.bearing_scale, -1.0, 1.0);
+  for (int k = 0; k < p.columns.count; ++k)
+    if (std::abs(p.columns.sine(k)) >= 1) p.columns.transmit[static_cast<std::size_t>(k)] = 0;
 }
 
 void lay_out_fixed_fan(PingPlan& p) {
@@ -268,16 +277,19 @@ double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settin
   return static_cast<double>(settings.device_sound_speed_mps) / static_cast<double>(mode.centre_hz);
 }
 
-PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool) {
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool,
+                   double bearing_scale) {
   PingPlan p;
   p.mode = mode;
   p.settings = settings;
   p.switches = switches;
   p.expected_power = switches.expected_power;
   p.fixed_fan = switches.fixed_fan;
+  p.bearing_scale = bearing_scale;
   p.columns = make_columns(mode, settings.beam_count);
   p.beam_sine = make_beam_sines(mode, settings.beam_count);
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
+  if (bearing_scale != 1) look_elsewhere(p);
   p.beam_pattern = receive_patterns(mode, p.beam_sine.size());
   p.beam_weights = make_beam_weights(mode, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);
@@ -305,9 +317,9 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   return p;
 }
 
-PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches) {
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, double bearing_scale) {
   Parallel alone;
-  return make_plan(mode, settings, switches, alone);
+  return make_plan(mode, settings, switches, alone, bearing_scale);
 }
 
 void set_gain(PingPlan& plan, float gain_db) {
@@ -323,7 +335,7 @@ bool serves(const PingPlan& plan, const PingRequest& r) {
   asked.gain_assist = plan.settings.gain_assist;
   asked.triggered = plan.settings.triggered;
   asked.transmit = plan.settings.transmit;
-  return asked == plan.settings && plan.switches == r.switches &&
+  return asked == plan.settings && plan.switches == r.switches && plan.bearing_scale == bearing_scale_of(r) &&
          plan.mode.name == r.model->modes[static_cast<std::size_t>(asked.mode)].name;
 }
 

@@ -80,8 +80,9 @@ struct PingPlan {
   Columns columns;
   Fan fan;
   BeamWeights beam_weights;
-  std::vector<float> beam_azimuth_rad;
-  std::vector<double> beam_sine;
+  double bearing_scale = 1;                  // bearing_scale_of() the request
+  std::vector<float> beam_azimuth_rad;       // reported
+  std::vector<double> beam_sine;             // where the beams look, as all sines here but those of tables by reported sine
   std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
@@ -130,8 +131,9 @@ struct PingPlan {
 };
 
 /// The same for any number of threads.
-PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool);
-PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool,
+                   double bearing_scale = 1);
+PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, double bearing_scale = 1);
 /// Wavelength of the centre frequency, at the sound speed that the device assumes [m].
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
 /// The client's gain alone, which may change with every ping.

@@ -7,7 +7,7 @@
 #include "core/base/random.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/range_returns.hpp"
-#include "core/sonar/water.hpp"
+#include "core/sonar/bearings.hpp"
 
 namespace sonar {
 namespace {
@@ -85,6 +85,8 @@ class RangeImager {
         grid_(request),
         cell_m_(static_cast<double>(settings_.pulse_width_m)),
         returns_(scene, request, cell_m_) {
+    scale_ = bearing_scale_of(request);
+    const double column_step_rad = grid_.column_step_rad() * scale_, row_step_rad = grid_.row_step_rad() * scale_;
     const double true_mps = true_sound_speed_mps(request.water, depth_from_z(request.sonar_in_world.position_m.z));
     cells_ = static_cast<std::size_t>(std::ceil((settings_.range_m + longest_return_half_m) / cell_m_)) + 2;
     first_wanted_ = static_cast<std::ptrdiff_t>(std::ceil(settings_.range_start_m / cell_m_ - 0.5));
@@ -93,12 +95,11 @@ class RangeImager {
     beam.pattern.elevation_width_rad = static_cast<float>(wanted.beam_height_rad);
     const double rms = noise_rms_upa(beam, true_mps / (2 * cell_m_));
     noise_power_ = rms * rms;
-    column_reach_ = static_cast<int>(reach * static_cast<double>(mode_.pattern.azimuth_width_rad) / grid_.column_step_rad());
-    row_reach_ = static_cast<int>(reach * wanted.beam_height_rad / grid_.row_step_rad());
+    column_reach_ = static_cast<int>(reach * static_cast<double>(mode_.pattern.azimuth_width_rad) / column_step_rad);
+    row_reach_ = static_cast<int>(reach * wanted.beam_height_rad / row_step_rad);
     for (int d = -column_reach_; d <= column_reach_; ++d)
-      column_weight_.push_back(pattern(d * grid_.column_step_rad(), static_cast<double>(mode_.pattern.azimuth_width_rad)));
-    for (int d = -row_reach_; d <= row_reach_; ++d)
-      row_weight_.push_back(pattern(d * grid_.row_step_rad(), wanted.beam_height_rad));
+      column_weight_.push_back(pattern(d * column_step_rad, static_cast<double>(mode_.pattern.azimuth_width_rad)));
+    for (int d = -row_reach_; d <= row_reach_; ++d) row_weight_.push_back(pattern(d * row_step_rad, wanted.beam_height_rad));
   }
 
   Ping run(Parallel& pool) {
@@ -146,8 +147,9 @@ class RangeImager {
     }
     for (const PointReturn& point : points_) {
       const double weight =
-          pattern(point.azimuth_rad - grid_.azimuth_rad(column), static_cast<double>(mode_.pattern.azimuth_width_rad)) *
-          pattern(point.elevation_rad - grid_.elevation_rad(row), wanted_.beam_height_rad);
+          pattern(point.azimuth_rad - looks_at_rad(grid_.azimuth_rad(column), scale_),
+                  static_cast<double>(mode_.pattern.azimuth_width_rad)) *
+          pattern(point.elevation_rad - looks_at_rad(grid_.elevation_rad(row), scale_), wanted_.beam_height_rad);
       if (weight > 0 && wanted(point)) f(point, weight);
     }
   }
@@ -247,7 +249,7 @@ class RangeImager {
   RangeImageGrid grid_;
   double cell_m_;
   RangeReturns returns_;
-  double noise_power_ = 0;
+  double noise_power_ = 0, scale_ = 1;  // scale_: bearing_scale_of() the request
   std::size_t cells_ = 0;
   std::ptrdiff_t first_wanted_ = 0, last_wanted_ = 0;  // cells whose centres lie within the ranges set
   int column_reach_ = 0, row_reach_ = 0;

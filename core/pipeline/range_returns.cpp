@@ -6,7 +6,7 @@
 
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
-#include "core/sonar/water.hpp"
+#include "core/sonar/bearings.hpp"
 
 namespace sonar {
 namespace {
@@ -67,8 +67,10 @@ RangeReturns::RangeReturns(const RayScene& scene, const PingRequest& request, do
   source_ = power_from_db(static_cast<double>(mode.source_level_db));
   for (const Material& material : scene.scene().materials) laws_.push_back(make_law(material, hz, true_mps, false));
   const auto angle = [](double rad) { return Angle{std::cos(rad), std::sin(rad)}; };
-  for (int c = 0; c < grid_.columns; ++c) azimuth_.push_back(angle(grid_.azimuth_rad(c)));
-  for (int r = 0; r < grid_.rows; ++r) elevation_.push_back(angle(grid_.elevation_rad(r)));
+  const double scale = bearing_scale_of(request);
+  column_step_rad_ = grid_.column_step_rad() * scale, row_step_rad_ = grid_.row_step_rad() * scale;
+  for (int c = 0; c < grid_.columns; ++c) azimuth_.push_back(angle(looks_at_rad(grid_.azimuth_rad(c), scale)));
+  for (int r = 0; r < grid_.rows; ++r) elevation_.push_back(angle(looks_at_rad(grid_.elevation_rad(r), scale)));
   rows_.resize(static_cast<std::size_t>(grid_.rows));
 }
 
@@ -134,9 +136,9 @@ void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ra
   // In the plane across the middle ray, which the few tenths of a degree allow.
   const auto [ca, sa] = azimuth_[static_cast<std::size_t>(column)];
   const Vec3d ahead = direction(column, row), to_port{-sa, ca, 0};
-  const double width = grid_.column_step_rad() * elevation_[static_cast<std::size_t>(row)].cosine;
+  const double width = column_step_rad_ * elevation_[static_cast<std::size_t>(row)].cosine;
   const Vec3 x = to_float(world_from_sonar_ * ahead), y = to_float(-width * (world_from_sonar_ * to_port)),
-             z = to_float(grid_.row_step_rad() * (world_from_sonar_ * cross(ahead, to_port)));
+             z = to_float(row_step_rad_ * (world_from_sonar_ * cross(ahead, to_port)));
   for (int ray = first_ray; ray < first_ray + rays; ++ray) {
     const int i = ray % lattice.across, j = ray / lattice.across;
     const int line = row * lattice.up + j, across_lines = column * lattice.across + i;
@@ -185,7 +187,7 @@ RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) con
   const LawTable& law = laws_[mesh.material[p.triangle[i]]];
   const double root = static_cast<double>(law.root_strength(static_cast<float>(cosine)));
   const double level = std::hypot(along.x, along.y);  // cosine of the elevation
-  const double width = grid_.column_step_rad() * level / lattice.across, height = grid_.row_step_rad() / lattice.up;
+  const double width = column_step_rad_ * level / lattice.across, height = row_step_rad_ / lattice.up;
   const double area_m2 = footprint_area_m2(cosine, range_m, width * height);
   const double loss = two_way_transmission(range_m, absorption_np_);
   // How the range changes over the patch of the ray: dr = -r (n . d') / (n . d) along both axes of the grid.

@@ -99,6 +99,7 @@ class RangeReturns {
   const PingRequest& request_;
   RangeImageGrid grid_;
   double cell_m_;
+  double column_step_rad_ = 0, row_step_rad_ = 0;  // between the directions that beams look in, amid the picture
   Rotation world_from_sonar_;
   Vec3 origin_;
   double device_per_true_ = 1, absorption_np_ = 0, source_ = 1;

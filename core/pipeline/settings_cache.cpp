@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <set>
 
+#include "core/sonar/bearings.hpp"
+
 namespace sonar {
 namespace {
 
@@ -28,7 +30,7 @@ PreparedSettings& SettingsCache::prepared_for(const PingRequest& request, const 
     auto made = std::make_unique<PreparedSettings>();
     made->model = request.model;
     made->plan = make_plan(request.model->modes[static_cast<std::size_t>(request.settings.mode)], request.settings,
-                           request.switches, pool);
+                           request.switches, pool, bearing_scale_of(request));
     it = prepared_.insert(prepared_.end(), std::move(made));
   }
   PreparedSettings& p = **it;

@@ -174,7 +174,8 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
   const double wavelength_m = device_wavelength_m(plan.mode, plan.settings);
   beams_ = plan.beam_sine.size();
   double widest = 0;
-  for (const double u : plan.beam_sine) widest = std::max(widest, std::abs(u));
+  const std::vector<double> reported = make_beam_sines(plan.mode, plan.settings.beam_count);  // the delays of the beams
+  for (const double u : reported) widest = std::max(widest, std::abs(u));
   const Reach noise_reach = reach_of(plan.mode, plan.settings, widest);
   const auto range_m = [&](std::size_t n) { return (static_cast<double>(n) + plan.sample_offset) * plan.sample_spacing_m; };
   const std::size_t leak_samples = leak.rms_upa().size(), all = static_cast<std::size_t>(plan.samples);
@@ -199,7 +200,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
     Responses responses;
     std::vector<double> focal;
   };
-  std::vector<Worker> workers(static_cast<std::size_t>(pool.threads()), Worker{{plan.beam_sine, law}, {}, {}});
+  std::vector<Worker> workers(static_cast<std::size_t>(pool.threads()), Worker{{reported, law}, {}, {}});
   parts_ = static_cast<std::size_t>(workers[0].array.parts());
   const double least = faint * law.channels * static_cast<double>(beams_);
   const auto audible = static_cast<float>(silent / static_cast<double>(parts_) * own_upa * own_upa * law.channels);

@@ -104,6 +104,13 @@ struct VendorSettings {
   virtual bool equals(const VendorSettings& other) const = 0;
 };
 
+/// Angles that a sonar reports, where its sound speed is not the water's (docs/acoustics.md, section 6).
+enum class Bearings {
+  are_true,             // beams look where they are said to
+  follow_device_speed,  // the beamformer's delays are those of the device's sound speed
+};
+inline constexpr std::array<std::string_view, 2> bearings_names = {"true", "device_sound_speed"};
+
 struct PingRequest {
   std::shared_ptr<const SonarModel> model;
   PingNumber number{};
@@ -117,6 +124,7 @@ struct PingRequest {
   std::shared_ptr<const VendorSettings> vendor_settings;  // may be null
   std::uint32_t sonar_id = 0;                             // keys the receiver noise
   Seed seed{};
+  Bearings bearings = Bearings::are_true;
   bool blank = false;  // no scene, noise only: on_stale: blank, or the sonar is out of the water
   Switches switches;
 };

@@ -135,6 +135,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     sonar.outbox.when_full = read_enum(outbox.optional("full"), sonar.outbox.when_full, when_full_names);
   }
   sonar.overload = read_enum(map.optional("overload"), sonar.overload, overload_names);
+  sonar.bearings = read_enum(map.optional("bearing"), sonar.bearings, bearings_names);
   const Node options = map.optional("options");
   if (profile) {
     sonar.profile = *profile;

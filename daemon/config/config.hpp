@@ -64,6 +64,7 @@ struct SonarConfig {
   std::uint16_t observer_port = 0;  // 0 = any free port
   OutboxRules outbox;
   Overload overload = Overload::slow;
+  Bearings bearings = Bearings::are_true;
   protocol::OptionValues options;  // complete
 };
 struct PoseListener {

@@ -21,7 +21,7 @@ bool is_same_device(const SonarConfig& a, const SonarConfig& b) {
          a.bind_ip == b.bind_ip && a.advertise_ip == b.advertise_ip && a.netmask == b.netmask && a.status_to == b.status_to &&
          a.groups == b.groups && a.device_id == b.device_id && a.max_clients == b.max_clients && a.when_full == b.when_full &&
          a.max_observers == b.max_observers && a.observer_port == b.observer_port && a.outbox == b.outbox &&
-         a.overload == b.overload && same_options(a, b);
+         a.overload == b.overload && a.bearings == b.bearings && same_options(a, b);
 }
 
 }  // namespace

@@ -14,6 +14,11 @@
 
 namespace sonar::aris {
 
+/// A row is the mean power of samples so close together, at most: the receiver integrates over a sample period. SMP: the spread
+/// of levels about their local mean is that of 1.7 looks a sample, not of 1.
+inline constexpr double samples_per_pulse = 1.5;
+inline constexpr int most_samples_per_row = 8;  // 1: no integration
+
 inline constexpr int channels = 16;  // beams that one ping of a frame forms
 
 /// How the beams of a frame are formed: `pings` pings of 16 interleaved beams.

@@ -151,7 +151,11 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.range_start_m = a.start_delay_us * m_per_us;
   s.range_m = s.range_start_m + s.range_bin_count * s.range_bin_m;
   s.row_centre = 0;  // sample i lies at the start delay and i sample periods
-  s.pulse_width_m = static_cast<float>(a.pulse_us * m_per_us);
+  // -3 dB of a tone in its matched filter (docs/acoustics.md, eq. 23).
+  const double width_m = (2 - std::sqrt(2.0)) * a.pulse_us * m_per_us;
+  s.pulse_width_m = static_cast<float>(width_m);
+  s.samples_per_row =
+      std::clamp(static_cast<int>(std::ceil(s.range_bin_m * samples_per_pulse / width_m - 1e-9)), 1, most_samples_per_row);
   s.rate_hz = settings.valid && settings.streaming ? a.frame_rate_hz : 0;
   s.gain_db = a.gain_db;
   s.transmit = a.transmit;

@@ -219,6 +219,30 @@ class Render(unittest.TestCase):
             self.assertIs(side["above_sea_surface"], is_above)
         self.assertEqual(self.render(*options, "--pings", "1", out=self.path / "below").stderr, "")
 
+    def test_a_sonar_above_z_0_is_told_without_a_sea_surface(self):
+        poses = self.path / "poses.csv"
+        poses.write_text("# frame: ENU_FLU\nt,x,y,z\n0,0,0,-2\n1,0,0,2\n", encoding="utf-8")
+        options = ["--poses", poses, "--quiet", "--format", "raw"]
+        result = self.render(*options)
+        self.expect(result, 0, "1 of 2 pings", "above z = 0", "no sea_surface", "NED")
+        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        about = json.loads((self.out / "render.json").read_text(encoding="utf-8"))
+        self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
+        side = json.loads((self.out / "000002.json").read_text(encoding="utf-8"))
+        self.assertIs(side["above_sea_surface"], False)
+        self.assertEqual(self.render(*options, "--pings", "1", out=self.path / "below").stderr, "")
+
+    def test_a_range_that_the_product_does_not_have_is_in_the_notes(self):
+        file = self.path / "far.yaml"
+        file.write_text("scene: {objects: [{type: point, target_strength_db: 0, pose: {xyz_m: [4, 0, -2]}}]}\n"
+                        "sonar: {profile: oculus-m1200d, ping: {mode: HF, range_m: 25}}\n"
+                        "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -2]}}\n", encoding="utf-8")
+        self.config = file
+        result = self.render("--quiet", "--format", "raw", "--pings", "1")
+        self.expect(result, 0, "range 25 m", "takes 0.1 to 10 m")
+        about = json.loads((self.out / "render.json").read_text(encoding="utf-8"))
+        self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
+
     def test_a_part_of_a_run_is_the_same_pings(self):
         options = ["--format", "raw,png"]
         self.expect(self.render("--pings", "4", *options), 0)

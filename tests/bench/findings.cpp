@@ -116,6 +116,40 @@ json find_cost_of_objects(const ScenePointer& scene, const BenchScene& where, co
           {"at_rest", Times(rest_ms)}, {"moving", Times(move_ms)}, {"added", added_ms}};
 }
 
+json find_cost_of_side_lobes(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options) {
+  json found = json::array();
+  for (const char* name : {"P1", "P3a", "P3c", "P3d"}) {
+    const BenchCase c = *find_case(name);
+    std::array<BenchOptions, 2> each{options, options};  // without, with
+    each[0].engine.switches.side_lobes = false, each[1].engine.switches.side_lobes = true;
+    Pinger without(c, each[0]), with(c, each[1]);
+    Bench bench(scene, 1, options);
+    std::array<std::vector<double>, 2> ms;
+    std::vector<double> ratios;
+    const int warming = options.pings / 10 + 1;
+    for (int k = 0; k < options.pings + warming; ++k) {
+      const Pose at = bench_pose(c, where, k / 40.0);
+      std::array<double, 2> took{};
+      for (const std::size_t turn : {k % 2 == 0 ? 0u : 1u, k % 2 == 0 ? 1u : 0u}) {
+        Pinger& pinger = turn == 0 ? without : with;
+        const PingRequest request = pinger.request(k, at);
+        const double begin = processor_s();
+        pinger.fire(*bench.engine, request);
+        took[turn] = 1e3 * (processor_s() - begin);
+      }
+      if (k < warming) continue;
+      for (const std::size_t turn : {0u, 1u}) ms[turn].push_back(took[turn]);
+      ratios.push_back(took[1] / took[0]);
+    }
+    const Times without_ms(ms[0]), with_ms(ms[1]), ratio(ratios);
+    std::printf("P15  %-4s side lobes: %.2f processor ms without, %.2f with them: %+.1f %% (best %+.1f %%)\n", name,
+                without_ms.median, with_ms.median, 100 * (ratio.median - 1), 100 * (with_ms.min / without_ms.min - 1));
+    std::fflush(stdout);
+    found.push_back({{"case", name}, {"without", without_ms}, {"with", with_ms}, {"ratio", ratio.median}});
+  }
+  return found;
+}
+
 json find_hashes(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options) {
   json found = json::array();
   for (const char* name : {"P1", "P3a", "P3d"}) {

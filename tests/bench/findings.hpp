@@ -16,6 +16,8 @@ using ScenePointer = std::shared_ptr<const Scene>;
 nlohmann::json find_cold_pings(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 /// P7: what 100 moving rigid objects add to a ping of P1 over the same objects at rest, and what placing them takes.
 nlohmann::json find_cost_of_objects(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
+/// P15: processor time of pings with the elevation pattern's side lobes over the same pings without, in turns, one thread.
+nlohmann::json find_cost_of_side_lobes(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 /// P9: SHA-256 of the samples of P1, P3a and P3d, with 1, 2 and 4 threads, and again.
 nlohmann::json find_hashes(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 /// P12: bins of a level bed 10 dB or more below their closed form, in expected power; cells, and one scatterer a ray.

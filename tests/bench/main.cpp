@@ -23,7 +23,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* other_cases[] = {"P3e", "P5", "P6", "P7", "P8", "P9", "P10", "P12", "P13", "P14"};  // beside bench_cases()
+constexpr const char* other_cases[] = {"P3e", "P5",  "P6",  "P7",  "P8", "P9",
+                                       "P10", "P12", "P13", "P14", "P15"};  // beside bench_cases()
 constexpr int ratios_missed = 1;
 
 template <class Items>
@@ -122,6 +123,7 @@ Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, c
       report["clients"].push_back(*std::move(cost));
     }
   }
+  if (asked("P15")) report["side_lobes"] = find_cost_of_side_lobes(scene, where, options);
   if (asked("P9")) report["hashes"] = find_hashes(scene, where, options);
   if (asked("P10") && options.engine.device != EngineDevice::cpu) {
     auto rates = find_device_rates(scene, where, options);
@@ -208,7 +210,7 @@ int parse_and_run(int argc, char** argv) {
       "with\n"
       "the plain ways of doing the same, P14 the first ping after a change of settings with a warm one: exit code 1 when a "
       "ratio\n"
-      "is missed.",
+      "is missed. P15 compares pings with and without side lobes.",
       "sonard_bench"};
   cli.footer("examples:\n  sonard_bench --case P1 --case P3d --threads 1 --threads 2 --json out.json\n  sonard_bench --case P6");
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));

@@ -122,6 +122,10 @@ def service(report):
         rows.append(["P7", f"placing {o['objects']} moving objects; and the ping's extra processor time over the same objects at rest",
                      f"{o['place']['median_ms']:.3f} ms; {o['added']['median_ms']:+.2f} ms", "0.5 ms", "0.1 ms",
                      verdict(o["place"]["median_ms"], 0.5, 0.1, True)])
+    for s in report.get("side_lobes", []):
+        rows.append(["P15", f"{s['case']} with side lobes over without, as in the rates above, in turns",
+                     f"{s['with']['median_ms']:.2f} over {s['without']['median_ms']:.2f} processor ms: {100 * s['ratio'] - 100:+.0f} %",
+                     "", "+10 %", "goal" if s["ratio"] <= 1.1 else "**missed**"])
     for c in report.get("clients", []):
         share = 100 * c["sender_share"]
         rows.append(["P8", f"{c['clients']} client{'s' if c['clients'] > 1 else ''} at {c['pings_per_second']:.1f} pings/s: the sending thread's share of a processor",

@@ -45,6 +45,7 @@ class Page(unittest.TestCase):
                   "clients": [{"clients": 10, "pings_per_second": 40.0, "dropped": 1, "sender_share": 0.1}],
                   "cold": [{"case": "P1", "threads": 2, "cold": TIMES, "warm": TIMES, "new_tiles": 0.9}],
                   "objects": {"objects": 100, "place": TIMES, "added": TIMES},
+                  "side_lobes": [{"case": "P3a", "with": TIMES, "without": TIMES, "ratio": 1.23}],
                   "hashes": [{"case": "P1", "same": False, "sha256": "0123456789abcdef0"}],
                   "empty_bins": [{"case": "P1", "rays": 300, "rows": 394, "bins": 1000, "empty_share": 0.31}],
                   "ratios": [{"name": "slow / fast", "slow_ms": 100.0, "fast_ms": 1.0, "ratio": 100.0, "least": 500.0,
@@ -57,7 +58,7 @@ class Page(unittest.TestCase):
                             for where in (Path(folder), Path(folder) / "tables"))
             for svg in ("benchmarks-rates.svg", "benchmarks-curves.svg"):
                 self.assertTrue(ElementTree.parse(Path(folder) / svg).getroot().tag.endswith("svg"))
-        for words in ("p99 4.00 ms", "1 dropped | 40 %, no drop | 15 % | **missed** |", "**different bytes**",
+        for words in ("p99 4.00 ms", "processor ms: +23 % |  | +10 % | **missed** |", "1 dropped | 40 %, no drop | 15 % | **missed** |", "**different bytes**",
                       "the next ping 2.0 ms | 500 ms | 60 ms | goal |", "before the run 5.5"):
             self.assertIn(words, page)
         for words in ("31.000 %", "| 500 |", "400: 5.00 ms"):

@@ -75,6 +75,20 @@ def two_cylinders(text):
     head, rows = tables_of(text)[0]
     off = largest([first_number(rows[-1][i]) - float(re.search(r"at ([\d.]+) m", head[i])[1]) for i in (1, 2)])
     yield ["two cylinders: range of the peaks", "nearest points", f"{off:+.3f} m", "none"]
+    yield from alike(text)
+
+
+def alike(text):
+    row = next(r for r in tables_of(text)[1][1] if "228 rows" in r[0])
+    yield ["the same: raster beside ray", "claim of equal quality",
+           f"{row[2]} within 3 dB: {'not equal' if 'does not hold' in text else 'equal'}", "none"]
+
+
+def pitched_sonar(text):
+    (_, rows), = tables_of(text)
+    raster, ray = rows[0], next(r for r in rows if r[0].startswith("ray, 228"))
+    yield ["pitched sonar: dark floor, raster, ray", f"rows alone: {raster[2]}, {ray[2]}", f"{raster[1]}, {ray[1]}; plate near: {raster[3]}, {ray[3]}",
+           "none"]
 
 
 def local_search(text):
@@ -114,7 +128,7 @@ def tell_apart(text):
            f"{by_sector[1]} % ({by_sector[2]}; most by: {features[0][0]})", "60 % at most is the aim"]
 
 
-CASES = {"tank": tank, "two-cylinders": two_cylinders, "local-search": local_search, "differences": differences, "coverage": coverage,
+CASES = {"tank": tank, "pitched-sonar": pitched_sonar, "two-cylinders": two_cylinders, "local-search": local_search, "differences": differences, "coverage": coverage,
          "capture": capture, "tell-apart": tell_apart}
 CHAPTERS = [*CASES, "oracles", "cost"]  # all that the page is made of
 PICTURE_FILE = "capture.png"

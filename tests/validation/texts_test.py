@@ -114,7 +114,10 @@ class Summary(unittest.TestCase):
             "tank": table(["", "measured", "predicted outside"], [["HF", "-24.44", "-24.06"], ["LF", "-22.47", "-22.11"]])
                     + "\n" + table(["validation", "calibration", "total", "predicted"], [["LF", "HF", "+2.63 dB", "+2.60 dB"]]),
             "two-cylinders": table(["", "lying, nearest point at 2.000 m", "upright, nearest point at 3.000 m"],
-                                   [["default", "2.060 m", "3.010 m"]]),
+                                   [["default", "2.060 m", "3.010 m"]])
+                             + "\n" + table(["", "beside", "within", ""], [["raster, 228 rows", "ray, 228 rays", "43 %", "3.5 dB"]]),
+            "pitched-sonar": table(["", "far", "", "near", ""], [["raster, 11 rows", "84.0 %", "85.2 %", "56.4 %", "67.9 %"],
+                                                                 ["ray, 228 rays", "1.3 %", "0.8 %", "0.0 %", "0.0 %"]]),
             "local-search": table(["", "mean", "", "within", "worst"],
                                   [["default", "closed form", "", "100.00 %", "+0.1 dB"],
                                    ["300 fixed rays, our pulse, beams and law", "closed form", "", "77.92 %", "-26.2 dB"]]),
@@ -229,7 +232,7 @@ class Summary(unittest.TestCase):
 
 class RenderFiles(unittest.TestCase):
     def test_every_scene_of_the_page_renders(self):
-        for name in ("tank-rod", "two-cylinders", "flat-sand", "rough-sand", "grazing", "point", "wall"):
+        for name in ("tank-rod", "pitched-sonar", "two-cylinders", "flat-sand", "rough-sand", "grazing", "point", "wall"):
             with self.subTest(name), tempfile.TemporaryDirectory() as folder:
                 text = with_step((SCENES / f"{name}.yaml").read_text(encoding="utf-8"), 0)
                 file = pathlib.Path(folder, f"{name}.yaml")

@@ -94,11 +94,11 @@ def makers_of(sonard, pictures, table_of_oracles):
     import differences
     import local_search
     import parts
+    import pitched_sonar
     import tank
-    import tilted_tank
     import two_cylinders
 
-    modules = {"tank": tank, "tilted-tank": tilted_tank, "two-cylinders": two_cylinders, "local-search": local_search,
+    modules = {"tank": tank, "pitched-sonar": pitched_sonar, "two-cylinders": two_cylinders, "local-search": local_search,
                "differences": differences, "coverage": coverage, "cost": cost, "parts": parts}
     makers = {name: functools.partial(module.chapter, sonard, pictures) for name, module in modules.items()}
     return makers | {"capture": lambda: capture(sonard.program, pictures), "tell-apart": lambda: tell_apart(sonard.program),

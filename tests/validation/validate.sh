@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Writes tables and pictures of the validation into build/validation, and their summary docs/validation.md: builds sonard, renders
 # the experiments. usage: tests/validation/validate.sh [--partial] [--only CHAPTER ...] | --summary
-# Chapters: tank two-cylinders local-search differences coverage cost parts capture tell-apart oracles. Costs need an otherwise idle machine.
+# Chapters: tank pitched-sonar two-cylinders local-search differences coverage cost parts capture tell-apart oracles.
+# Costs need an otherwise idle machine.
 # Takes under fifteen minutes on two cores; --summary rewrites the summary from the tables in a moment. The table of oracles is that
 # of the last ./test.sh, complete unless --partial is given; capture and tell-apart need SONARD_CAPTURES. Chapters without data are
 # kept; the summary is written when there are all, else the exit code is 1.
@@ -11,7 +12,7 @@ cd "$(dirname "$0")/../.." || exit 70
 . tests/tools/setup.sh
 
 case "${1:-}" in
-  -h | --help) sed -n '2,7s/^# //p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,8s/^# //p' "$0"; exit 0 ;;
   --summary) exec python3 tests/validation/validate.py --summary ;;
 esac
 

@@ -9,6 +9,7 @@
 #include <set>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "core/paper/paper_engine.hpp"
 #include "daemon/commands/load_progress.hpp"
@@ -94,9 +95,15 @@ Result<RenderInput> input_of(const RenderCommand& command) {
       if (const auto r = follow(job, *file, command.poses, body); !r) return tl::make_unexpected(r.error());
     }
   }
+  std::set<std::string> ranges;  // a line each, however many steps a sweep has
+  for (const RenderJob& job : input->jobs)
+    if (std::string note = note_of_range(job); !note.empty()) ranges.insert(std::move(note));
+  input->notes.insert(input->notes.end(), ranges.begin(), ranges.end());
+  bool is_noted = false;
   for (RenderJob& job : input->jobs) {
     if (job.wants_motion || is_given_on(command.engine, &Switches::motion)) job.snapshots = false;
-    if (job.snapshots && input->notes.empty()) input->notes.push_back(note_of_snapshots(*job.vehicle().plan.trajectory));
+    if (job.snapshots && !std::exchange(is_noted, true))
+      input->notes.push_back(note_of_snapshots(*job.vehicle().plan.trajectory));
   }
   return input;
 }
@@ -147,10 +154,7 @@ Result<int> check(const RenderInput& input) {
 /// A line each, however many steps a sweep has.
 void print_notes(const RenderInput& input) {
   std::set<std::string> notes{note_of_parts_left_out(input.jobs.front().config.engine.switches)};
-  for (const RenderJob& job : input.jobs) {
-    notes.insert(note_of_range(job));
-    notes.insert(job.scene->notes.begin(), job.scene->notes.end());
-  }
+  for (const RenderJob& job : input.jobs) notes.insert(job.scene->notes.begin(), job.scene->notes.end());
   for (const std::string& note : notes)
     if (!note.empty()) std::fprintf(stderr, "sonard: %s\n", note.c_str());
 }

@@ -65,6 +65,7 @@ void read_sonar(const Node& node, RenderJob& job) {
   SonarConfig& sonar = job.sonar();
   sonar.name = keys.optional("name").text_or("sonar", 64);
   sonar.mount = read_mount(keys.optional("mount"));
+  sonar.bearings = read_enum(keys.optional("bearing"), sonar.bearings, bearings_names);
   const Node ping = keys.optional("ping"), model_node = keys.optional("model");
   protocol::Profile& profile = sonar.profile = {nullptr, std::make_shared<const SonarModel>(plain_model())};
   if (profile_node.present()) {
@@ -86,7 +87,12 @@ void read_sonar(const Node& node, RenderJob& job) {
   job.settings =
       profile.vendor ? device_settings(job) : plain_settings(job.config.water, first_depth_m(job), profile.model->modes.front());
   job.settings.mode = mode;
-  read_ping(ping.map(), *profile.model, !profile.vendor, job.settings);
+  RowsOf rows = profile.vendor ? RowsOf::device : RowsOf::no_device;
+  if (const auto cell_m = range_cell_m(job)) {
+    rows = RowsOf::range_image;
+    job.settings.pulse_width_m = *cell_m;
+  }
+  read_ping(ping.map(), *profile.model, rows, job.settings);
 }
 
 /// The scene's keys inline, or the name of a file. What is wrong with the scene is bad data, as where a file of its own holds it.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/sonar/range_image.hpp"
 #include "core/text/format.hpp"
 #include "daemon/commands/render/snapshots.hpp"
 #include "daemon/emulator/sonar/ping_request.hpp"
@@ -22,19 +23,27 @@ PingSettings device_settings(const RenderJob& job) {
 
 namespace {
 
-/// As the device keeps them in the job's mode: they say whether its ping is a range image.
-std::shared_ptr<const VendorSettings> vendor_settings(const RenderJob& job) {
+/// As the device keeps them in the job's mode; without vendor settings where there is no device.
+protocol::ChangeSettings as_the_device_keeps(const RenderJob& job) {
   const protocol::Vendor* const vendor = job.sonar().profile.vendor;
-  if (vendor == nullptr) return nullptr;
+  if (vendor == nullptr) return {};
   protocol::DeviceState device = device_state(job.sonar(), job.config, Time{});
-  device.settings = vendor->initial_settings(device).vendor_settings;
+  device.depth_m = first_depth_m(job);
+  protocol::ChangeSettings first = vendor->initial_settings(device);
+  device.settings = first.vendor_settings;
   protocol::SettingsOverride wanted;
   wanted.mode = static_cast<std::uint32_t>(job.settings.mode);
-  const auto change = vendor->apply_override(wanted, device);
-  return change ? change->vendor_settings : device.settings;
+  auto change = vendor->apply_override(wanted, device);
+  return change ? *std::move(change) : std::move(first);
 }
 
 }  // namespace
+
+std::optional<float> range_cell_m(const RenderJob& job) {
+  const protocol::ChangeSettings kept = as_the_device_keeps(job);
+  if (dynamic_cast<const RangeImageSettings*>(kept.vendor_settings.get()) == nullptr) return {};
+  return kept.settings.pulse_width_m;
+}
 
 std::string note_of_range(const RenderJob& job) {
   constexpr double rounding = 1 + 1e-6;
@@ -73,7 +82,8 @@ PingRequest make_request(const RenderJob& job, const World& world, PingNumber nu
   request.model = sonar.profile.model;
   request.number = number;
   request.settings = job.settings;
-  request.vendor_settings = vendor_settings(job);
+  request.vendor_settings = as_the_device_keeps(job).vendor_settings;  // they say whether the ping is a range image
+  request.bearings = sonar.bearings;
   request.sonar_id = static_cast<std::uint32_t>(job.sonar_index);
   return request;
 }

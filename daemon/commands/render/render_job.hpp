@@ -58,6 +58,8 @@ Result<RenderInput> parse_render_file(std::string_view text, const std::string& 
 
 /// A sentence when the product cannot be set to the range, which is rendered all the same; else empty.
 std::string note_of_range(const RenderJob& job);
+/// Width of a range cell in the job's mode, on the wire at every range; none of a sonar that makes no range images.
+std::optional<float> range_cell_m(const RenderJob& job);
 
 /// The vehicle follows its trajectory in a file, in the file's own time; an empty name: of the only body in it. Errors:
 /// name:line: what.

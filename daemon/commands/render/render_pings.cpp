@@ -15,6 +15,7 @@
 #include "daemon/commands/render/npy.hpp"
 #include "daemon/commands/render/sidecar.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
+#include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/server/engine/choose_engine.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 
@@ -218,22 +219,33 @@ Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions
 }
 
 std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
-  std::size_t all = 0, in_air = 0;
+  std::size_t all = 0, in_air = 0, above = 0;
   for (const RenderJob& job : input.jobs) {
     const auto times = firing_times(job, o);
     if (!times) return {};
     all += times->size();
     const World world = world_of(job);
     const SonarConfig& sonar = job.sonar();
-    for (const Time at : *times)
-      in_air += is_in_air(compose(world.vehicle_at(sonar.vehicle, at), sonar.mount), *job.scene) ? 1 : 0;
+    const Extent scene = surroundings_of(job.config, *job.scene).scene;
+    const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // its z = 0 is no surface
+    for (const Time at : *times) {
+      const Pose sonar_in_world = compose(world.vehicle_at(sonar.vehicle, at), sonar.mount);
+      const bool is_above = sonar_in_world.position_m.z > least_depth_m, hears_nothing = is_in_air(sonar_in_world, *job.scene);
+      in_air += hears_nothing ? 1 : 0;
+      above += is_above && !hears_nothing && !lies_above ? 1 : 0;
+    }
   }
-  if (in_air == 0) return {};
+  constexpr const char* cure = "was NED taken for ENU? Check the poses and their frame";
+  if (in_air > 0)
+    return text::format(
+        "%zu of %zu pings: the sonar is above the sea surface and receives noise only (z = 0 is the surface, lower is negative); "
+        "%s",
+        in_air, all, cure);
+  if (above == 0) return {};
   return text::format(
-      "%zu of %zu pings: the sonar is above the sea surface and receives noise only (z = 0 is the surface, lower is negative); "
-      "was "
-      "NED taken for ENU? Check the poses and their frame",
-      in_air, all);
+      "%zu of %zu pings: the sonar is above z = 0, where the sea surface is, and is computed as in water since the scene has no "
+      "sea_surface; %s",
+      above, all, cure);
 }
 
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, Parallel& pool,

@@ -20,7 +20,8 @@ struct Progress {
 /// When the pings of a job are fired [s], from the first wanted on. usage: more pings than the poses last.
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& options);
 
-/// One sentence when the sonar is above the sea surface in some of them; else empty, and where the times are refused.
+/// One sentence when the sonar is above the sea surface, or above z = 0 in a scene that has none, in some of them; else empty,
+/// and where the times are refused.
 std::string note_of_air(const RenderInput& input, const OutputOptions& options);
 
 /// Calls `on_progress` after every ping, in order. Errors: io; requests that the engine rejects.

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/pipeline/water_line.hpp"
+#include "core/sonar/range_image.hpp"
 #include "daemon/commands/render/sonar_version.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
@@ -171,6 +172,9 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
   const PingRequest& r = ping.request;
   const PingSettings& s = r.settings;
   const FrequencyMode& mode = ping.mode();
+  const bool of_ranges = range_image_of(r) != nullptr;  // its rows are elevations
+  json settings = json_of(s);
+  if (of_ranges) settings["row_spacing_m"] = nullptr;
   const double depth_m = depth_from_z(r.sonar_in_world.position_m.z);
   return {{"sonard", version},
           {"inputs", digest},
@@ -180,9 +184,9 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
           {"sweep", job.values},
           {"sonar", json_of(*r.model, mode)},
           {"sonar_name", job.sonar().name},
-          {"settings", json_of(s)},
-          {"row_0_m", s.range_of_row(0)},
-          {"row_spacing_m", s.range_bin_m},
+          {"settings", std::move(settings)},
+          {"row_0_m", of_ranges ? json(nullptr) : json(s.range_of_row(0))},
+          {"row_spacing_m", of_ranges ? json(nullptr) : json(s.range_bin_m)},
           {"beam_azimuth_rad", ping.beam_azimuth_rad},
           {"row_gain", ping.row_gain},
           {"water",
@@ -192,6 +196,7 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
              water["absorption_db_per_m"] = absorption_db_per_m(r.water, depth_m, static_cast<double>(mode.centre_hz));
              return water;
            }()},
+          {"bearing", bearings_names[static_cast<std::size_t>(r.bearings)]},
           {"sonar_in_world", json_of(r.sonar_in_world)},
           {"vehicle_in_world", json_of(r.vehicle_in_world)},
           {"above_sea_surface", is_in_air(r.sonar_in_world, *job.scene)},
@@ -215,7 +220,8 @@ std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictu
     add(hash,
         {json_of(job.settings), json_of(job.config.water), json_of(job.config.engine.switches), job.config.seed, job.sonar_index,
          job.values, static_cast<int>(job.config.engine.simd) + 16 * static_cast<int>(job.config.engine.device),
-         json_of(job.sonar().mount), json_of(job.vehicle().initial_pose), job.vehicle().orbits});
+         json_of(job.sonar().mount), static_cast<int>(job.sonar().bearings), json_of(job.vehicle().initial_pose),
+         job.vehicle().orbits});
     add_way(hash, job.vehicle().plan.trajectory, job.begins_at);
     if (job.snapshots) add(hash, "snapshots");
     const std::vector<BodyStart> bodies = bodies_of(*job.scene, job.config);

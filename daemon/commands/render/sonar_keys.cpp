@@ -157,8 +157,9 @@ int read_mode(const Node& node, const SonarModel& model, int fallback) {
   return static_cast<int>(node.choice_index(std::move(names)));
 }
 
-void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s) {
+void read_ping(Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& s) {
   const PingSettings before = s;
+  const bool own_grid = rows_of == RowsOf::no_device, range_image = rows_of == RowsOf::range_image;
   s.mode = read_mode(keys.optional("mode"), model, s.mode);
   const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
   if (!own_grid) s.range_m = std::min(s.range_m, static_cast<double>(mode.max_range_m));
@@ -182,8 +183,8 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   const double c = static_cast<double>(s.device_sound_speed_mps);
   if (spacing.present())
     s.range_bin_m = spacing.number(a_length);
-  else if (rows.present())
-    s.range_bin_m = shown_m / static_cast<double>(std::max<std::int64_t>(rows.integer(1, 65535), 1));
+  else if (rows.present() || range_image)
+    s.range_bin_m = shown_m / static_cast<double>(std::max<std::int64_t>(rows.integer_or(before.range_bin_count, 1, 65535), 1));
   else if (own_grid)
     s.range_bin_m = c / (2 * native_sample_rate_hz(envelope_parameter_hz(c, static_cast<double>(s.pulse_width_m))));
   else
@@ -191,7 +192,7 @@ void read_ping(Map keys, const SonarModel& model, bool own_grid, PingSettings& s
   if (!(s.range_bin_m > 0)) return;  // said already
   s.range_bin_count = static_cast<int>(
       rows.integer_or(std::clamp<std::int64_t>(std::llround(std::ceil(shown_m / s.range_bin_m - 1e-9)), 1, 65535), 1, 65535));
-  if (!pulse.present() && !own_grid)
+  if (!pulse.present() && rows_of == RowsOf::device)
     s.pulse_width_m = static_cast<float>(static_cast<double>(before.pulse_width_m) * s.range_bin_m / before.range_bin_m);
 
   s.row_centre = keys.optional("row_centre").number_or(s.row_centre, Range::between(0, 1));

@@ -12,9 +12,14 @@ namespace sonar::render {
 
 void read_model(text::Map keys, FrequencyMode& mode);
 
-/// Keys of a sonar with that model. `own_grid`: the settings come from no device; rows then follow the pulse, two samples to its
-/// b (docs/acoustics.md, section 4), unless they are given.
-void read_ping(text::Map keys, const SonarModel& model, bool own_grid, PingSettings& settings);
+/// How rows and pulse that are not given follow from the range.
+enum class RowsOf {
+  no_device,    // rows follow the pulse, two samples to its b (docs/acoustics.md, section 4)
+  device,       // rows and pulse are proportional to the range
+  range_image,  // rows are elevations and the pulse is the product's range cell: neither changes
+};
+/// Keys of a sonar with that model.
+void read_ping(text::Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& settings);
 /// `mode:` of a ping, a name or a number from 1; `fallback` counts from 0.
 int read_mode(const text::Node& node, const SonarModel& model, int fallback);
 

@@ -215,6 +215,7 @@ PingRequest Sonar::request_at(Time at, const protocol::RequestPing& aim) const {
   request.settings = settings_;
   request.vendor_settings = aim.with ? aim.with : state_.settings;
   request.sonar_id = index_;
+  request.bearings = config_.bearings;
   request.blank = (stale && config.poses.on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
   return request;
 }

@@ -111,6 +111,62 @@ TEST(Labels, TheShadowLiesBehindTheSphereAndNamesIt) {
   EXPECT_EQ(labels.instance[after], 1);
 }
 
+/// A sphere in front of a box, on sand: what of both a straight line from the sonar to a place of the bed meets first.
+struct SphereBeforeBox {
+  static constexpr double box_x_m = 8, box_half_m[3] = {0.2, 1.5, 0.6};
+
+  std::shared_ptr<const Scene> scene() const {
+    return labelled(SceneMaker()
+                        .add(flat_bed(), -27)
+                        .add(sphere(radius_m, 5), -27, {sphere_x_m, 0, radius_m})
+                        .add(box({box_half_m[0], box_half_m[1], box_half_m[2]}), -27, {box_x_m, 0, box_half_m[2]}));
+  }
+  static bool meets_sphere(Vec3d from, Vec3d to) {
+    const Vec3d way = to - from, away = from - Vec3d{sphere_x_m, 0, radius_m};
+    const double b = dot(way, away), a = dot(way, way);
+    return b * b > a * (dot(away, away) - radius_m * radius_m);
+  }
+  static bool meets_box(Vec3d from, Vec3d to) {
+    double enters = 0, leaves = 1;
+    const auto slab = [&](double begin, double step, double middle, double half) {
+      const double a = (middle - half - begin) / step, b = (middle + half - begin) / step;
+      enters = std::max(enters, std::min(a, b)), leaves = std::min(leaves, std::max(a, b));
+    };
+    slab(from.x, to.x - from.x, box_x_m, box_half_m[0]);
+    if (to.y != from.y) slab(from.y, to.y - from.y, 0, box_half_m[1]);
+    slab(from.z, to.z - from.z, box_half_m[2], box_half_m[2]);
+    return enters < leaves;
+  }
+};
+
+TEST(Labels, OfTwoThingsInTheWayTheNearerCastsTheShadow) {
+  const SphereBeforeBox things;
+  Labelled l(things.scene(), 2);
+  const PingLabels& labels = l.run();
+  (void)l.s.ping();
+  const auto beams = static_cast<std::size_t>(labels.beams);
+  const Vec3d sonar{0, 0, height_m};
+  int of_both = 0, nearer = 0, of_box = 0, box = 0;
+  for (int row = 0; row < labels.rows; ++row)
+    for (std::size_t j = 0; j < beams; ++j) {
+      const double range_m = l.s.request.settings.range_of_row(row);
+      const double y = range_m * std::sin(static_cast<double>(l.pings.front().beam_azimuth_rad[j]));
+      const double x_square = range_m * range_m - y * y - height_m * height_m;
+      const std::uint16_t caster = labels.caster[static_cast<std::size_t>(row) * beams + j];
+      if (caster == 0 || x_square <= SphereBeforeBox::box_x_m * SphereBeforeBox::box_x_m) continue;
+      const Vec3d place{std::sqrt(x_square), y, 0};
+      if (!things.meets_box(sonar, place)) continue;
+      const bool both = things.meets_sphere(sonar, place);
+      (both ? of_both : of_box) += 1;
+      (both ? nearer : box) += caster == (both ? 2 : 3) ? 1 : 0;
+    }
+  std::printf("behind both: %d of %d name the sphere; behind the box alone: %d of %d the box\n", nearer, of_both, box, of_box);
+  ASSERT_GT(of_both, 100);
+  ASSERT_GT(of_box, 1000);
+  EXPECT_GT(nearer, 0.9 * of_both);
+  EXPECT_GT(box, 0.95 * of_box);
+}
+
 TEST(Labels, OpenWaterBehindASphereInMidWaterIsNoShadow) {
   constexpr double small_m = 0.1, sphere_m = 2, deep_m = 3.5;  // the bed is farther than the sphere everywhere
   const Vec3d middle{sphere_m * std::cos(tilt_rad), 0, height_m - sphere_m * std::sin(tilt_rad)};

@@ -76,6 +76,25 @@ TEST(PointOracles, Oracle02_SoundSpeedMismatchScalesRange) {
   }
 }
 
+TEST(PointOracles, BearingsFollowTheDevicesSoundSpeedWhereAsked) {
+  for (const FrequencyMode& mode : {p900(), oculus_high()})
+    for (const double c : {1412.0, 1500.0, 1549.0})
+      for (const double deg : {25.0, -12.0, 0.0})
+        for (const Bearings bearings : {Bearings::are_true, Bearings::follow_device_speed}) {
+          Sounding s(SceneMaker().add_point(at(5, rad_from_deg(deg)), -15).make(), mode, native_rows(7, 0.0254));
+          s.request.water.sound_speed_mps = c;
+          s.request.bearings = bearings;
+          s.ping();
+          const int row = static_cast<int>(std::lround(s.row_of_range(5 * 1500 / c))), j = s.loudest_beam(row);
+          const Peak peak = log_parabola(s.pressure(row, j - 1), s.pressure(row, j), s.pressure(row, j + 1));
+          const double next = peak.offset < 0 ? s.beam_sine(j - 1) : s.beam_sine(j + 1);
+          const double seen_deg = deg_from_rad(std::asin(std::lerp(s.beam_sine(j), next, std::abs(peak.offset))));
+          const double speeds = bearings == Bearings::are_true ? 1 : 1500 / c;
+          const double expected_deg = deg_from_rad(std::asin(std::sin(rad_from_deg(deg)) * speeds));
+          record_oracle(no_number, "bearing under a wrong sound speed", expected_deg, seen_deg, 0.03, "deg");
+        }
+}
+
 TEST(PointOracles, Oracle03_LevelOfAPoint) {
   struct Case {
     FrequencyMode mode;

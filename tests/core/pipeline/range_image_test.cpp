@@ -220,6 +220,22 @@ TEST(RangeImage, BelievedSoundSpeedScalesRanges) {
   EXPECT_NEAR(s.range_m(127, 32) / right, 1450.0 / 1500, 1e-3);
 }
 
+TEST(RangeImage, AnglesFollowTheBelievedSoundSpeedWhereAsked) {
+  const double c = 1412, azimuth = rad_from_deg(25), elevation = rad_from_deg(-12);
+  const Vec3d there{6 * std::cos(elevation) * std::cos(azimuth), 6 * std::cos(elevation) * std::sin(azimuth),
+                    6 * std::sin(elevation)};
+  for (const Bearings bearings : {Bearings::are_true, Bearings::follow_device_speed}) {
+    RangeImageSounding s(SceneMaker().add_point(there, 0).make());
+    s.request().water.sound_speed_mps = c;
+    s.request().bearings = bearings;
+    s.ping();
+    const double scale = bearings == Bearings::are_true ? 1 : 1500 / c;
+    const auto [column, row] = s.middle();
+    EXPECT_NEAR(s.grid().azimuth_rad(column), std::asin(std::sin(azimuth) * scale), s.grid().column_step_rad() / 2);
+    EXPECT_NEAR(s.grid().elevation_rad(row), std::asin(std::sin(elevation) * scale), s.grid().row_step_rad() / 2);
+  }
+}
+
 TEST(RangeImage, StrengthIsProportionalToAmplitude) {
   RangeImageSounding s(plane_ahead(5));
   s.request().switches.expected_power = true;

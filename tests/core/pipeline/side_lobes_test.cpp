@@ -79,6 +79,35 @@ TEST(SideLobes, ABedIsAsLoudAsTheClosedFormDownTo45Db) {
   for (const FrequencyMode& mode : {p900(), oculus_high()}) expect_bed(mode, true, false);
 }
 TEST(SideLobes, CoarserCellsKeepItsLevel) { expect_bed(p900(), true, true); }
+/// Scintillation index of samples over the bed's closed form, where the pattern is between `least_db` and -20 dB: 1 for speckle
+/// of many cells a sample.
+double scintillation(const FrequencyMode& mode, double least_db) {
+  constexpr double height = 2, tilt = 0.1, lambert_db = -20;
+  double sum = 0, squares = 0, n = 0;
+  Sounding s(SceneMaker().add(height_field(-1, 14, -12, 12, 1, [](double, double) { return 0.0; }), lambert_db).make(), mode,
+             native_rows(12, 0.0254));
+  s.request.switches.side_lobes = true;
+  for (const std::uint32_t seed : {1u, 2u, 3u, 4u}) {
+    s.request.seed = Seed{seed};
+    s.ping_from({0, 0, height}, {0, tilt, 0});
+    const reference::SeabedLevel bed(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, tilt);
+    for (int row = static_cast<int>(s.row_of_range(2.15)); row < s.row_of_range(11); ++row) {
+      const double r = s.range_of_row(row), level = two_way_db(mode, bed.psi_rad(r));
+      const double near = two_way_db(mode, bed.psi_rad(r - 0.05)), far = two_way_db(mode, bed.psi_rad(r + 0.05));
+      if (level < least_db || level > -20 || std::abs(near - far) > 3 || bed.psi_rad(r) < -1.3) continue;
+      for (int j = 200; j < 312; ++j, ++n) {
+        const double ratio = s.power(row, j) / power_from_db(bed.db(r, s.beam_sine(j)));
+        sum += ratio, squares += ratio * ratio;
+      }
+    }
+  }
+  const double mean = sum / n;
+  return squares / n / (mean * mean) - 1;
+}
+TEST(SideLobes, CoarserCellsKeepItsSpeckle) {
+  for (const FrequencyMode& mode : {p900(), oculus_high()})
+    record_oracle(24, "bed in the side lobes, scintillation index", 1, scintillation(mode, -45), 0.2, "");
+}
 TEST(SideLobes, SwitchedOffNothingIsHeardThere) { expect_bed(p900(), false, false); }
 
 }  // namespace

@@ -200,6 +200,11 @@ TEST(Config, LimitsAndPriorityAreRead) {
 }
 
 TEST(Config, OverloadIsRead) {
+  EXPECT_EQ(parse(world + vehicles + sonar)->sonars.at(0).bearings, Bearings::are_true);
+  for (const auto& [bearing, means] :
+       {std::pair("true", Bearings::are_true), {"device_sound_speed", Bearings::follow_device_speed}})
+    EXPECT_EQ(parse(world + vehicles + sonar + "    bearing: " + bearing + "\n")->sonars.at(0).bearings, means);
+  EXPECT_THAT(why(world + vehicles + sonar + "    bearing: false\n"), StartsWith("sonard.yaml:7:14: sonars[0].bearing: "));
   EXPECT_EQ(parse(world + vehicles + sonar)->sonars.at(0).overload, Overload::slow);
   EXPECT_EQ(parse(world + vehicles + sonar + "    overload: count\n")->sonars.at(0).overload, Overload::count);
   EXPECT_THAT(why(world + vehicles + sonar + "    overload: counts\n"),

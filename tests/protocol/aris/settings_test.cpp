@@ -136,7 +136,8 @@ TEST(ArisOverride, IsWhatAControllerWouldHaveSet) {
   EXPECT_EQ(far->settings.beam_count, 128);
   const auto long_range = change({20, 5, {}, {}, {}});
   ASSERT_TRUE(long_range) << long_range.error().text;
-  EXPECT_GE(static_cast<double>(long_range->settings.pulse_width_m), 0.99 * long_range->settings.range_bin_m);
+  EXPECT_GE(static_cast<double>(long_range->settings.pulse_width_m), 0.99 * 0.5858 * long_range->settings.range_bin_m)
+      << "a tone as long as a row";
   const auto few = change({{}, {}, {}, {}, 64u});
   ASSERT_TRUE(few) << few.error().text;
   EXPECT_EQ(few->settings.beam_count, 64);

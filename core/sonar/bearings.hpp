@@ -1,0 +1,26 @@
+// Where beams look whose delays were made for another sound speed than the water's (docs/acoustics.md, section 6).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/sonar/ping.hpp"
+#include "core/sonar/water.hpp"
+
+namespace sonar {
+
+/// Sine of the direction that a beam looks in over the one that the device reports; 1 where bearings are true. In steps of
+/// 1.2e-4, so that a vehicle keeps its tables until it has changed its depth by some 10 m.
+inline double bearing_scale_of(const PingRequest& r) {
+  constexpr double steps = 1 << 13;
+  if (r.bearings == Bearings::are_true) return 1;
+  const double true_mps = true_sound_speed_mps(r.water, depth_from_z(r.sonar_in_world.position_m.z));
+  return std::round(true_mps / static_cast<double>(r.settings.device_sound_speed_mps) * steps) / steps;
+}
+
+/// The angle that a beam looks at, of the reported one.
+inline double looks_at_rad(double reported_rad, double bearing_scale) {
+  return bearing_scale == 1 ? reported_rad : std::asin(std::clamp(bearing_scale * std::sin(reported_rad), -1.0, 1.0));
+}
+
+}  // namespace sonar
