@@ -98,7 +98,7 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
   HeightValues values("-9999");
   const auto points = points_of(*text, values);
   if (!points) return bad(points.error().text);
-  RawHeights raw{.geographic = geographic_by_prj(file)};
+  RawHeights raw{.system = system_by_prj(file)};
   const auto axis_of = [&](double Point::*coordinate) {
     std::vector<double> all;
     all.reserve(points->size());
