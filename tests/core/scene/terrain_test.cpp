@@ -414,6 +414,21 @@ TEST(XyzGrid, PointsOfAnEvenGridInAnyOrder) {
   EXPECT_TRUE(rounded->origin);
 }
 
+TEST(XyzGrid, NamesOfColumnsMayPutNorthFirst) {
+  TemporaryFiles files;
+  for (const char* names : {"lat,lon,depth", "Latitude Longitude z", "NORTHING;EASTING;Z", "y x z"}) {
+    const auto grid =
+        read_xyz_heights(files.write("g.xyz", names + std::string("\n1 100 -1\n2 100 -2\n3 100 -3\n1 110 -4\n")), {});
+    ASSERT_TRUE(grid) << names << ": " << grid.error().text;
+    EXPECT_EQ(grid->x, (std::vector<double>{100, 110})) << names;
+    EXPECT_EQ(grid->y, (std::vector<double>{1, 2, 3})) << names;
+    EXPECT_FLOAT_EQ(grid->z_m[1], -4) << names;
+  }
+  const auto usual = read_xyz_heights(files.write("g.xyz", "lon lat depth\n100 1 -1\n100 2 -2\n110 1 -4\n"), {});
+  ASSERT_TRUE(usual) << usual.error().text;
+  EXPECT_EQ(usual->x, (std::vector<double>{100, 110}));
+}
+
 TEST(XyzGrid, FineStepsFarAwayStayInTheirCells) {
   TemporaryFiles files;
   std::string text;
