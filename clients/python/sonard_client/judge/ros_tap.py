@@ -1,6 +1,6 @@
-"""The tap of a ROS 1 driver: starts the driver and prints a JSON line for each message of a topic.
+"""The tap of a ROS driver: starts the driver and prints a JSON line for each message of a topic.
 
-    python3 -m sonard_client.judge.ros1_tap TOPIC -- COMMAND...
+    python3 -m sonard_client.judge.ros_tap ros1|ros2 TOPIC -- COMMAND...
 
 Any message type with a number (ping_id, ping_number or header.seq) and samples (ping_data, image.data or data) will do.
 """
@@ -14,6 +14,8 @@ import time
 import zlib
 from typing import Any
 
+GAIN_BYTES = 4  # before the samples of a row
+
 
 def _field(message: Any, *paths: str) -> Any:
     for path in paths:
@@ -26,14 +28,21 @@ def _field(message: Any, *paths: str) -> Any:
 
 
 def line_of(message: Any) -> str:
-    """The tap line of a message."""
+    """The tap line of a message. Gains before the samples of a row, of messages with has_gains, are not among its samples."""
     samples = _field(message, "ping_data", "image.data", "data")
-    crc = zlib.crc32(bytes(samples if samples is not None else b""))
-    return json.dumps({"id": _field(message, "ping_id", "ping_number", "header.seq"), "crc32": f"{crc:08x}"})
+    data = bytes(samples if samples is not None else b"")
+    step = getattr(message, "step", 0)
+    if getattr(message, "has_gains", False) and step > GAIN_BYTES:
+        data = b"".join(data[at + GAIN_BYTES:at + step] for at in range(0, len(data), step))
+    return json.dumps({"id": _field(message, "ping_id", "ping_number", "header.seq"), "crc32": f"{zlib.crc32(data):08x}"})
 
 
-def _subscribe(topic: str) -> None:
-    import rospy    # of ROS 1
+def _print(message: Any) -> None:
+    print(line_of(message), flush=True)
+
+
+def _subscribe_ros1(topic: str) -> None:
+    import rospy
     import rostopic
     while True:
         try:
@@ -44,13 +53,28 @@ def _subscribe(topic: str) -> None:
             pass
         time.sleep(0.2)
     rospy.init_node("sonard_judge", anonymous=True, disable_signals=True)
-    rospy.Subscriber(name, kind, lambda message: print(line_of(message), flush=True))
+    rospy.Subscriber(name, kind, _print)
+
+
+def _subscribe_ros2(topic: str) -> None:
+    import rclpy
+    from rclpy.qos import QoSProfile
+    from rclpy.signals import SignalHandlerOptions
+    from rosidl_runtime_py.utilities import get_message
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node("sonard_judge")
+    while not (publishers := node.get_publishers_info_by_topic(topic)):
+        time.sleep(0.1)
+    quality = QoSProfile(depth=100, reliability=publishers[0].qos_profile.reliability)  # as its publisher offers it
+    node.create_subscription(get_message(publishers[0].topic_type), topic, _print, quality)
+    rclpy.spin(node)
 
 
 def main() -> int:
-    topic, command = sys.argv[1], sys.argv[sys.argv.index("--") + 1:]
+    subscribe = {"ros1": _subscribe_ros1, "ros2": _subscribe_ros2}[sys.argv[1]]
+    topic, command = sys.argv[2], sys.argv[sys.argv.index("--") + 1:]
     driver = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr)
-    threading.Thread(target=_subscribe, args=(topic,), daemon=True).start()
+    threading.Thread(target=subscribe, args=(topic,), daemon=True).start()
     return driver.wait()
 
 
