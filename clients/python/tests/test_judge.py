@@ -622,6 +622,8 @@ class CommandLine(unittest.TestCase):
         with_gains = b"".join(b"\1\0\0\0" + row for row in rows)
         ping = types.SimpleNamespace(ping_id=7, step=8, has_gains=True, ping_data=array.array("B", with_gains))
         self.assertEqual(json.loads(ros_tap.line_of(ping)), plain)
+        ping.ping_data, ping.n_ranges = array.array("B", b"head" + with_gains), 2
+        self.assertEqual(json.loads(ros_tap.line_of(ping)), plain)
         image = types.SimpleNamespace(header=types.SimpleNamespace(), image=types.SimpleNamespace(data=b"abcdefgh"))
         self.assertEqual(json.loads(ros_tap.line_of(image)), {**plain, "id": None})
 

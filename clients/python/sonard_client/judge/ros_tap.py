@@ -6,6 +6,7 @@ Any message type with a number (ping_id, ping_number or header.seq) and samples 
 """
 from __future__ import annotations
 
+import importlib
 import json
 import subprocess
 import sys
@@ -28,11 +29,14 @@ def _field(message: Any, *paths: str) -> Any:
 
 
 def line_of(message: Any) -> str:
-    """The tap line of a message. Gains before the samples of a row, of messages with has_gains, are not among its samples."""
+    """The tap line of a message. Of a message with n_ranges rows of step bytes each, these are the samples, less the gain before
+    each row if has_gains: ping_data of one driver's Ping begins with the whole head of the message on the wire."""
     samples = _field(message, "ping_data", "image.data", "data")
     data = bytes(samples if samples is not None else b"")
-    step = getattr(message, "step", 0)
-    if getattr(message, "has_gains", False) and step > GAIN_BYTES:
+    step, rows = getattr(message, "step", 0), getattr(message, "n_ranges", 0)
+    if step and rows:
+        data = data[-step * rows:]
+    if step > GAIN_BYTES and getattr(message, "has_gains", False):
         data = b"".join(data[at + GAIN_BYTES:at + step] for at in range(0, len(data), step))
     return json.dumps({"id": _field(message, "ping_id", "ping_number", "header.seq"), "crc32": f"{zlib.crc32(data):08x}"})
 
@@ -60,13 +64,14 @@ def _subscribe_ros2(topic: str) -> None:
     import rclpy
     from rclpy.qos import QoSProfile
     from rclpy.signals import SignalHandlerOptions
-    from rosidl_runtime_py.utilities import get_message
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("sonard_judge")
     while not (publishers := node.get_publishers_info_by_topic(topic)):
         time.sleep(0.1)
+    package, _, kind = publishers[0].topic_type.split("/")  # "sensor_msgs/msg/Image"
+    message = getattr(importlib.import_module(package + ".msg"), kind)
     quality = QoSProfile(depth=100, reliability=publishers[0].qos_profile.reliability)  # as its publisher offers it
-    node.create_subscription(get_message(publishers[0].topic_type), topic, _print, quality)
+    node.create_subscription(message, topic, _print, quality)
     rclpy.spin(node)
 
 
