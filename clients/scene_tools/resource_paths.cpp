@@ -136,6 +136,7 @@ std::optional<FuelAddress> fuel_address(const fs::path& address) {
   std::erase_if(parts, [](const std::string& part) { return part.empty() || part == "/"; });
   const auto is_api = [](const std::string& part) { return part.find_first_not_of("0123456789.") == std::string::npos; };
   if (parts.size() > 1 && is_api(parts[1])) parts.erase(parts.begin() + 1);
+  if (parts.size() > 3 && parts[2] == "fuel" && parts[3] == "models") parts.erase(parts.begin() + 2);  // as web pages name it
   if (parts.size() < 4 || lower(parts[2]) != "models") return std::nullopt;
   FuelAddress out{parts[0], parts[1], parts[3], "", {}};
   std::size_t next = 4;
@@ -157,7 +158,7 @@ std::vector<fs::path> fuel_caches() {
 
 fs::path find_in_fuel_caches(const FuelAddress& address) {
   std::vector<std::string> hosts{address.host, "fuel.gazebosim.org", "fuel.ignitionrobotics.org"};  // two names of one server
-  if (address.host != hosts[1] && address.host != hosts[2]) hosts.resize(1);
+  if (address.host != hosts[1] && address.host != hosts[2] && address.host != "app.gazebosim.org") hosts.resize(1);
   for (const fs::path& cache : fuel_caches())
     for (const std::string& host : hosts) {
       fs::path model = cache;

@@ -13,8 +13,13 @@ constexpr std::size_t most_models = 4096, most_elements = 5'000'000;
 
 bool is_true(std::string_view text) { return text == "true" || text == "1"; }
 
-/// The last part of an address in small letters: "coast water" for ".../models/Coast%20Water".
+/// The name of a model in small letters: "coast water" for ".../models/Coast%20Water/2".
 std::string model_name(std::string_view uri) {
+  const auto last = [&] { return uri.substr(uri.find_last_of('/') + 1); };
+  while (uri.ends_with('/')) uri.remove_suffix(1);
+  while (uri.find('/') != std::string_view::npos &&
+         (last() == "tip" || last().find_first_not_of("0123456789") == std::string_view::npos))
+    uri.remove_suffix(last().size() + 1);
   std::string name(uri.substr(uri.find_last_of('/') + 1));
   for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c == '_' ? ' ' : c;
   for (std::size_t at = 0; (at = name.find("%20")) != std::string::npos;) name.replace(at, 3, " ");

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Judges drivers one after the other and writes a page that compares them.
 # usage: tests/judge/judge_drivers.sh PAGE FOLDER NAME VERSION TAP COMMAND [NAME VERSION TAP COMMAND]...
-#   FOLDER gets a report each and the matrix; it must be new. TAP: json, ros1:TOPIC or none. COMMAND starts the driver (docs/judge.md).
+#   FOLDER gets a report each and the matrix; it must be new. TAP: json, ros1:TOPIC, ros2:TOPIC or none. COMMAND starts the driver (docs/judge.md).
 #   SONARCTL=PROGRAM  instead of build/release/clients/sonarctl
 set -u -o pipefail
 if [ $# -lt 6 ] || [ $((($# - 2) % 4)) -ne 0 ]; then

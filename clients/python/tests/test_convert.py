@@ -639,6 +639,25 @@ class Command(WithFolder):
         self.assertIn("north and east are held at -1.5, 2", said)
         self.assertEqual(text.splitlines()[-1].split(",")[1:3], ["-1.500000", "2.000000"])
 
+    def test_dead_reckoning_is_done_when_asked(self):
+        """Ahead along the heading of each moment, at the speed that is given."""
+        log = self.file(WithoutHorizontalPosition.telemetry(("ATTITUDE", "GLOBAL_POSITION_INT")), "rov.tlog")
+        code, text, said = self.run_main(log, "-o", "-", "--at=10,20", "--dead-reckon", "0.5")
+        self.assertEqual(code, 0, said)
+        self.assertIn("dead reckoned at 0.5 m/s ahead: the error grows with time", said)
+        rows = [[float(v) for v in line.split(",")] for line in text.splitlines() if line[:1].isdigit()]
+        north, east = 10.0, 20.0
+        for step, (row, after) in enumerate(zip(rows, rows[1:])):
+            self.assertAlmostEqual(row[1], north, delta=1e-4)
+            self.assertAlmostEqual(row[2], east, delta=1e-4)
+            _, _, _, _, _, pitch, yaw = made.moment(step)
+            north += 0.5 * (after[0] - row[0]) * math.cos(pitch) * math.cos(yaw)
+            east += 0.5 * (after[0] - row[0]) * math.cos(pitch) * math.sin(yaw)
+        self.assertGreater(math.hypot(north - 10, east - 20), 0.3)
+        has_positions = self.file(made.dataflash_log(("SIM",), 3))
+        for words in ((has_positions, "-o", "-", "--dead-reckon", "1"), (log, "-o", "-", "--dead-reckon", "1000")):
+            self.assertEqual(self.run_main(*words)[0], 64)
+
     def run_main(self, *words):
         out, error = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):

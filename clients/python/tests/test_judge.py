@@ -1,4 +1,5 @@
 """The judge without a daemon: the truth of a stream, verdicts, cases, captures, reports."""
+import array
 import contextlib
 import io
 import json
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import types
 import unittest
 import unittest.mock as mock
 import xml.etree.ElementTree
@@ -18,7 +20,7 @@ from html.parser import HTMLParser
 from common import ROOT, made_ping
 
 from sonard_client.judge import __main__ as judge_main
-from sonard_client.judge import cases, driver, report, wire
+from sonard_client.judge import cases, driver, report, ros_tap, wire
 from sonard_client.judge.cases import CASES
 from sonard_client.judge.scene import Scene
 from sonard_client.judge.truth import TruePing, TruthReader
@@ -605,11 +607,25 @@ class CommandLine(unittest.TestCase):
                                     (["--driver", "x", "--no-namespaces", "--out", folder + "/new"], "{ip}"), (right + ["--case", "Q77"], "Q77"),
                                     (right + ["--tap", "yaml"], "--tap"), (right + ["--repeat", "0"], "--repeat"),
                                     (right + ["--shallow", "5"], "--torture"), (right + ["--tap", "ros1"], "topic"),
+                                    (right + ["--tap", "ros2:"], "ros2:/sonar/ping"),
                                     (["merge", folder, "--out", folder + "/new"], "no report")):
                 code, text = self.said(*arguments)
                 self.assertEqual((code, word in text), (64, True), text)
             self.assertEqual(self.said(*right, "--sonard", "/nowhere/sonard"),
                              (69, "judge: /nowhere/sonard: not found; --sonard names the program\n"))
+
+    def test_lines_of_ros_messages(self):
+        rows = [b"abcd", b"efgh"]
+        plain = {"id": 7, "crc32": f"{zlib.crc32(b''.join(rows)):08x}"}
+        ping = types.SimpleNamespace(ping_id=7, step=4, has_gains=False, ping_data=array.array("B", b"".join(rows)))
+        self.assertEqual(json.loads(ros_tap.line_of(ping)), plain)
+        with_gains = b"".join(b"\1\0\0\0" + row for row in rows)
+        ping = types.SimpleNamespace(ping_id=7, step=8, has_gains=True, ping_data=array.array("B", with_gains))
+        self.assertEqual(json.loads(ros_tap.line_of(ping)), plain)
+        ping.ping_data, ping.n_ranges = array.array("B", b"head" + with_gains), 2
+        self.assertEqual(json.loads(ros_tap.line_of(ping)), plain)
+        image = types.SimpleNamespace(header=types.SimpleNamespace(), image=types.SimpleNamespace(data=b"abcdefgh"))
+        self.assertEqual(json.loads(ros_tap.line_of(image)), {**plain, "id": None})
 
     def test_name_of_a_driver(self):
         for words, name in ((["/usr/bin/mydriver", "{ip}"], "mydriver"), (["python3", "-u", "a/drv.py", "{ip}"], "drv.py"),

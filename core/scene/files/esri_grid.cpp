@@ -57,7 +57,8 @@ Result<Header> read_header(Words& words) {
       words.rewind(word);
       break;
     }
-    const std::string key = lower(word.substr(0, 20));
+    std::string key = lower(word.substr(0, 20));
+    if (key == "nodata") key = "nodata_value";
     static constexpr std::array<const char*, 10> keys{"ncols",     "nrows",    "xllcorner", "yllcorner", "xllcenter",
                                                       "yllcenter", "cellsize", "dx",        "dy",        "nodata_value"};
     if (std::none_of(keys.begin(), keys.end(), [&](const char* k) { return key == k; })) {
@@ -101,7 +102,7 @@ Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const He
   const auto header = read_header(words);
   if (!header) return bad(header.error().text);
   const std::size_t columns = header->columns, rows = header->rows;
-  RawHeights raw{.geographic = geographic_by_prj(file)};  // grows with what is there, not with what the header promises
+  RawHeights raw{.system = system_by_prj(file)};  // grows with what is there, not with what the header promises
   HeightValues values(header->no_data);
   for (std::size_t i = 0; i < rows * columns; ++i) {
     const std::string_view word = words.next();

@@ -5,9 +5,11 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <set>
 #include <span>
+#include <sstream>
 
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
@@ -29,8 +31,17 @@ enum : std::uint32_t {
   gdal_metadata = 42112,
   gdal_no_data = 42113,
 };
-enum : std::uint16_t { model_type = 1024, raster_type = 1025, angular_units = 2054, linear_units = 3076, vertical_units = 4099 };
-constexpr std::uint16_t projected = 1, geographic = 2, pixel_is_point = 2, degree = 9102;
+enum : std::uint16_t {
+  model_type = 1024,
+  raster_type = 1025,
+  angular_units = 2054,
+  projected_system = 3072,
+  linear_units = 3076,
+  vertical_system = 4096,
+  vertical_units = 4099,
+};
+constexpr std::uint16_t projected = 1, geographic = 2, pixel_is_point = 2, degree = 9102, web_mercator = 3857;
+constexpr std::uint16_t metre = 9001, foot = 9002, us_survey_foot = 9003;
 
 struct CloseTiff {
   void operator()(TIFF* tiff) const { TIFFClose(tiff); }
@@ -98,13 +109,13 @@ struct Georeference {
 
 /// 1 of metres and degrees.
 Result<double> length_unit(std::optional<std::uint16_t> key) {
-  switch (key.value_or(9001)) {
-    case 9001:
+  switch (key.value_or(metre)) {
+    case metre:
     case 0:
       return 1;
-    case 9002:
+    case foot:
       return 0.3048;
-    case 9003:
+    case us_survey_foot:
       return 1200.0 / 3937;
     case 9036:
       return 1000;
@@ -114,17 +125,42 @@ Result<double> length_unit(std::optional<std::uint16_t> key) {
   }
 }
 
+/// The code of the unit of systems of heights that are not in metres, of the EPSG data set 10.0.
+std::optional<std::uint16_t> unit_of_height_system(std::uint16_t system) {
+  static const std::set<std::uint16_t> in_feet{5614, 6130, 6131, 6132, 8050, 8051, 8228},
+      in_us_survey_feet{5702, 6358, 6359, 6360, 8052, 8053};
+  if (in_feet.contains(system)) return foot;
+  if (in_us_survey_feet.contains(system)) return us_survey_foot;
+  return std::nullopt;
+}
+
+/// GDAL's unit of a band. Other words, such as a sensor's, are no units of length.
+std::optional<std::uint16_t> unit_of_band(std::string_view metadata) {
+  const std::string_view begin = "role=\"unittype\">";
+  const std::size_t at = metadata.find(begin);
+  if (at == metadata.npos) return std::nullopt;
+  const std::string_view word = metadata.substr(at + begin.size(), metadata.find('<', at) - at - begin.size());
+  if (word == "ft" || word == "foot" || word == "feet" || word == "international foot") return foot;
+  if (word == "US survey foot" || word == "ftUS" || word == "us-ft") return us_survey_foot;
+  return word == "m" || word == "metre" || word == "meter" || word == "metres" || word == "meters" ? std::optional(metre)
+                                                                                                   : std::nullopt;
+}
+
 class GeoTiffReader {
  public:
-  GeoTiffReader(TIFF* tiff, const HeightOptions& options) : tiff_(tiff), options_(options) {}
+  GeoTiffReader(TIFF* tiff, const std::filesystem::path& file, const HeightOptions& options)
+      : tiff_(tiff), file_(file), options_(options) {}
 
   Result<HeightGrid> read() {
+    if (has_mask())
+      return bad(
+          "marks cells without data in a mask of its own, which is not read; write them as a value: gdalwarp -dstnodata -9999");
     if (auto r = read_description(); !r) return tl::make_unexpected(r.error());
     const auto place = read_georeference();
     if (!place) return tl::make_unexpected(place.error());
     if (auto room = check_memory_for("its heights", memory_of_a_cell * picture_.columns * picture_.rows); !room)
       return tl::make_unexpected(room.error());
-    raw_.z.assign(std::size_t{picture_.columns} * picture_.rows, 0);
+    raw_.z.assign(std::size_t{picture_.columns} * picture_.rows, std::numeric_limits<float>::quiet_NaN());
     const auto no_data = values_of<char>(tiff_, gdal_no_data, TIFF_ASCII);
     std::string declared(no_data.begin(), std::find(no_data.begin(), no_data.end(), '\0'));
     declared.erase(0, declared.find_first_not_of(' '));
@@ -137,16 +173,39 @@ class GeoTiffReader {
       raw_.y.push_back(place->y + (north_first ? picture_.rows - 1 - j : j) * place->step_y);
     if (north_first) raw_.turn_rows(picture_.columns);
     raw_.fill_values = values_.fill_values();
-    return finish_heights(std::move(raw_), scaled());
+    return finish_heights(std::move(raw_), options_);
   }
 
  private:
   static tl::unexpected<Error> bad(const std::string& what) { return failure(ErrorKind::bad_data, what); }
 
-  HeightOptions scaled() const {
-    HeightOptions options = options_;
-    options.z_scale *= height_unit_m_;
-    return options;
+  /// A mask is a further picture of the file.
+  bool has_mask() {
+    constexpr std::uint16_t most_pictures = 64;
+    bool mask = false;
+    for (std::uint16_t n = 1; n < most_pictures && !mask && TIFFReadDirectory(tiff_) == 1; ++n) {
+      std::uint32_t kind = 0;
+      TIFFGetField(tiff_, TIFFTAG_SUBFILETYPE, &kind);
+      mask = (kind & FILETYPE_MASK) != 0;
+    }
+    TIFFSetDirectory(tiff_, 0);
+    last_error.clear();
+    return mask;
+  }
+
+  /// The six numbers of a world file beside it, about the middle of the first cell.
+  std::optional<Georeference> world_file() const {
+    for (const char* extension : {".tfw", ".tifw", ".TFW", ".wld"}) {
+      std::filesystem::path beside = file_;
+      const auto text = read_regular(beside.replace_extension(extension), 4096);
+      if (!text) continue;
+      std::array<double, 6> n{};
+      std::istringstream words(*text);
+      std::string word;
+      for (double& v : n) v = words >> word ? height_number(word).value_or(NAN) : NAN;
+      if (n[1] == 0 && n[2] == 0) return Georeference{n[4], n[5], n[0], n[3]};
+    }
+    return std::nullopt;
   }
 
   Result<void> read_description() {
@@ -182,30 +241,30 @@ class GeoTiffReader {
     return {};
   }
 
-  /// Heights that are not what the cells hold would be wrong by a factor without a word.
-  bool is_scaled() const {
-    const auto more = values_of<char>(tiff_, gdal_metadata, TIFF_ASCII);
-    const std::string_view text(more.data(), more.size());
-    return text.find("role=\"scale\"") != text.npos || text.find("role=\"offset\"") != text.npos;
-  }
-
   Result<Georeference> read_georeference() {
-    if (is_scaled())
+    const auto more = values_of<char>(tiff_, gdal_metadata, TIFF_ASCII);
+    const std::string_view metadata(more.data(), more.size());
+    // Heights that are not what the cells hold would be wrong by a factor without a word.
+    if (metadata.find("role=\"scale\"") != metadata.npos || metadata.find("role=\"offset\"") != metadata.npos)
       return bad("stores heights with a scale or an offset; write the heights themselves: gdal_translate -unscale -ot Float32");
     const Keys keys(values_of<std::uint16_t>(tiff_, key_directory, TIFF_SHORT));
     const auto model = keys.value_of(model_type);
     if (model == geographic) {
-      raw_.geographic = true;
+      raw_.system.geographic = true;
       if (const auto unit = keys.value_of(angular_units); unit.value_or(degree) != degree)
         return bad("has angles that are not in degrees; bring it to them: gdalwarp -t_srs EPSG:4326");
     } else if (model == projected) {
-      raw_.geographic = false;
+      raw_.system.geographic = false;
+      raw_.system.web_mercator = keys.value_of(projected_system) == web_mercator;
     }
-    const auto height_unit = length_unit(keys.value_of(vertical_units));
+    auto of_heights = unit_of_band(metadata);
+    if (!of_heights) of_heights = keys.value_of(vertical_units);
+    if (!of_heights) of_heights = unit_of_height_system(keys.value_of(vertical_system).value_or(0));
+    const auto height_unit = length_unit(of_heights);
     if (!height_unit) return tl::make_unexpected(height_unit.error());
-    height_unit_m_ = *height_unit;
     const auto unit = length_unit(model == projected ? keys.value_of(linear_units) : std::nullopt);
     if (!unit) return tl::make_unexpected(unit.error());
+    raw_.system.unit_m = *unit, raw_.system.height_unit_m = *height_unit;
 
     Georeference place;
     const auto scale = values_of<double>(tiff_, pixel_scale, TIFF_DOUBLE),
@@ -216,12 +275,18 @@ class GeoTiffReader {
     } else if (matrix.size() == 16) {
       if (matrix[1] != 0 || matrix[4] != 0) return bad("is turned against its axes; straighten it: gdalwarp");
       place = {matrix[3], matrix[7], matrix[0], matrix[5]};
+    } else if (const auto beside = world_file()) {
+      if (!model) raw_.system = system_by_prj(file_);
+      return check(*beside);
     } else {
       return bad("has no coordinates (no GeoTIFF); give it some: gdal_translate -a_ullr WEST NORTH EAST SOUTH");
     }
     if (keys.value_of(raster_type) != pixel_is_point)  // the corner of the first cell, not its middle
       place.x += 0.5 * place.step_x, place.y += 0.5 * place.step_y;
-    place = {*unit * place.x, *unit * place.y, *unit * place.step_x, *unit * place.step_y};
+    return check(place);
+  }
+
+  static Result<Georeference> check(const Georeference& place) {
     const double step = std::abs(place.step_y);
     const bool sound = place.step_x > 1e-7 && place.step_x < 1e5 && step > 1e-7 && step < 1e5 && std::abs(place.x) <= 1e8 &&
                        std::abs(place.y) <= 1e8;
@@ -259,9 +324,13 @@ class GeoTiffReader {
 
   tl::unexpected<Error> unreadable() const { return bad("cannot be read: " + (last_error.empty() ? "damaged" : last_error)); }
 
+  /// Sparse files leave blocks out that have no data.
+  bool is_left_out(std::uint32_t block) { return TIFFGetStrileByteCount(tiff_, block) == 0; }
+
   Result<void> read_strips() {
     std::vector<std::byte> line(static_cast<std::size_t>(TIFFScanlineSize64(tiff_)));
     for (std::uint32_t row = 0; row < picture_.rows; ++row) {
+      if (is_left_out(TIFFComputeStrip(tiff_, row, 0))) continue;
       if (TIFFReadScanline(tiff_, line.data(), row, 0) != 1) return unreadable();
       if (auto r = take(line, 0, row, picture_.columns); !r) return r;
     }
@@ -281,6 +350,7 @@ class GeoTiffReader {
       return bad("its tiles are much larger than the picture; write it without: gdal_translate -co TILED=NO");
     for (std::uint32_t row = 0; row < picture_.rows; row += std::min(height, picture_.rows - row))
       for (std::uint32_t column = 0; column < picture_.columns; column += std::min(width, picture_.columns - column)) {
+        if (is_left_out(TIFFComputeTile(tiff_, column, row, 0, 0))) continue;
         if (TIFFReadTile(tiff_, tile.data(), column, row, 0, 0) < 0) return unreadable();
         for (std::uint32_t j = 0; j < std::min(height, picture_.rows - row); ++j) {
           const auto bytes = std::span<const std::byte>(tile).subspan(static_cast<std::size_t>(j * row_bytes));
@@ -291,11 +361,11 @@ class GeoTiffReader {
   }
 
   TIFF* tiff_;
+  const std::filesystem::path& file_;
   const HeightOptions& options_;
   Picture picture_;
   RawHeights raw_;
   HeightValues values_{std::nullopt};
-  double height_unit_m_ = 1;
 };
 
 }  // namespace
@@ -308,7 +378,7 @@ Result<HeightGrid> read_geo_tiff_heights(const std::filesystem::path& file, cons
     return bad("larger than 2 GiB; cut a part out (gdal_translate)");
   const Tiff tiff = open(file);
   if (!tiff) return bad("no TIFF, or damaged: " + last_error);
-  auto grid = GeoTiffReader(tiff.get(), options).read();
+  auto grid = GeoTiffReader(tiff.get(), file, options).read();
   if (!grid) return failure(grid.error().kind, file.string() + ": " + grid.error().text);
   return grid;
 }

@@ -16,7 +16,8 @@ constexpr double highest_m = 1e7, least_fill = 1e20;
 constexpr double farthest_deg = 5, nearest_pole_deg = 89;
 constexpr float none = std::numeric_limits<float>::quiet_NaN();
 /// Fill values of programs that write grids, besides those that no height can be.
-constexpr std::array<float, 8> usual_fills{-9999, -32768, -32767, 32767, -99999, 99999, -999999, 65535};
+constexpr std::array<float, 12> usual_fills{-9999,   -32768, -32767, 32767, -99999, 99999,
+                                            -999999, 65535,  -999,   9999,  -10000, 999999};
 
 /// One of the last digit that the text of a number has.
 double last_digit(std::string_view word, double value) {
@@ -47,12 +48,11 @@ void take_out_fills(RawHeights& raw, std::vector<std::string>& notes) {
   for (std::size_t k = 0; k < cells.size(); ++k)
     if (cells[k] > 0)
       notes.push_back(
-          text::format("%zu cells of %.0f, far from all heights, are taken as no data, although the file does not "
-                       "declare it",
-                       cells[k], static_cast<double>(usual_fills[k])));
+          text::format("%zu cell%s of %.0f, far from all heights, taken as no data, although the file does not declare it",
+                       cells[k], cells[k] == 1 ? "" : "s", static_cast<double>(usual_fills[k])));
   if (raw.fill_values > 0)
-    notes.push_back(
-        text::format("%zu cells beyond 1e20 m are taken as no data, although the file does not declare it", raw.fill_values));
+    notes.push_back(text::format("%zu cell%s beyond 1e20 m taken as no data, although the file does not declare it",
+                                 raw.fill_values, raw.fill_values == 1 ? "" : "s"));
 }
 
 bool could_be_degrees(const RawHeights& raw) {
@@ -71,6 +71,28 @@ bool shows_degrees(const RawHeights& raw) {
       rise += std::abs(static_cast<double>(raw.z[k]) - static_cast<double>(raw.z[k - 1])), ++steps;
   const double slope = steps == 0 ? 0 : rise / static_cast<double>(steps) / cell;
   return slope > 10 || (slope == 0 && cell < 0.005);
+}
+
+/// A metre of Web Mercator is shorter on the ground, by the cosine of the latitude.
+void bring_to_degrees(RawHeights& raw, std::vector<std::string>& notes) {
+  constexpr double radius_m = 6378137;
+  for (double& x : raw.x) x = deg_from_rad(x * raw.system.unit_m / radius_m);
+  for (double& y : raw.y) y = deg_from_rad(std::atan(std::sinh(y * raw.system.unit_m / radius_m)));
+  raw.system.geographic = true;
+  notes.push_back(
+      text::format("its coordinates, in Web Mercator, whose lengths are %.3g times those on the ground here, become degrees",
+                   1 / std::cos(rad_from_deg(0.5 * (raw.y.front() + raw.y.back())))));
+}
+
+void bring_to_metres(RawHeights& raw, double z_scale, std::vector<std::string>& notes) {
+  const double unit_m = raw.system.unit_m;
+  if (unit_m == 1) return;
+  for (auto* axis : {&raw.x, &raw.y})
+    for (double& v : *axis) v *= unit_m;
+  notes.push_back(text::format("its coordinates, in units of %.6g m, become metres", unit_m) +
+                  (raw.system.height_unit_m == 1 && unit_m < 1 && std::abs(z_scale) == 1
+                       ? text::format("; heights stay as they are: set z_scale: %.6g if they are in these units too", unit_m)
+                       : ""));
 }
 
 Result<void> set_origin(HeightGrid& grid, const HeightOptions& options, bool guessed) {
@@ -104,8 +126,12 @@ Result<void> set_origin(HeightGrid& grid, const HeightOptions& options, bool gue
 }  // namespace
 
 bool is_nan_word(std::string_view word) {
-  if (word.starts_with('-') || word.starts_with('+')) word.remove_prefix(1);
-  return word == "nan" || word == "NaN" || word == "NAN";
+  // printf's, those of Microsoft's C, of R, of databases, of numpy's masked arrays
+  static constexpr std::array<std::string_view, 10> words{"nan",    "NaN", "NAN",  "nan(ind)", "1.#QNAN",
+                                                          "1.#IND", "NA",  "null", "NULL",     "--"};
+  const auto is_word = [](std::string_view w) { return std::find(words.begin(), words.end(), w) != words.end(); };
+  if (is_word(word)) return true;
+  return (word.starts_with('-') || word.starts_with('+')) && is_word(word.substr(1));
 }
 
 std::optional<double> height_number(std::string_view s) {
@@ -147,8 +173,12 @@ void RawHeights::turn_rows(std::size_t columns) {
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) {
   HeightGrid grid;
   take_out_fills(raw, grid.notes);
-  const bool said = options.geographic.has_value() || raw.geographic.has_value();
-  const bool geographic = options.geographic.value_or(raw.geographic.value_or(!said && shows_degrees(raw)));
+  if (raw.system.web_mercator && options.geographic.value_or(true)) bring_to_degrees(raw, grid.notes);
+  const bool said = options.geographic.has_value() || raw.system.geographic.has_value();
+  const bool geographic = options.geographic.value_or(raw.system.geographic.value_or(!said && shows_degrees(raw)));
+  if (!geographic) bring_to_metres(raw, options.z_scale, grid.notes);
+  if (raw.system.height_unit_m != 1)
+    grid.notes.push_back(text::format("its heights, in units of %.6g m, become metres", raw.system.height_unit_m));
   if (geographic && !could_be_degrees(raw))
     return failure(ErrorKind::bad_data,
                    "its coordinates are no longitudes and latitudes, in degrees; take geographic: true away");
@@ -162,21 +192,11 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   grid.x = std::move(raw.x);
   grid.y = std::move(raw.y);
   grid.z_m = std::move(raw.z);
-  for (float& z : grid.z_m) z = static_cast<float>(static_cast<double>(z) * options.z_scale);
+  const double z_scale = options.z_scale * raw.system.height_unit_m;
+  for (float& z : grid.z_m) z = static_cast<float>(static_cast<double>(z) * z_scale);
   if (geographic)
     if (auto set = set_origin(grid, options, !said); !set) return tl::make_unexpected(set.error());
   return grid;
-}
-
-std::optional<bool> geographic_by_prj(const std::filesystem::path& heights) {
-  std::filesystem::path prj = heights;
-  const auto text = read_regular(prj.replace_extension(".prj"), 65536);
-  if (!text) return std::nullopt;
-  for (const char* word : {"GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS"})
-    if (text->starts_with(word)) return true;
-  for (const char* word : {"PROJCS", "PROJCRS", "LOCAL_CS"})
-    if (text->starts_with(word)) return false;
-  return std::nullopt;
 }
 
 }  // namespace sonar

@@ -29,12 +29,20 @@ class HeightValues {
   std::size_t fill_values_ = 0;
 };
 
+/// Coordinates and heights as a file describes them.
+struct CoordinateSystem {
+  std::optional<bool> geographic = {};  // coordinates in degrees
+  double unit_m = 1;                    // of coordinates that are no degrees
+  double height_unit_m = 1;
+  bool web_mercator = false;  // its metres are longer than metres on the ground
+};
+
 /// As a file has them.
 struct RawHeights {
-  std::vector<double> x = {}, y = {};   // rising
-  std::vector<float> z = {};            // [y][x], NaN: no data
-  std::optional<bool> geographic = {};  // coordinates in degrees, if the file says
-  std::size_t fill_values = 0;          // undeclared ones beyond every height, which are NaN already
+  std::vector<double> x = {}, y = {};  // rising
+  std::vector<float> z = {};           // [y][x], NaN: no data
+  std::size_t fill_values = 0;         // undeclared ones beyond every height, which are NaN already
+  CoordinateSystem system = {};
 
   /// The other row first: files that begin in the north have their rows turned so. `columns`: of `z`.
   void turn_rows(std::size_t columns);
@@ -43,7 +51,9 @@ struct RawHeights {
 /// Scale, holes, and the origin of degrees. Errors lack the file's name.
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 
-/// Whether a .prj file beside the heights states degrees (true) or metres; nullopt if neither.
-std::optional<bool> geographic_by_prj(const std::filesystem::path& heights);
+/// By the .prj file beside the heights: WKT of version 1 or 2, or the lines that Arc/Info writes.
+CoordinateSystem system_by_prj(const std::filesystem::path& heights);
+/// By WKT; units that it does not name are metres.
+CoordinateSystem system_of_wkt(std::string_view text);
 
 }  // namespace sonar

@@ -28,6 +28,7 @@ struct LoadedMesh {
   CentredMesh centred;                      // Mesh::material indexes material_names
   std::vector<std::string> material_names;  // as the file calls them; may be empty strings
   std::uint64_t lost = 0;                   // triangles of faces that the file lists and the importer does not read
+  std::uint64_t hidden = 0;                 // triangles of parts that the scene in the file does not show
 };
 
 /// Refused with one sentence: missing, unknown format, unreadable, empty, not finite, beyond 1e7 m, more than 20 million

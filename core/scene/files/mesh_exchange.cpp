@@ -13,7 +13,7 @@
 namespace sonar {
 namespace {
 
-constexpr const char* version = "sonard-mesh-2";
+constexpr const char* version = "sonard-mesh-3";
 constexpr std::uint64_t magic = 0x3168'7365'6d64'7273;
 constexpr std::uint64_t most_text = std::uint64_t{256} << 20;  // bytes, of an error or of the materials' names
 
@@ -21,7 +21,7 @@ struct Head {
   std::uint64_t magic = 0;
   std::uint64_t error = 0;  // an ErrorKind; 0: a mesh
   std::uint64_t text = 0;   // bytes: the sentence, or names of materials with a zero after each
-  std::uint64_t vertices = 0, triangles = 0, left_out = 0, lost = 0;
+  std::uint64_t vertices = 0, triangles = 0, left_out = 0, lost = 0, hidden = 0;
   Vec3d centre_m{};
 };
 
@@ -125,6 +125,7 @@ bool write_answer(int descriptor, const Result<LoadedMesh>& mesh) {
                                  .triangles = centred.mesh.triangles.size(),
                                  .left_out = centred.left_out,
                                  .lost = mesh->lost,
+                                 .hidden = mesh->hidden,
                                  .centre_m = centred.centre_m});
 }
 
@@ -149,6 +150,7 @@ std::optional<Result<LoadedMesh>> read_answer(int descriptor) {
   mesh.centred.centre_m = head.centre_m;
   mesh.centred.left_out = head.left_out;
   mesh.lost = head.lost;
+  mesh.hidden = head.hidden;
   Mesh& m = mesh.centred.mesh;
   m.vertices.resize(head.vertices), m.triangles.resize(head.triangles), m.material.resize(head.triangles);
   if (!read_at(descriptor, std::span(m.vertices), at) || !read_at(descriptor, std::span(m.triangles), at) ||

@@ -74,6 +74,9 @@ Shape ShapeReader::read_mesh_file(Map& keys) {
       scene.notes.push_back(name + ": " + std::to_string(loaded->lost) +
                             " of the triangles that it lists cannot be read and are "
                             "missing here; do their faces name vertices that are not there? Export it again");
+    if (loaded->hidden > 0)
+      scene.notes.push_back(name + ": " + std::to_string(loaded->hidden) +
+                            " triangles of parts that the file's own scene does not show are left out");
     meshes.emplace(key, std::move(*loaded));
   }
   const LoadedMesh& loaded = meshes.at(key);

@@ -24,27 +24,32 @@ void on_error(png_structp png, png_const_charp message) {
 }
 void on_warning(png_structp, png_const_charp) {}
 
-void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<png_byte>& row) {
+void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<png_byte>& rows_read) {
   png_read_info(png, info);
   const std::size_t columns = png_get_image_width(png, info), rows = png_get_image_height(png, info);
   const bool grey = (png_get_color_type(png, info) & ~PNG_COLOR_MASK_ALPHA) == PNG_COLOR_TYPE_GRAY;
-  if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) png_error(png, "interlaced; save it without interlacing");
   if (columns < 2 || rows < 2) png_error(png, "smaller than 2 x 2 pixels");
   if (columns * rows > max_mesh_triangles / 2) png_error(png, "more than 10 million pixels; use a coarser image");
   if (grey && png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
   if (!grey) png_set_palette_to_rgb(png);  // of palettes only
   png_set_strip_alpha(png);
+  const int passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);
   const bool wide = png_get_bit_depth(png, info) == 16;
   const std::size_t sample = wide ? 2 : 1, pixel = grey ? sample : 3 * sample;
-  row.resize(png_get_rowbytes(png, info));
+  // Interlaced, every row is whole only after the last pass, which completes what the passes before it left there.
+  const std::size_t row_bytes = png_get_rowbytes(png, info);
+  rows_read.resize(passes > 1 ? row_bytes * rows : row_bytes);
+  for (int pass = 1; pass < passes; ++pass)
+    for (std::size_t j = 0; j < rows; ++j) png_read_row(png, rows_read.data() + row_bytes * j, nullptr);
   picture.columns = columns;
   picture.rows = rows;
   picture.grey.resize(columns * rows);
   for (std::size_t j = 0; j < rows; ++j) {
-    png_read_row(png, row.data(), nullptr);
+    png_byte* const row = rows_read.data() + (passes > 1 ? row_bytes * j : 0);
+    png_read_row(png, row, nullptr);
     for (std::size_t i = 0; i < columns; ++i) {
-      const png_byte* at = row.data() + pixel * i;
+      const png_byte* at = row + pixel * i;
       if (!grey && (std::memcmp(at, at + sample, sample) != 0 || std::memcmp(at, at + 2 * sample, sample) != 0))
         png_error(png, "not a grey image: it has colours, where red, green and blue differ; heights need one channel");
       const unsigned v = wide ? (unsigned{at[0]} << 8 | at[1]) : at[0] * 257u;

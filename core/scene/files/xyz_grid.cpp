@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 
 #include "core/base/regular_file.hpp"
@@ -63,10 +64,22 @@ std::size_t index_on(const std::vector<double>& axis, double v) {
   return static_cast<std::size_t>(std::clamp(std::round((v - axis.front()) / (axis.back() - axis.front()) * last), 0.0, last));
 }
 
+/// Whether names of columns put north before east: "lat lon depth".
+bool begins_with_north(const std::array<std::string_view, 3>& names) {
+  const auto is_one_of = [](std::string_view name, std::initializer_list<std::string_view> begins) {
+    return std::any_of(begins.begin(), begins.end(), [&](std::string_view begin) {
+      return name.size() >= begin.size() &&
+             std::equal(begin.begin(), begin.end(), name.begin(), [](char a, char b) { return a == (b | 32); });
+    });
+  };
+  return is_one_of(names[0], {"lat", "y", "north"}) && is_one_of(names[1], {"lon", "lng", "x", "east"});
+}
+
 Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values) {
   std::vector<Point> points;
   std::array<std::string_view, 3> words;
   std::size_t line = 0;
+  bool north_first = false;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
     const std::size_t count = split(text.substr(at, end - at), words);
@@ -74,7 +87,10 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
     if (count == 0 || words[0].front() == '#') continue;
     const auto x = height_number(words[0]), y = count > 1 ? height_number(words[1]) : x,
                z = count > 2 ? height_number(words[2]) : x;
-    if (points.empty() && !x && count == 3) continue;  // names of columns
+    if (points.empty() && !x && count == 3) {  // names of columns
+      north_first = begins_with_north(words);
+      continue;
+    }
     const auto bad = [&](const std::string& what) {
       return failure(ErrorKind::bad_data, "line " + std::to_string(line) + ": " + what);
     };
@@ -83,7 +99,7 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
     const auto height = values.height_of(*z);
     if (!height) return bad("the height " + std::string(words[2].substr(0, 40)) + " is beyond 1e7 m");
     if (points.size() >= max_mesh_triangles / 2) return bad("more than 10 million points; use a coarser grid");
-    points.push_back({*x, *y, *height});
+    points.push_back(north_first ? Point{*y, *x, *height} : Point{*x, *y, *height});
   }
   return points;
 }
@@ -98,7 +114,7 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
   HeightValues values("-9999");
   const auto points = points_of(*text, values);
   if (!points) return bad(points.error().text);
-  RawHeights raw{.geographic = geographic_by_prj(file)};
+  RawHeights raw{.system = system_by_prj(file)};
   const auto axis_of = [&](double Point::*coordinate) {
     std::vector<double> all;
     all.reserve(points->size());

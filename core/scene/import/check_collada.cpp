@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "core/scene/import/check_mesh.hpp"
@@ -14,7 +15,7 @@ constexpr std::string_view blanks = " \t\r\n";
 constexpr auto none = std::string_view::npos;
 
 struct Element {
-  std::string_view name, id, label, url, count;
+  std::string_view name, id, label, url, count, source, offset;
 };
 
 /// `tag` is the text between "<" and ">".
@@ -35,6 +36,8 @@ Element parse_element(std::string_view tag) {
     if (name == "name") element.label = value;
     if (name == "url") element.url = value;
     if (name == "count") element.count = value;
+    if (name == "source") element.source = value;
+    if (name == "offset") element.offset = value;
     at = close + 1;
   }
   return element;
@@ -59,6 +62,8 @@ struct Nodes {
   std::vector<std::size_t> scenes;
   std::map<std::string_view, std::size_t> library, others;
   std::vector<std::pair<std::size_t, std::string_view>> instances;  // parent, name of the child
+  std::vector<std::pair<std::size_t, std::string_view>> surfaces;   // node, name of a geometry or controller
+  std::string_view scene;                                           // the name of the one that is shown
 
   std::size_t add(const Element& element, bool in_a_node) {
     const std::size_t node = graph.add(std::string(element.id.empty() ? element.label : element.id));
@@ -77,11 +82,67 @@ struct Nodes {
   }
 };
 
+std::uint64_t number_in(std::string_view text) {
+  std::uint64_t n = 0;
+  std::from_chars(text.data(), text.data() + text.size(), n);
+  return n;
+}
+
+/// Follows the elements of geometries and counts triangles by the numbers that primitives list, not by the counts that they
+/// state.
+class Geometries {
+ public:
+  void begin(const Element& element, std::string_view text) {
+    const std::string_view name = element.name;
+    if (name == "geometry") geometry_ = element.id, kind_ = {}, triangles_[geometry_];
+    if (name == "controller") controller_ = element.id;
+    if ((name == "skin" || name == "morph") && element.source.starts_with("#")) skin_of_[controller_] = element.source.substr(1);
+    for (const char* kind : {"triangles", "polylist", "polygons", "trifans", "tristrips", "lines", "linestrips"})
+      if (name == kind) kind_ = name, values_a_corner_ = 1, has_sides_ = name == "polylist";
+    if (name == "input" && !kind_.empty())
+      values_a_corner_ = std::max(values_a_corner_, std::min<std::uint64_t>(number_in(element.offset), 1000) + 1);
+    if (name == "vcount" && has_sides_)
+      each_word(text, [&](std::string_view word) { triangles_[geometry_] += std::max<std::uint64_t>(number_in(word), 2) - 2; });
+    if (name != "p" || kind_.empty() || kind_.starts_with("line") || has_sides_) return;
+    std::uint64_t values = 0;
+    each_word(text, [&](std::string_view) { ++values; });
+    const std::uint64_t corners = values / values_a_corner_;
+    triangles_[geometry_] += kind_ == "triangles" ? corners / 3 : std::max<std::uint64_t>(corners, 2) - 2;
+  }
+
+  ListedFaces faces(const std::vector<std::string_view>& shown) const {
+    ListedFaces faces;
+    std::set<std::string_view> seen;
+    for (std::string_view name : shown) {
+      for (int k = 0; k < 4 && skin_of_.contains(name); ++k) name = skin_of_.at(name);
+      if (const auto at = triangles_.find(name); at != triangles_.end()) faces.shown += at->second, seen.insert(name);
+    }
+    for (const auto& [name, count] : triangles_) faces.hidden += seen.contains(name) ? 0 : count;
+    return faces;
+  }
+
+ private:
+  template <class Take>
+  static void each_word(std::string_view text, const Take& take) {
+    for (std::size_t at = text.find_first_not_of(blanks); at != none; at = text.find_first_not_of(blanks, at)) {
+      const std::size_t end = std::min(text.find_first_of(blanks, at), text.size());
+      take(text.substr(at, end - at));
+      at = end;
+    }
+  }
+  std::map<std::string_view, std::uint64_t> triangles_;   // of geometries
+  std::map<std::string_view, std::string_view> skin_of_;  // geometry or controller that a controller moves
+  std::string_view geometry_, controller_, kind_;         // that are being read
+  std::uint64_t values_a_corner_ = 1;
+  bool has_sides_ = false;
+};
+
 }  // namespace
 
-MeshFault check_collada(std::string_view file) {
+MeshFault check_collada(std::string_view file, ListedFaces* faces) {
   constexpr std::size_t no_node = ~std::size_t{0};
   Nodes nodes;
+  Geometries geometries;
   std::vector<std::size_t> inside;  // for each open element, the node that it is in
   const auto after = [&](std::string_view end, std::size_t at) {
     const std::size_t found = file.find(end, at);
@@ -113,6 +174,11 @@ MeshFault check_collada(std::string_view file) {
         if (element.name == "visual_scene") nodes.scenes.push_back(here);
         node = here;
       }
+      geometries.begin(element, tag.ends_with("/") ? std::string_view() : file.substr(at, file.find('<', at) - at));
+      if (element.name == "instance_visual_scene" && element.url.starts_with("#")) nodes.scene = element.url.substr(1);
+      if ((element.name == "instance_geometry" || element.name == "instance_controller") && node != no_node &&
+          element.url.starts_with("#"))
+        nodes.surfaces.emplace_back(node, element.url.substr(1));
       if (element.name == "instance_node" && node != no_node && element.url.starts_with("#"))
         nodes.instances.emplace_back(node, element.url.substr(1));
       std::uint64_t count = 0;
@@ -125,7 +191,15 @@ MeshFault check_collada(std::string_view file) {
         return "nests its elements deeper than " + std::to_string(deepest_element) + " levels; it is damaged, export it again";
     }
   }
-  return nodes.fault();
+  if (MeshFault fault = nodes.fault()) return fault;
+  if (faces && nodes.library.contains(nodes.scene)) {
+    std::multimap<std::size_t, std::string_view> surfaces(nodes.surfaces.begin(), nodes.surfaces.end());
+    std::vector<std::string_view> shown;
+    for (const std::size_t node : nodes.graph.shown({nodes.library.at(nodes.scene)}))
+      for (auto [at, end] = surfaces.equal_range(node); at != end; ++at) shown.push_back(at->second);
+    *faces = geometries.faces(shown);
+  }
+  return std::nullopt;
 }
 
 }  // namespace sonar

@@ -1,5 +1,8 @@
+#include <algorithm>
+#include <array>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <vector>
 
 #include "core/scene/import/check_mesh.hpp"
@@ -17,11 +20,29 @@ class GltfWalk final : public Json::json_sax_t {
   MeshFault fault;
   std::map<std::string, std::vector<std::string>> children;  // of nodes
   std::vector<std::vector<std::string>> scenes;              // the nodes of each
+  std::size_t scene = 0;                                     // the one that is shown
+  struct Primitive {
+    std::string positions, indices;  // accessors
+    std::uint64_t mode = 4;          // triangles
+  };
+  std::map<std::string, std::vector<Primitive>> primitives;  // of meshes
+  std::map<std::string, std::string> mesh_of;                // of nodes
+  struct Accessor {
+    std::uint64_t count = 0, type = 0;
+  };
+  std::map<std::string, Accessor> accessors;
+  std::vector<std::string> required, used;  // extensions
 
   bool null() override { return value({}); }
   bool boolean(bool) override { return value({}); }
   bool number_integer(number_integer_t v) override { return value(std::to_string(v)); }
-  bool number_unsigned(number_unsigned_t v) override { return value(std::to_string(v)); }
+  bool number_unsigned(number_unsigned_t v) override {
+    if (is_at(3, "accessors", "count")) accessors[levels_[1].name()].count = v;
+    if (is_at(3, "accessors", "componentType")) accessors[levels_[1].name()].type = v;
+    if (levels_.size() == 1 && levels_[0].key == "scene") scene = v;
+    if (Primitive* p = primitive(); p && levels_.size() == 5 && levels_[4].key == "mode") p->mode = v;
+    return value(std::to_string(v));
+  }
   bool number_float(number_float_t, const string_t&) override { return value({}); }
   bool string(string_t& v) override { return value(v); }
   bool binary(binary_t&) override { return true; }
@@ -46,7 +67,21 @@ class GltfWalk final : public Json::json_sax_t {
   bool is_at(std::size_t depth, const char* top, const char* last) const {
     return levels_.size() == depth && levels_[0].key == top && !levels_[2].array && levels_[2].key == last;
   }
+  /// The one that is being read.
+  Primitive* primitive() {
+    if (levels_.size() < 5 || levels_[0].key != "meshes" || levels_[2].key != "primitives" || !levels_[3].array) return nullptr;
+    auto& all = primitives[levels_[1].name()];
+    if (all.size() <= levels_[3].index) all.resize(levels_[3].index + 1);
+    return &all.back();
+  }
   bool value(const std::string& v) {
+    if (Primitive* p = primitive()) {
+      if (levels_.size() == 5 && levels_[4].key == "indices") p->indices = v;
+      if (levels_.size() == 6 && levels_[4].key == "attributes" && levels_[5].key == "POSITION") p->positions = v;
+    }
+    if (is_at(3, "nodes", "mesh")) mesh_of[levels_[1].name()] = v;
+    if (levels_.size() == 2 && levels_[0].key == "extensionsRequired") required.push_back(v);
+    if (levels_.size() == 2 && levels_[0].key == "extensionsUsed") used.push_back(v);
     if (is_at(4, "nodes", "children")) children[levels_[1].name()].push_back(v);
     if (is_at(4, "scenes", "nodes")) scenes.back().push_back(v);
     if (is_at(3, "buffers", "uri") && (v.starts_with("/") || v.starts_with("\\") || v.substr(1, 1) == ":"))
@@ -82,9 +117,56 @@ std::string_view json_of(std::string_view file) {
   return file.substr(head, length);
 }
 
+std::uint64_t triangles_of(const GltfWalk& walk, const GltfWalk::Primitive& primitive) {
+  const auto at = walk.accessors.find(primitive.indices.empty() ? primitive.positions : primitive.indices);
+  const std::uint64_t corners = at == walk.accessors.end() ? 0 : at->second.count;
+  constexpr std::uint64_t triangles = 4, strip = 5, fan = 6;  // others are points and lines
+  if (primitive.mode == triangles) return corners / 3;
+  return (primitive.mode == strip || primitive.mode == fan) && corners > 2 ? corners - 2 : 0;
+}
+
+/// Extensions that change where surfaces are, or where their numbers stand. The importer passes over them without a word.
+MeshFault unread_extension(const GltfWalk& walk) {
+  const auto unread = [](const std::string& name) {
+    return "needs the extension " + name.substr(0, 64) + ", which is not read; export it without";
+  };
+  static constexpr std::array<std::string_view, 10> harmless{
+      "KHR_materials_", "KHR_texture_",  "KHR_lights_", "KHR_draco_mesh_compression", "KHR_xmp",
+      "EXT_texture_",   "MSFT_texture_", "EXT_lights_", "KHR_mesh_quantization",      "KHR_techniques_webgl"};
+  for (const std::string& name : walk.required)
+    if (std::none_of(harmless.begin(), harmless.end(), [&](std::string_view begin) { return name.starts_with(begin); }))
+      return unread(name);
+  if (std::find(walk.used.begin(), walk.used.end(), "EXT_mesh_gpu_instancing") != walk.used.end())
+    return unread("EXT_mesh_gpu_instancing");
+  constexpr std::uint64_t floating = 5126;
+  for (const auto& [name, primitives] : walk.primitives)
+    for (const GltfWalk::Primitive& p : primitives)
+      if (const auto at = walk.accessors.find(p.positions); at != walk.accessors.end() && at->second.type != floating)
+        return "has vertices that are no floating numbers (KHR_mesh_quantization), which are not read; export it without";
+  return std::nullopt;
+}
+
+/// Triangles of a file of version 2.
+ListedFaces faces_of(const GltfWalk& walk, const NodeGraph& graph, const std::map<std::string, std::size_t>& number,
+                     const std::vector<std::size_t>& scenes) {
+  std::map<std::string, std::uint64_t> triangles;
+  for (const auto& [mesh, primitives] : walk.primitives)
+    for (const GltfWalk::Primitive& p : primitives) triangles[mesh] += triangles_of(walk, p);
+  ListedFaces faces;
+  if (walk.scene >= scenes.size()) return faces;
+  std::vector<std::string> mesh_at(number.size() + scenes.size());
+  for (const auto& [node, mesh] : walk.mesh_of)
+    if (const auto at = number.find(node); at != number.end()) mesh_at[at->second] = mesh;
+  std::set<std::string> seen;
+  for (const std::size_t node : graph.shown({scenes[walk.scene]}))
+    if (const auto at = triangles.find(mesh_at[node]); at != triangles.end()) faces.shown += at->second, seen.insert(at->first);
+  for (const auto& [mesh, count] : triangles) faces.hidden += seen.contains(mesh) ? 0 : count;
+  return faces;
+}
+
 }  // namespace
 
-MeshFault check_gltf(std::string_view file) {
+MeshFault check_gltf(std::string_view file, ListedFaces* faces) {
   const std::string_view text = json_of(file);
   GltfWalk walk;
   Json::sax_parse(text.begin(), text.end(), &walk, Json::input_format_t::json, false);
@@ -102,7 +184,11 @@ MeshFault check_gltf(std::string_view file) {
     roots.push_back(graph.add("scene"));
     link(roots.back(), nodes);
   }
-  return graph.fault(roots);
+  if (MeshFault fault = graph.fault(roots)) return fault;
+  if (file.starts_with("glTF") && file.substr(4, 1) == "\1") return std::nullopt;  // version 1
+  if (MeshFault fault = unread_extension(walk)) return fault;
+  if (faces) *faces = faces_of(walk, graph, number, roots);
+  return std::nullopt;
 }
 
 MeshFault glb_fault(std::string_view file) {

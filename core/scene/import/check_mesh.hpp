@@ -13,11 +13,17 @@ namespace sonar {
 /// The fault of a file, as a sentence that lacks the file's name; none: nothing was found.
 using MeshFault = std::optional<std::string>;
 
+/// Triangles by the text of a file that names its parts.
+struct ListedFaces {
+  std::uint64_t shown = 0;   // in the file's scene, each as often as the scene shows it
+  std::uint64_t hidden = 0;  // of parts that the scene does not name
+};
+
 /// `head`: the header at least, of a file of `file_bytes`.
 MeshFault check_ply(std::string_view head, std::uint64_t file_bytes);
 /// Text or binary (GLB), version 1 or 2.
-MeshFault check_gltf(std::string_view file);
-MeshFault check_collada(std::string_view file);
+MeshFault check_gltf(std::string_view file, ListedFaces* faces = nullptr);
+MeshFault check_collada(std::string_view file, ListedFaces* faces = nullptr);
 /// The fault in the container of a GLB file, version 2. The importer calls every such fault an unknown format.
 MeshFault glb_fault(std::string_view file);
 

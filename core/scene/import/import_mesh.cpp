@@ -81,8 +81,12 @@ Result<std::string> text_of(const MeshFile& request, std::size_t most) {
 
 /// Why the importer cannot read it, if that can be said better than by the importer.
 std::string better_reason(const MeshFile& request, const std::string& extension, std::string reason) {
-  if (extension != ".glb") return reason;
+  if (extension != ".glb" && extension != ".gltf") return reason;
   const auto text = text_of(request, max_mesh_bytes);
+  if (extension == ".gltf")
+    return text && text->starts_with("glTF") ? "is a GLB file; name it .glb"
+           : reason == "GLTF: No scene"      ? "has no scene; export it with one"
+                                             : reason;
   const MeshFault fault = text ? glb_fault(*text) : MeshFault();
   return fault ? *fault : reason;
 }
@@ -102,7 +106,7 @@ std::uint64_t triangles_listed(const MeshFile& request, const std::string& exten
   return imported + (listed > faces ? listed - faces : 0);  // at least one triangle each
 }
 
-Result<MeshFault> check_text(const MeshFile& request, const std::string& extension) {
+Result<MeshFault> check_text(const MeshFile& request, const std::string& extension, ListedFaces& faces) {
   const bool ply = extension == ".ply", collada = extension == ".dae", gltf = extension == ".gltf" || extension == ".glb";
   if (!ply && !collada && !gltf) return MeshFault();
   std::string held;
@@ -115,14 +119,17 @@ Result<MeshFault> check_text(const MeshFile& request, const std::string& extensi
     bytes = std::filesystem::file_size(request.file, error);
     text = held = *std::move(read);
   }
-  return ply ? check_ply(text.substr(0, ply_head_bytes), bytes) : collada ? check_collada(text) : check_gltf(text);
+  return ply       ? check_ply(text.substr(0, ply_head_bytes), bytes)
+         : collada ? check_collada(text, &faces)
+                   : check_gltf(text, &faces);
 }
 
 }  // namespace
 
 Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks) {
   const std::string extension = mesh_extension(request.file);
-  const auto checked = check_text(request, extension);
+  ListedFaces faces;
+  const auto checked = check_text(request, extension, faces);
   if (!checked) return tl::make_unexpected(checked.error());
   if (*checked) return bad_mesh(request, **checked);
 
@@ -149,7 +156,7 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
     names.emplace_back(label.C_Str());
   }
   const std::uint64_t triangles = triangles_of_nodes(*scene->mRootNode, triangles_of_meshes(*scene));
-  const std::uint64_t listed = triangles_listed(request, extension, *files, *scene, triangles);
+  const std::uint64_t listed = std::max(faces.shown, triangles_listed(request, extension, *files, *scene, triangles));
   std::uint64_t taken = 0;
   auto mesh = finish_mesh(request, y_up_by_default, triangles, std::move(names), [&](const TriangleSink& take) {
     taken = 0;
@@ -159,6 +166,7 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
     });
   });
   if (mesh && listed > taken) mesh->lost = listed - taken;
+  if (mesh) mesh->hidden = faces.hidden;
   return mesh;
 }
 

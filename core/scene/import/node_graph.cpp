@@ -48,4 +48,11 @@ std::optional<std::string> NodeGraph::fault(const std::vector<std::size_t>& root
   return std::nullopt;
 }
 
+std::vector<std::size_t> NodeGraph::shown(std::vector<std::size_t> roots) const {
+  std::vector<std::size_t> nodes = std::move(roots);
+  for (std::size_t k = 0; k < nodes.size(); ++k)  // grows within
+    nodes.insert(nodes.end(), nodes_[nodes[k]].children.begin(), nodes_[nodes[k]].children.end());
+  return nodes;
+}
+
 }  // namespace sonar

@@ -25,6 +25,9 @@ class NodeGraph {
   /// below the roots together. Nothing when all is well. Linear in its edges.
   std::optional<std::string> fault(const std::vector<std::size_t>& roots) const;
 
+  /// The nodes below the roots and these themselves, each as often as it is shown. Of a graph without a fault.
+  std::vector<std::size_t> shown(std::vector<std::size_t> roots) const;
+
  private:
   struct Node {
     std::string name;

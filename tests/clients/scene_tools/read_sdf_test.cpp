@@ -168,7 +168,7 @@ TEST(ReadSdf, WhatASceneCannotHoldIsNamedOnceWithItsLine) {
                 "<plugin name='p' filename='x.so'/><joint name='j' type='prismatic'/><joint type='fixed'/>"
                 "<link name='l'><inertial/><visual name='v'><geometry><polyline/></geometry></visual></link>") +
           "\n<include><uri>model://cam</uri></include><include><uri>model://cam</uri><name>b</name></include>"
-          "<include><uri>model://sun</uri></include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Sun</uri>"
+          "<include><uri>model://sun</uri></include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Sun/2</uri>"
           "</include><include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/North East Down frame</uri></include>"));
   ASSERT_TRUE(world) << world.error().text;
   EXPECT_THAT(r.findings.left_out(),

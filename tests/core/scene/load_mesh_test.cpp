@@ -272,6 +272,98 @@ TEST_F(LoadMesh, TrianglesThatAFileListsAndTheMeshHasNotAreCounted) {
   EXPECT_EQ(good("whole.glb", glb(3)).lost, 0u);
 }
 
+/// A glTF file of two squares at x = 0 and 2, its meshes 0 and 1; `rest` overrides what follows the parts.
+std::string gltf(const std::string& nodes, const std::string& scenes, const std::string& rest = "",
+                 const std::string& last_index = "3") {
+  static constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string data;
+  for (const float x : {0.f, 2.f})
+    for (const auto& [dx, y] : {std::pair{0.f, 0.f}, {1.f, 0.f}, {1.f, 1.f}, {0.f, 1.f}})
+      for (const float v : {x + dx, y, 0.f}) data.append(reinterpret_cast<const char*>(&v), 4);
+  for (const std::string& last : {std::string("3"), last_index})
+    for (const int k : {0, 1, 2, 0, 2, std::stoi(last)}) data += {static_cast<char>(k), 0};
+  std::string text;
+  for (std::size_t i = 0; i < data.size(); i += 3) {
+    const auto byte = [&](std::size_t k) { return static_cast<unsigned>(static_cast<unsigned char>(data[i + k])); };
+    const unsigned v = byte(0) << 16 | byte(1) << 8 | byte(2);
+    for (const int shift : {18, 12, 6, 0}) text += letters[v >> shift & 63];
+  }
+  std::string views, accessors, meshes;
+  for (const auto& [offset, length] : {std::pair{0, 48}, {48, 48}, {96, 12}, {108, 12}})
+    views += (views.empty() ? "" : ",") + std::string(R"({"buffer":0,"byteOffset":)") + std::to_string(offset) +
+             R"(,"byteLength":)" + std::to_string(length) + "}";
+  for (int k = 0; k < 4; ++k)
+    accessors += (k == 0 ? "" : ",") + std::string(R"({"bufferView":)") + std::to_string(k) + R"(,"componentType":)" +
+                 (k < 2 ? R"(5126,"count":4,"type":"VEC3"})" : R"(5123,"count":6,"type":"SCALAR"})");
+  for (int k = 0; k < 2; ++k)
+    meshes += (k == 0 ? "" : ",") + std::string(R"({"primitives":[{"attributes":{"POSITION":)") + std::to_string(k) +
+              R"(},"indices":)" + std::to_string(k + 2) + "}]}";
+  return R"({"asset":{"version":"2.0"},"nodes":[)" + nodes + R"(],"scenes":[)" + scenes + R"(],"meshes":[)" + meshes +
+         R"(],"accessors":[)" + accessors + R"(],"bufferViews":[)" + views +
+         R"(],"buffers":[{"byteLength":120,"uri":"data:application/octet-stream;base64,)" + text + R"("}])" + rest + "}";
+}
+
+TEST_F(LoadMesh, TrianglesOutsideOfTheScenesOfGltfFilesAreCounted) {
+  const auto counts = [&](const std::string& text) {
+    const LoadedMesh mesh = good("a.gltf", text);
+    return std::array<std::uint64_t, 3>{mesh.centred.mesh.triangles.size(), mesh.lost, mesh.hidden};
+  };
+  using Counts = std::array<std::uint64_t, 3>;
+  const std::string two = R"({"mesh":0},{"mesh":1})";
+  EXPECT_EQ(counts(gltf(two, R"({"nodes":[0,1]})")), (Counts{4, 0, 0}));
+  EXPECT_EQ(counts(gltf(two, R"({"nodes":[0]})")), (Counts{2, 0, 2}));
+  EXPECT_EQ(counts(gltf(R"({"mesh":0})", R"({"nodes":[0]})")), (Counts{2, 0, 2}));
+  EXPECT_EQ(counts(gltf(two, R"({"nodes":[0]},{"nodes":[1]})", R"(,"scene":1)")), (Counts{2, 0, 2}));
+  EXPECT_EQ(counts(gltf(R"({"children":[1,2]},{"mesh":0},{"mesh":0,"translation":[5,0,0]})", R"({"nodes":[0]})")),
+            (Counts{4, 0, 2}));
+  EXPECT_EQ(counts(gltf(two, R"({"nodes":[0,1]})", "", "9")), (Counts{3, 1, 0})) << "a vertex that is not there";
+}
+
+TEST_F(LoadMesh, GltfExtensionsThatMoveSurfacesAreRefusedByName) {
+  const std::string two = R"({"mesh":0},{"mesh":1})", scene = R"({"nodes":[0,1]})";
+  const auto with = [&](const char* list, const std::string& name) {
+    return gltf(two, scene, std::string(",\"") + list + "\":[\"" + name + "\"]");
+  };
+  EXPECT_THAT(refusal("a.gltf", with("extensionsRequired", "EXT_meshopt_compression")),
+              HasSubstr("a.gltf: needs the extension EXT_meshopt_compression, which is not read; export it without"));
+  EXPECT_THAT(refusal("a.gltf", with("extensionsUsed", "EXT_mesh_gpu_instancing")), HasSubstr("EXT_mesh_gpu_instancing"));
+  for (const char* harmless : {"KHR_materials_unlit", "KHR_texture_transform", "KHR_mesh_quantization"})
+    EXPECT_EQ(good("a.gltf", with("extensionsRequired", harmless)).centred.mesh.triangles.size(), 4u) << harmless;
+  std::string whole_numbers = gltf(two, scene);
+  whole_numbers.replace(whole_numbers.find("5126"), 4, "5122");
+  EXPECT_THAT(refusal("a.gltf", whole_numbers), HasSubstr("(KHR_mesh_quantization), which are not read"));
+  EXPECT_THAT(refusal("b.gltf", glb()), HasSubstr("is a GLB file; name it .glb"));
+}
+
+TEST_F(LoadMesh, TrianglesOutsideOfTheSceneOfACollada) {
+  const auto changed = [](const std::string& from, const std::string& to) {
+    std::string text = collada("Z_UP");
+    return text.replace(text.find(from), from.size(), to);
+  };
+  EXPECT_EQ(good("a.dae", collada("Z_UP")).hidden, 0u);
+  EXPECT_EQ(good("a.dae", collada("Z_UP")).lost, 0u);
+  const std::string second =
+      "<geometry id=\"h\"><mesh><source id=\"hp\"><float_array id=\"ha\" count=\"9\">0 0 0 1 0 0 0 1 0</float_array>"
+      "<technique_common><accessor source=\"#ha\" count=\"3\" stride=\"3\"><param name=\"X\" type=\"float\"/>"
+      "<param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor></technique_common></source>"
+      "<vertices id=\"hv\"><input semantic=\"POSITION\" source=\"#hp\"/></vertices><polylist count=\"1\"><input "
+      "semantic=\"VERTEX\" source=\"#hv\" offset=\"0\"/><vcount>3</vcount><p>0 1 2</p></polylist></mesh></geometry>";
+  const LoadedMesh unused = good("a.dae", changed("</library_geometries>", second + "</library_geometries>"));
+  EXPECT_EQ(unused.centred.mesh.triangles.size(), 4u);
+  EXPECT_EQ(unused.hidden, 1u);
+  EXPECT_EQ(unused.lost, 0u);
+  const LoadedMesh no_count = good("b.dae", [&] {
+    std::string text = changed("</library_geometries>", second + "</library_geometries>");
+    text.replace(text.find("<node>"), 6, "<node><instance_geometry url=\"#h\"/>");
+    return text.replace(text.find("<triangles count=\"4\">"), 21, "<triangles>");
+  }());
+  EXPECT_EQ(no_count.centred.mesh.triangles.size(), 1u);
+  EXPECT_EQ(no_count.lost, 4u) << "which the importer passes over";
+  const LoadedMesh twice = good("c.dae", changed("<node>", "<node><instance_geometry url=\"#g\"/>"));
+  EXPECT_EQ(twice.centred.mesh.triangles.size(), 8u);
+  EXPECT_EQ(twice.lost + twice.hidden, 0u);
+}
+
 TEST_F(LoadMesh, FaultsOfAGlbAreNamed) {
   const std::string whole = glb();
   const auto with = [&](std::size_t at, char c) {

@@ -9,10 +9,13 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <type_traits>
 
+#include "core/scene/files/height_values.hpp"
 #include "core/scene/shapes/relief_noise.hpp"
+#include "core/text/format.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/temporary_files.hpp"
 
@@ -353,6 +356,34 @@ TEST(PngHeights, GreyStoredAsColoursIsRead) {
               HasSubstr("not a grey image: it has colours"));
 }
 
+TEST(PngHeights, InterlacedRowsAreWhole) {
+  TemporaryFiles files;
+  const auto file = files.path("interlaced.png");
+  constexpr unsigned width = 9, height = 11;  // all seven passes
+  std::vector<std::vector<png_byte>> rows;
+  std::vector<png_bytep> pointers;
+  for (unsigned j = 0; j < height; ++j) {
+    auto& row = rows.emplace_back();
+    for (unsigned i = 0; i < width; ++i) row.push_back(static_cast<png_byte>(20 * j + i));
+  }
+  for (auto& row : rows) pointers.push_back(row.data());
+  std::FILE* out = std::fopen(file.c_str(), "wb");
+  ASSERT_TRUE(out);
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  png_init_io(png, out);
+  png_set_IHDR(png, info, width, height, 8, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
+  png_set_rows(png, info, pointers.data());
+  png_write_png(png, info, PNG_TRANSFORM_IDENTITY, nullptr);
+  png_destroy_write_struct(&png, &info);
+  std::fclose(out);
+  const auto grid = read_png_heights(file, 8, 10, 0, 255);
+  ASSERT_TRUE(grid) << grid.error().text;
+  for (unsigned j = 0; j < height; ++j)
+    for (unsigned i = 0; i < width; ++i) EXPECT_NEAR(grid->z_m[(height - 1 - j) * width + i], 20 * j + i, 1e-3);
+}
+
 TEST(XyzGrid, PointsOfAnEvenGridInAnyOrder) {
   TemporaryFiles files;
   const auto read = [&](const std::string& text) { return read_xyz_heights(files.write("g.xyz", text), {}); };
@@ -381,6 +412,21 @@ TEST(XyzGrid, PointsOfAnEvenGridInAnyOrder) {
   EXPECT_EQ(rounded->x.size(), 400u);
   EXPECT_EQ(rounded->y.size(), 30u);
   EXPECT_TRUE(rounded->origin);
+}
+
+TEST(XyzGrid, NamesOfColumnsMayPutNorthFirst) {
+  TemporaryFiles files;
+  for (const char* names : {"lat,lon,depth", "Latitude Longitude z", "NORTHING;EASTING;Z", "y x z"}) {
+    const auto grid =
+        read_xyz_heights(files.write("g.xyz", names + std::string("\n1 100 -1\n2 100 -2\n3 100 -3\n1 110 -4\n")), {});
+    ASSERT_TRUE(grid) << names << ": " << grid.error().text;
+    EXPECT_EQ(grid->x, (std::vector<double>{100, 110})) << names;
+    EXPECT_EQ(grid->y, (std::vector<double>{1, 2, 3})) << names;
+    EXPECT_FLOAT_EQ(grid->z_m[1], -4) << names;
+  }
+  const auto usual = read_xyz_heights(files.write("g.xyz", "lon lat depth\n100 1 -1\n100 2 -2\n110 1 -4\n"), {});
+  ASSERT_TRUE(usual) << usual.error().text;
+  EXPECT_EQ(usual->x, (std::vector<double>{100, 110}));
 }
 
 TEST(XyzGrid, FineStepsFarAwayStayInTheirCells) {
@@ -466,6 +512,29 @@ struct TiffFile {
     return *this;
   }
 
+  /// With another picture after it.
+  std::string bytes_before(const TiffFile& next) const {
+    std::string out = bytes(), more = next.bytes();
+    out.resize(out.size() + out.size() % 2);
+    const auto start = static_cast<std::uint32_t>(out.size());
+    const auto add = [&](std::string& in, std::size_t at) {
+      std::uint32_t v = 0;
+      std::memcpy(&v, in.data() + at, 4);
+      v += start;
+      std::memcpy(in.data() + at, &v, 4);
+    };
+    std::uint32_t directory = 0;
+    std::memcpy(&directory, out.data() + 4, 4);
+    std::uint32_t second = 0;
+    std::memcpy(&second, more.data() + 4, 4);
+    second += start;
+    std::memcpy(out.data() + directory + 2 + 12 * fields.size(), &second, 4);
+    for (std::size_t k = 0; k < next.fields.size(); ++k) {  // its strip lies farther back, too
+      const std::size_t at = second - start + 2 + 12 * k;
+      if (static_cast<unsigned char>(more[at]) == 273 % 256 && more[at + 1] == 1) add(more, at + 8);
+    }
+    return out + more;
+  }
   std::string bytes() const {
     std::vector<Field> sorted = fields;
     std::sort(sorted.begin(), sorted.end(), [](const Field& a, const Field& b) { return a.tag < b.tag; });
@@ -526,6 +595,122 @@ TEST_F(GeoTiff, MetresByCornerAndByPoint) {
   EXPECT_NEAR(feet->z_m[3], -0.3048, 1e-6);
 }
 
+TEST_F(GeoTiff, HeightsInFeetBecomeMetresWhereverTheFileSaysIt) {
+  const auto first = [&](TiffFile tiff) {
+    const auto grid = read(tiff.without(42113));
+    return grid ? static_cast<double>(grid->z_m[3]) : -9;
+  };
+  const auto good = [] { return TiffFile::of(3, 2, std::vector<float>{-1, -2, -3, -4, -5, -6}).at(0, 100, 10, 10); };
+  EXPECT_NEAR(first(good().keys({{{1024, 1}, {4096, 5703}}})), -1, 1e-6);  // NAVD88, in metres
+  EXPECT_NEAR(first(good().keys({{{1024, 1}, {4096, 6360}}})), -0.3048006, 1e-6);
+  EXPECT_NEAR(first(good().keys({{{1024, 1}, {4096, 8228}}})), -0.3048, 1e-6);
+  EXPECT_NEAR(first(good().keys({{{1024, 1}, {4096, 6360}, {4099, 9001}}})), -1, 1e-6);
+  const auto unit = [&](const std::string& word) {
+    TiffFile tiff = good();
+    tiff.text(42112, R"(<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">)" + word + "</Item></GDALMetadata>");
+    return first(tiff);
+  };
+  EXPECT_NEAR(unit("ft"), -0.3048, 1e-6);
+  EXPECT_NEAR(unit("US survey foot"), -0.3048006, 1e-6);
+  EXPECT_NEAR(unit("metre"), -1, 1e-6);
+  const auto lengths = read(good().keys({{{1024, 1}, {3076, 9003}}}));
+  ASSERT_TRUE(lengths);
+  EXPECT_NEAR(lengths->z_m[3], -1, 1e-6);
+  EXPECT_THAT(lengths->notes, ::testing::ElementsAre(HasSubstr("set z_scale: 0.304801 if they are")));
+}
+
+TEST_F(GeoTiff, WebMercatorHasItsLengthsOnTheGround) {
+  const std::vector<float> whole(6, -5);
+  // Cells of 100 "m" at 60 degrees north are 50 m wide.
+  const double north = 6378137 * std::log(std::tan(0.25 * pi + 0.5 * rad_from_deg(60.0)));
+  const auto grid =
+      read(TiffFile::of(3, 2, whole).at(0, north, 100, 100).keys({{{1024, 1}, {1025, 2}, {3072, 3857}, {3076, 9001}}}));
+  ASSERT_TRUE(grid) << grid.error().text;
+  ASSERT_TRUE(grid->origin);
+  EXPECT_NEAR(grid->y.back(), 60, 1e-9);
+  const auto mesh = mesh_from_grid(*grid);
+  ASSERT_TRUE(mesh);
+  const auto& v = mesh->mesh.vertices;
+  EXPECT_NEAR(v[1].x - v[0].x, 50, 0.2);
+  EXPECT_NEAR(v[3].y - v[0].y, 50, 0.2);
+  const auto as_metres =
+      read(TiffFile::of(3, 2, whole).at(0, north, 100, 100).keys({{{1024, 1}, {3072, 3857}}}), {.geographic = false});
+  ASSERT_TRUE(as_metres);
+  EXPECT_NEAR(as_metres->x[1] - as_metres->x[0], 100, 1e-9);
+}
+
+TEST_F(GeoTiff, BlocksThatAreLeftOutAreHolesAndAMaskIsRefused) {
+  TiffFile sparse = TiffFile::of(3, 2, six).at(0, 100, 10, 10).without(273).without(278).without(279);
+  sparse.shorts(278, {1}), sparse.longs(273, {8, 0}), sparse.longs(279, {12, 0});  // a strip a row, the second without bytes
+  sparse.fields[1].value = TiffFile::bytes_of(std::vector<std::uint16_t>{2});
+  const auto grid = read(sparse);
+  EXPECT_FALSE(grid && mesh_from_grid(*grid));
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_FLOAT_EQ(grid->z_m[3], -1);
+  EXPECT_TRUE(std::isnan(grid->z_m[0]));
+
+  TiffFile mask = TiffFile::of(3, 2, std::vector<std::uint8_t>(6)).without(262);
+  mask.longs(254, {4}), mask.shorts(262, {4});
+  std::string both = TiffFile::of(3, 2, six).at(0, 100, 10, 10).bytes_before(mask);
+  EXPECT_THAT(read_geo_tiff_heights(files.write("g.tif", both), {}).error().text, HasSubstr("gdalwarp -dstnodata"));
+}
+
+TEST_F(GeoTiff, AWorldFileBesideATiffGivesItsPlace) {
+  files.write("g.tfw", "10\n0\n0\n-5\n1000\n2000\n");
+  files.write("g.prj", "PROJCS[\"x\",GEOGCS[\"y\",UNIT[\"degree\",0.017]],UNIT[\"foot\",0.3048]]");
+  const auto grid = read(TiffFile::of(3, 2, six));
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_NEAR(grid->x.back(), 1020 * 0.3048, 1e-9);
+  EXPECT_NEAR(grid->y.front(), 1995 * 0.3048, 1e-9);
+}
+
+TEST(CoordinateSystems, OfPrjFilesOfSeveralWriters) {
+  const auto of = [](std::string_view wkt) {
+    const CoordinateSystem s = system_of_wkt(wkt);
+    return text::format("%s %.4f %.4f%s",
+                        !s.geographic   ? "?"
+                        : *s.geographic ? "degrees"
+                                        : "lengths",
+                        s.unit_m, s.height_unit_m, s.web_mercator ? " Mercator" : "");
+  };
+  const std::string datum = "DATUM[\"D\",SPHEROID[\"S\",6378137,298.25]]", degrees = "UNIT[\"Degree\",0.0174532925]";
+  EXPECT_EQ(of("GEOGCS[\"G\"," + datum + "," + degrees + "]"), "degrees 1.0000 1.0000");
+  EXPECT_EQ(of("PROJCS[\"P\",GEOGCS[\"G\"," + datum + "," + degrees + "],PARAMETER[\"F\",0],UNIT[\"Foot_US\",0.3048006096]]"),
+            "lengths 0.3048 1.0000");
+  EXPECT_EQ(
+      of("COMPD_CS[\"C\",PROJCS[\"P\",GEOGCS[\"G\"," + degrees + "],UNIT[\"metre\",1]],VERT_CS[\"V\",UNIT[\"foot\",0.3048]]]"),
+      "lengths 1.0000 0.3048");
+  EXPECT_EQ(of("COMPOUNDCRS[\"C\",\n  GEOGCRS[\"G\",CS[ellipsoidal,2],AXIS[\"lat\",north]],VERTCRS[\"V\",CS[vertical,1],"
+               "AXIS[\"H\",up,LENGTHUNIT[\"foot\",0.3048]]]]"),
+            "degrees 1.0000 0.3048");
+  EXPECT_EQ(of("PROJCRS[\"P\",BASEGEOGCRS[\"G\"],CONVERSION[\"c\",PARAMETER[\"F\",0,LENGTHUNIT[\"metre\",1]]],CS[Cartesian,2],"
+               "AXIS[\"X\",east],AXIS[\"Y\",north],LENGTHUNIT[\"kilometre\",1000]]"),
+            "lengths 1000.0000 1.0000");
+  EXPECT_EQ(of("PROJCS[\"WGS_1984_Web_Mercator_Auxiliary_Sphere\",GEOGCS[\"G\"],UNIT[\"Meter\",1.0]]"),
+            "lengths 1.0000 1.0000 Mercator");
+  EXPECT_EQ(of("PROJCS[\"P\",UNIT[\"none\",0]]"), "lengths 1.0000 1.0000");
+  EXPECT_EQ(of(std::string(100, '[') + "UNIT[\"x"), "? 1.0000 1.0000");
+  EXPECT_EQ(of("]]],,\""), "? 1.0000 1.0000");
+}
+
+TEST(EsriGrid, LengthsOfItsPrjBecomeMetres) {
+  TemporaryFiles files;
+  const std::string grid_text = "ncols 2\nnrows 2\nxllcenter 1000\nyllcenter 2000\ncellsize 10\nNODATA -1\n-3 NA\n-5 -1\n";
+  const auto read = [&](const std::string& prj) {
+    files.write("g.prj", prj);
+    return read_esri_heights(files.write("g.asc", grid_text), {});
+  };
+  auto grid = read("Projection    STATEPLANE\r\nUnits         feet\r\nZunits        feet\r\n");
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_NEAR(grid->x.back(), 1010 * 0.3048, 1e-9);
+  EXPECT_NEAR(grid->z_m[2], -3 * 0.3048, 1e-6);
+  EXPECT_TRUE(std::isnan(grid->z_m[3]) && std::isnan(grid->z_m[1]));
+  grid = read("PROJCS[\"P\",UNIT[\"km\",1000]]");
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_NEAR(grid->x.back(), 1010e3, 1e-6);
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("in units of 1000 m, become metres"), HasSubstr("are no data")));
+}
+
 TEST_F(GeoTiff, DegreesStandAboutAnOrigin) {
   const auto grid = read(TiffFile::of(3, 2, std::vector<std::int16_t>{-10, -20, -30, -40, -32768, -60})
                              .at(5, 60, 0.01, 0.01)
@@ -536,7 +721,7 @@ TEST_F(GeoTiff, DegreesStandAboutAnOrigin) {
   EXPECT_NEAR(grid->x[0], 5.005, 1e-12);
   EXPECT_NEAR(grid->y[1], 59.995, 1e-12);
   EXPECT_TRUE(std::isnan(grid->z_m[1]));
-  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 cells of -32768"), HasSubstr("are no data")));
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 cell of -32768, far from"), HasSubstr("are no data")));
   EXPECT_FALSE(read(TiffFile::of(3, 2, six).at(5, 60, 0.01, 0.01).keys({{{1024, 1}}}))->origin) << "metres, says the file";
 }
 

@@ -15,7 +15,7 @@ from typing import List, Optional
 from ..geodesy import parse_origin
 from ..nmea import Assumptions
 from .formats import FORMATS, RECORDINGS, convert, format_of
-from .track import ConvertError, Place2, Track, gap_warning, write_csv
+from .track import ConvertError, Place2, Track, dead_reckon, gap_warning, write_csv
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -30,6 +30,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--component", type=int, help="use only messages of this MAVLink component (autopilots are 1)")
     parser.add_argument("--origin", metavar="LAT,LON[,ALT]", help="origin of the world, degrees and m (default: the first fix)")
     parser.add_argument("--at", metavar="NORTH,EAST", help="place [m] of a vehicle whose log has depth and attitude only (0,0)")
+    parser.add_argument("--dead-reckon", type=float, metavar="M/S", help="move such a vehicle ahead at this speed")
     parser.add_argument("--frame", choices=("ENU_FLU", "NED_FRD"), help="frame of a recording that does not use ROS's ENU_FLU")
     parser.add_argument("--body", help="adds a column `body` with this name, to combine several files")
     parser.add_argument("--keep-time", action="store_true", help="keep the log's times (default: start at 0)")
@@ -81,6 +82,8 @@ def _run(options: argparse.Namespace) -> None:
         warned.append(text)
         _log(f"{options.file}: {text}")
 
+    if options.dead_reckon is not None and not abs(options.dead_reckon) <= 100:
+        raise ValueError(f"--dead-reckon {options.dead_reckon:g} is out of range: within 100 m/s")
     if options.component is not None and not 0 <= options.component <= 255:
         raise ValueError(f"component {options.component}: it must be 0 to 255")
     origin = parse_origin(options.origin) if options.origin else None
@@ -93,6 +96,11 @@ def _run(options: argparse.Namespace) -> None:
         if kind not in RECORDINGS:
             raise ValueError(f"--frame is for recordings of ROS and MCAP only: {kind} is always {track.frame}")
         track.frame = options.frame
+    if options.dead_reckon is not None:
+        if not track.held:
+            raise ValueError(f"--dead-reckon is for logs without horizontal position: {track.source} has one")
+        dead_reckon(track, options.dead_reckon)
+        warn(f"dead reckoned at {options.dead_reckon:g} m/s ahead: the error grows with time")
     gap = gap_warning(track.rows)
     if gap:
         warn(gap)

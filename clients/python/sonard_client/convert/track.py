@@ -32,6 +32,7 @@ class Track:
     source: str
     rows: List[Row]
     comments: List[str] = field(default_factory=list)
+    held: bool = False  # north and east are not known
 
 
 class Source(NamedTuple):
@@ -101,6 +102,7 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
         warn(f"messages of {source.name} omitted because their time does not increase: {late}")
     geodetic = isinstance(positions[0][1], Geodetic)
     comments: List[str] = []
+    is_held = False
     if geodetic:
         from_here = origin or next((p for _, p in positions if isinstance(p, Geodetic)), None)
         assert from_here is not None
@@ -116,7 +118,7 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
                  ("" if at else "; --at NORTH,EAST sets them") + ("" if origin is None else "; the origin is not used"))
             comments.append(f"north and east are held at {held[0]:g}, {held[1]:g}: the log has no horizontal position")
             local = [(t, (held[0], held[1], p[2])) for t, p in local]
-            at, stays = None, False
+            at, stays, is_held = None, False, True
         elif own_origin is not None:
             comments.append(f"origin: {origin or own_origin}")
             if origin is not None:
@@ -133,7 +135,22 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
     rows = paired(attitudes, local)
     if not rows:
         raise ConvertError(f"{name}: attitudes and positions of {source.name} do not overlap in time")
-    return Track("NED_FRD", source.name, rows, comments)
+    return Track("NED_FRD", source.name, rows, comments, is_held)
+
+
+def dead_reckon(track: Track, speed_m_s: float) -> None:
+    """Moves a vehicle without horizontal position ahead at a constant speed, from where it is held."""
+    north, east, rows = 0.0, 0.0, track.rows
+    moved = rows[:1]
+    for before, row in zip(rows, rows[1:]):
+        w, x, y, z = before.orientation
+        ahead = 1 - 2 * (y * y + z * z), 2 * (x * y + w * z)  # the body's forward axis in the world, north and east
+        north += speed_m_s * (row.t_s - before.t_s) * ahead[0]
+        east += speed_m_s * (row.t_s - before.t_s) * ahead[1]
+        p = row.position_m
+        moved.append(row._replace(position_m=(p[0] + north, p[1] + east, p[2])))
+    track.rows = moved
+    track.comments.append(f"north and east are dead reckoned at {speed_m_s:g} m/s ahead")
 
 
 def depth_source(attitude: str, attitudes: Stream[Quaternion], depths: Stream[float]) -> Source:

@@ -32,6 +32,7 @@ from .cases import CASES, Case, listing, select, torture
 USAGE, UNAVAILABLE, NOT_HELD = 64, 69, 1
 _PACKAGE = str(pathlib.Path(__file__).resolve().parents[2])
 _BLUEVIEW_PORT = 14750
+ROS_MODULES = {"ros1": "rospy", "ros2": "rclpy"}  # of the taps
 
 
 class NotJudged(RuntimeError):
@@ -43,7 +44,7 @@ def _parser() -> argparse.ArgumentParser:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--driver", metavar="TEXT", help="starts the driver; {ip}, {port} and {id} are filled in")
     parser.add_argument("--tap", metavar="TEXT", default="none",
-                        help="json: the driver prints a JSON line a ping; ros1:TOPIC; none (the default)")
+                        help="json: the driver prints a JSON line a ping; ros1:TOPIC or ros2:TOPIC; none (the default)")
     parser.add_argument("--profile", metavar="TEXT", default="oculus-m1200d", help="product")
     parser.add_argument("--case", metavar="TEXT", action="append", default=[],
                         help="number (L05.2), code (L05), family (L) or name; repeatable")
@@ -100,12 +101,12 @@ def _check(options: argparse.Namespace) -> None:
     if options.shallow is not None and not options.torture:
         raise ValueError("--shallow belongs to --torture")
     kind, _, topic = options.tap.partition(":")
-    if kind not in ("json", "none", "ros1"):
-        raise ValueError(f"--tap {options.tap}: it must be json, ros1:TOPIC or none")
-    if kind == "ros1" and not topic:
-        raise ValueError("--tap ros1 needs the topic: --tap ros1:/sonar/ping")
-    if kind == "ros1" and importlib.util.find_spec("rospy") is None:
-        raise NotJudged("--tap ros1 needs rospy, which this Python does not have: source ROS's setup.bash first")
+    if kind not in ("json", "none", *ROS_MODULES):
+        raise ValueError(f"--tap {options.tap}: it must be json, ros1:TOPIC, ros2:TOPIC or none")
+    if kind in ROS_MODULES and not topic:
+        raise ValueError(f"--tap {kind} needs the topic: --tap {kind}:/sonar/ping")
+    if kind in ROS_MODULES and importlib.util.find_spec(ROS_MODULES[kind]) is None:
+        raise NotJudged(f"--tap {kind} needs {ROS_MODULES[kind]}, which this Python does not have: source ROS's setup.bash first")
 
 
 class TimeLeft:
@@ -148,8 +149,9 @@ class Judge:
         self.lacking = "namespaces (--no-namespaces)" if options.no_namespaces else lab.missing()
         self.kinds: Dict[str, Dict[str, Any]] = {}
         self.command = options.driver
-        if options.tap.startswith("ros1:"):
-            adapter = [sys.executable, "-m", "sonard_client.judge.ros1_tap", options.tap.partition(":")[2], "--"]
+        kind, _, topic = options.tap.partition(":")
+        if kind in ROS_MODULES:
+            adapter = [sys.executable, "-m", "sonard_client.judge.ros_tap", kind, topic, "--"]
             self.command = shlex.join(adapter) + " " + options.driver
         self._running: "set[subprocess.Popen[str]]" = set()
         self._stopping = False

@@ -1,0 +1,87 @@
+"""The tap of a ROS driver: starts the driver and prints a JSON line for each message of a topic.
+
+    python3 -m sonard_client.judge.ros_tap ros1|ros2 TOPIC -- COMMAND...
+
+Any message type with a number (ping_id, ping_number or header.seq) and samples (ping_data, image.data or data) will do.
+"""
+from __future__ import annotations
+
+import importlib
+import json
+import subprocess
+import sys
+import threading
+import time
+import zlib
+from typing import Any
+
+GAIN_BYTES = 4  # before the samples of a row
+
+
+def _field(message: Any, *paths: str) -> Any:
+    for path in paths:
+        value = message
+        for name in path.split("."):
+            value = getattr(value, name, None)
+        if value is not None:
+            return value
+    return None
+
+
+def line_of(message: Any) -> str:
+    """The tap line of a message. Of a message with n_ranges rows of step bytes each, these are the samples, less the gain before
+    each row if has_gains: ping_data of one driver's Ping begins with the whole head of the message on the wire."""
+    samples = _field(message, "ping_data", "image.data", "data")
+    data = bytes(samples if samples is not None else b"")
+    step, rows = getattr(message, "step", 0), getattr(message, "n_ranges", 0)
+    if step and rows:
+        data = data[-step * rows:]
+    if step > GAIN_BYTES and getattr(message, "has_gains", False):
+        data = b"".join(data[at + GAIN_BYTES:at + step] for at in range(0, len(data), step))
+    return json.dumps({"id": _field(message, "ping_id", "ping_number", "header.seq"), "crc32": f"{zlib.crc32(data):08x}"})
+
+
+def _print(message: Any) -> None:
+    print(line_of(message), flush=True)
+
+
+def _subscribe_ros1(topic: str) -> None:
+    import rospy
+    import rostopic
+    while True:
+        try:
+            kind, name, _ = rostopic.get_topic_class(topic, blocking=False)
+            if kind is not None:
+                break
+        except Exception:  # the master is not up yet
+            pass
+        time.sleep(0.2)
+    rospy.init_node("sonard_judge", anonymous=True, disable_signals=True)
+    rospy.Subscriber(name, kind, _print)
+
+
+def _subscribe_ros2(topic: str) -> None:
+    import rclpy
+    from rclpy.qos import QoSProfile
+    from rclpy.signals import SignalHandlerOptions
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node("sonard_judge")
+    while not (publishers := node.get_publishers_info_by_topic(topic)):
+        time.sleep(0.1)
+    package, _, kind = publishers[0].topic_type.split("/")  # "sensor_msgs/msg/Image"
+    message = getattr(importlib.import_module(package + ".msg"), kind)
+    quality = QoSProfile(depth=100, reliability=publishers[0].qos_profile.reliability)  # as its publisher offers it
+    node.create_subscription(message, topic, _print, quality)
+    rclpy.spin(node)
+
+
+def main() -> int:
+    subscribe = {"ros1": _subscribe_ros1, "ros2": _subscribe_ros2}[sys.argv[1]]
+    topic, command = sys.argv[2], sys.argv[sys.argv.index("--") + 1:]
+    driver = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr)
+    threading.Thread(target=subscribe, args=(topic,), daemon=True).start()
+    return driver.wait()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
