@@ -342,7 +342,7 @@ TEST_P(Hosts, ReadTheSamePingsFromEveryKindOfFile) {
   Talk talk(make, all_that_is_known(make, range_m), 0, model_of(make));
   talk.run(6);
   ASSERT_FALSE(talk.pings.empty());
-  const bool by_tcp = make.device->pings_over_tcp();
+  const bool by_tcp = make.device->pings_by() != PingsBy::datagrams;
   const recording::PcapConversation ends = recording::usual_ends(make);
   std::map<std::string, std::function<std::unique_ptr<recording::RecordingWriter>(std::unique_ptr<recording::Sink>)>> kinds;
   kinds["mcap"] = [&](auto sink) { return std::make_unique<recording::McapSession>(std::move(sink), "front", make); };

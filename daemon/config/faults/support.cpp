@@ -69,7 +69,7 @@ std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& ve
   const bool of_port = kind.effect == E::close_ports || kind.effect == E::flap || kind.effect == E::power_cycle;
   const bool of_datagrams = dialogue && kind.stage != S::clients && !of_port && acts_without_stream(kind, dialogue);
   if (of_stream && vendor.port(Port::tcp_stream) == nullptr && !of_datagrams) return "has no TCP stream";
-  if (!vendor.pings_over_tcp() && !acts_without_stream(kind, dialogue)) return "sends pings by datagrams alone";
+  if (vendor.pings_by() == protocol::PingsBy::datagrams && !acts_without_stream(kind, dialogue)) return "sends pings by datagrams alone";
   return kind.effect == E::change_settings ? why_without_setting(kind.given().front().value, vendor) : std::string();
 }
 
