@@ -121,10 +121,10 @@ NAME_MAKES = {
     "clients/python/sonard_client/judge/report.py", "clients/python/sonard_client/judge/scene.py", "clients/python/sonard_client/lab.py",
     "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/nmea_to_pose.py", "clients/python/sonard_client/oculus.py",
     "clients/python/sonard_client/poses.py", "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py",
-    "clients/sonarctl/completion/make_completion.py", "clients/sonarctl/setting_options.cpp", "clients/web/src/panels/head.js",
-    "clients/wireshark/aris.lua", "clients/wireshark/oculus.lua", "clients/wireshark/ping.lua", "clients/wireshark/waterlinked.lua",
-    "daemon/commands/command_line.cpp", "daemon/commands/render/render_file.cpp", "daemon/commands/replay/replay_device.cpp",
-    "daemon/commands/replay/replay_device.hpp", "daemon/commands/run/banner.cpp", "daemon/config/config.cpp", "daemon/config/faults/support.cpp",
+    "clients/web/src/panels/head.js", "clients/wireshark/aris.lua",
+    "clients/wireshark/oculus.lua", "clients/wireshark/ping.lua", "clients/wireshark/waterlinked.lua",
+    "daemon/commands/render/render_file.cpp", "daemon/commands/replay/replay_device.cpp",
+    "daemon/commands/replay/replay_device.hpp",
 }
 CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc"}
 TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ".js", ""}
