@@ -128,7 +128,7 @@ struct Search {
   std::optional<Answer> (*answer)(BytesView datagram) = nullptr;  // nullopt: it is none
 };
 
-/// A make of sonar, both ends. Adding one = one folder + one line in makes.cpp.
+/// A make of sonar, both ends. Adding one = one folder + one row of makes.cpp.
 struct Make {
   const Vendor* device = nullptr;
   std::string_view title;    // "an ARIS"
@@ -141,14 +141,23 @@ struct Make {
   std::optional<Announcement> (*announced)(BytesView beacon) = nullptr;  // nullopt: it is none; null: hosts need no beacon
   const Search* search = nullptr;                                        // null: hosts do not search
 
+  std::string_view usual_settings = {};         // that a host sends where none are wanted, as options of sonarctl: "--rate 10"
+  std::string_view driver_call = {};            // opens the sonar at {at}, where a library of ours is between
+  char own_faults = 0;                          // first letter of the kinds of faults that only this make has
   bool each_ping_requested = false;             // by its hosts; a rate is a limit
   bool own_numbers = false;                     // of pings: not those of sonard's events
   bool scans = false;                           // pings come as fast as its head turns
+  std::string_view demo_name = {};              // of `sonard --demo NAME`; empty: name()
+  std::string_view demo_profile = {};           // its product; empty: the first model
   std::optional<RollPitchYaw> demo_mount = {};  // in the demo; nullopt: it looks ahead
   PictureKind picture = PictureKind::fan;
 
   std::string_view name() const { return device->name(); }
+  std::string_view name_in_demo() const { return demo_name.empty() ? name() : demo_name; }
 };
+/// The rows of makes.cpp.
+std::vector<Make> product_makes();
+/// All makes of the program, in the order of their rows.
 std::span<const Make> makes();
 /// Null: no make has this name.
 const Make* find_make(std::string_view name);

@@ -47,6 +47,9 @@ struct DeviceState {
   StoredAddress stored_address;
 };
 
+/// How pings reach a host: in its TCP connection, as datagrams (frame() returns null), or by either, as the host connects.
+enum class PingsBy { stream, datagrams, either };
+
 class Vendor {
  public:
   virtual ~Vendor() = default;
@@ -101,8 +104,7 @@ class Vendor {
   }
   /// A new dialogue at a port of kind tcp_stream or udp_dialogue. The state must outlive it.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
-  /// Whether pings travel over TCP; else frame() returns null.
-  virtual bool pings_over_tcp() const { return true; }
+  virtual PingsBy pings_by() const { return PingsBy::stream; }
   /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings).
   virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const = 0;
   /// The datagrams of a ping in order, at most 65,507 bytes each, for a port of kind udp_stream with receivers, or udp_dialogue.

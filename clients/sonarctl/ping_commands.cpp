@@ -76,7 +76,7 @@ Run add_listen(CLI::App& app) {
 }
 
 Run add_view(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand("view", "draw pings as fans: into a file or the terminal, once or live");
+  CLI::App& command = *app.add_subcommand("view", "draw pings as the make shows them: into a file or the terminal, once or live");
   command.footer(
       "examples:\n"
       "  sonarctl view --png ping.png\n"

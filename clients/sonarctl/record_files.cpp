@@ -52,7 +52,7 @@ Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const Make
   for (const recording::FileKind& kind : make.codec.files)
     if (const auto named = options.files.find(kind.ending); named != options.files.end()) add(named->second, kind.write);
   add(options.raw, [&make](auto sink) {
-    const bool by_tcp = make.device->pings_over_tcp();
+    const bool by_tcp = make.device->pings_by() != protocol::PingsBy::datagrams;
     return recording::write_raw_dump(std::move(sink), by_tcp ? recording::Carrier::stream : recording::Carrier::datagram);
   });
   add(options.mcap, [&](auto sink) {

@@ -23,7 +23,11 @@ std::string complaint_about_rate(std::string& given) {
 }  // namespace
 
 void SettingArguments::add_to(CLI::App& app) {
-  const auto group = [](CLI::Option* option) { return option->group("Settings of the sonar"); };
+  std::string usual;
+  for (const Make& make : protocol::makes())
+    if (!make.usual_settings.empty()) usual.append("; of ").append(make.title).append(" ").append(make.usual_settings);
+  const std::string heading = "Settings of the sonar (default: the make's own" + usual + ")";
+  const auto group = [&heading](CLI::Option* option) { return option->group(heading); };
   const auto value = [&](const char* name, std::optional<double>& to, const char* help) {
     return group(app.add_option_function<double>(
         name, [&to](double given) { to = given; }, help));
@@ -31,21 +35,16 @@ void SettingArguments::add_to(CLI::App& app) {
   const auto extra = [&](const std::string& name, const char* help) {
     return group(app.add_option("--" + name, more[name], help));
   };
-  group(
-      app.add_option_function<std::uint32_t>(
-          "--mode", [this](std::uint32_t given) { settings.mode = given - 1; },
-          "from 1, as the sonar's models list them: of an Oculus 1 low frequency, wide, 2 high frequency, narrow; of a BlueView "
-          "sonar the head. Default: 2 of an Oculus, otherwise the make's own"))
+  group(app.add_option_function<std::uint32_t>(
+            "--mode", [this](std::uint32_t given) { settings.mode = given - 1; },
+            "from 1, as the sonar's models list them: a frequency, or a head"))
       ->check(whole_number(1, 100));
-  CLI::Option* metres = value("--range", settings.range_m, "metres. Default: 10; of BlueView, ARIS and 3D-15 their own")
-                            ->check(number(0.0, 1000.0));
+  CLI::Option* metres = value("--range", settings.range_m, "metres")->check(number(0.0, 1000.0));
   extra("range-percent", "of the mode's maximum, instead of metres")->check(number(0.0, 100.0))->excludes(metres);
-  value("--gain", settings.gain_percent, "per cent of what can be set. Default: 50 of an Oculus, otherwise the make's own")
-      ->check(number(0.0, 100.0));
+  value("--gain", settings.gain_percent, "per cent of what can be set")->check(number(0.0, 100.0));
   group(app.add_option_function<std::string>(
             "--rate", [this](const std::string& given) { settings.rate_hz = given == "standby" ? 0 : std::stod(given); },
-            "maximum ping rate [Hz], any number, of an Oculus the nearest of these; or standby. Default: 10 of Oculus and "
-            "Omniscan, otherwise the make's own"))
+            "maximum ping rate [Hz], any number, of some makes the nearest of these; or standby"))
       ->check(CLI::Validator(complaint_about_rate, "2|5|10|15|40|standby", "rate"));
   group(app.add_option_function<std::uint32_t>(
             "--beams", [this](std::uint32_t given) { settings.beams = given; }, "default: 512"))

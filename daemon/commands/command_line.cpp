@@ -12,6 +12,7 @@
 #include "core/text/nearest.hpp"
 #include "daemon/config/move_addresses.hpp"
 #include "daemon/config/products.hpp"
+#include "protocol/host.hpp"
 
 namespace sonar {
 namespace {
@@ -21,21 +22,31 @@ using text::one_of;
 using text::whole_number;
 
 constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the names of the files
-/// Makers of the demo's sonar, and the product that stands for each; empty = the demo's own.
-constexpr std::pair<std::string_view, std::string_view> demos[] = {
-    {"oculus", ""},         {"blueview", "blueview-p900-90"}, {"aris", "aris-3000"},       {"3d15", "waterlinked-3d15"},
-    {"ping360", "ping360"}, {"surveyor", "surveyor-240"},     {"omniscan", "omniscan-450"}};
+
+/// Names that --demo takes, with `between` between two of them; `first`: also that of the demo without a name.
+std::string demo_names(std::string_view between, bool first = true) {
+  std::string names;
+  for (const protocol::Make& make : protocol::makes())
+    if (first || &make != &protocol::makes().front()) names.append(names.empty() ? "" : between).append(make.name_in_demo());
+  return names;
+}
+
+/// Null: there is no such demo.
+const protocol::Make* find_demo(std::string_view name) {
+  for (const protocol::Make& make : protocol::makes())
+    if (make.name_in_demo() == name) return &make;
+  return nullptr;
+}
 
 void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("config", run.config, "configuration file; without one sonard looks in the usual places, then runs the demo");
   app.add_option_function<std::string>(
          "--demo", [&run](const std::string& maker) { run.demo = true, run.demo_of = maker; },
-         "run the built-in demo, whatever files there are; --demo blueview, aris, 3d15, ping360, surveyor, omniscan: with such "
-         "a sonar instead of an Oculus")
+         "run the built-in demo, whatever files there are; --demo " + demo_names(", ", false) +
+             ": with such a sonar instead of " + std::string(protocol::makes().front().title))
       ->expected(0, 1)
-      ->type_name(
-          "TEXT:oculus|blueview|aris|3d15|ping360|surveyor|omniscan");  // complaint() judges it: a file is not meant for a maker
-  app.add_option("--profile", run.profile, "run the demo with this product, as blueview-m900-130 (docs/configuration.md)");
+      ->type_name("TEXT:" + demo_names("|"));  // complaint() judges it: a file is not meant for a maker
+  app.add_option("--profile", run.profile, "run the demo with this product (docs/configuration.md)");
   app.add_option(
          "--clock", run.clock,
          "realtime, or stepped (when clients have taken the last ping), lockstep (sonarctl step), follow (stamps of poses)")
@@ -173,13 +184,11 @@ bool is_like_a_file(std::string_view word) {
 
 /// The contradictory options; empty = none.
 std::string complaint(const RunCommand& run) {
-  const bool known = run.demo_of.empty() ||
-                     std::any_of(std::begin(demos), std::end(demos), [&](const auto& demo) { return demo.first == run.demo_of; });
+  const bool known = run.demo_of.empty() || find_demo(run.demo_of) != nullptr;
   const std::string file = !known && is_like_a_file(run.demo_of) ? run.demo_of : run.config;
   if (run.demo && !file.empty()) return "--demo runs the built-in demo, not " + file + ": leave out one of the two";
   if (!known)
-    return "there is no demo \"" + run.demo_of +
-           "\"; there are oculus, blueview, aris, 3d15, ping360, surveyor and omniscan, and --profile NAME for any product";
+    return "there is no demo \"" + run.demo_of + "\"; there are " + demo_names(", ") + ", and --profile NAME for any product";
   if (!run.profile.empty() && !file.empty())
     return "--profile chooses the demo's sonar, and " + file + " says itself what its sonars are: leave out one of the two";
   if (!run.profile.empty() && !run.demo_of.empty())
@@ -217,17 +226,17 @@ Command parse_command_line(int argc, char** argv) {
   if (bare) {
     add_run_options(app, run);
     app.footer(
-        "examples:\n"
+        std::string("examples:\n") +
         "  sonard                           the configuration found in the usual places, else the demo\n"
-        "  sonard --demo blueview           the demo with a BlueView head; aris, 3d15, ping360, surveyor, omniscan; --profile "
-        "NAME: with any product\n"
+        "  sonard --demo NAME               the demo with another make: " +
+        demo_names(", ", false) +
+        "; --profile NAME: with any product\n"
         "  sonard my.yaml --log-level debug\n"
         "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, dataset JOB --out DIR, worker --out DIR, "
         "farm, "
         "replay FILE; each has --help.\n"
-        "Oculus, ARIS, Water Linked, Ping360, Surveyor and Omniscan sonars are wire-compatible. BlueView sonars are compatible "
-        "with the vendor's SDK by libraries of our own, not on "
-        "the wire. Not affiliated with any vendor.");
+        "Sonars are wire-compatible, but for those that sonard opens by a library of its own, as it prints when it starts. Not "
+        "affiliated with any vendor.");
   } else {
     app.require_subcommand(1);
     CLI::App& run_app = *app.add_subcommand("run", "serve the sonars of a configuration");
@@ -267,8 +276,8 @@ Command parse_command_line(int argc, char** argv) {
     return complain(wrong + text::where_help_is(app));
   }
   if (const std::string wrong = complaint(run); !wrong.empty()) return complain(wrong + text::where_help_is(app));
-  for (const auto& [maker, product] : demos)
-    if (run.demo_of == maker && !product.empty()) run.profile = product;
+  if (const protocol::Make* const make = find_demo(run.demo_of); make != nullptr && make != &protocol::makes().front())
+    run.profile = make->demo_profile.empty() ? make->device->models().front()->profile : make->demo_profile;
   run.demo = run.demo || !run.profile.empty();
   return run;
 }

@@ -9,6 +9,7 @@
 #include "daemon/config/config_parts.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/config/read_trajectory.hpp"
+#include "protocol/host.hpp"
 
 namespace sonar {
 namespace {
@@ -235,7 +236,9 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   return config;
 }
 
-constexpr std::string_view demo_yaml = R"(world:
+/// With the product that stands for the first make.
+std::string demo_yaml() {
+  std::string yaml = R"(world:
   scene: demo.yaml
   seed: 1
 vehicles:
@@ -244,10 +247,11 @@ vehicles:
     trajectory: orbit
 sonars:
   - name: front
-    profile: oculus-m1200d
     mount: {frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}
     bind_ip: 127.0.0.2
 )";
+  return yaml.append("    profile: ").append(protocol::makes().front().demo_profile).append("\n");
+}
 
 }  // namespace
 
@@ -277,7 +281,7 @@ Result<Config> parse_config(std::string_view yaml, const std::string& name, cons
 }
 
 Result<Config> demo_config() {
-  auto config = parse_config(demo_yaml, "demo", {});
+  auto config = parse_config(demo_yaml(), "demo", {});
   if (!config) return config;
   config->scene = {"demo.yaml", true};  // whatever files there are
   config->previews = config->faults.armed = true;

@@ -27,7 +27,7 @@ std::string title_of(const protocol::Vendor& vendor) {
 }
 
 int default_max_observers(const protocol::Vendor& vendor) {
-  return vendor.default_max_clients() > 1 || !vendor.pings_over_tcp() ? 0 : 4;
+  return vendor.default_max_clients() > 1 || vendor.pings_by() == protocol::PingsBy::datagrams ? 0 : 4;
 }
 
 std::vector<std::string> notes_of_options(const Config& config) {

@@ -41,7 +41,7 @@ class ArisVendor final : public protocol::Vendor {
   double gain_percent(const protocol::DeviceState& device) const override {
     return 100 / highest_gain_db * static_cast<double>(settings_from(device.settings.get(), device).acoustics.gain_db);
   }
-  bool pings_over_tcp() const override { return false; }
+  protocol::PingsBy pings_by() const override { return protocol::PingsBy::datagrams; }
   bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
   protocol::Bytes beacon(const protocol::DeviceState& device, Time) const override { return make_beacon(device); }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState& device, Time) const override {

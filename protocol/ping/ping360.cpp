@@ -68,7 +68,7 @@ class Ping360Vendor final : public protocol::Vendor {
   double gain_percent(const protocol::DeviceState& device) const override {
     return 50.0 * settings_from(device.settings.get()).ping.gain;
   }
-  bool pings_over_tcp() const override { return false; }
+  protocol::PingsBy pings_by() const override { return protocol::PingsBy::datagrams; }
   bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
   /// To and fro over the half circle ahead, 10 m far unless other settings were requested.
   std::optional<ScanStep> scan_step(std::uint32_t number, const protocol::DeviceState& device) const override {

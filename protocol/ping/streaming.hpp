@@ -50,6 +50,7 @@ class StreamingConversation : public Conversation {
 class StreamingVendor : public protocol::Vendor {
  public:
   int default_max_clients() const override { return 1; }
+  protocol::PingsBy pings_by() const override { return protocol::PingsBy::either; }
   Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
                                                   const protocol::OptionValues&) const override {
     return model;

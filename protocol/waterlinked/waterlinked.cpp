@@ -43,7 +43,7 @@ class WaterLinkedVendor final : public protocol::Vendor {
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState&, Time) const override {
     return nullptr;
   }
-  bool pings_over_tcp() const override { return false; }
+  protocol::PingsBy pings_by() const override { return protocol::PingsBy::datagrams; }
   std::shared_ptr<const protocol::Bytes> frame(const Ping&, const protocol::DeviceState&) const override { return nullptr; }
   std::vector<protocol::Bytes> datagrams(const protocol::Port&, const Ping& ping,
                                          const protocol::DeviceState& device) const override {

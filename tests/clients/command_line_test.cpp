@@ -56,8 +56,9 @@ TEST(CommandLine, HelpNamesTheDefaultsOfSettings) {
   CLI::App app("", "sonarctl");
   const auto command = add_listen(app);
   const std::string help = app.get_subcommand("listen")->help();
-  for (const char* words : {"Default: 10; of BlueView, ARIS and 3D-15 their own", "Default: 50 of an Oculus",
-                            "Default: 2 of an Oculus", "Default: 10 of Oculus and Omniscan", "default: 512", "Default: 127"})
+  for (const char* words :
+       {"default: the make's own; of an Oculus --mode 2 --range 10 --gain 50 --rate 10; of an Omniscan --rate 10", "default: 512",
+        "Default: 127"})
     EXPECT_THAT(unwrapped(help), HasSubstr(words));
 }
 

@@ -27,7 +27,7 @@ class DelegatingVendor : public Vendor {
     return of_.apply_override(wanted, device);
   }
   double gain_percent(const DeviceState& device) const override { return of_.gain_percent(device); }
-  bool pings_over_tcp() const override { return of_.pings_over_tcp(); }
+  PingsBy pings_by() const override { return of_.pings_by(); }
   bool pings_before_first_request(const DeviceState& device) const override { return of_.pings_before_first_request(device); }
   Bytes beacon(const DeviceState& device, Time now) const override { return of_.beacon(device, now); }
   Reaction on_datagram(const Port& port, BytesView datagram, const DeviceState& device, Time now) const override {

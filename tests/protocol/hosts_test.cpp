@@ -72,7 +72,7 @@ class Talk {
     for (HostAction& action : actions) {
       if (const auto* send = std::get_if<HostSend>(&action)) {
         ASSERT_TRUE(dialogue_) << "bytes for a port without a conversation";
-        react(dialogue_->on_bytes(send->bytes, now));
+        in_pieces(send->port, send->bytes, [this](BytesView part) { react(dialogue_->on_bytes(part, now)); });
       } else if (const auto* ask = std::get_if<ResourceRequest>(&action)) {
         const ResourceReply reply = device.on_http(*device.port(Port::Kind::http), *ask, state, now);
         obey(reply.events);
@@ -95,6 +95,8 @@ class Talk {
   std::vector<HostPing> pings;
   std::vector<std::pair<std::size_t, Bytes>> sent;  // by the device, with the host's port
   std::optional<Error> error;
+  bool only_port = false;  // echoes are in the quarter of the beams that is most to port, in some rows
+  double head_rad = 0;     // of the request before
 
  private:
   void react(const Reaction& reaction) {
@@ -110,6 +112,7 @@ class Talk {
       if (const auto* request = std::get_if<RequestPing>(&event)) {
         ++requested_;
         with_ = request->with;
+        head_rad = request->head_rad;
       }
       if (const auto* close = std::get_if<Close>(&event)) error = Error{ErrorKind::io, close->why};
     }
@@ -117,9 +120,12 @@ class Talk {
 
   void deliver(std::size_t port, const Bytes& bytes) {
     sent.emplace_back(port, bytes);
+    in_pieces(port, bytes, [&](BytesView part) { carry_out(host->on_bytes(port, part, now)); });
+  }
+  /// Streams in pieces, datagrams whole.
+  void in_pieces(std::size_t port, const Bytes& bytes, const std::function<void(BytesView)>& give) const {
     const std::size_t step = piece_ == 0 || make.ports[port].kind != HostPort::Kind::tcp ? bytes.size() : piece_;
-    for (std::size_t at = 0; at < bytes.size(); at += step)
-      carry_out(host->on_bytes(port, BytesView(bytes).subspan(at, std::min(step, bytes.size() - at)), now));
+    for (std::size_t at = 0; at < bytes.size(); at += step) give(BytesView(bytes).subspan(at, std::min(step, bytes.size() - at)));
   }
 
   void ping() {
@@ -136,6 +142,10 @@ class Talk {
       made.beam_azimuth_rad.push_back(beams < 2 ? 0.0f : 0.5f - static_cast<float>(i) / static_cast<float>(beams - 1));
     const std::size_t sample_bytes = static_cast<std::size_t>(std::max(settings.format.bits / 8, 1));
     for (std::size_t i = 0; i < beams * rows * sample_bytes; ++i) made.samples.push_back(static_cast<std::byte>(i * 7 % 251));
+    for (std::size_t i = 0; only_port && i < made.samples.size(); ++i) {
+      const std::size_t row = i / sample_bytes / beams, beam = i / sample_bytes % beams;
+      made.samples[i] = static_cast<std::byte>(row % 16 == 8 && beam < beams / 4 ? 100 : 0);
+    }
     const auto framed = device.frame(made, state);
     const Port* const stream = device.port(Port::Kind::udp_stream);
     if (dialogue_) {
@@ -202,6 +212,52 @@ TEST_P(Hosts, SetWhatIsWantedAndGetPings) {
   const auto raster = PicturePainter(style).draw(*drawing);
   ASSERT_TRUE(raster) << raster.error().text;
   EXPECT_EQ(raster->height, picture_height(*drawing, style));
+}
+
+TEST_P(Hosts, FindASonarWithSettingsThatItsModelHas) {
+  Wanted nothing;
+  nothing.as_it_is = true;
+  const Vendor& device = *GetParam().device;
+  for (std::size_t i = 0; i < device.models().size(); ++i) {
+    Talk talk(GetParam(), nothing, 0, i);
+    SCOPED_TRACE(talk.state.model->profile);
+    const PingSettings& s = talk.settings;
+    ASSERT_GE(s.mode, 0);
+    ASSERT_LT(static_cast<std::size_t>(s.mode), talk.state.model->modes.size());
+    const FrequencyMode& mode = talk.state.model->modes[static_cast<std::size_t>(s.mode)];
+    EXPECT_GT(s.beam_count, 0);
+    EXPECT_GT(s.range_bin_count, 0);
+    EXPECT_GT(s.range_m, s.range_start_m);
+    EXPECT_LE(s.range_m, 1.01 * static_cast<double>(mode.max_range_m));
+    EXPECT_NEAR(s.range_start_m + s.range_bin_count * s.range_bin_m, s.range_m, 1.01 * s.range_bin_m);
+    EXPECT_GE(s.rate_hz, 0);
+    EXPECT_GE(device.gain_percent(talk.state), 0);
+    EXPECT_LE(device.gain_percent(talk.state), 100);
+    const auto same = device.apply_override({}, talk.state);
+    ASSERT_TRUE(same) << same.error().text;
+    EXPECT_TRUE(same->vendor_settings->equals(*talk.state.settings)) << same->summary;
+  }
+}
+
+TEST_P(Hosts, ShowPortAtPort) {
+  Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), 0, model_of(GetParam()));
+  talk.only_port = true;
+  talk.run(6);
+  ASSERT_FALSE(talk.pings.empty());
+  const auto drawing = drawing_of(talk.pings.back());
+  ASSERT_TRUE(drawing) << drawing.error().text;
+  if (drawing->kind == PictureKind::waterfall) return;  // one beam
+  if (drawing->kind == PictureKind::sweep) {
+    EXPECT_NEAR(std::remainder(drawing->head_rad - talk.head_rad, 2 * pi), 0, 0.02);
+    return;
+  }
+  const PolarImage& image = drawing->image;
+  std::size_t port = 0, starboard = 0;
+  for (const auto& [azimuth_rad, at_m] : drawing->points) ++(azimuth_rad > 0 ? port : starboard);
+  for (std::size_t i = 0; drawing->points.empty() && i < image.samples.size(); ++i)
+    if (image.samples[i] > 0) ++(image.azimuth_rad[i % image.beams] > 0 ? port : starboard);
+  EXPECT_GT(port, 0u);
+  EXPECT_EQ(starboard, 0u);
 }
 
 TEST_P(Hosts, ReadTheSameHoweverAStreamIsSplit) {
@@ -342,7 +398,7 @@ TEST_P(Hosts, ReadTheSamePingsFromEveryKindOfFile) {
   Talk talk(make, all_that_is_known(make, range_m), 0, model_of(make));
   talk.run(6);
   ASSERT_FALSE(talk.pings.empty());
-  const bool by_tcp = make.device->pings_over_tcp();
+  const bool by_tcp = make.device->pings_by() != PingsBy::datagrams;
   const recording::PcapConversation ends = recording::usual_ends(make);
   std::map<std::string, std::function<std::unique_ptr<recording::RecordingWriter>(std::unique_ptr<recording::Sink>)>> kinds;
   kinds["mcap"] = [&](auto sink) { return std::make_unique<recording::McapSession>(std::move(sink), "front", make); };

@@ -33,6 +33,8 @@ one() {
   local bound=$runs promised=500000 words=500,000 patience=20
   if [ "$name" = mesh_file ]; then
     bound=$((runs / 100)) patience=700 promised=5000 words="5,000: the importer takes a hundred times as long"
+  elif [ "$name" = conversations ]; then
+    bound=$((runs / 10)) promised=50000 words="50,000: each is minutes of a sonar's time"
   fi
   local given=(-runs="$bound" -max_total_time="$longest" -timeout="$patience" -rss_limit_mb=2560 -entropic=0 -print_final_stats=1
     -artifact_prefix="$findings/")

@@ -10,9 +10,9 @@ import sys
 import time
 from typing import Iterator, List, Optional, TextIO, Tuple
 
+from .endpoints import endpoint
 from .geodesy import parse_origin
 from .nmea import Assumptions, NmeaError, NmeaPoses, parse_sentence
-from .oculus import endpoint
 from .poses import PoseSender
 
 UDP_PORT = 10110  # registered for NMEA 0183

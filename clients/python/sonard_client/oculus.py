@@ -6,22 +6,13 @@ import socket
 import time
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Callable, Deque, Iterator, List, Optional, Tuple
+from typing import Any, Callable, Deque, Iterator, List, Optional
 
 from . import layouts
+from .endpoints import endpoint
 from .layouts import FireSettings
 from .ping import Ping, ping_from
 from .stream import Message, MessageReader
-
-
-def endpoint(address: str, port: int, lowest: int = 1) -> Tuple[str, int]:
-    """Splits "host" or "host:port" into ("host", port). lowest: 0 for listeners, where port 0 means any free port."""
-    host, colon, number = address.rpartition(":")
-    if not colon:
-        return address, port
-    if not number.isdigit() or not lowest <= int(number) < 65536:
-        raise ValueError(f"{address}: the port must be a number from {lowest} to 65535")
-    return host, int(number)
 
 
 def _checked(name: str, value: float, low: float, high: float) -> float:

@@ -5,7 +5,7 @@ import math
 import socket
 from typing import Any, Dict, Optional, Sequence
 
-from .oculus import endpoint
+from .endpoints import endpoint
 from .pose_messages import CLOCKS, FRAMES, PoseMessage, json_line, pose_update
 from .rotations import orientation, three
 

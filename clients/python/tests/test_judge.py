@@ -20,7 +20,7 @@ from html.parser import HTMLParser
 from common import ROOT, made_ping
 
 from sonard_client.judge import __main__ as judge_main
-from sonard_client.judge import cases, driver, report, ros_tap, wire
+from sonard_client.judge import cases, driver, report, ros_tap, run_case, wire
 from sonard_client.judge.cases import CASES
 from sonard_client.judge.scene import Scene
 from sonard_client.judge.truth import TruePing, TruthReader
@@ -226,6 +226,20 @@ class Tap(unittest.TestCase):
     def test_command_line(self):
         self.assertEqual(driver.expand("a --x='{ip}:{port}' {id} {other}", "127.0.0.2", 52100, 7),
                          ["a", "--x=127.0.0.2:52100", "7", "{other}"])
+
+    def test_the_port_is_that_of_the_sonars_make(self):
+        one = [{"protocol": "status", "address": "127.0.0.2:52102", "sonar_speaks_first": True},
+               {"protocol": "udp", "address": "127.0.0.2:12345"}, {"protocol": "udp", "address": "127.0.0.2:30303"}]
+        self.assertEqual(run_case.port_of({"listens": "127.0.0.2:1", "addresses": one}), 12345)
+        self.assertEqual(run_case.port_of({"listens": "127.0.0.2:14750"}), 14750)
+
+    def test_why_a_fault_has_no_effect_on_a_make(self):
+        judge = mock.Mock(options=mock.Mock(profile="omniscan-450"), lacking="", fault_engine=True, ping_bytes=1)
+        judge.kinds = {"G01": {"parameters": [], "without_effect": {"oculus": "sends none", "omniscan450": "has none"}}}
+        case = next(case for case in CASES if case.kind == "G01")
+        self.assertEqual(judge_main.Judge.not_run(judge, case), "G01 has none")
+        judge.options.profile = "blueview-p900-90"
+        self.assertNotIn("has none", judge_main.Judge.not_run(judge, case))
 
     def test_a_drivers_output_and_end(self):
         program = ("import os, sys, time\nprint('{\"id\": 1, \"crc32\": 2}')\nprint('words')\n"

@@ -7,7 +7,8 @@ import unittest
 from common import GOLDEN, made_ping
 
 from sonard_client import MessageReader, arrays, layouts
-from sonard_client.oculus import endpoint, settings_of
+from sonard_client.endpoints import endpoint
+from sonard_client.oculus import settings_of
 from sonard_client.ping import ping_from
 from sonard_client.status import read_status
 

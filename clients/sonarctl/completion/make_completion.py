@@ -15,8 +15,8 @@ HERE = pathlib.Path(__file__).resolve().parent
 OPTION = re.compile(r"^  (?:(-\w),)?(--[\w-]+)(?:,--[\w-]+)*((?:[ :=(]\S.*|\s{2,}.*)?)$")
 CHOICES = re.compile(r"\{([^}]+)\}|TEXT:([\w.-]+(?:\|[\w.-]+)*)|INT:([\w.-]+(?:\|[\w.-]+)+)")  # of CLI11's own check, and of ours
 COMMAND = re.compile(r"^  ([a-z][\w-]*)\s{2,}\S")
-FILE_WORDS = {"--png", "--record", "--token-file", "--out", "--poses", "--json-file", "--pcap", "--mcap",
-              "--oculus", "--aris", "--sonar-file", "--svlog", "--raw", "--from", "--credentials"}
+FILE_WORDS = {"--png", "--record", "--token-file", "--out", "--poses", "--json-file", "--pcap", "--mcap", "--raw", "--from", "--credentials"}
+FILES = ["a file"]  # in place of choices: of the kinds of files that makes of sonar have
 SCENE_COMMANDS = {"load", "run", "check", "render", "dataset", "replay", "info", "import", "submit", "collect"}  # they take files, not addresses
 
 
@@ -43,7 +43,7 @@ def read_help(text):
         takes_value = bool(re.match(r"[ =]?(TEXT|INT|UINT|FLOAT|PATH|FILE|ENUM|NUMBER|\{)", rest.strip())) and not rest.startswith("  ")
         choices = CHOICES.search(rest.split("  ")[0]) if takes_value else None
         words = [w.split("->")[0] for w in re.split(r"[,|]", choices[1] or choices[2] or choices[3])] if choices else []
-        options[match[2]] = words if takes_value else None
+        options[match[2]] = FILES if "the makers' own kind of file" in rest else words if takes_value else None
     return commands, options
 
 
@@ -75,7 +75,8 @@ def values(tree, of_words, files, anything):
         for option, choices in options.items():
             if choices is None:
                 continue
-            action = of_words(" ".join(choices)) if choices else files if option in FILE_WORDS else anything
+            is_file = choices is FILES or not choices and option in FILE_WORDS
+            action = files if is_file else of_words(" ".join(choices)) if choices else anything
             actions.setdefault(action, []).append(f'"{path}:{option}"')
     return [f"    {' | '.join(labels)}) {action} ;;" for action, labels in actions.items()]
 

@@ -19,7 +19,7 @@ struct ReplayDevice {
 
   /// Null: it listens by TCP for connections that last.
   const protocol::Port* http() const { return vendor != nullptr ? vendor->port(protocol::Port::Kind::http) : nullptr; }
-  bool by_datagrams() const { return vendor != nullptr && !vendor->pings_over_tcp(); }
+  bool by_datagrams() const { return vendor != nullptr && vendor->pings_by() == protocol::PingsBy::datagrams; }
   std::string name() const;
   std::uint16_t tcp_port() const;
   /// 0: it sends no status.

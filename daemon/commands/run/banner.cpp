@@ -6,7 +6,7 @@
 #include "core/text/format.hpp"
 #include "cuda/cuda_status.hpp"
 #include "daemon/server/view/page_files.hpp"
-#include "protocol/blueview/frames.hpp"
+#include "protocol/host.hpp"
 
 namespace sonar {
 namespace {
@@ -26,11 +26,13 @@ std::filesystem::path sdk_library_folder() {
   return {};
 }
 
-/// How the host of a BlueView head comes to it: by a library, not by a driver as it is.
-std::string blueview_lines(std::string at, unsigned port) {
+/// How a host comes to a sonar by a library of ours, not by a driver as it is.
+std::string library_lines(const protocol::Make& make, std::string at, unsigned port) {
   const std::string folder = sdk_library_folder().string();
-  if (port != blueview::tcp_port) at += format(":%u", port);
-  return "  driver  BVTSonar_Open(sonar, \"NET\", \"" + at + "\") with sonard's libbvtsdk: " +
+  if (port != make.ports.front().number) at += format(":%u", port);
+  std::string call(make.driver_call);
+  if (const std::size_t place = call.find("{at}"); place != std::string::npos) call.replace(place, 4, at);
+  return "  driver  " + call + ": " +
          (folder.empty() ? "package sonard-bvtsdk" : "LD_LIBRARY_PATH=" + folder + " (SDK 3.x: bvt3)") +
          ", docs/bvtsdk.md\n  look    sonarctl view " + at + " --png ping.png\n";
 }
@@ -47,8 +49,8 @@ std::string sonar_lines(const Device& device) {
     text += "  " + protocol::line_of(address.protocol, text_of(address.at), address.sonar_speaks_first) + "\n";
   if (device.sonar().state().advertise_ip != device.config().bind_ip)
     text += "  advertised as " + text_of(device.sonar().state().advertise_ip) + "\n";
-  if (device.config().profile.vendor->name() == "blueview")
-    text += blueview_lines(text_of(device.sonar().state().advertise_ip), device.data_endpoint().port);
+  if (const protocol::Make& make = protocol::make_of_profile(model.profile); !make.driver_call.empty())
+    text += library_lines(make, text_of(device.sonar().state().advertise_ip), device.data_endpoint().port);
   return text;
 }
 

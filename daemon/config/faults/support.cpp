@@ -3,6 +3,8 @@
 #include <iterator>
 
 #include "daemon/config/faults/kinds.hpp"
+#include "daemon/config/products.hpp"
+#include "protocol/host.hpp"
 
 namespace sonar {
 namespace {
@@ -34,14 +36,37 @@ bool has_integer(const protocol::Vendor& vendor, protocol::Part part, protocol::
       part, name, [](auto n) { return n; }, none);
 }
 
+/// How many of the values first to last one model of the vendor takes, of the model that takes most.
+template <class T>
+std::size_t accepted(const protocol::Vendor& vendor, std::optional<T> protocol::SettingsOverride::*setting, std::uint32_t first,
+                     std::uint32_t last) {
+  std::size_t most = 0;
+  for (const auto& model : vendor.models()) {
+    protocol::DeviceState device;
+    device.id = 1;
+    device.model = model;
+    if (const auto options = check_options(vendor, {})) device.options = *options;
+    device.settings = vendor.initial_settings(device).vendor_settings;
+    std::size_t taken = 0;
+    for (std::uint32_t value = first; value <= last; ++value) {
+      protocol::SettingsOverride wanted;
+      wanted.*setting = static_cast<T>(value);
+      taken += vendor.apply_override(wanted, device).has_value();
+    }
+    most = std::max(most, taken);
+  }
+  return most;
+}
+
 /// `what`: of the kind's parameter of that name. As Vendor::apply_override refuses it, whatever the value.
 std::string why_without_setting(std::string_view what, const protocol::Vendor& vendor) {
-  const std::string_view name = vendor.name();
+  using Wanted = protocol::SettingsOverride;
   const auto has_modes = [](const auto& model) { return model->modes.size() > 1; };
-  if ((what == "sample-bits" || what == "row-gains" || what == "largest") && name != "oculus") return "has one type of samples";
-  if (what == "beams" && name != "oculus" && name != "aris") return "has one number of beams";
+  if ((what == "sample-bits" || what == "row-gains" || what == "largest") && accepted(vendor, &Wanted::sample_bits, 8, 32) < 2)
+    return "has one type of samples";
+  if (what == "beams" && accepted(vendor, &Wanted::beams, 1, 512) < 2) return "has one number of beams";
   if (what == "mode" && std::none_of(vendor.models().begin(), vendor.models().end(), has_modes)) return "has one mode";
-  if (what == "rate" && (name == "blueview" || name == "aris" || name == "ping360")) return "has no standby";
+  if (what == "rate" && accepted(vendor, &Wanted::rate_hz, 0, 0) == 0) return "has no standby";
   return {};
 }
 
@@ -51,8 +76,9 @@ std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& ve
   using Port = protocol::Port::Kind;
   if (kind.code == "B15") return "is of files: cut one with head -c";
   if (kind.effect == E::harness) return "needs two network namespaces: sonarctl lab";
-  const bool blueview_only = kind.code.front() == 'B';
-  if (blueview_only && vendor.name() != "blueview") return "only the BlueView link has it";
+  for (const protocol::Make& make : protocol::makes())
+    if (kind.code.front() == make.own_faults && vendor.name() != make.name())
+      return "only the " + title_of(*make.device) + " link has it";
   const bool dialogue = vendor.port(Port::udp_dialogue) != nullptr;
   if (const protocol::Port* const stream = vendor.port(Port::udp_stream); kind.stage == S::datagrams) {
     if (stream == nullptr && !dialogue) return "sends no datagrams of pings";
@@ -69,7 +95,8 @@ std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& ve
   const bool of_port = kind.effect == E::close_ports || kind.effect == E::flap || kind.effect == E::power_cycle;
   const bool of_datagrams = dialogue && kind.stage != S::clients && !of_port && acts_without_stream(kind, dialogue);
   if (of_stream && vendor.port(Port::tcp_stream) == nullptr && !of_datagrams) return "has no TCP stream";
-  if (!vendor.pings_over_tcp() && !acts_without_stream(kind, dialogue)) return "sends pings by datagrams alone";
+  if (vendor.pings_by() == protocol::PingsBy::datagrams && !acts_without_stream(kind, dialogue))
+    return "sends pings by datagrams alone";
   return kind.effect == E::change_settings ? why_without_setting(kind.given().front().value, vendor) : std::string();
 }
 

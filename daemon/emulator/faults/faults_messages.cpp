@@ -142,7 +142,8 @@ void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Conne
 }
 
 void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
-  if (stream.role == Role::client || !around_.vendor.pings_over_tcp()) alter_bytes_of_datagrams(datagrams, stream, ping, now);
+  if (stream.role == Role::client || around_.vendor.pings_by() == protocol::PingsBy::datagrams)
+    alter_bytes_of_datagrams(datagrams, stream, ping, now);
   for (Entry& e : entries_) {
     if (e.fault.kind->stage != FaultStage::datagrams || datagrams.empty() || !chosen(e.fault, stream)) continue;
     const bool older = e.fault.kind->effect == Effect::older_part, delays = e.fault.kind->effect == Effect::late_part;

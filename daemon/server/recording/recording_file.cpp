@@ -23,8 +23,7 @@ const protocol::Make& make_of(std::string_view vendor) {
 
 /// All that it sends of a ping, as it is sent.
 bool is_one_stream(const protocol::Make& make) {
-  return make.codec.framing != nullptr && !make.each_ping_requested &&
-         make.device->port(protocol::Port::Kind::udp_stream) == nullptr;
+  return make.codec.framing != nullptr && !make.each_ping_requested && make.device->pings_by() != protocol::PingsBy::datagrams;
 }
 
 bool may_stand_in_name(char c) {

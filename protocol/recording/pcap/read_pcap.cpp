@@ -34,20 +34,13 @@ struct Found {
   std::string note;
 };
 
-bool pings_by_datagram(const Make& make) {
-  const auto ports = make.device->ports();
-  return std::any_of(ports.begin(), ports.end(), [](const protocol::Port& port) {
-    return port.kind == protocol::Port::Kind::udp_stream || port.kind == protocol::Port::Kind::udp_dialogue;
-  });
-}
-
 /// The make whose messages a segment begins with; clients may send such messages too. Of the makes whose stream begins so, the
 /// one whose usual port the source has, else the first.
 const Make* make_of(const Segment& segment) {
   const Make* found = nullptr;
   if (!segment.tcp) {
     const auto by = sender_of({{}, Origin::device, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});
-    return by && pings_by_datagram(*by->make) ? by->make : nullptr;
+    return by && by->make->device->pings_by() != protocol::PingsBy::stream ? by->make : nullptr;
   }
   for (const Make& make : protocol::makes()) {
     const Framing* const framing = make.codec.framing;

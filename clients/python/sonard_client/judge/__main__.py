@@ -25,13 +25,12 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Dict, List, Optional, Sequence
 
-from .. import lab, layouts
+from .. import lab
 from . import markdown, report
 from .cases import CASES, Case, listing, select, torture
 
 USAGE, UNAVAILABLE, NOT_HELD = 64, 69, 1
 _PACKAGE = str(pathlib.Path(__file__).resolve().parents[2])
-_BLUEVIEW_PORT = 14750
 ROS_MODULES = {"ros1": "rospy", "ros2": "rclpy"}  # of the taps
 
 
@@ -175,7 +174,6 @@ class Judge:
         return {"case": described, "driver": self.command, "tap": "json" if o.tap != "none" else "none", "profile": o.profile,
                 "sonard": self.sonard, "seed": o.seed, "space": "loopback" if self.lacking else "lab",
                 "offset": self._first_offset + slot,
-                "port": _BLUEVIEW_PORT if o.profile.startswith("blueview") else layouts.DATA_PORT,
                 "fault_engine": self.fault_engine, "ping_bytes": self.ping_bytes}
 
     def run_one(self, case: Optional[Case], folder: pathlib.Path) -> Dict[str, Any]:
@@ -230,11 +228,8 @@ class Judge:
 
     def not_run(self, case: Case) -> str:
         """Why a case cannot run here; empty if it can."""
-        vendor = self.options.profile.partition("-")[0]
         if case.kind == "N00":
             return ""
-        if case.family == "G" and vendor in ("oculus", "blueview"):
-            return f"{vendor} sonars do not send pings as datagrams"
         if case.needs_lab:
             lacking = self.lacking or lab.fault_missing(case.kind)
             return f"needs {lacking}" if lacking else ""
@@ -247,8 +242,10 @@ class Judge:
         kind = self.kinds.get(case.kind)
         if kind is None:
             return f"this sonard does not know {case.kind}"
-        if kind.get("without_effect", {}).get(vendor):
-            return f"{case.kind} {kind['without_effect'][vendor]}"
+        product = self.options.profile.replace("-", "")  # which begins with the name of its make
+        why = next((why for make, why in kind.get("without_effect", {}).items() if product.startswith(make)), "")
+        if why:
+            return f"{case.kind} {why}"
         unknown = sorted(set(case.given) - {"byte"} - {p["name"] for p in kind.get("parameters", ())})
         return f"{case.kind} of this sonard has no parameter {', '.join(unknown)}" if unknown else ""
 

@@ -54,7 +54,7 @@ def counts(rows: Sequence[Json]) -> Json:
 
 
 def summary(column: Json) -> str:
-    """oculus_driver: 92 of 107 MUST, 71 of 96 SHOULD, 2 flaky"""
+    """my_driver: 92 of 107 MUST, 71 of 96 SHOULD, 2 flaky"""
     n = column["counts"]
     text = f"{column['name']}: {n['must']} of {n['of']} MUST, {n['should']} of {n['of']} SHOULD, {n['flaky']} flaky"
     return text + (f", {n['not_run']} not run" if n["not_run"] else "") + ("" if column["tap"] != "none" else " (wire only)")

@@ -79,14 +79,21 @@ def _last_line(text: str) -> str:
     return ([line for line in text.splitlines() if line.strip()] or [""])[-1].strip()[:300]
 
 
+def port_of(sonar: Dict[str, Any]) -> int:
+    """Where a driver connects, as the sonar's status names it."""
+    for_drivers = [a["address"] for a in sonar.get("addresses", ()) if not a.get("sonar_speaks_first")]
+    return int([*for_drivers, sonar["listens"]][0].rpartition(":")[2])
+
+
 def _with_driver(spec: Dict[str, Any], case: Optional[Case], folder: pathlib.Path, laboratory: Optional[lab.Lab], sonard: Daemon,
                  address: str, http_port: int) -> Dict[str, Any]:
     (folder / "driver.log").write_bytes(b"")
-    words = expand(spec["driver"], address, spec["port"], _DEVICE_ID)
-    driver = Driver(words, laboratory.host if laboratory else [], folder / "driver.log", spec["tap"] == "json")
     control = Control("127.0.0.1", http_port, timeout=2)
+    port = port_of(control.status()["sonars"][0])
+    words = expand(spec["driver"], address, port, _DEVICE_ID)
+    driver = Driver(words, laboratory.host if laboratory else [], folder / "driver.log", spec["tap"] == "json")
     try:
-        capture: Optional[Capture] = Capture(lab.LINK if laboratory else "lo", address, spec["port"])
+        capture: Optional[Capture] = Capture(lab.LINK if laboratory else "lo", address, port)
     except (PermissionError, OSError):
         capture = None
     scene = Scene(spec, folder, address, sonard, driver, capture, StatusWire(control), Journal(folder / "journal.jsonl"),

@@ -152,6 +152,7 @@ class MadeUpVendor final : public protocol::Vendor {
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return {}; }
   int default_max_clients() const override { return 2; }
+  protocol::PingsBy pings_by() const override { return protocol::PingsBy::either; }
   Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
                                                   const protocol::OptionValues&) const override {
     return model;

@@ -1,0 +1,12 @@
+// The Example, a make of sonar that tests add to the product's: its folder, as protocol/<make>/, and a row.
+#pragma once
+
+#include "protocol/host.hpp"
+
+namespace sonar::example_make {
+
+const protocol::Vendor& vendor();
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+recording::Codec codec();
+
+}  // namespace sonar::example_make

@@ -1,0 +1,35 @@
+// The host and the emulated sonar of every make against each other in virtual time, through every kind of fault that takes effect
+// on such a sonar: the host takes whatever comes, and pings come again when the fault is over.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/example_make/host_link.hpp"
+
+namespace sonar::faults_test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class HostsAndFaults : public testing::TestWithParam<protocol::Make> {};
+INSTANTIATE_TEST_SUITE_P(OfEveryMake, HostsAndFaults, testing::ValuesIn(protocol::makes().begin(), protocol::makes().end()),
+                         [](const auto& of) { return std::string(of.param.name()); });
+
+TEST_P(HostsAndFaults, PingsComeAgainAfterEveryFault) {
+  const protocol::Make& make = GetParam();
+  int tried = 0;
+  for (const FaultKind& kind : fault_kinds()) {
+    if (!why_without_effect(kind, *make.device).empty()) continue;
+    SCOPED_TRACE(std::string(kind.code) + " " + std::string(kind.name));
+    host_link::Link link(make);
+    ASSERT_TRUE(link.gets_ping_within(20s));
+    if (!link.add(kind)) continue;
+    ++tried;
+    link.run(5s);
+    link.end_faults();
+    EXPECT_TRUE(link.gets_ping_within(60s));
+  }
+  EXPECT_GT(tried, 20);
+}
+
+}  // namespace
+}  // namespace sonar::faults_test

@@ -1,0 +1,228 @@
+// The host and the emulated sonar of a make against each other in virtual time, without sockets: tests and fuzzers of every make.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "daemon/emulator/sonar/sonar.hpp"
+#include "daemon/emulator/world/world_parts.hpp"
+#include "protocol/host.hpp"
+
+namespace sonar::host_link {
+
+using namespace std::chrono_literals;
+using protocol::Bytes;
+using protocol::Make;
+
+inline constexpr Time start = Time{} + std::chrono::hours(24 * 365 * 50);
+inline constexpr std::chrono::milliseconds step = 50ms, patience = 3s;  // of a driver: then it connects again
+
+inline Config surroundings() {
+  Config config;
+  config.clock = ClockMode::stepped;
+  config.water = Water{15, 0, 8, 0};
+  config.vehicles.push_back({.name = "rov", .initial_pose = {{0, 0, -3}, {}}});
+  return config;
+}
+
+inline void require(bool holds, const char* else_what) {
+  if (!holds) throw std::logic_error(else_what);
+}
+
+inline SonarConfig sonar_of(const Make& make) {
+  SonarConfig sonar;
+  sonar.name = "front";
+  sonar.profile = {make.device, make.device->models().front()};
+  sonar.device_id = 7001;
+  sonar.options = *protocol::check_options(*make.device, {});
+  sonar.max_clients = 1;
+  return sonar;
+}
+
+inline std::shared_ptr<const Ping> computed(PingRequest request) {
+  auto ping = std::make_shared<Ping>();
+  const PingSettings& s = request.settings;
+  const auto beams = static_cast<std::size_t>(s.beam_count), rows = static_cast<std::size_t>(s.range_bin_count);
+  ping->samples.resize(beams * rows * static_cast<std::size_t>(s.format.bits) / 8);
+  for (std::size_t b = 0; b < beams; ++b)
+    ping->beam_azimuth_rad.push_back(beams < 2 ? 0.0f : 0.5f - static_cast<float>(b) / static_cast<float>(beams - 1));
+  if (s.format.row_gains) ping->row_gain.assign(rows, 1);
+  ping->request = std::move(request);
+  return ping;
+}
+
+/// A sonar and a driver that connects again when it loses the connection or gets no ping.
+class Link {
+ public:
+  explicit Link(const Make& make)
+      : make_(make),
+        world_(pose_rules(config_), vehicles_of(config_), {}, start),
+        sonar({config_, world_}, sonar_of(make), 0, start) {
+    using Kind = protocol::Port::Kind;
+    for (const protocol::Port& port : make.device->ports())
+      if (port.kind == Kind::udp_stream) {
+        streams_.push_back(++last_id_);
+        perform(sonar.open_stream(last_id_, port, now_));
+      }
+    const bool by_udp = make.ports.front().kind == protocol::HostPort::Kind::udp;
+    port_ = make.device->port(by_udp ? Kind::udp_dialogue : Kind::tcp_stream);
+    connect();
+  }
+
+  void run(std::chrono::nanoseconds time) {
+    for (const Time end = now_ + time; now_ < end;) step_once();
+  }
+  bool gets_ping_within(std::chrono::nanoseconds time) {
+    const std::size_t before = pings;
+    for (const Time end = now_ + time; now_ < end && pings == before;) step_once();
+    return pings > before;
+  }
+  /// False: such a sonar has no such fault.
+  bool add(const FaultKind& kind) {
+    FaultRecord record;
+    record.what = std::string(kind.code);
+    const auto faults = check_fault(record, true);
+    if (!faults || !sonar.why_no_faults(*faults).empty()) return false;
+    perform(sonar.add_faults(*faults, true, now_));
+    return true;
+  }
+  /// Bytes of any kind from the driver, and to it.
+  void to_sonar(protocol::BytesView bytes) {
+    if (id_ != 0 && served_) perform(sonar.on_bytes(id_, bytes, now_));
+    drain();
+  }
+  void to_host(std::size_t port, protocol::BytesView bytes) {
+    if (make_.ports[port].kind != protocol::HostPort::Kind::http) obey(host_->on_bytes(port, bytes, now_));
+  }
+  std::size_t host_ports() const { return make_.ports.size(); }
+  void reconnect() { connect(); }
+  void end_faults() {
+    Actions actions;
+    sonar.end_faults({}, now_, actions);
+    perform(std::move(actions));
+  }
+
+ private:
+  const Make& make_;
+  Config config_ = surroundings();
+  World world_;
+  Time now_ = start;
+
+ public:
+  Sonar sonar;
+  std::size_t pings = 0;
+
+ private:
+  void step_once() {
+    now_ += step;
+    for (int n = 0; n < 100; ++n) {
+      const auto next = sonar.next_tick();
+      if (!next || *next > now_) break;
+      perform(sonar.on_tick(std::max(*next, now_ - step)));
+    }
+    if (lost_ || now_ - last_sign_ > patience) connect();
+    obey(host_->on_tick(now_));
+    obey(host_->on_demand(now_));
+    drain();
+  }
+
+  void connect() {
+    if (id_ != 0) perform(sonar.on_closed(std::exchange(id_, 0), "closed by the client", now_, true));
+    protocol::Wanted wanted;
+    wanted.settings.range_m = 3;
+    host_ = *make_.host(wanted);
+    lost_ = served_ = false;
+    last_sign_ = now_;
+    if (port_ != nullptr) {
+      if (!listens_ && port_->kind == protocol::Port::Kind::tcp_stream) return;
+      id_ = ++last_id_;
+      perform(sonar.on_connect(id_, Role::client, {"driver", {127, 0, 0, 1}}, now_, port_));
+      if (id_ == 0) return;
+    }
+    obey(host_->on_open(std::vector<std::uint16_t>(make_.ports.size(), 40000), now_));
+  }
+
+  void obey(protocol::HostActions actions) {
+    for (protocol::HostAction& action : actions) {
+      if (const auto* send = std::get_if<protocol::HostSend>(&action)) {
+        if (id_ != 0 && served_) perform(sonar.on_bytes(id_, send->bytes, now_));
+      } else if (const auto* ask = std::get_if<protocol::ResourceRequest>(&action)) {
+        auto answer = sonar.on_http(*make_.device->port(protocol::Port::Kind::http), *ask, now_);
+        perform(std::move(answer.actions));
+        obey(host_->on_reply(answer.reply, now_));
+      } else if (std::holds_alternative<protocol::HostPing>(action)) {
+        ++pings;
+        last_sign_ = now_;
+      } else if (std::holds_alternative<Error>(action)) {
+        lost_ = true;
+      }
+    }
+  }
+
+  void lose(ConnectionId id) {
+    if (id != id_) return;
+    id_ = 0;
+    lost_ = true;
+    perform(sonar.on_closed(id, "ended", now_));
+  }
+
+  void perform(Actions actions) {
+    for (Action& action : actions) {
+      if (auto* compute = std::get_if<ComputePing>(&action)) {
+        perform(sonar.on_ping({.ping = computed(std::move(compute->request)), .seconds = 1e-3}, now_));
+      } else if (const auto* serve = std::get_if<Serve>(&action)) {
+        served_ = served_ || serve->connection == id_;
+      } else if (const auto* away = std::get_if<TurnAway>(&action)) {
+        if (away->connection == id_) id_ = 0, lost_ = true;
+      } else if (const auto* finish = std::get_if<Finish>(&action)) {
+        finished_.push_back(finish->connection);
+      } else if (const auto* reset = std::get_if<Reset>(&action)) {
+        require(reset->why != "an internal fault", "an internal fault");
+        lose(reset->connection);
+      } else if (const auto* listen = std::get_if<Listen>(&action)) {
+        listens_ = listen->on;
+      }
+      require(!std::holds_alternative<EngineFailed>(action), "the engine failed");
+    }
+  }
+
+  /// Writes all that waits, to the host.
+  void drain() {
+    std::vector<ConnectionId> ids = streams_;
+    if (id_ != 0 && served_) ids.push_back(id_);
+    for (const ConnectionId id : ids)
+      while (sonar.connections().find(id) != nullptr) {
+        const Outbox::Message message = sonar.next_message(id, now_);
+        if (!message) break;
+        deliver(id, message);
+      }
+    for (const ConnectionId id : std::exchange(finished_, {})) lose(id);
+  }
+  void deliver(ConnectionId id, const Outbox::Message& message) {
+    std::vector<Bytes> pieces;
+    if (message.datagrams != nullptr) pieces = *message.datagrams;
+    for (std::size_t copy = 0; message.bytes && copy < std::max<std::size_t>(1, message.prefixes.size()); ++copy) {
+      if (!message.prefixes.empty()) pieces.push_back(message.prefixes[copy]);
+      pieces.push_back(*message.bytes);
+    }
+    if (message.datagrams == nullptr) sonar.on_sent(id, message.size());
+    sonar.on_written(id, message, now_);
+    const bool to_all = message.datagrams != nullptr && id != id_;
+    for (const Bytes& piece : pieces)
+      if (!lost_ && !(to_all && sonar.receivers(id).empty()))
+        obey(host_->on_bytes(to_all ? make_.ports.size() - 1 : 0, piece, now_));
+    if (message.shape != nullptr && message.shape->end != Outbox::Shape::End::none) lose(id);
+  }
+
+  const protocol::Port* port_ = nullptr;
+  std::unique_ptr<protocol::Host> host_;
+  std::vector<ConnectionId> streams_, finished_;
+  ConnectionId id_ = 0, last_id_ = 0;
+  bool served_ = false, lost_ = false, listens_ = true;
+  Time last_sign_ = start;
+};
+
+}  // namespace sonar::host_link

@@ -1,0 +1,106 @@
+// Messages of the Example, a sonar that tests alone have: by TCP, little-endian, a header and a payload.
+#pragma once
+
+#include <optional>
+
+#include "protocol/recording/message_splitter.hpp"
+#include "protocol/wire/wire.hpp"
+
+namespace sonar::example_make {
+
+using wire::Bytes;
+using wire::BytesView;
+
+inline constexpr std::uint16_t tcp_port = 23000;
+inline constexpr std::uint32_t longest_payload = 1 << 20;
+
+enum class Kind : std::uint8_t { settings = 1, accepted = 2, refused = 3, ping = 4 };
+
+struct Header {
+  std::array<std::uint8_t, 2> magic{'E', 'X'};
+  Kind kind{};
+  std::uint8_t version = 1;
+  std::uint32_t payload = 0;
+};
+template <class V, wire::Like<Header> M>
+constexpr void fields(V& visit, M& m) {
+  visit("magic", m.magic);
+  visit("kind", m.kind);
+  visit("version", m.version);
+  visit("payload", m.payload);
+}
+
+/// From the host. `accepted` returns them; `refused` has no payload.
+struct Settings {
+  std::uint32_t range_mm = 10000;
+  std::uint16_t rate_centihz = 0;  // 0: standby
+  std::uint8_t gain_percent = 50;
+  bool operator==(const Settings&) const = default;
+};
+template <class V, wire::Like<Settings> M>
+constexpr void fields(V& visit, M& m) {
+  visit("range_mm", m.range_mm);
+  visit("rate_centihz", m.rate_centihz);
+  visit("gain_percent", m.gain_percent);
+}
+
+/// Behind it a bearing for each beam in 1e-4 rad, to port, 16 bits, and a sample for each row and beam, 8 bits.
+struct PingHead {
+  std::uint32_t number = 0;
+  std::uint64_t fired_us = 0;
+  std::uint32_t range_mm = 0;
+  std::uint16_t beams = 0, rows = 0;
+  float frequency_hz = 0;
+  std::uint8_t gain_percent = 0;
+};
+template <class V, wire::Like<PingHead> M>
+constexpr void fields(V& visit, M& m) {
+  visit("number", m.number);
+  visit("fired_us", m.fired_us);
+  visit("range_mm", m.range_mm);
+  visit("beams", m.beams);
+  visit("rows", m.rows);
+  visit("frequency_hz", m.frequency_hz);
+  visit("gain_percent", m.gain_percent);
+}
+inline constexpr std::size_t header_size = wire::wire_size<Header>(), head_size = wire::wire_size<PingHead>();
+static_assert(header_size == 8 && wire::wire_size<Settings>() == 7 && head_size == 25);
+
+struct PingMessage {
+  Header header;
+  PingHead head;
+};
+template <class V, wire::Like<PingMessage> M>
+constexpr void fields(V& visit, M& m) {
+  visit("header", m.header);
+  visit("head", m.head);
+}
+
+inline Bytes message(Kind kind, BytesView payload) {
+  Bytes bytes = wire::bytes_of(Header{.kind = kind, .payload = static_cast<std::uint32_t>(payload.size())});
+  bytes.insert(bytes.end(), payload.begin(), payload.end());
+  return bytes;
+}
+
+inline std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
+  Header header;
+  wire::Reader reader(bytes);
+  fields(reader, header);
+  const bool known = header.kind >= Kind::settings && header.kind <= Kind::ping;
+  if (!reader.ok() || header.payload > longest_payload || (strict && !known)) return std::nullopt;
+  return header_size + header.payload;
+}
+inline constexpr recording::Framing framing{{'E', 'X'}, header_size, length_of};
+
+/// The kind of a whole message.
+inline Kind kind_of(BytesView whole) { return static_cast<Kind>(whole[2]); }
+/// The front of its payload; nothing where it is shorter.
+template <class M>
+std::optional<M> payload_of(BytesView whole) {
+  M read;
+  wire::Reader reader(whole.subspan(header_size));
+  fields(reader, read);
+  return reader.ok() ? std::optional(read) : std::nullopt;
+}
+
+}  // namespace sonar::example_make
