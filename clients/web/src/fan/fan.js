@@ -207,6 +207,7 @@ export class Fan {
 
   /// The picture and its marks as a PNG file.
   save() {
+    if (!this.layout) return;  // nothing drawn yet
     const whole_picture = document.createElement('canvas');
     whole_picture.width = this.marks.width;
     whole_picture.height = this.marks.height;
