@@ -161,7 +161,7 @@ class Pages(PageChecks, unittest.TestCase):
                     page.press(key)
                 page.wait(field + ".value === '4'")
                 eventually(lambda: "4 m" in run(SONARCTL, "status").stdout)
-                page.run("document.activeElement.select()")
+                page.run(field + ".focus(), document.activeElement.select()")
                 for key in ("9", "9", "9", "Enter"):
                     page.press(key)
                 page.wait("document.querySelector('#refusal').offsetWidth")

@@ -138,7 +138,7 @@ class Page(PageChecks, unittest.TestCase):
 
     def test_faults_begin_and_are_cleared(self):
         page = self.open()
-        page.wait("document.querySelectorAll('#troubles button').length > 5")
+        page.wait("document.querySelector('[data-trouble=thin_tether] small')?.innerText")  # with it the buttons are made anew
         page.press_mouse("[data-trouble=thin_tether]")
         page.wait("document.querySelector('.fault-card .left')?.innerText.startsWith('0:')")
         self.assertIn(("/faults/thin_tether", 20), self.mock.set_calls)

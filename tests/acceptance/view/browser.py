@@ -155,10 +155,16 @@ class Page:
         self.run(f"document.querySelector({json.dumps(selector)}).click()")
 
     def place(self, selector):
-        """The middle of an element, which is scrolled into view."""
-        self.wait(f"document.querySelector({json.dumps(selector)})?.offsetWidth")
-        return self.run(f"((e) => (e.scrollIntoView({{block: 'nearest'}}), (({{x, y, width, height}}) => [x + width / 2, y + height / 2])"
-                        f"(e.getBoundingClientRect())))(document.querySelector({json.dumps(selector)}))")
+        """The middle of an element, which is scrolled into view, once it is enabled and stands still: a slow page is still laid out."""
+        element = f"document.querySelector({json.dumps(selector)})"
+        self.wait(f"{element}?.offsetWidth && !{element}.disabled")
+        before, place = None, []
+        while place != before:
+            before = place
+            place = self.run(f"((e) => (e.scrollIntoView({{block: 'nearest'}}), (({{x, y, width, height}}) => [x + width / 2, y + height / 2])"
+                             f"(e.getBoundingClientRect())))({element})")
+            time.sleep(0.1)
+        return place
 
     def press_mouse(self, selector):
         """Clicks as a mouse does: the topmost element at that place gets the click."""
