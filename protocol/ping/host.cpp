@@ -74,13 +74,11 @@ std::optional<BytesView> read_front(const Frame& frame, M& message) {
   return BytesView(frame.payload).subspan(wire::wire_size<M>());
 }
 
-HostPing points_of(const YzPointData& data, BytesView rest) {
-  HostPing found;
-  SonarPicture seen{.kind = PictureKind::points, .image = {}};
-  const double half_rad = static_cast<double>(surveyor::vendor().models().front()->modes.front().horizontal_aperture_rad) / 2;
-  seen.image = {
-      point_rows, 2, static_cast<double>(data.end_m) / point_rows, {half_rad, -half_rad}, std::vector<float>(2 * point_rows)};
-  std::vector<std::pair<double, double>> polar;  // azimuth, range
+using Points = std::vector<std::pair<double, double>>;  // azimuth, range
+
+/// As far as they are there; none from the first bad one on.
+Points points_in(const YzPointData& data, BytesView rest) {
+  Points polar;
   wire::Reader reader(rest);
   for (int i = 0; i < data.points; ++i) {
     float y = 0, z = 0;
@@ -90,12 +88,41 @@ HostPing points_of(const YzPointData& data, BytesView rest) {
     polar.emplace_back(std::atan2(static_cast<double>(y), -static_cast<double>(z)),
                        std::hypot(static_cast<double>(y), static_cast<double>(z)));
   }
+  return polar;
+}
+Points points_in(const AtofPointData& data, BytesView rest) {
+  Points polar;
+  wire::Reader reader(rest);
+  for (int i = 0; i < data.points; ++i) {
+    AtofPoint point;
+    fields(reader, point);
+    const double azimuth = static_cast<double>(point.angle_rad);
+    const double range_m = static_cast<double>(point.two_way_s) * static_cast<double>(data.speed_mps) / 2;
+    if (!reader.ok() || !(std::abs(azimuth) <= pi) || !(range_m >= 0 && std::isfinite(range_m))) break;
+    polar.emplace_back(azimuth, range_m);
+  }
+  return polar;
+}
+
+double end_m(const YzPointData& data, const Points&) { return static_cast<double>(data.end_m); }
+/// The message has no far end, but how long the sonar listened, from the near end on.
+double end_m(const AtofPointData& data, const Points& polar) {
+  double far_m = static_cast<double>(data.listening_s) * static_cast<double>(data.speed_mps) / 2;
+  for (const auto& point : polar) far_m = std::max(far_m, point.second);
+  return far_m;
+}
+
+HostPing ping_of(std::uint32_t number, double end_m, Points polar) {
+  HostPing found;
+  SonarPicture seen{.kind = PictureKind::points, .image = {}};
+  const double half_rad = static_cast<double>(surveyor::vendor().models().front()->modes.front().horizontal_aperture_rad) / 2;
+  seen.image = {point_rows, 2, end_m / point_rows, {half_rad, -half_rad}, std::vector<float>(2 * point_rows)};
   std::sort(polar.begin(), polar.end(), std::greater<>());
   polar.erase(std::unique(polar.begin(), polar.end(), [](auto a, auto b) { return a.first == b.first; }), polar.end());
   PolarImage image;
   image.rows = point_rows;
   image.beams = polar.size();
-  image.row_spacing_m = static_cast<double>(data.end_m) / point_rows;
+  image.row_spacing_m = end_m / point_rows;
   image.samples.resize(image.rows * image.beams);
   double nearest_m = 0, farthest_m = 0;
   for (std::size_t i = 0; i < polar.size(); ++i) {
@@ -106,8 +133,7 @@ HostPing points_of(const YzPointData& data, BytesView rest) {
     const double row = range_m / image.row_spacing_m;
     if (row >= 0 && row < static_cast<double>(point_rows)) image.samples[static_cast<std::size_t>(row) * image.beams + i] = 255;
   }
-  const double end_m = static_cast<double>(data.end_m);
-  found.facts = {data.ping, static_cast<unsigned>(polar.size()), 1, 32, end_m, end_m, 240e3, 0};
+  found.facts = {number, static_cast<unsigned>(polar.size()), 1, 32, end_m, end_m, 240e3, 0};
   found.facts.note = polar.empty() ? "no points" : format("points from %.2f to %.2f m", nearest_m, farthest_m);
   found.picture = [image = std::move(image)]() -> Result<PolarImage> {
     if (image.beams >= 2) return image;
@@ -219,10 +245,21 @@ class SurveyorHost final : public PingHost {
 
  private:
   std::optional<HostPing> ping_from(const Frame& frame) override {
-    YzPointData data;
-    const auto rest = frame.header.id == Id::yz_point_data ? read_front(frame, data) : std::nullopt;
-    return rest ? std::optional(points_of(data, *rest)) : std::nullopt;
+    if (frame.header.id == Id::atof_point_data) return read(frame, AtofPointData{});
+    return frame.header.id == Id::yz_point_data ? read(frame, YzPointData{}) : std::nullopt;
   }
+  /// A ping may have its points in both messages: the first one counts.
+  template <class Data>
+  std::optional<HostPing> read(const Frame& frame, Data data) {
+    const auto rest = read_front(frame, data);
+    if (!rest || (newest_.first == data.ping && newest_.second != frame.header.id)) return std::nullopt;
+    newest_ = {data.ping, frame.header.id};
+    Points polar = points_in(data, *rest);
+    const double far_m = end_m(data, polar);
+    return ping_of(data.ping, far_m, std::move(polar));
+  }
+
+  std::pair<std::optional<std::uint32_t>, Id> newest_{};  // a ping's number, and which message it came in
 };
 
 class OmniscanHost final : public PingHost {

@@ -1,8 +1,10 @@
 // A host's conversation with an emulated Surveyor 240, without a socket: its session, its clock, refusals.
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <limits>
 
+#include "protocol/ping/host.hpp"
 #include "protocol/ping/surveyor_settings.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 
@@ -88,6 +90,48 @@ TEST(Surveyor, OneFrameADatagramAndTheSameFramesOverTcp) {
     EXPECT_EQ(*talk.vendor.frame(ping, talk.state), all);
   }
   EXPECT_EQ(talk.vendor.datagrams(talk.vendor.ports()[1], ping_of(talk, 6.05), talk.state).size(), 4u) << "118 once a second";
+}
+
+/// An AtofPointData of a ping that ends at 15 m, with one point 10 m away and 0.1 rad to port; or the same as YzPointData.
+Bytes one_point(Id id, std::uint32_t ping) {
+  Bytes payload, point;
+  if (id == Id::atof_point_data) {
+    payload = wire::bytes_of(AtofPointData{.listening_s = 0.02f, .speed_mps = 1500, .ping = ping, .points = 1});
+    point = wire::bytes_of(AtofPoint{0.1f, 20.0f / 1500, {}});
+  } else {
+    payload = wire::bytes_of(YzPointData{.ping = ping, .speed_mps = 1500, .end_m = 15, .points = 1});
+    const float y = 10 * std::sin(0.1f), z = -10 * std::cos(0.1f);
+    wire::Writer write(point);
+    write("y", y);
+    write("z", z);
+  }
+  payload.insert(payload.end(), point.begin(), point.end());
+  return framed(id, 0, payload);
+}
+
+TEST(Surveyor, ItsHostReadsPointsFromEitherMessageOnceAPing) {
+  const auto host = *make_host({.as_it_is = true, .settings = {}});
+  const auto read = [&](const Bytes& bytes) {
+    std::vector<protocol::HostPing> pings;
+    for (const protocol::HostAction& action : host->on_bytes(0, bytes, at_s(0)))
+      if (const auto* const ping = std::get_if<protocol::HostPing>(&action)) pings.push_back(*ping);
+    return pings;
+  };
+  std::uint32_t number = 0;
+  for (const Id id : {Id::atof_point_data, Id::yz_point_data}) {
+    const auto pings = read(one_point(id, ++number));
+    ASSERT_EQ(pings.size(), 1u);
+    EXPECT_EQ(pings[0].facts.number, number);
+    EXPECT_NEAR(pings[0].facts.range_m, 15, 1e-4);
+    const SonarPicture picture = pings[0].drawing();
+    ASSERT_EQ(picture.points.size(), 1u);
+    EXPECT_NEAR(picture.points[0].first, 0.1, 1e-5);
+    EXPECT_NEAR(picture.points[0].second, 10, 1e-4);
+  }
+  Bytes both = one_point(Id::atof_point_data, ++number);
+  const Bytes again = one_point(Id::yz_point_data, number);
+  both.insert(both.end(), again.begin(), again.end());
+  EXPECT_EQ(read(both).size(), 1u);
 }
 
 TEST(Surveyor, RefusesWhatItCannotDo) {
