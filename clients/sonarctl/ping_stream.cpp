@@ -12,7 +12,7 @@
 
 #include "clients/sonarctl/http.hpp"
 #include "core/text/ipv4.hpp"
-#include "protocol/recording/recording.hpp"
+#include "protocol/recording/recorded_pings.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -349,26 +349,19 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
 Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar) {
   auto opened = recording::open_recording(file, sonar);
   if (!opened) return tl::unexpected(opened.error());
-  const auto by = recording::find_sender(*opened->reader);
+  auto pings = recording::RecordedPings::open(std::move(opened->reader));
+  if (!pings) return failure(pings.error().kind, file.string() + " " + pings.error().text);
   std::optional<HostPing> last;
   std::size_t count = 0;
-  if (const auto host = by ? by->make->host(nothing_wanted()) : failure(ErrorKind::bad_data, ""); host) {
-    while (const auto message = opened->reader->next()) {
-      const auto port = recording::host_port(*by->make, message->by);
-      if (!port || message->from != recording::Origin::device) continue;
-      for (protocol::HostAction& action : (*host)->on_bytes(*port, message->bytes, message->at)) {
-        auto* const ping = std::get_if<HostPing>(&action);
-        if (ping == nullptr) continue;
-        if (number ? count++ == *number : ping->is_whole) return std::move(*ping);
-        last = std::move(*ping);
-      }
-    }
+  while (auto found = pings->next()) {
+    if (number ? count++ == *number : found->ping.is_whole) return std::move(found->ping);
+    last = std::move(found->ping);
   }
   if (last && !number) return *std::move(last);
   if (last)
     return failure(ErrorKind::usage,
                    file.string() + " holds pings 0 to " + std::to_string(count - 1) + ", not " + std::to_string(*number));
-  const auto damage = opened->reader->damage();
+  const auto damage = pings->reader().damage();
   return failure(ErrorKind::bad_data, file.string() + " holds no ping of a known sonar" + (damage ? ": " + damage->text : ""));
 }
 

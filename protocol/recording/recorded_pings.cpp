@@ -1,0 +1,45 @@
+#include "protocol/recording/recorded_pings.hpp"
+
+#include <utility>
+#include <variant>
+
+namespace sonar::recording {
+
+Result<RecordedPings> RecordedPings::open(std::unique_ptr<RecordingReader> reader) {
+  auto by = find_sender(*reader);
+  if (!by) return failure(ErrorKind::bad_data, "holds no ping of a known sonar");
+  RecordedPings pings(std::move(reader), std::move(*by));
+  if (const Result<void> made = pings.make_host(); !made) return tl::unexpected(made.error());
+  return pings;
+}
+
+Result<void> RecordedPings::make_host() {
+  protocol::Wanted wanted;
+  wanted.as_it_is = true;
+  auto host = by_.make->host(wanted);
+  if (!host) return tl::unexpected(host.error());
+  host_ = *std::move(host);
+  return {};
+}
+
+std::optional<RecordedPing> RecordedPings::next() {
+  while (decoded_.empty()) {
+    const auto message = reader_->next();
+    if (!message) return std::nullopt;
+    const auto port = host_port(*by_.make, message->by);
+    if (!port || message->from != Origin::device) continue;
+    for (protocol::HostAction& action : host_->on_bytes(*port, message->bytes, message->at))
+      if (auto* const ping = std::get_if<protocol::HostPing>(&action)) decoded_.push_back({message->at, std::move(*ping)});
+  }
+  RecordedPing first = std::move(decoded_.front());
+  decoded_.pop_front();
+  return first;
+}
+
+void RecordedPings::rewind() {
+  reader_->rewind();
+  decoded_.clear();
+  static_cast<void>(make_host());  // as the first time
+}
+
+}  // namespace sonar::recording

@@ -1,0 +1,38 @@
+// The pings of a recording, front to back, as the host of their make decodes them. Used by `sonarctl` and by the live view.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+
+#include "protocol/recording/recording.hpp"
+
+namespace sonar::recording {
+
+struct RecordedPing {
+  Time at{};  // 0 where the format stores no times
+  protocol::HostPing ping;
+};
+
+class RecordedPings {
+ public:
+  /// bad_data: "holds no ping of a known sonar".
+  static Result<RecordedPings> open(std::unique_ptr<RecordingReader> reader);
+
+  /// nullopt at the end.
+  std::optional<RecordedPing> next();
+  void rewind();
+  const SentBy& by() const { return by_; }
+  const RecordingReader& reader() const { return *reader_; }
+
+ private:
+  RecordedPings(std::unique_ptr<RecordingReader> reader, SentBy by) : reader_(std::move(reader)), by_(std::move(by)) {}
+  Result<void> make_host();
+
+  std::unique_ptr<RecordingReader> reader_;
+  SentBy by_;
+  std::unique_ptr<protocol::Host> host_;
+  std::deque<RecordedPing> decoded_;  // of the last message, not yet handed out
+};
+
+}  // namespace sonar::recording
