@@ -39,6 +39,10 @@ constexpr recording::Framing framing{{magic[0], magic[1]}, header_size, length_o
 
 }  // namespace
 
-recording::Codec codec() { return {.framing = &framing, .sender = sender_of}; }
+recording::Codec codec() {
+  return {.framing = &framing, .sender = sender_of, .message = [](wire::BytesView payload) {
+            return make_frame(FrameType::ping_data, 0, payload);  // of no request
+          }};
+}
 
 }  // namespace sonar::blueview

@@ -53,6 +53,8 @@ struct Codec {
   std::optional<Sender> (*sender)(const RecordedMessage&) = nullptr;
   /// Reads the samples of a message that holds them as a picture has them. Null: this make has no such message.
   std::optional<Samples> (*samples)(BytesView message) = nullptr;
+  /// A message as a client gets it of what Vendor::frame() makes of a ping. Null: the same bytes.
+  Bytes (*message)(BytesView framed) = nullptr;
 };
 
 }  // namespace sonar::recording

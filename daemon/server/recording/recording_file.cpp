@@ -68,12 +68,25 @@ const recording::FileKind RecordingFile::raw_dump{
     .holds = "pings that are one stream",
     .write = [](std::unique_ptr<recording::Sink> sink) { return recording::write_raw_dump(std::move(sink)); }};
 
+bool RecordingFile::is_plain_name(std::string_view name) {
+  return name.size() <= longest_name && !name.empty() && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), may_stand_in_name);
+}
+
+bool RecordingFile::is_recording(std::string_view name) {
+  const auto ends_so = [name](const recording::FileKind& kind) { return name.ends_with(kind.ending); };
+  const auto makes = protocol::makes();
+  return is_plain_name(name) && (ends_so(mcap) || ends_so(pcap) || ends_so(raw_dump) ||
+                                 std::any_of(makes.begin(), makes.end(), [&](const protocol::Make& make) {
+                                   return std::any_of(make.codec.files.begin(), make.codec.files.end(), ends_so);
+                                 }));
+}
+
 Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vendor) {
   const auto refuse = [&](const std::string& why) {
     return failure(ErrorKind::usage, "\"" + std::string(name.substr(0, longest_name)) + "\": " + why);
   };
-  if (name.size() > longest_name || name.empty() || name.front() == '.' ||
-      !std::all_of(name.begin(), name.end(), may_stand_in_name))
+  if (!is_plain_name(name))
     return refuse("the name of a recording has letters, digits, - _ and . only, 128 at most, and no folder: run-1.mcap");
   if (name.front() == '-')
     return refuse("the name of a recording does not begin with -, which every program takes for an option: run-1.mcap");
@@ -117,8 +130,11 @@ Result<void> RecordingFile::write(const RecordedPing& ping) {
     status_at_ = ping.at;
     if (Result<void> put_it = put({ping.at, Origin::device, recording::Carrier::datagram, ping.status}); !put_it) return put_it;
   }
-  if (ping.bytes)
-    if (Result<void> put_it = put({ping.at, Origin::device, recording::Carrier::stream, *ping.bytes}); !put_it) return put_it;
+  if (ping.bytes) {
+    protocol::Bytes message = make_->codec.message != nullptr ? make_->codec.message(*ping.bytes) : *ping.bytes;
+    if (Result<void> put_it = put({ping.at, Origin::device, recording::Carrier::stream, std::move(message)}); !put_it)
+      return put_it;
+  }
   for (const auto& stream : ping.datagrams)
     for (const protocol::Bytes& datagram : *stream)
       if (Result<void> put_it = put({ping.at, Origin::device, recording::Carrier::datagram, datagram}); !put_it) return put_it;

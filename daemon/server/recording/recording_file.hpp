@@ -46,6 +46,10 @@ class RecordingFile {
   using Kind = const recording::FileKind*;
   static const recording::FileKind mcap, pcap, raw_dump;
 
+  /// Whether it is the name of a file in a folder: letters, digits, - _ and . that does not begin it, at most 128.
+  static bool is_plain_name(std::string_view name);
+  /// Whether its end is that of recordings too.
+  static bool is_recording(std::string_view name);
   /// Kind of a file's name: letters, digits, - _ and . that does not begin it, at most 128, ending in .mcap or as files of this
   /// vendor do; for one whose pings are a stream also in .pcap or .raw. An error for another name.
   static Result<Kind> kind_of(std::string_view name, std::string_view vendor);
