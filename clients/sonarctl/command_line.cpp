@@ -35,6 +35,10 @@ int run(int argc, char** argv) {
       {"step", add_step(app)},           {"load", add_load(app)},          {"object", add_object(app)},
       {"recording", add_recording(app)}, {"fault", add_fault(app)},        {"scene", add_scene(app)},
       {"farm", add_farm(app, words)},    {"judge", add_judge(app, words)}, {"lab", add_lab(app, words)}};
+  if (words.empty()) {
+    std::fputs(app.help().c_str(), stderr);
+    return exit_code(ErrorKind::usage);
+  }
   const bool is_other_program = !words.empty() && (words[0] == "farm" || words[0] == "judge" || words[0] == "lab");
   try {
     text::parse(app, is_other_program ? 2 : argc, argv);

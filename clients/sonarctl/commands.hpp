@@ -27,6 +27,7 @@ struct SourceOptions {
   Wanted wanted;
   double connect_patience_s = 2;
   double silence_limit_s = 10;  // longest time without a byte
+  double return_limit_s = 60;   // longest time without a connection in a run without an end
   double picture_limit_s = 30;  // longest time for a picture of many pings, from the first on: a Ping360 scans 180 degrees in it
   bool observe = false;         // occupy no client slot, request nothing
   bool keeps_messages = false;  // PingStream::Item::messages

@@ -21,13 +21,44 @@ std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_
 
 class Listener {
  public:
-  Listener(const ListenOptions& options, OpenedStream opened)
-      : options_(options), stream_(std::move(opened.stream)), received_(!stream_.host().counts()), start_(opened.connected_at) {}
+  Listener(const ListenOptions& options, OpenedStream opened) : options_(options), start_(opened.connected_at) {
+    use(std::move(opened.stream));
+  }
 
-  /// Until the requested time or number of pings; an error when the device stops earlier.
+  /// Until the requested time or number of pings; an error when the device stops earlier, and in a run without an end does not
+  /// come back.
   Result<void> run() {
+    for (;;) {
+      const Result<void> ran = run_once();
+      if (ran || interrupted != 0 || log_.counts().pings == 0 || options_.seconds > 0 || options_.pings > 0 ||
+          !options_.record.empty())
+        return ran;
+      const Endpoint device = stream_->device();
+      before_ = counts();
+      stream_.reset();  // its ports are wanted again
+      auto again = open_again(options_.source, device, ran.error(), [](const std::string& line) { print_notices({line}); });
+      if (!again) return interrupted != 0 ? Result<void>{} : tl::unexpected(again.error());
+      use(std::move(again->stream));
+    }
+  }
+
+  PingSummary summary() const { return log_.summary(counts()); }
+  /// True when settings were sent that pings echo.
+  bool asked() const { return asked_; }
+  const std::optional<HostPing>& last_ping() const { return last_ping_; }
+  std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }
+
+ private:
+  void use(PingStream stream) {
+    stream_.emplace(std::move(stream));
+    received_ = !stream_->host().counts();
+    asked_ = stream_->host().expects_echo();
+    last_message_ = Clock::now();
+  }
+
+  Result<void> run_once() {
     while (!finished()) {
-      const PingStream::Item item = stream_.next(patience(options_, seconds_since(start_), seconds_since(last_message_)));
+      const PingStream::Item item = stream_->next(patience(options_, seconds_since(start_), seconds_since(last_message_)));
       if (item.what == Wait::closed) return failure(ErrorKind::io, closed_text(item.error));
       if (item.what == Wait::data) {
         last_message_ = Clock::now();
@@ -35,20 +66,25 @@ class Listener {
         print_notices(item.notices);
         if (item.ping) handle_ping(*item.ping);
       } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
-        return tl::unexpected(silence(options_.source, stream_, received_, "nothing more",
+        return tl::unexpected(silence(options_.source, *stream_, received_, "nothing more",
                                       "drivers give up after 10 s; is the daemon stopped or stuck?"));
       }
     }
     return {};
   }
 
-  PingSummary summary() const { return log_.summary(stream_.host().counts()); }
-  /// True when settings were sent that pings echo.
-  bool asked() const { return stream_.host().expects_echo(); }
-  const std::optional<HostPing>& last_ping() const { return last_ping_; }
-  std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }
+  /// Counts of all connections so far, reconnections included.
+  std::optional<protocol::Host::Counts> counts() const {
+    if (!stream_) return before_;
+    auto all = stream_->host().counts();
+    if (!all || !before_) return all;
+    all->messages += before_->messages;
+    all->dummies += before_->dummies;
+    all->junk_bytes += before_->junk_bytes;
+    all->missing_pings += before_->missing_pings;
+    return all;
+  }
 
- private:
   bool finished() const {
     const bool enough = options_.pings > 0 && log_.counts().pings >= options_.pings;
     const bool over = options_.seconds > 0 && seconds_since(start_) >= options_.seconds;
@@ -77,8 +113,9 @@ class Listener {
   }
 
   const ListenOptions& options_;
-  PingStream stream_;
-  bool received_;
+  std::optional<PingStream> stream_;
+  std::optional<protocol::Host::Counts> before_;  // of connections that are lost
+  bool received_ = false, asked_ = false;
   PingLog log_;
   Clock::time_point start_, last_message_ = Clock::now();
   std::optional<HostPing> last_ping_;

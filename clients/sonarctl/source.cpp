@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <thread>
 
 #include "clients/sonarctl/control/control_client.hpp"
 #include "core/text/format.hpp"
@@ -113,6 +114,23 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
                  "the device closed the connection before a ping arrived: another client may be connected (clients.max); "
                  "connecting as an observer failed too: " +
                      observed.error().text);
+}
+
+Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, const Error& why,
+                                const std::function<void(const std::string&)>& say) {
+  using Clock = std::chrono::steady_clock;
+  const auto until = Clock::now() + milliseconds_from(source.return_limit_s);
+  say(why.text + "; connecting again, for " + text::format("%g s", source.return_limit_s));
+  while (interrupted == 0 && Clock::now() < until) {
+    const auto next = Clock::now() + std::chrono::milliseconds(500);
+    auto opened = open_stream(source, device);
+    if (opened) {
+      say("connected again to " + opened->stream.about());
+      return opened;
+    }
+    while (interrupted == 0 && Clock::now() < next) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return tl::unexpected(why);
 }
 
 void print_notices(const std::vector<std::string>& notices) {

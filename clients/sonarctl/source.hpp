@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 
 #include "clients/sonarctl/commands.hpp"
 
@@ -22,6 +23,11 @@ struct OpenedStream {
 /// As an observer when source.observe is set, or when the sonar has no free client slot and its sonard reports an address for
 /// observers; then with a note on standard error.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
+
+/// The stream again after `why` it was lost, within source.return_limit_s; both lines go to `say`. The error is `why` when the
+/// device does not come back, or when Ctrl-C is pressed.
+Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, const Error& why,
+                                const std::function<void(const std::string&)>& say);
 
 /// To standard error.
 void print_notices(const std::vector<std::string>& notices);

@@ -69,21 +69,41 @@ class LiveView {
   LiveView(const ViewOptions& options, PingStream stream)
       : options_(options), stream_(std::move(stream)), painter_(options.style) {}
 
-  /// Succeeds when interrupted, after the requested pings, or when the output was closed.
+  /// Succeeds when interrupted, after the requested pings, or when the output was closed. A run without an end connects again
+  /// when the device has gone.
   Result<void> run() {
-    const Result<void> ran = draw();
+    const bool has_screen = options_.terminal && terminal_facts().is_terminal;
+    Result<void> ran;
+    {
+      const LiveScreen screen(has_screen);
+      for (;;) {
+        ran = draw(screen, has_screen);
+        if (!lost_ || interrupted != 0 || options_.pings > 0 || figures_.pings() == 0) break;
+        const Endpoint device = stream_->device();
+        stream_.reset();  // its ports are wanted again
+        auto again = open_again(options_.source, device, ran.error(), [&](const std::string& line) {
+          if (has_screen)
+            static_cast<void>(screen.show({line}));
+          else
+            print_notices({line});
+        });
+        if (!again) break;
+        stream_.emplace(std::move(again->stream));
+        lost_ = false;
+      }
+    }
+    if (interrupted != 0) ran = {};
     print_notices(notices_);  // the screen would have hidden them
     return ran;
   }
 
  private:
-  Result<void> draw() {
-    const bool has_screen = options_.terminal && terminal_facts().is_terminal;
-    const LiveScreen screen(has_screen);
+  Result<void> draw(const LiveScreen& screen, bool has_screen) {
     double heard_s = now_s();
-    bool received = !stream_.host().counts();  // without counts, other messages look like junk
+    bool received = !stream_->host().counts();  // without counts, other messages look like junk
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
-      PingStream::Item item = stream_.next(std::chrono::milliseconds(500));
+      PingStream::Item item = stream_->next(std::chrono::milliseconds(500));
+      lost_ = item.what == Wait::closed || (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s);
       if (item.what == Wait::closed)
         return failure(ErrorKind::io, "the device ended the connection" + (item.error.empty() ? "" : ": " + item.error) +
                                           "; it stopped, or another client holds it (clients.max)");
@@ -92,8 +112,8 @@ class LiveView {
       if (!has_screen) print_notices(item.notices);
       for (std::string& notice : item.notices)
         if (has_screen && notices_.size() < most_notices) notices_.push_back(std::move(notice));
-      if (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s)
-        return tl::unexpected(silence(options_.source, stream_, received, "nothing more", "is the daemon stopped or stuck?"));
+      if (lost_)
+        return tl::unexpected(silence(options_.source, *stream_, received, "nothing more", "is the daemon stopped or stuck?"));
       if (!item.ping) continue;
       const Result<bool> read = show(*item.ping, screen);
       if (!read) return tl::unexpected(read.error());
@@ -104,7 +124,7 @@ class LiveView {
 
   /// False when the output was closed.
   Result<bool> show(const HostPing& ping, const LiveScreen& screen) {
-    figures_.add(ping, stream_.host().counts(), now_s());
+    figures_.add(ping, stream_->host().counts(), now_s());
     const Result<SonarPicture> picture = protocol::drawing_of(ping);
     if (!picture) return tl::unexpected(picture.error());
     if (!options_.png.empty())
@@ -121,10 +141,11 @@ class LiveView {
   }
 
   const ViewOptions& options_;
-  PingStream stream_;
+  std::optional<PingStream> stream_;
   PicturePainter painter_;
   ViewCaption figures_;
   std::vector<std::string> notices_;
+  bool lost_ = false;  // the device is gone, or silent
 };
 
 Result<void> view_live(const ViewOptions& options) {

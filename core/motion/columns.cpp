@@ -107,8 +107,9 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
   out.count_ = header.size();
   for (std::size_t i = 0; i < header.size(); ++i) {
     // A header may mix both sets of names.
+    const std::string_view name = header[i] == "time" || header[i] == "time_s" ? "t_s" : header[i];  // as many programs write
     std::size_t c = 0;
-    while (c < columns && header[i] != long_names[c] && header[i] != short_names[c]) ++c;
+    while (c < columns && name != long_names[c] && name != short_names[c]) ++c;
     if (c == columns)
       return "unknown column " + in_quotes(header[i]) +
              text::suggestion(header[i].substr(0, longest_name), long_names, "columns");

@@ -58,7 +58,7 @@ std::string suggestion(std::string_view name, std::span<const std::string_view> 
   }
   if (candidates.empty()) return {};
   std::string out = "; " + std::string(label) + ": ";
-  const std::size_t shown = std::min<std::size_t>(candidates.size(), 12);
+  const std::size_t shown = std::min<std::size_t>(candidates.size(), 20);
   for (std::size_t i = 0; i < shown; ++i) out += (i ? ", " : "") + std::string(candidates[i]);
   if (shown < candidates.size()) out += ", ...";
   return out;

@@ -63,7 +63,7 @@ class Mistakes(unittest.TestCase):
 
     def test_usage_is_64(self):
         self.expect(run(SONARD, "--no-such-option"), 64, "--no-such-option")
-        self.expect(run(SONARCTL), 64, "doctor, status, listen, view")
+        self.expect(run(SONARCTL), 64, "Usage: sonarctl", "doctor", "status", "listen", "view")
         self.expect(run(SONARCTL, "veiw"), 64, 'unknown command "veiw"; did you mean "view"?')
         self.expect(run(SONARCTL, "pose"), 64, "once, circle, line")
         self.expect(run(SONARCTL, "pose", "once", "--xzy", "0,0,0"), 64, 'did you mean "--xyz"?', "sonarctl pose once --help")

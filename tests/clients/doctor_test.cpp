@@ -89,6 +89,14 @@ void expect(const Finding& finding, Level level, const std::string& text, const 
     EXPECT_THAT(finding.cure, HasSubstr(cure));
 }
 
+TEST(Doctor, ColoursLevelsForATerminal) {
+  const std::vector<Finding> found{
+      {Level::ok, "a", "well", ""}, {Level::warn, "b", "doubtful", ""}, {Level::fail, "c", "bad", "mend it"}};
+  const std::string text = text_from(found, true);
+  EXPECT_THAT(text, HasSubstr("\x1b[32mok    \x1b[0mwell\n\x1b[33mwarn  \x1b[0mdoubtful\n\x1b[31mfail  \x1b[0mbad; mend it\n"));
+  EXPECT_THAT(text_from(found), testing::Not(HasSubstr("\x1b")));
+}
+
 TEST(Doctor, PraisesWhatIsWell) {
   EXPECT_EQ(
       text_from(run_checks(healthy())),

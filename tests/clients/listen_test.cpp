@@ -55,13 +55,17 @@ wire::Bytes ping_bytes(std::uint32_t id, const oculus::FireSettings& echo) {
   return oculus::encode_ping(head, {bearings, {}, samples});
 }
 
-/// Accepts one client, waits for its fire message and sends what `answer` makes of it, then whatever `stay` says.
+/// Accepts one client, waits for its fire message and sends what `answer` makes of it, then waits until the client leaves. With
+/// `visits` > 1 it ends the connection instead, and so on for so many clients; then it is gone.
 class FakeDevice {
  public:
   using Answer = std::function<wire::Bytes(std::uint32_t number, const oculus::FireSettings& asked)>;
-  explicit FakeDevice(std::uint32_t pings, Answer answer) : listener_(bound(SOCK_STREAM, port_)) {
+  explicit FakeDevice(std::uint32_t pings, Answer answer, int visits = 1) : listener_(bound(SOCK_STREAM, port_)) {
     ::listen(listener_.fd(), 1);
-    thread_ = std::thread([this, pings, answer = std::move(answer)] { serve(pings, answer); });
+    thread_ = std::thread([this, pings, answer = std::move(answer), visits] {
+      for (int i = 0; i < visits; ++i) serve(pings, answer, visits == 1);
+      if (visits > 1) ::shutdown(listener_.fd(), SHUT_RDWR);
+    });
   }
   ~FakeDevice() {
     ::shutdown(listener_.fd(), SHUT_RDWR);
@@ -70,7 +74,7 @@ class FakeDevice {
   Endpoint endpoint() const { return {"127.0.0.2", port_}; }
 
  private:
-  void serve(std::uint32_t pings, const Answer& answer) {
+  void serve(std::uint32_t pings, const Answer& answer, bool stays) {
     const Socket client(::accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC));
     if (client.fd() < 0) return;
     std::array<std::byte, 512> received;
@@ -79,7 +83,8 @@ class FakeDevice {
     if (!fire) return;
     for (std::uint32_t i = 0; i < pings; ++i)
       if (!write_all(client, answer(i, fire->settings))) return;
-    while (read_some(client, received, std::chrono::seconds(10)).what == Wait::data) continue;  // until the client leaves
+    while (stays && read_some(client, received, std::chrono::seconds(10)).what == Wait::data)
+      continue;  // until the client leaves
   }
 
   std::uint16_t port_ = 0;
@@ -153,6 +158,33 @@ TEST(Listen, RefusesBrokenSizesJunkAndWrongEchoes) {
   const Result<void> done = listen(quiet(deaf.endpoint(), 3));
   EXPECT_EQ(done.error().kind, ErrorKind::bad_data);
   EXPECT_THAT(done.error().text, HasSubstr("never matched the request"));
+}
+
+TEST(Listen, ConnectsAgainInARunWithoutAnEnd) {
+  for (const bool live : {false, true}) {
+    SCOPED_TRACE(live ? "view --live" : "listen");
+    FakeDevice device(
+        3, [](std::uint32_t i, const oculus::FireSettings& echo) { return ping_bytes(i + 1, echo); }, 2);
+    ListenOptions options = quiet(device.endpoint(), 0);
+    options.seconds = 0;
+    options.source.connect_patience_s = options.source.return_limit_s = 1;
+    ViewOptions view_options;
+    view_options.source = options.source;
+    view_options.png = std::filesystem::path(testing::TempDir()) / "view_again_test.png";
+    view_options.style = options.style;
+    view_options.live = true;
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const Result<void> done = live ? view(view_options) : listen(options);
+    const std::string out = testing::internal::GetCapturedStdout(), err = testing::internal::GetCapturedStderr();
+    std::filesystem::remove(view_options.png);
+    ASSERT_FALSE(done) << "it does not come back a third time";
+    EXPECT_EQ(done.error().kind, ErrorKind::io);
+    EXPECT_THAT(err, HasSubstr("; connecting again, for 1 s\nsonarctl: connected again to 127.0.0.2:"));
+    if (!live) {
+      EXPECT_THAT(out, HasSubstr("pings 6")) << "of both connections";
+    }
+  }
 }
 
 /// `--seconds` and the time of the first ping do not include the wait for a device that starts late.

@@ -51,10 +51,21 @@ std::string text_from(const v1::FaultEntry& e) {
 std::string fault_list_text(const v1::FaultReport& report) {
   if (!report.armed()) return "faults are not armed: sonard run --faults, or faults: {armed: true}\n";
   if (report.faults().empty()) return "no faults\n";
-  std::string text = format("%-16s %-4s %-16s %-12s %-8s\n", "NAME", "KIND", "ASKED AS", "SONAR", "STATE");
+  std::vector<const v1::FaultStatus*> faults;  // those that act, then those that wait, then those that are over
+  int name_width = 16, asked_width = 16;
   for (const v1::FaultStatus& f : report.faults()) {
-    text += format("%-16s %-4s %-16s %-12s %-8s %6" PRIu64 " injection%s", f.name().c_str(), f.code().c_str(), f.do_().c_str(),
-                   f.sonar().c_str(), f.state().c_str(), f.injections(), f.injections() == 1 ? "" : "s");
+    faults.push_back(&f);
+    name_width = std::max(name_width, static_cast<int>(f.name().size()));
+    asked_width = std::max(asked_width, static_cast<int>(f.do_().size()));
+  }
+  const auto rank = [](const v1::FaultStatus& f) { return f.state() == "active" ? 0 : f.state() == "over" ? 2 : 1; };
+  std::stable_sort(faults.begin(), faults.end(), [&](const auto* a, const auto* b) { return rank(*a) < rank(*b); });
+  std::string text = format("%-*s %-4s %-*s %-12s %-8s\n", name_width, "NAME", "KIND", asked_width, "ASKED AS", "SONAR", "STATE");
+  for (const v1::FaultStatus* const one : faults) {
+    const v1::FaultStatus& f = *one;
+    text +=
+        format("%-*s %-4s %-*s %-12s %-8s %6" PRIu64 " injection%s", name_width, f.name().c_str(), f.code().c_str(), asked_width,
+               f.do_().c_str(), f.sonar().c_str(), f.state().c_str(), f.injections(), f.injections() == 1 ? "" : "s");
     if (f.expires_s() > 0) text += format("  ends in %.1f s", f.expires_s());
     text += (f.waits_for().empty() ? "" : "  waits for " + f.waits_for()) + "\n";
   }

@@ -70,6 +70,7 @@ std::string trajectory_text(const auto& body) {
 }
 
 std::string recording_text(const v1::RecordingStatus& r) {
+  if (r.sonar().empty()) return r.file() + format("  %.1f MB, of an earlier run", static_cast<double>(r.bytes()) / 1e6);
   return r.file() +
          format("  of %s: %llu ping%s, %llu message%s, %.1f MB", r.sonar().c_str(), wide(r.pings()), r.pings() == 1 ? "" : "s",
                 wide(r.messages()), r.messages() == 1 ? "" : "s", static_cast<double>(r.bytes()) / 1e6) +

@@ -126,10 +126,13 @@ void check_ports(const Facts& facts, std::vector<Finding>& findings) {
                       "reserve: sysctl net.ipv4.ip_local_reserved_ports=" + reserved});
 }
 
-std::string text_from(const std::vector<Finding>& findings) {
+std::string text_from(const std::vector<Finding>& findings, bool colours) {
   std::string text;
   for (const Finding& f : findings) {
-    text += text::format("%-6s", name_of(f.level)) + f.text + (f.cure.empty() ? "" : "; " + f.cure) + "\n";
+    const char* const colour = f.level == Level::fail ? "31" : f.level == Level::warn ? "33" : "32";  // red, yellow, green
+    const std::string level = text::format("%-6s", name_of(f.level));
+    text += (colours ? std::string("\x1b[") + colour + "m" + level + "\x1b[0m" : level) + f.text +
+            (f.cure.empty() ? "" : "; " + f.cure) + "\n";
   }
   return text + counted(std::ssize(findings), "check") + ", " + counted(count_of(findings, Level::fail), "error") + ", " +
          counted(count_of(findings, Level::warn), "warning") + "\n";

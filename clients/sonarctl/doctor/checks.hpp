@@ -21,7 +21,8 @@ void check_ports(const Facts& facts, std::vector<Finding>& findings);
 void check_networks(const Facts& facts, std::vector<Finding>& findings);
 
 /// "ok    text" or "warn  text; cure"; lines end with a newline, the last is "5 checks, 0 errors, 1 warning".
-std::string text_from(const std::vector<Finding>& findings);
+/// `colours`: of the levels, for a terminal.
+std::string text_from(const std::vector<Finding>& findings, bool colours = false);
 /// One object: the findings and their number per level.
 std::string json_from(const std::vector<Finding>& findings);
 bool any_failed(const std::vector<Finding>& findings);

@@ -7,6 +7,7 @@
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "clients/sonarctl/doctor/gather.hpp"
+#include "clients/sonarctl/terminal.hpp"
 #include "core/text/arguments.hpp"
 
 namespace sonar::clients {
@@ -26,7 +27,9 @@ Result<void> examine(const Arguments& arguments) {
   const Result<doctor::Facts> facts = doctor::gather(questions);
   if (!facts) return tl::unexpected(facts.error());
   const std::vector<doctor::Finding> findings = doctor::run_checks(*facts);
-  std::fputs(arguments.json ? (doctor::json_from(findings) + "\n").c_str() : doctor::text_from(findings).c_str(), stdout);
+  const bool has_colours = choose_colours(terminal_facts()) != TerminalColours::none;
+  std::fputs(arguments.json ? (doctor::json_from(findings) + "\n").c_str() : doctor::text_from(findings, has_colours).c_str(),
+             stdout);
   if (!doctor::any_failed(findings)) return {};
   return failure(ErrorKind::unavailable, "a driver would not be served; see the lines that begin with fail");
 }

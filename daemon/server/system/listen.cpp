@@ -32,6 +32,10 @@ Error explain(const error_code& ec, Endpoint at) {
               ", so an outgoing connection may hold it. Reserve it: sysctl net.ipv4.ip_local_reserved_ports=52100,52102";
   } else if (ec.value() == EADDRNOTAVAIL) {
     text += "address not on this host. Add it: ip addr add " + text_of(at.ip) + "/24 dev eth0 (or use --bind 127.0.0.2)";
+  } else if (ec == asio::error::access_denied) {
+    const std::string port = std::to_string(at.port);
+    text += "ports below 1024 need a right. Give it to all programs: sysctl net.ipv4.ip_unprivileged_port_start=" + port +
+            ", or run sonard as root";
   } else {
     text += ec.message();
   }

@@ -63,6 +63,7 @@ TEST(TrajectoryFile, EveryFormatSaysTheSame) {
     std::string text;
   } files[] = {
       {Format::csv, "t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0.5,1,2,-3,0.7071067811865476,0,0,0.7071067811865476\n1.5,1,4,-3,1,0,0,0\n"},
+      {Format::csv, "time,x,y,z,yaw\n0.5,1,2,-3,90\n1.5,1,4,-3,0\n"},
       {Format::csv, "\xef\xbb\xbft, x, y, z, roll, pitch, yaw_deg\r\n0.5, 1, 2, -3, 0, 0, +90\r\n1.5, 1, 4, -3, 0, 0, 0\r\n"},
       {Format::csv, "yaw\tz y x t_ns\n090.0 -3 2 1 500000000\n0 -3 4 1 1500000000"},
       {Format::tum, "# t x y z qx qy qz qw\n0.5 1 2 -3 0 0 0.70710678 0.70710678\n\n1.5e0 1 4 -3 0 0 0 1\n"},
