@@ -285,6 +285,7 @@ Result<Config> demo_config() {
   if (!config) return config;
   config->scene = {"demo.yaml", true};  // whatever files there are
   config->previews = config->faults.armed = true;
+  config->recording = {std::filesystem::absolute("sonard-recordings"), true};
   return config;
 }
 

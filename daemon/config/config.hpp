@@ -124,6 +124,7 @@ struct LimitConfig {
 /// Recordings by control requests (docs/recording.md).
 struct RecordingConfig {
   std::filesystem::path folder;  // an existing one; empty = recording is off
+  bool is_made = false;          // when the first recording begins: of the demo
 };
 /// Faults on purpose (docs/faults.md).
 struct FaultConfig {

@@ -93,6 +93,7 @@ Result<void> App::open() {
   }
   if (!config_.faults.journal.empty())
     if (auto r = fault_log_.open(config_.faults.journal); !r) return r;
+  recordings_.find_earlier();
   if (auto r = fleet_.open(config_); !r) return r;
   if (auto r = pose_server_.open(); !r) return r;
   if (auto r = mavlink_server_.open(); !r) return r;

@@ -70,7 +70,7 @@ DEPENDENCIES = {
         "protocol/control/", "protocol/doctor/", "daemon/server/control/control_http.cpp", "daemon/server/control/stream_connection.cpp", "daemon/server/events.cpp",
         "daemon/server/faults/fault_log.cpp", "daemon/server/operations/fault_operations.cpp",
         "daemon/server/operations/monitoring.cpp", "daemon/server/operations/time_operations.cpp", "daemon/server/recording/recordings.cpp",
-        "daemon/server/sonars/device_control.cpp", "daemon/server/sonars/fleet.cpp", "daemon/server/view/view_doctor.cpp", "daemon/server/view/view_messages.cpp", "clients/sonarctl/control/control_client.cpp",
+        "daemon/server/sonars/device_control.cpp", "daemon/server/sonars/fleet.cpp", "daemon/server/view/recording_views.cpp", "daemon/server/view/view_doctor.cpp", "daemon/server/view/view_messages.cpp", "clients/sonarctl/control/control_client.cpp",
         "clients/sonarctl/control/control_commands.cpp", "clients/sonarctl/control/fault_commands.cpp",
         "clients/sonarctl/control/fault_text.cpp", "clients/sonarctl/control/status_text.cpp", "clients/sonarctl/doctor/check_daemon.cpp",
         "clients/sonarctl/doctor/check_sonar.cpp", "clients/sonarctl/doctor/gather.cpp", "clients/sonarctl/doctor/watch_pings.cpp",

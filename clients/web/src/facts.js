@@ -53,6 +53,8 @@ export class Facts {
     this.clock = meta['sonard.clock'] ?? 'realtime';
     if (!same) this.clear();
     this.previews = meta['sonard.previews'] === 'true';  // by itself, without a driver
+    this.recording = meta['sonard.recording'] ?? '';  // the file that is played; empty = the sonars are looked at
+    this.recordingFailure = meta['sonard.recording_failure'] ?? '';
     this.openedAt = now_s();
     this.parameters.clear();
   }

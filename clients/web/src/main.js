@@ -29,6 +29,9 @@ const scene = new Scene(facts, fan);
 const connection = new Connection({
   open(info) {
     facts.opened(info);
+    $('name').title = `${info.name} at ${location.host}`;
+    setText($('about'), `${info.name} at ${location.host}. Documents: docs/live-view.md of the source tree, /usr/share/doc/sonard of the package.`);
+    document.body.classList.toggle('plays', Boolean(facts.recording));
     scene.forget();
     allEchoesOf = '';
     choose();
@@ -157,6 +160,7 @@ function showTab(tab) {
     if (button.dataset.tab === tab) button.setAttribute('aria-current', 'page');
     else button.removeAttribute('aria-current');
   }
+  if (tab === 'log') $('log').scrollTop = $('log').scrollHeight;  // the newest line
 }
 
 function maximise(pane) {
@@ -198,14 +202,15 @@ for (const button of document.querySelectorAll('.maximise')) button.onclick = ()
 document.addEventListener('visibilitychange', choose);
 matchMedia('(prefers-color-scheme: light)').addEventListener('change', () => setTheme(look.theme));
 listenToKeys([
-  [[' '], 'space', 'play or pause the trajectory', () => timeline.toggle()],
+  [[' '], 'space', 'play or pause the trajectory or the recording', () => timeline.toggle()],
   [['ArrowLeft', 'ArrowRight'], '← →', 'one second back or ahead', (key) => timeline.step(key === 'ArrowLeft' ? -1 : 1)],
   [['c'], 'c', 'next colour map', () => (fan.nextMap(), showMap())],
-  [['+', '=', '-'], '+ −', 'more or less gain of the display', (key) => changeGain(key === '-' ? -0.25 : 0.25)],
+  [['+', '=', '-'], '+ −', 'a brighter or darker picture', (key) => changeGain(key === '-' ? -0.25 : 0.25)],
   [['f'], 'f', 'hold the picture, or go on', freeze],
   [['s'], 's', 'save the picture as PNG', () => fan.save()],
   [['g'], 'g', 'range rings', () => fan.toggleRings()],
   [['1', '2', '0'], '1 2 0', 'fan alone, scene alone, both', (key) => maximise(key)],
+  [['e'], 'e', 'to the faults', () => (showTab('faults'), document.querySelector('#troubles button:not(:disabled)')?.focus())],
   [['t'], 't', 'light or dark', toggleTheme],
   [['?'], '?', 'this list; Esc closes it', () => $('help').showModal()],
 ]);

@@ -38,6 +38,10 @@ function stands(facts) {
 export function situationOf(facts, connection) {
   if (facts.connection === 'token') return { kind: 'token', picture: 'none', text: `${facts.tokenRefused ? 'That token was refused. ' : ''}Enter the token of sonard: the text in the file that control.token_file names.` };
   if (facts.connection !== 'open') return { kind: 'lost', picture: 'old', text: lost(facts, connection) };
+  if (facts.recording) {
+    if (facts.recordingFailure) return { kind: 'no-recording', picture: 'none', text: facts.recordingFailure };
+    return facts.vehicle ? null : { kind: 'reading', picture: 'none', text: `Reading ${facts.recording}.` };
+  }
   const sonar = facts.sonarStatus;
   if (!sonar) return facts.status ? { kind: 'no-sonar', picture: 'none', text: 'This sonard has no sonar.' } : null;
   if (!facts.listened && !facts.preview) {
@@ -68,6 +72,7 @@ export function badgesOf(facts) {
   const out = [];
   const sonar = facts.sonarStatus;
   if (facts.connection !== 'open' || !sonar) return out;
+  if (facts.recording) return [{ text: 'RECORDING', level: 'note', title: facts.recording }];
   if (facts.preview) out.push({ text: 'PREVIEW', level: 'note', title: 'for viewers only; it ends when a driver connects' });
   if (!sonar.transmits) out.push({ text: 'transmit is off: noise only', level: 'warning', title: 'see the settings' });
   const vehicle = facts.vehicle;

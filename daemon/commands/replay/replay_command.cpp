@@ -5,6 +5,7 @@
 
 #include "core/text/arguments.hpp"
 #include "core/text/decimal.hpp"
+#include "daemon/commands/replay/replay_page.hpp"
 #include "daemon/commands/replay/replay_server.hpp"
 
 namespace sonar {
@@ -33,12 +34,40 @@ void add_replay_options(CLI::App& app, ReplayCommand& replay) {
   app.add_option("--part-number", replay.part_number, "of the sonar, where the recording holds no status (1042 = M1200d)")
       ->check(text::whole_number(1, 65535))
       ->capture_default_str();
+  app.add_option("--http", replay.http, "IP:PORT of the page that shows the recording, or off")->capture_default_str();
   app.add_option("--log-format", "text or json (default text)")
       ->check(text::one_of({"text", "json"}))
       ->each([&replay](const std::string& format) { replay.json = format == "json"; });
 }
 
 namespace {
+
+/// Port 0: none is given.
+Result<Endpoint> endpoint_from(const std::string& place, const std::string& option) {
+  const std::size_t colon = place.find(':');
+  const auto ip = parse_ipv4(place.substr(0, colon));
+  if (!ip) return failure(ErrorKind::usage, option + ": " + ip.error().text);
+  if (colon == std::string::npos) return Endpoint{*ip, 0};
+  const auto port = text::parse_integer(std::string_view(place).substr(colon + 1));
+  if (!port || *port < 0 || *port > 65535)
+    return failure(ErrorKind::usage, option + ": \"" + place + "\" is not IP or IP:PORT, such as 127.255.255.255");
+  return Endpoint{*ip, static_cast<std::uint16_t>(*port)};
+}
+
+/// Empty: it is off, or its usual address is in use.
+Result<std::string> open_page(ReplayPage& page, const ReplayCommand& command, Log& log) {
+  if (command.http == "off") return std::string();
+  const auto at = endpoint_from(command.http, "--http");
+  if (!at) return tl::make_unexpected(at.error());
+  if (const auto opened = page.open(*at); !opened) {
+    const std::string what = opened.error().text + "; --http takes another address, or off";
+    if (command.http != ReplayCommand::default_page) return failure(opened.error().kind, what);
+    log.warning("continuing without the page: " + what);
+    return std::string();
+  }
+  page.start();
+  return "open      http://" + text_of(page.at()) + "   the recording, in a browser\n";
+}
 
 Result<ReplayOptions> options_from(const ReplayCommand& command) {
   ReplayOptions options;
@@ -47,17 +76,9 @@ Result<ReplayOptions> options_from(const ReplayCommand& command) {
   if (!ip) return usage(ip.error());
   options.at = {*ip, command.port};
   for (const std::string& place : command.status_to) {
-    const std::size_t colon = place.find(':');
-    const auto to = parse_ipv4(place.substr(0, colon));
-    if (!to) return usage(to.error());
-    Endpoint endpoint{*to, 0};
-    if (colon != std::string::npos) {
-      const auto port = text::parse_integer(std::string_view(place).substr(colon + 1));
-      if (!port || *port < 1 || *port > 65535)
-        return failure(ErrorKind::usage, "--status-to: \"" + place + "\" is not IP or IP:PORT, such as 127.255.255.255");
-      endpoint.port = static_cast<std::uint16_t>(*port);
-    }
-    options.status_to.push_back(endpoint);
+    const auto to = endpoint_from(place, "--status-to");
+    if (!to) return tl::make_unexpected(to.error());
+    options.status_to.push_back(*to);
   }
   options.speed = command.speed;
   options.stepped = command.stepped;
@@ -84,14 +105,26 @@ Result<void> run_replay(const ReplayCommand& command) {
   log_options.json = command.json;
   Log log(log_options);
   asio::io_context io;
+  const LimitConfig limits;
+  Admission admission(limits, log);
+  ReplayPage page(io, limits, admission, log, {command.file, command.sonar, command.rate_hz});
+  options->on_end = [&page] { page.stop(); };
   ReplayServer server(io, *opened->reader, *device, *options, log);
   if (auto listening = server.open(); !listening) return listening;
   if (!opened->reader->note().empty()) log.info(opened->reader->note());
-  log.announce(std::string("replaying ") + command.file + " (" + std::string(opened->format) + ") as " + device->name() +
-               " on tcp " + text_of(server.at()) + "; Ctrl-C stops\n");
+  const auto where = open_page(page, command, log);
+  if (!where) return tl::make_unexpected(where.error());
+  if (!device->is_only_seen.empty() && where->empty()) return failure(ErrorKind::bad_data, device->is_only_seen);
+  log.announce(*where);
+  if (!device->is_only_seen.empty())
+    log.announce(device->is_only_seen + "; Ctrl-C stops\n");
+  else
+    log.announce(std::string("replaying ") + command.file + " (" + std::string(opened->format) + ") as " + device->name() +
+                 " on tcp " + text_of(server.at()) + "; Ctrl-C stops\n");
   server.start();
   io.run();
   const ReplayServer::Figures& done = server.figures();
+  if (!device->is_only_seen.empty()) return server.outcome();
   log.announce("served " + std::to_string(done.messages) + " messages, " + std::to_string(done.bytes) + " bytes, to " +
                std::to_string(done.clients) + (done.clients == 1 ? " client\n" : " clients\n"));
   return server.outcome();

@@ -14,7 +14,8 @@ class App;
 namespace sonar {
 
 struct ReplayCommand {
-  std::string file, ip = "127.0.0.2", sonar;
+  static constexpr const char* default_page = "127.0.0.1:8088";
+  std::string file, ip = "127.0.0.2", sonar, http = default_page;
   std::uint16_t port = 0, part_number = 1042;
   std::vector<std::string> status_to;
   double speed = 1, rate_hz = 10;

@@ -86,10 +86,11 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   const auto damage = reader.damage();
   reader.rewind();
   if (device.vendor != nullptr) return device;
-  if (unserved != nullptr)
-    return failure(ErrorKind::bad_data, file + " holds pings of " + std::string(unserved->title) +
-                                            ", which depend on the requests of its host: they cannot be replayed; see them with "
-                                            "sonarctl view --from");
+  if (unserved != nullptr) {
+    device.is_only_seen = file + " holds pings of " + std::string(unserved->title) +
+                          ", which depend on the requests of its host: they cannot be replayed to a driver, the page shows them";
+    return device;
+  }
   if (!id)
     return failure(ErrorKind::bad_data, file + " holds no message of a sonar" + (damage ? ": " + damage->text : std::string()));
   if (!device.recorded_status) {

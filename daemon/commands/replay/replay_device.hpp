@@ -16,6 +16,7 @@ struct ReplayDevice {
   const protocol::Vendor* vendor = nullptr;  // of one that is asked, else null; and what it is like
   std::shared_ptr<protocol::DeviceState> state;
   std::uint32_t serial = 0;  // of an ARIS
+  std::string is_only_seen;  // why no driver can be served; empty = one can
 
   /// Null: it listens by TCP for connections that last.
   const protocol::Port* http() const { return vendor != nullptr ? vendor->port(protocol::Port::Kind::http) : nullptr; }

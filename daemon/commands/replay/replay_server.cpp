@@ -33,6 +33,7 @@ ReplayServer::ReplayServer(asio::io_context& io, recording::RecordingReader& rea
 
 Result<void> ReplayServer::open() {
   at_ = options_.at;
+  if (!device_.is_only_seen.empty()) return {};
   if (device_.http() != nullptr) return open_http();
   if (Result<void> listening = listen_tcp(acceptor_, at_); !listening) return listening;
   error_code ec;
@@ -79,7 +80,9 @@ void ReplayServer::spawn(Coroutine coroutine) {
 }
 
 void ReplayServer::start() {
-  if (http_) {
+  if (!device_.is_only_seen.empty()) {
+    // The page alone is served, until a signal comes.
+  } else if (http_) {
     http_->start();
     spawn(serve(client_));
   } else {
@@ -128,6 +131,7 @@ void ReplayServer::end() {
   status_timer_.cancel();
   deadline_.cancel();
   signals_.cancel(ec);
+  if (options_.on_end) options_.on_end();
 }
 
 asio::awaitable<void> ReplayServer::accept() {

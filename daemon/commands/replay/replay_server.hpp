@@ -4,6 +4,7 @@
 // The whole of `sonard replay` but its command line; one thread, no scene, no engine.
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "daemon/commands/replay/replay_device.hpp"
@@ -22,6 +23,7 @@ struct ReplayOptions {
   bool loop = false;                // from the front again and again
   double rate_hz = 10;              // messages a second of recordings that know no times
   bool handle_signals = false;
+  std::function<void()> on_end = {};  // nothing of the server keeps io.run() going any more
 };
 
 class ReplayServer {

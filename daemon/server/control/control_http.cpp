@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "daemon/server/recording/recording_file.hpp"
 #include "daemon/server/view/view_feed.hpp"
 #include "protocol/control/answers.hpp"
 
@@ -43,14 +44,20 @@ HttpOutcome ControlHttp::open_socket(const HttpRequest& request, const SocketAct
   auto opened = open_view(request, asked.query, {services_.token, view_->secrets(), from.reached().ip, config_},
                           ViewSecrets::Steady::now());
   if (auto* answer = std::get_if<HttpAnswer>(&opened)) return *std::move(answer);
+  if (const std::string& name = std::get<ViewWelcome>(opened).recording;
+      !name.empty() && (view_->folder_of_recordings().empty() || !RecordingFile::is_plain_name(name)))
+    return answer_of(404, StatusCode::unsupported, "no such recording: recording=NAME is a file in recording.folder");
   if (view_->is_full() || !from.claim_slot()) {
     HttpAnswer full =
         answer_of(503, StatusCode::failed, "all places of viewers are taken; limits.viewers in the configuration makes more");
     full.why = "all " + std::to_string(services_.limits.viewers) + " places of viewers are taken: limits.viewers";
     return full;
   }
+  const ViewWelcome& welcome = std::get<ViewWelcome>(opened);
+  if (!welcome.recording.empty())
+    return view_->recordings().open(services_, from, request, welcome, {view_->folder_of_recordings() / welcome.recording});
   return std::shared_ptr<HttpTakeover>(
-      std::make_shared<ViewConnection>(services_, from, *view_, request, std::get<ViewWelcome>(opened),
+      std::make_shared<ViewConnection>(services_, from, *view_, request, welcome,
                                        [view = view_](const std::shared_ptr<ViewConnection>& viewer) { view->add(viewer); }));
 }
 

@@ -71,8 +71,11 @@ void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar
   const Pointer recording = *begun;
   on_thread(
       recording->work,
-      [file = std::filesystem::path(recording->status.file()), kind = recording->kind, labels = recording->labels,
+      [folder = config_.recording.is_made ? config_.recording.folder : std::filesystem::path(),
+       file = std::filesystem::path(recording->status.file()), kind = recording->kind, labels = recording->labels,
        sonar = std::move(sonar)](Work& work) -> Result<void> {
+        if (std::error_code ec; !folder.empty() && !std::filesystem::create_directory(folder, ec) && ec)
+          return failure(ErrorKind::io, folder.string() + ": cannot be made: " + ec.message());
         auto made = RecordingFile::create(file, kind, sonar, labels);
         if (!made) return tl::make_unexpected(made.error());
         work.file = std::move(*made);
@@ -91,6 +94,31 @@ void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar
         if (outcome.result && !recording->ends_with.empty()) end(recording, recording->ends_with);
         on_change_();
       });
+}
+
+void Recordings::find_earlier() {
+  struct Found {
+    std::filesystem::file_time_type at;
+    Pointer recording;
+  };
+  std::vector<Found> found;
+  std::error_code ec;
+  for (std::filesystem::directory_iterator file(config_.recording.folder, ec), end; !ec && file != end; file.increment(ec)) {
+    std::error_code one;
+    const std::string name = file->path().filename().string();
+    if (!RecordingFile::is_recording(name) || !file->is_regular_file(one)) continue;
+    auto recording = std::make_shared<Recording>();
+    recording->state = Recording::State::ended;
+    recording->name = name;
+    recording->status.set_file(file->path().string());
+    recording->status.set_bytes(file->file_size(one));
+    found.push_back({file->last_write_time(one), recording});
+  }
+  std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.at < b.at; });
+  for (const Found& one : found) {
+    remove_oldest();
+    recordings_.push_back(one.recording);
+  }
 }
 
 Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& asked, const RecordedSonar& sonar) {

@@ -39,6 +39,8 @@ class Recordings {
   Recordings(const Recordings&) = delete;
   Recordings& operator=(const Recordings&) = delete;
 
+  /// Names the newest files that are in the folder already, as recordings that have ended.
+  void find_earlier();
   /// `who` asks, for the log. usage: the name, or that nothing may be recorded; io, unavailable.
   void start(const control::StartRecording& asked, RecordedSonar sonar, const std::string& who, Done done);
   /// An empty name = all that there are.

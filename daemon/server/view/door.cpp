@@ -123,6 +123,7 @@ std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
     welcome.most_hz = *number;
   }
   welcome.playback = value_of(query, "playback");
+  welcome.recording = value_of(query, "recording");
 
   welcome.may_steer = true;
   if (shows_secret(request, query, door, now)) return welcome;

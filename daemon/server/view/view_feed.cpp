@@ -90,7 +90,7 @@ void ViewFeed::say_time(Viewer& viewer) const {
 }
 
 bool ViewFeed::is_full() const {
-  int open = 0;
+  int open = recordings_.count();
   each([&open](const ViewConnection&) { ++open; });
   return open >= of_.config.limits.viewers;
 }

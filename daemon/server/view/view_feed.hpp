@@ -21,6 +21,7 @@
 #include "daemon/server/sonars/fleet.hpp"
 #include "daemon/server/time/clock.hpp"
 #include "daemon/server/view/door.hpp"
+#include "daemon/server/view/recording_views.hpp"
 #include "daemon/server/view/scene_shapes.hpp"
 #include "daemon/server/view/view_connection.hpp"
 #include "daemon/server/view/view_doctor.hpp"
@@ -56,6 +57,9 @@ class ViewFeed final : public ViewerHost {
   bool is_full() const;
   std::vector<ViewerFigures> viewers() const;
   ViewSecrets& secrets() { return secrets_; }
+  /// Viewers of files.
+  RecordingViews& recordings() { return recordings_; }
+  const std::filesystem::path& folder_of_recordings() const { return of_.config.recording.folder; }
   const ViewSecrets& secrets() const { return secrets_; }
   void stop();
 
@@ -148,6 +152,7 @@ class ViewFeed final : public ViewerHost {
 
   Viewed of_;
   ViewSecrets secrets_;
+  RecordingViews recordings_{of_.io, of_.log};
   std::vector<std::weak_ptr<ViewConnection>> connections_;
   std::map<std::uint32_t, ViewChannel> channels_;
   std::uint32_t last_channel_ = 0, tf_ = 0, scene_ = 0, swath_ = 0, log_ = 0, status_ = 0, faults_ = 0, doctor_channel_ = 0;

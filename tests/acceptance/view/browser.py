@@ -13,7 +13,7 @@ import urllib.request
 
 from websocket import TEXT, WebSocket
 
-KEY_NUMBERS = {"Backspace": 8, "Tab": 9, "Enter": 13, "Escape": 27, "ArrowUp": 38, "ArrowDown": 40}
+KEY_NUMBERS = {"Backspace": 8, "Home": 36, "ArrowLeft": 37, "ArrowRight": 39, "Tab": 9, "Enter": 13, "Escape": 27, "ArrowUp": 38, "ArrowDown": 40}
 
 
 def program():

@@ -42,7 +42,7 @@ export class Fan {
 
   /// sonard draws the picture: it is no fan, or there is no WebGL2.
   get drawn() {
-    return !this.painter || this.facts.pictureKind !== 'fan';
+    return !this.painter || Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
   }
 
   useMap(name) {

@@ -5,6 +5,7 @@ import { dash, fixed, frequency } from '../numbers.js';
 function rateOf(facts) {
   const sonar = facts.sonarStatus;
   if (facts.connection !== 'open' || !sonar) return { word: { lost: 'lost', token: 'token wanted' }[facts.connection] ?? 'connecting', dot: 'error', rate: dash };
+  if (facts.recording) return { word: 'recording', dot: 'note', rate: '' };
   if (facts.preview) return { word: 'preview', dot: 'note', rate: facts.drawn.rate === undefined ? dash : `${fixed(facts.drawn.rate, 1)} Hz` };
   if (!facts.listened) return { word: 'no driver', dot: 'warning', rate: '' };
   if (sonar.rate_hz === 0) return { word: 'standby', dot: 'warning', rate: '0 Hz' };
@@ -15,6 +16,9 @@ function rateOf(facts) {
 
 /// The product's short name: "oculus-m1200d" -> "M1200d".
 const product = (profile) => profile.replace(/^(oculus|blueview)-/, '').replace(/^aris-/, 'ARIS ').replace('waterlinked-3d15', 'Sonar 3D-15').replace(/^./, (c) => c.toUpperCase());
+
+/// UTC; of files without times a dash.
+const recordedTime = (ns) => (ns > 1e17 ? new Date(ns / 1e6).toISOString().slice(0, 19).replace('T', ' ') : dash);
 
 export function drawHead(facts) {
   const sonars = facts.status?.sonars ?? [];
@@ -38,8 +42,9 @@ export function drawHead(facts) {
   setText($('fault-count'), String(faults));
   setText($('fault-word'), faults === 1 ? 'fault' : 'faults');
   setHidden($('chip-look'), facts.connection !== 'open' || facts.maySteer);
-  setText($('clock'), facts.realtime || facts.now_ns === null ? facts.clock ?? dash : `${facts.clock} ${fixed(facts.now_ns / 1e9, 1)} s`);
+  setHidden($('live'), !facts.recording || !location.search.includes('recording='));
+  setText($('clock'), facts.recording ? recordedTime(facts.now_ns) : facts.realtime || facts.now_ns === null ? facts.clock ?? dash : `${facts.clock} ${fixed(facts.now_ns / 1e9, 1)} s`);
   setText($('scene-name'), facts.status?.scene.replace(/^.*\//, '') || dash);
-  const name = facts.sonar ? `${facts.sonar} · sonard` : 'sonard';
+  const name = [facts.recording || facts.sonar, 'sonard', location.host].filter(Boolean).join(' · ');
   if (document.title !== name) document.title = name;
 }

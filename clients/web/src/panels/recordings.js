@@ -19,12 +19,18 @@ export function toggleRecording(facts, call) {
   else call('/sonard/start_recording', { file: newName(facts.sonar), sonar: facts.sonar });
 }
 
+/// Of those of earlier runs only the size is known.
+function about(r) {
+  const size = `${fixed(r.bytes / 1e6, 1)} MB`;
+  return r.sonar ? `${r.sonar} · ${whole(r.pings)} pings · ${size} · ${r.running ? 'running' : r.why || 'ended'}` : size;
+}
+
 export function drawRecordings(facts) {
   const all = facts.status?.recordings ?? [];
   const one = running(facts);
   setText($('record'), one ? 'Stop recording' : 'Record');
   $('record').setAttribute('aria-pressed', String(Boolean(one)));
   $('record').disabled = !facts.maySteer || facts.connection !== 'open' || !facts.sonar;
-  showList($('recordings'), all, () => all.map((r) => make('li', {}, make('b', { title: r.file }, nameOf(r)), make('small', {},
-    ` ${r.sonar} · ${whole(r.pings)} pings · ${fixed(r.bytes / 1e6, 1)} MB · ${r.running ? 'running' : r.why || 'ended'}`))));
+  showList($('recordings'), all, () => all.map((r) => make('li', {}, r.running ? make('b', { title: r.file }, nameOf(r)) : make('a', { href: `/?recording=${encodeURIComponent(nameOf(r))}`, title: `Play ${r.file}` }, `▶ ${nameOf(r)}`),
+    make('small', {}, ` ${about(r)}`))));
 }

@@ -38,16 +38,18 @@ export class Connection {
     clearTimeout(this.timer);
     this.socket?.close();
     const attempt = (this.attempt = {});
-    let ticket = '';
+    const query = new URLSearchParams();
+    const recording = new URLSearchParams(location.search).get('recording');
+    if (recording) query.set('recording', recording);
     try {
-      if (this.token) ticket = `?ticket=${await this.ticket()}`;
+      if (this.token) query.set('ticket', await this.ticket());
     } catch (error) {
       if (error.message === 'token') return this.on.needsToken(true);
       return this.retry();
     }
     if (attempt !== this.attempt) return;
     const here = location.origin.replace(/^http/, 'ws');
-    const socket = (this.socket = new WebSocket(`${here}/${ticket}`, subprotocols));
+    const socket = (this.socket = new WebSocket(`${here}/?${query}`, subprotocols));
     socket.binaryType = 'arraybuffer';
     socket.onmessage = ({ data }) => {
       if (socket !== this.socket) return;

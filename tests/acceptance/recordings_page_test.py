@@ -1,0 +1,143 @@
+"""Recordings as viewers see them: of every demo, by sonard and by `sonard replay`, with a time line that each viewer moves alone.
+
+The page's part is skipped without browser or page.
+"""
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
+
+from browser import Browser  # noqa: E402
+from demos_test import DEMOS, HTTP, SONAR, UNCOVERED, demo  # noqa: E402
+from foxglove_viewer import Refused, Viewer  # noqa: E402
+from page_checks import WHY_NOT, PageChecks, shown  # noqa: E402
+from recording_test import Replay  # noqa: E402
+from running_sonard import SONARCTL, eventually, run  # noqa: E402
+
+OWN = "/recording/trajectory/"
+PATIENCE_S = 120
+
+
+def is_message(topic):
+    return lambda kind, value: kind == "message" and value[0] == topic
+
+
+def record(maker, pings):
+    """A demo's recording, started and stopped as from the page, while a driver is connected."""
+    with demo(maker), subprocess.Popen([SONARCTL, "listen", f"{SONAR}:{DEMOS[maker][2]}", "--quiet"], stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.DEVNULL) as driver:
+        name = f"{maker}.mcap"
+        assert run(SONARCTL, "recording", "start", name).returncode == 0
+        eventually(lambda: f" {pings} pings" in run(SONARCTL, "status").stdout or more_than(pings), 300)
+        assert run(SONARCTL, "recording", "stop").returncode == 0
+        driver.terminate()
+    return pathlib.Path("sonard-recordings") / name
+
+
+def more_than(pings):
+    words = run(SONARCTL, "status").stdout.split()
+    return any(word.startswith("ping") and before.isdigit() and int(before) >= pings for before, word in zip(words, words[1:]))
+
+
+class Recordings(PageChecks, unittest.TestCase):
+    """In a folder of its own, where demos put their recordings."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.addCleanup(os.chdir, os.getcwd())
+        os.chdir(folder.name)
+
+    def look(self, viewer, kind):
+        """It plays; then it is sought, stopped and played again."""
+        viewer.greeted().subscribe("/recording/picture", "/recording/fan", "/recording/ping", "/status")
+        self.assertEqual(viewer.first_of("/recording/picture", PATIENCE_S)["kind"], kind)
+        image = viewer.first_of("/recording/fan")
+        self.assertGreater(max(image["data"]), 20, "an echo is to be seen")
+        trajectory = viewer.first_of("/status")["vehicles"][0]["trajectory"]
+        self.assertGreater(trajectory["duration_s"], 0)
+        viewer.wait_for(lambda kind, value: kind == "word" and "playbackControl" in value.get("capabilities", ()) or viewer.info and
+                        "playbackControl" in viewer.info["capabilities"])
+        first_ns = viewer.info["dataStartTime"]["sec"] * 10**9 + viewer.info["dataStartTime"]["nsec"]
+
+        def tell(name, value):
+            viewer.say(op="setParameters", parameters=[{"name": OWN + name, "value": value, "type": "float64"} if name != "paused" else
+                                                       {"name": OWN + name, "value": value}], id=name)
+            return viewer.wait_for(lambda kind, word: kind == "word" and word["op"] == "parameterValues" and word.get("id") == name)
+
+        tell("paused", True)
+        tell("position_s", trajectory["duration_s"])
+        viewer.wait_for(lambda kind, value: is_message("/recording/ping")(kind, value) and
+                        value[1] - first_ns > 0.9e9 * trajectory["duration_s"])
+        tell("position_s", 0.0)
+        viewer.wait_for(lambda kind, value: is_message("/recording/ping")(kind, value) and value[1] == first_ns)
+        tell("speed", 4.0)
+        tell("paused", False)
+        viewer.wait_for(lambda kind, value: is_message("/recording/ping")(kind, value) and value[1] > first_ns)
+
+    def test_every_demo_is_recorded_and_played(self):
+        for maker, (kind, pings, port) in DEMOS.items():
+            with self.subTest(demo=maker):
+                path = record(maker, max(pings + 10, 5))
+                with demo("oculus"), Viewer(HTTP, path=f"/?recording={path.name}") as viewer:
+                    self.look(viewer, kind)
+                with Replay(path) as replay, Viewer(HTTP) as viewer:
+                    self.look(viewer, kind)
+                    self.assertIn("open      http://127.0.0.1:8088", replay.text())
+                    if maker not in ("blueview", "ping360"):
+                        done = run(SONARCTL, "listen", f"{replay.address}:{port}", "--quiet", "--pings", 2)
+                        self.assertIn("pings 2", done.stdout, "the driver is served beside it: " + done.stderr)
+
+    def test_only_files_of_the_folder(self):
+        pathlib.Path("sonard-recordings").mkdir()
+        pathlib.Path("sonard-recordings/broken.mcap").write_bytes(b"nothing")
+        pathlib.Path("secret.mcap").write_bytes(b"nothing")
+        with demo("oculus"):
+            for name in ("..%2Fsecret.mcap", "%2Fetc%2Fpasswd", ".", "-x.mcap%2F"):
+                with self.subTest(name), self.assertRaises(Refused):
+                    Viewer(HTTP, path=f"/?recording={name}")
+            for name in ("broken.mcap", "missing.mcap"):
+                with self.subTest(name), Viewer(HTTP, path=f"/?recording={name}") as viewer:
+                    viewer.wait_for(lambda kind, word: kind == "word" and "sonard.recording_failure" in word.get("metadata", {}))
+            self.assertIn("broken.mcap  0.0 MB, of an earlier run", run(SONARCTL, "status").stdout)
+
+    @unittest.skipIf(WHY_NOT, WHY_NOT)
+    def test_page(self):
+        path = record("oculus", 20)
+        with demo("oculus"), Browser() as browser:
+            for width, height, theme in ((1600, 1000, "dark"), (390, 844, "light")):
+                with self.subTest(width=width):
+                    page = self.opened(browser.open(f"http://{HTTP}:8088/", width, height, touch=width < 800, theme=theme))
+                    shown(page)
+                    if width < 800:
+                        page.touch("#tabs [data-tab=clients]")
+                    page.press_mouse(f"#recordings a[href='/?recording={path.name}']")
+                    page.wait("document.body.classList.contains('plays')")
+                    shown(page)
+                    page.wait(UNCOVERED)
+                    page.press(" ")
+                    page.wait("document.querySelector('#play').getAttribute('aria-label') === 'Play'")
+                    page.run("document.querySelector('#position').focus()")
+                    page.press("Home")
+                    page.wait("document.querySelector('#position-text').textContent === '0.0 s'")
+                    number = page.text("#ping-number")
+                    page.run("document.activeElement.blur()")
+                    page.press("ArrowRight")
+                    page.wait(f"document.querySelector('#ping-number').innerText !== '{number}'")
+                    self.picture(page, f"recording-{width}", 1)
+                    self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
+                    self.assert_quiet(page, f"http://{HTTP}:8088/")
+                    page.press_mouse("#live")
+                    page.wait("!document.body.classList.contains('plays')")
+                    if width < 800:
+                        page.touch("#tabs [data-tab=fan]")
+                    shown(page)
+                    page.close()
+
+
+if __name__ == "__main__":
+    unittest.main()
