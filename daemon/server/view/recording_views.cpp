@@ -56,7 +56,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
     return found == channels_.end() ? nullptr : &found->second;
   }
   void on_subscribed(Viewer& viewer, std::uint32_t channel) override {
-    if (channel == status_channel) return give(viewer, channel, status());
+    if (channel == status_channel) return playback_ ? give(viewer, channel, status()) : void();
     const auto made = made_.find(channel);
     if (made != made_.end()) give(viewer, channel, made->second);
     wanted_ = true;
