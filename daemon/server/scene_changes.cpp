@@ -44,7 +44,7 @@ void SceneChanges::submit(Change change) {
 
 void SceneChanges::begin() {
   under_way_ = true;
-  if (!waiting_.front().make) return finish(Built{scene_, nullptr});
+  if (!waiting_.front().make) return finish(Built{scene_, nullptr, {{}}});
   const auto pause = pause_before_engine();
   if (pause.count() == 0) return build_next();
   pause_.expires_after(pause);
@@ -61,24 +61,32 @@ std::chrono::steady_clock::duration SceneChanges::pause_before_engine() {
   return std::max(due - now, std::chrono::steady_clock::duration{});
 }
 
+std::vector<SceneChanges::Make> SceneChanges::next_makes() const {
+  std::vector<Make> makes;
+  for (const Change& change : waiting_) {
+    if (!makes.empty() && !(change.shares_engine && change.make && waiting_.front().shares_engine)) break;
+    makes.push_back(change.make);
+  }
+  return makes;
+}
+
 void SceneChanges::build_next() {
   building_ = true;
   building_since_ = std::chrono::steady_clock::now();
   // Without `done`: what that holds (a connection, say) must not end on another thread.
-  asio::post(thread_, [this, make = waiting_.front().make, now = scene_] {
-    auto built = std::make_shared<Result<Built>>(build(make, now));
+  asio::post(thread_, [this, makes = next_makes(), now = scene_] {
+    auto built = std::make_shared<Built>(build(makes, now));
     asio::post(io_, [this, built] { finish(std::move(*built)); });
   });
 }
 
-Result<SceneChanges::Built> SceneChanges::build(const Make& make, const ScenePointer& now) const {
+namespace {
+
+/// What `work` returns; what it throws becomes an error.
+template <class Work>
+auto caught(const Work& work) -> decltype(work()) {
   try {
-    auto scene = make(now);
-    if (!scene) return tl::make_unexpected(scene.error());
-    if (*scene == now || is_same(**scene, *now)) return Built{*scene, nullptr};
-    auto engine = start_engine(make_engine_, *scene);
-    if (!engine) return tl::make_unexpected(engine.error());
-    return Built{*std::move(scene), std::make_shared<std::unique_ptr<PingEngine>>(*std::move(engine))};
+    return work();
   } catch (const std::bad_alloc&) {
     return failure(ErrorKind::unavailable, "not enough memory for the changed scene; use a smaller one or free some");
   } catch (const std::exception& e) {
@@ -86,23 +94,43 @@ Result<SceneChanges::Built> SceneChanges::build(const Make& make, const ScenePoi
   }
 }
 
-void SceneChanges::finish(Result<Built> built) {
+}  // namespace
+
+SceneChanges::Built SceneChanges::build(const std::vector<Make>& makes, const ScenePointer& now) const {
+  Built built{now, nullptr, {}};
+  for (const Make& make : makes) {
+    const auto scene = caught([&] { return make(built.scene); });
+    if (scene) built.scene = *scene;
+    built.outcomes.push_back(scene ? Result<void>{} : tl::make_unexpected(scene.error()));
+  }
+  if (built.scene == now || is_same(*built.scene, *now)) return built;
+  auto engine = caught([&] { return start_engine(make_engine_, built.scene); });
+  if (engine) {
+    built.engine = std::make_shared<std::unique_ptr<PingEngine>>(*std::move(engine));
+    return built;
+  }
+  // The others must not fail with the one that asks for too much: each is tried alone then.
+  if (makes.size() > 1) return build({makes.front()}, now);
+  return {now, nullptr, {tl::make_unexpected(engine.error())}};
+}
+
+void SceneChanges::finish(Built built) {
   building_ = false;
   if (stopped_) return;
-  if (built && built->engine) {
-    scene_ = built->scene;
-    simulator_.use(std::move(*built->engine), [this](std::shared_ptr<PingEngine> before) {
+  if (built.engine) {
+    scene_ = built.scene;
+    simulator_.use(std::move(*built.engine), [this](std::shared_ptr<PingEngine> before) {
       // Its cells are a hundred megabytes: they are freed on this thread, not on the I/O thread.
       if (!stopped_) asio::post(thread_, [before = std::move(before)]() mutable { before.reset(); });
     });
     in_use_(scene_);
   }
-  const auto done = std::move(waiting_.front().done);
-  waiting_.pop_front();
-  if (built)
-    done({});
-  else
-    done(tl::make_unexpected(built.error()));
+  for (const Result<void>& outcome : built.outcomes) {
+    const auto done = std::move(waiting_.front().done);
+    waiting_.pop_front();
+    done(outcome);
+    if (stopped_) break;  // nothing waits any more
+  }
   under_way_ = false;
   if (!stopped_ && !waiting_.empty()) begin();
   on_change_();

@@ -1,5 +1,6 @@
 // Loads and changes the scene while pings go on: one change after the other, made and built into an engine on a thread of its
-// own, then put to use in one moment. Owned by App; everything here is called on the I/O thread, but for Change::make.
+// own, then put to use in one moment. Edits that wait together share one engine. Owned by App; everything here is called on the
+// I/O thread, but for Change::make.
 //
 // Pings are made with the old scene until the new one is ready. Then the simulator gets the new engine and the world the new
 // moving bodies before anything else happens, so that a request's bodies are always those of the scene it meets. In stepped
@@ -10,6 +11,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "daemon/config/scene_file.hpp"
 #include "daemon/emulator/world/edit_scene.hpp"
@@ -30,13 +32,14 @@ class SceneChanges {
     Make make;  // empty: nothing is to be made, it only waits for those before
     /// On the I/O thread, when the new scene is in use, or nothing was changed. Never after stop().
     std::function<void(const Result<void>& outcome)> done;
+    bool shares_engine = false;  // with such Changes beside it; its `done` then meets the scene of all of them
   };
   /// A new scene is in use: called before its Change is done.
   using InUse = std::function<void(const ScenePointer& scene)>;
   static constexpr std::size_t most_waiting = 64;
-  /// While drivers are served: each engine costs them some of a ping.
-  static constexpr int most_at_once = 8;
-  static constexpr std::chrono::milliseconds between_engines{500};
+  /// While drivers are served: each engine costs a driver at 40 Hz between one and two pings.
+  static constexpr int most_at_once = 2;
+  static constexpr std::chrono::milliseconds between_engines{1000};
 
   /// `nice_by` is added to the niceness of the thread; `on_change` is called when a Change is done.
   SceneChanges(asio::io_context& io, Simulator& simulator, ScenePointer scene, EngineFactory make_engine, int nice_by,
@@ -64,12 +67,15 @@ class SceneChanges {
   struct Built {
     ScenePointer scene;
     std::shared_ptr<std::unique_ptr<PingEngine>> engine;  // empty: the scene stays
+    std::vector<Result<void>> outcomes;                   // of each Change that was made
   };
   void begin();
   void build_next();
   std::chrono::steady_clock::duration pause_before_engine();
-  Result<Built> build(const Make& make, const ScenePointer& now) const;
-  void finish(Result<Built> built);
+  /// Of the Changes that wait, those which share the next engine: the first one at least.
+  std::vector<Make> next_makes() const;
+  Built build(const std::vector<Make>& makes, const ScenePointer& now) const;
+  void finish(Built built);
 
   asio::io_context& io_;
   Simulator& simulator_;
@@ -77,7 +83,7 @@ class SceneChanges {
   EngineFactory make_engine_;
   InUse in_use_;
   std::function<void()> on_change_;
-  std::deque<Change> waiting_;  // the first is under way
+  std::deque<Change> waiting_;  // the first ones are under way
   bool under_way_ = false;      // until its `done` has returned, which may submit another
   bool stopped_ = false, building_ = false;
   std::chrono::steady_clock::time_point building_since_{}, engine_due_{};

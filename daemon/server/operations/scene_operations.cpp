@@ -28,7 +28,8 @@ void SceneOperations::edit(Edit edit, const std::string& what, const Sender& sen
                    [this, what, sender, done = std::move(done)](const Result<void>& outcome) {
                      if (outcome) log_change(what, sender);
                      done(result_of(outcome));
-                   }});
+                   },
+                   true});
 }
 
 void SceneOperations::add(const control::AddObject& asked, const Sender& sender, Operations::Done done) {

@@ -79,7 +79,7 @@ TEST(SceneChange, UnderLoadNoPingIsLostAndEachMeetsItsOwnBodies) {
   client.fire(fire_at(PingRate::hz40));
   std::atomic<bool> over{false};
   std::thread changes([&] {
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < 4; ++i) {
       EXPECT_EQ(daemon.ask(added("whale", true)).code, Code::done);
       control::RemoveObject gone;
       gone.object = "whale";
@@ -125,12 +125,51 @@ TEST(SceneChange, WhileADriverIsServedEnginesAreMadeSoOften) {
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
   ASSERT_TRUE(client.next_ping());
-  constexpr int beyond = 4;
+  constexpr int beyond = 3;
   const auto begin = Steady::now();
   for (int i = 0; i < SceneChanges::most_at_once + beyond; ++i)
     EXPECT_EQ(daemon.ask(added("buoy " + std::to_string(i))).code, Code::done);
   EXPECT_GE(Steady::now() - begin, (beyond - 1) * SceneChanges::between_engines);
   EXPECT_EQ(objects_in(daemon.status()), 2 + SceneChanges::most_at_once + beyond) << "none is lost";
+}
+
+/// What waits together costs the driver one engine; an edit that cannot be made fails alone.
+TEST(SceneChange, EditsThatWaitShareAnEngine) {
+  auto gate = std::make_shared<Gate>();
+  DaemonSetup setup;
+  setup.before_engine = [gate](const Scene&) { gate->pass(); };
+  Daemon daemon(setup);
+  auto first = daemon.ask_later(added("first"));
+  ASSERT_TRUE(eventually([&] { return gate->arrived() == 1; }));
+  std::vector<std::future<OperationResult>> others;
+  for (const char* const name : {"second", "second", "third"}) others.push_back(daemon.ask_later(added(name)));
+  gate->open();
+  EXPECT_EQ(first.get().code, Code::done);
+  EXPECT_EQ(others[0].get().code, Code::done);
+  EXPECT_NE(others[1].get().code, Code::done) << "its name is taken";
+  EXPECT_EQ(others[2].get().code, Code::done);
+  EXPECT_EQ(objects_in(daemon.status()), 5);
+  EXPECT_EQ(gate->arrived(), 2) << "engines";
+}
+
+TEST(SceneChange, EditsThatShareAnEngineDoNotFailTogether) {
+  auto gate = std::make_shared<Gate>();
+  DaemonSetup setup;
+  setup.before_engine = [gate](const Scene& scene) {
+    gate->pass();
+    if (object_named(scene, "too much") != nullptr) throw std::bad_alloc();
+  };
+  Daemon daemon(setup);
+  auto first = daemon.ask_later(added("first"));
+  ASSERT_TRUE(eventually([&] { return gate->arrived() == 1; }));
+  std::vector<std::future<OperationResult>> others;
+  for (const char* const name : {"second", "too much", "third"}) others.push_back(daemon.ask_later(added(name)));
+  gate->open();
+  EXPECT_EQ(first.get().code, Code::done);
+  EXPECT_EQ(others[0].get().code, Code::done);
+  EXPECT_EQ(others[1].get().code, Code::failed);
+  EXPECT_EQ(others[2].get().code, Code::done);
+  EXPECT_EQ(objects_in(daemon.status()), 5);
 }
 
 TEST(SceneChange, ChangesQueueInOrder) {
