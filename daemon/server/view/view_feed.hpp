@@ -159,7 +159,7 @@ class ViewFeed final : public ViewerHost {
   SceneShapes shapes_;
   ViewDoctor doctor_{of_.operations, of_.clock};
   std::deque<ViewPayloadPointer> lines_;
-  ViewPayloadPointer faults_said_;
+  ViewPayloadPointer last_sent_faults_;
   std::vector<foxglove::Parameter> pushed_;
   asio::steady_timer timer_;
   bool armed_ = false, stopping_ = false, changed_ = false;
