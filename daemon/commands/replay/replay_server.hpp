@@ -73,8 +73,8 @@ class ReplayServer {
   asio::awaitable<void> send_replies(ClientPointer client);
   asio::awaitable<void> send_datagram(ClientPointer client, const protocol::Bytes& datagram);
   asio::awaitable<void> listen_to(ClientPointer client);
-  void obey(Client& client, protocol::BytesView bytes);
-  void obey(Client& client, const protocol::Event& event);
+  void on_client_bytes(Client& client, protocol::BytesView bytes);
+  void apply(Client& client, const protocol::Event& event);
   Result<void> open_http();
   void end_if_silent();
   asio::awaitable<void> close_stream(ClientPointer client);

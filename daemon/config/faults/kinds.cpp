@@ -48,7 +48,7 @@ constexpr FaultKind table[] = {
     {"L16", "mtu-hole", 2, S::link, E::harness, "Large packets vanish.", "reports a problem of the link", 6, {}, {}, {}},
     {"L17", "address-lost", 1, S::link, E::harness, "The address is withdrawn and returns.",
      "keeps the connection or reconnects within 3 s of its return", 6, {}, {}, {}},
-    {"L18", "one-way", 1, S::link, E::harness, "What the host sends is lost.", "says that commands are not obeyed", 6, {}, {}, {}},
+    {"L18", "one-way", 1, S::link, E::harness, "What the host sends is lost.", "says that commands have no effect", 6, {}, {}, {}},
     {"L19", "loss-above-rate", 2, S::link, E::harness, "Packets are lost above a rate.", "does not stall", 6, {}, {}, {}},
 
     // ---- shape of the stream: no driver may notice
