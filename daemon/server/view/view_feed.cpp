@@ -332,7 +332,7 @@ void ViewFeed::tick() {
   }
   sync_sonars();
   const Time now = of_.clock.now();
-  if (of_.clock.stepped() && std::exchange(told_, now) != now)
+  if (of_.clock.stepped() && std::exchange(last_sent_time_, now) != now)
     each([now](ViewConnection& c) {
       if (c.viewer().playback().empty()) c.viewer().set_time(now);
       c.wake();
