@@ -89,8 +89,8 @@ class VirtualTime {
     const Config next = parsed(yaml);
     for (auto it = sonars.begin(); it != sonars.end();) {
       const auto s = it++;
-      const Fate fate = fate_of(s->config(), config, next);
-      if (fate == Fate::removed || fate == Fate::changed) {
+      const SonarChange change = sonar_change(s->config(), config, next);
+      if (change == SonarChange::removed || change == SonarChange::changed) {
         perform(*s, s->stop("the configuration changed"));
         retired.splice(retired.end(), sonars, s);
       } else {
