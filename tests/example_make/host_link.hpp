@@ -175,7 +175,7 @@ class Link {
         perform(sonar.on_ping({.ping = computed(std::move(compute->request)), .seconds = 1e-3}, now_));
       } else if (const auto* serve = std::get_if<Serve>(&action)) {
         served_ = served_ || serve->connection == id_;
-      } else if (const auto* away = std::get_if<TurnAway>(&action)) {
+      } else if (const auto* away = std::get_if<Refuse>(&action)) {
         if (away->connection == id_) id_ = 0, lost_ = true;
       } else if (const auto* finish = std::get_if<Finish>(&action)) {
         finished_.push_back(finish->connection);

@@ -146,8 +146,8 @@ asio::awaitable<void> ReplayServer::accept() {
     if (ec) continue;
     client->name = peer.address().to_string() + ":" + std::to_string(peer.port());
     if (client_) {
-      ++figures_.turned_away;
-      log_limited(log_, turned_away_limit_, LogLevel::info, "client refused: another one is being served",
+      ++figures_.refused;
+      log_limited(log_, refused_limit_, LogLevel::info, "client refused: another one is being served",
                   {{"client", client->name}});
       continue;  // closes it
     }

@@ -27,7 +27,7 @@ struct ReplayOptions {
 class ReplayServer {
  public:
   struct Figures {
-    std::uint64_t clients = 0, turned_away = 0, messages = 0, bytes = 0, times_through = 0, client_bytes = 0;
+    std::uint64_t clients = 0, refused = 0, messages = 0, bytes = 0, times_through = 0, client_bytes = 0;
   };
 
   /// The recording has been rewound. All must outlive io.run().
@@ -100,7 +100,7 @@ class ReplayServer {
   Admission admission_{limits_, log_};
   std::unique_ptr<SonarHttp> http_;  // of a device with settings over HTTP; then nothing else listens
   ClientPointer client_;
-  LogLimiter turned_away_limit_, unsent_limit_;
+  LogLimiter refused_limit_, unsent_limit_;
   Figures figures_;
   Result<void> outcome_;
   bool stopping_ = false, over_ = false, damage_logged_ = false;

@@ -223,7 +223,7 @@ constexpr FaultKind table[] = {
      {P{"ms", "60", 1, 10000}}, "delay"},
 
     // ---- clients
-    {"M01", "second-refused", 1, S::clients, E::turn_away, "New connections are refused.", "says so, and waits longer each time",
+    {"M01", "second-refused", 1, S::clients, E::refuse, "New connections are refused.", "says so, and waits longer each time",
      10, {}, {end_how}, "admission"},
     {"M02", "take-over", 1, S::clients, E::take_over, "The newest connection replaces the others.", "does not reconnect in a loop",
      30, {}, {}, "admission"},
@@ -236,7 +236,7 @@ constexpr FaultKind table[] = {
      "sees the gaps by number", 30, {}, {}, "outbox"},
     {"M06", "zero-window", 1, S::clients, E::stop_reading, "The device does not read what clients send.", "does not block", 6, {},
      {}, "reading"},
-    {"M08", "no-free-slot", 1, S::clients, E::turn_away, "New connections are reset: no slot is free.", "waits longer each time",
+    {"M08", "no-free-slot", 1, S::clients, E::refuse, "New connections are reset: no slot is free.", "waits longer each time",
      10, {}, {P{.name = "how", .value = "reset", .words = "reset fin"}}, "admission"},
     {"M09", "rejects-host-message", 1, S::clients, E::end_on_request,
      "The device ends the connection when the host sends a command.", "checks what it sends; does not reconnect in a loop", 10, {},

@@ -29,8 +29,7 @@ Faults::Admission Faults::admission() const {
     if (!e.active) continue;
     if (e.fault.kind->effect == Effect::leave_waiting) return Admission::wait;
     if (e.fault.kind->effect == Effect::take_over) return Admission::take_over;
-    if (e.fault.kind->effect == Effect::turn_away)
-      return e.fault.word("how") == "reset" ? Admission::reset : Admission::turn_away;
+    if (e.fault.kind->effect == Effect::refuse) return e.fault.word("how") == "reset" ? Admission::reset : Admission::refuse;
   }
   return Admission::as_configured;
 }

@@ -80,11 +80,11 @@ bool Connections::has_audience() const {
 
 Connections::Verdict Connections::verdict(Role role) const {
   if (role == Role::observer)
-    return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::turn_away;
+    return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::refuse;
   if (clients() < static_cast<std::size_t>(config_.max_clients)) return Verdict::serve;
   if (config_.when_full == WhenClientsFull::take_over) return Verdict::take_over;
   const bool waits = config_.when_full == WhenClientsFull::queue && waiting() < longest_queue;
-  return waits ? Verdict::wait : Verdict::turn_away;
+  return waits ? Verdict::wait : Verdict::refuse;
 }
 
 Connection& Connections::add(ConnectionId id, Role role, Peer peer, State state, const protocol::Port* port) {

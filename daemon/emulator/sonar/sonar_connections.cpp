@@ -22,16 +22,15 @@ Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const
   Actions actions;
   if (port == nullptr) port = vendor_.port(protocol::Port::Kind::tcp_stream);
   // The slots give the verdict; a fault of clients may replace it; a sonar that stops refuses all.
-  Connections::Verdict verdict = stopping_ ? Connections::Verdict::turn_away : connections_.verdict(role);
+  Connections::Verdict verdict = stopping_ ? Connections::Verdict::refuse : connections_.verdict(role);
   const auto admission = role == Role::client && !stopping_ ? faults_.admission() : Faults::Admission::as_configured;
   if (admission == Faults::Admission::wait) verdict = Connections::Verdict::wait;
   if (admission == Faults::Admission::take_over && verdict != Connections::Verdict::serve && connections_.clients() > 0)
     verdict = Connections::Verdict::take_over;
-  if (admission == Faults::Admission::turn_away || admission == Faults::Admission::reset)
-    verdict = Connections::Verdict::turn_away;
-  if (verdict == Connections::Verdict::turn_away) {
+  if (admission == Faults::Admission::refuse || admission == Faults::Admission::reset) verdict = Connections::Verdict::refuse;
+  if (verdict == Connections::Verdict::refuse) {
     if (role == Role::client) ++figures_.refused_clients;
-    actions.emplace_back(TurnAway{id, admission == Faults::Admission::reset});
+    actions.emplace_back(Refuse{id, admission == Faults::Admission::reset});
     return actions;
   }
   if (verdict == Connections::Verdict::wait) {

@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-constexpr int most_turned_away_at_once = 16;
+constexpr int most_refused_at_once = 16;
 
 }  // namespace
 
@@ -144,14 +144,14 @@ void Device::stop(const std::string& why) {
 }
 
 bool Device::gone() const {
-  return sessions_.empty() && streams_.empty() && turning_away_ == 0 && !sonar_.busy() &&
+  return sessions_.empty() && streams_.empty() && refusing_ == 0 && !sonar_.busy() &&
          std::all_of(http_.begin(), http_.end(), [](const SonarHttp& http) { return http.gone(); });
 }
 
 void Device::on_client_socket(tcp::socket socket, const protocol::Port& port) {
   if (auto place = network_.admission.enter(socket)) return on_arrival(std::move(socket), std::move(place), Role::client, &port);
   sonar_.count_refused_client();
-  turned_away_ = Visit{peer_of(socket).name, "sonard has no descriptor or place left for it"};
+  refused_ = Visit{peer_of(socket).name, "sonard has no descriptor or slot left for it"};
   close_politely(socket);
 }
 
@@ -164,7 +164,7 @@ void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, c
 }
 
 /// FIN and no byte. What the client has sent meanwhile is read away, or the kernel would answer it with RST.
-asio::awaitable<void> Device::turn_away(tcp::socket socket, Admission::Place place) {
+asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place) {
   error_code ec;
   socket.shutdown(tcp::socket::shutdown_send, ec);
   bool late = false;
@@ -308,14 +308,14 @@ void Device::carry_out(const KeepWaiting&) {
   visits_.say(VisitLog::Kind::waits, "client waits for a place", {{"waiting", sonar_.connections().waiting()}});
 }
 
-void Device::carry_out(const TurnAway& action) {
+void Device::carry_out(const Refuse& action) {
   auto arrived = arrived_.extract(action.connection);
   if (arrived.empty()) return;
   Arrived& from = arrived.mapped();
   if (from.role == Role::client)
-    turned_away_ = Visit{peer_of(from.socket).name, action.reset ? "reset by a fault" : "no place is free"};
+    refused_ = Visit{peer_of(from.socket).name, action.reset ? "reset by a fault" : "no slot is free"};
   if (action.reset) {
-    report_visit(from.role, VisitLog::Kind::turned_away, "client refused: reset", {});
+    report_visit(from.role, VisitLog::Kind::refused, "client refused: reset", {});
     error_code ec;
     from.socket.set_option(asio::socket_base::linger(true, 0), ec);
     from.socket.close(ec);  // its destructor would send FIN
@@ -323,19 +323,19 @@ void Device::carry_out(const TurnAway& action) {
   }
   if (from.role == Role::observer) {
     const std::string most = std::to_string(config().max_observers);
-    report_visit(from.role, VisitLog::Kind::turned_away, "observer refused: " + most + " observers connected", {});
+    report_visit(from.role, VisitLog::Kind::refused, "observer refused: " + most + " observers connected", {});
     return close_politely(from.socket);
   }
   const std::string most = std::to_string(config().max_clients);
-  report_visit(from.role, VisitLog::Kind::turned_away, "client refused: " + most + " already connected", {});
-  if (turning_away_ >= most_turned_away_at_once || stopping_) return;
-  ++turning_away_;
+  report_visit(from.role, VisitLog::Kind::refused, "client refused: " + most + " already connected", {});
+  if (refusing_ >= most_refused_at_once || stopping_) return;
+  ++refusing_;
   asio::co_spawn(
       network_.io,
-      [this, s = std::move(from.socket), p = std::move(from.place)]() mutable { return turn_away(std::move(s), std::move(p)); },
+      [this, s = std::move(from.socket), p = std::move(from.place)]() mutable { return refuse(std::move(s), std::move(p)); },
       [this](std::exception_ptr fault) {
         if (fault) on_fault(text_of(fault));
-        --turning_away_;
+        --refusing_;
         parent_.on_change();
       });
 }

@@ -93,7 +93,7 @@ v1::SonarStatus Device::status(Time now) const {
   s.set_asked_by(sonar_.asked_by());
   if (!sonar_.transmits()) s.set_silenced_by(silenced_by_);
   s.set_waiting(static_cast<std::uint32_t>(sonar_.connections().waiting()));
-  if (turned_away_) *s.mutable_turned_away() = message_of(*turned_away_);
+  if (refused_) *s.mutable_turned_away() = message_of(*refused_);
   if (gone_) *s.mutable_gone() = message_of(*gone_);
   if (searched_) *s.mutable_searched() = message_of(*searched_);
   fill(*s.mutable_figures(), figures());

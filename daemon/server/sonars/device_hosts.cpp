@@ -94,14 +94,14 @@ Device::StreamPointer Device::host_of(const protocol::Port& port) const {
   return nullptr;
 }
 
-/// Null: no place is free. A datagram does not wait for one.
+/// Null: no slot is free. A datagram does not wait for one.
 Device::StreamPointer Device::begin_dialogue(DatagramPort& at, const protocol::Port& port, Peer host) {
   const ConnectionId id = ++last_connection_;
   perform(sonar_.on_connect(id, Role::client, host, network_.clock.now(), &port));
   const Connection* const connection = sonar_.connections().find(id);
   if (connection == nullptr || connection->state != Connection::State::served) {
-    turned_away_ = Visit{host.name, "no place is free"};
-    if (connection != nullptr) perform(sonar_.on_closed(id, "no place is free", network_.clock.now()));
+    refused_ = Visit{host.name, "no slot is free"};
+    if (connection != nullptr) perform(sonar_.on_closed(id, "no slot is free", network_.clock.now()));
     return nullptr;
   }
   report_visit(Role::client, VisitLog::Kind::connected, "client connected", {{"client", host.name}});

@@ -78,7 +78,7 @@ class Fleet final : public DeviceParent {
     std::uint32_t index = 0;
     std::list<Device>::iterator before;  // the one it replaces, or end()
   };
-  /// What the reload did to each sonar, by its name: a word of the summary.
+  /// By the name of a sonar: the word of the summary for what the reload did to it.
   using Outcomes = std::map<std::string, std::string>;
   bool is_held(Ipv4 ip) const;
   std::vector<Opening> sort_out(const Config& now, const Config& next, Outcomes& outcomes);

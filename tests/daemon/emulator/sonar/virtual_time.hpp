@@ -133,7 +133,7 @@ class VirtualTime {
         clients[serve->connection].waits = false;
       } else if (const auto* wait = std::get_if<KeepWaiting>(&action)) {
         clients[wait->connection].waits = true;
-      } else if (const auto* away = std::get_if<TurnAway>(&action)) {
+      } else if (const auto* away = std::get_if<Refuse>(&action)) {
         clients[away->connection].closed = true;
         clients[away->connection].reset = away->reset;
       } else if (const auto* finish = std::get_if<Finish>(&action)) {
