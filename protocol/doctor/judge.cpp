@@ -115,15 +115,14 @@ class SonarJudge {
     if (sonar_.waiting() > 0)
       add(Level::warn, "places",
           counted(sonar_.waiting(), "client") + " of " + sonar_.name() + (sonar_.waiting() == 1 ? " waits" : " wait") +
-              " for a place" + holders,
+              " for a slot" + holders,
           free_a_place);
     if (is_recent(visit) && find(&sonar_, visit.address()) == nullptr)
       add(Level::fail, "places",
-          visit.address() + " was turned away from " + sonar_.name() + " at " + utc_text(visit.utc_ns()) + ": " + visit.why() +
-              holders,
+          visit.address() + " was refused by " + sonar_.name() + " at " + utc_text(visit.utc_ns()) + ": " + visit.why() + holders,
           free_a_place, visit.address());
     else if (sonar_.waiting() == 0)
-      add(Level::ok, "places", "No client of " + sonar_.name() + " was turned away in the last minute");
+      add(Level::ok, "places", "No client of " + sonar_.name() + " was refused in the last minute");
   }
 
   void check_absence() {

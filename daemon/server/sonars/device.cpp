@@ -189,7 +189,7 @@ void Device::forget_who_left() {
     if (has_left(arrived.socket)) left.push_back(id);
   for (const ConnectionId id : left) {
     arrived_.erase(id);
-    perform(sonar_.on_closed(id, "it waited for a place", network_.clock.now()));
+    perform(sonar_.on_closed(id, "it waited for a slot", network_.clock.now()));
   }
   for (const SessionPointer& session : std::vector(sessions_.begin(), sessions_.end())) session->end_if_closed();
 }
@@ -305,7 +305,7 @@ void Device::carry_out(const Serve& action) {
 }
 
 void Device::carry_out(const KeepWaiting&) {
-  visits_.say(VisitLog::Kind::waits, "client waits for a place", {{"waiting", sonar_.connections().waiting()}});
+  visits_.say(VisitLog::Kind::waits, "client waits for a slot", {{"waiting", sonar_.connections().waiting()}});
 }
 
 void Device::carry_out(const Refuse& action) {
