@@ -221,7 +221,7 @@ void write_address(Bytes& bytes, const std::optional<Field>& field, const text::
 Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
   const auto of = [&](FieldName name) { return vendor.field(Part::beacon, name, bytes); };
   const std::string& address = fault.word("address");
-  if (address == "stranger") {
+  if (address == "foreign") {
     write_address(bytes, of(FieldName::address), address_from("link-local"));
     return bytes;
   }
