@@ -54,7 +54,9 @@ void Sonar::serve(Connection& connection, Time now, Actions& actions) {
   update_depth(now);
   connection.state = Connection::State::served;
   connection.dialogue = vendor_.converse(*connection.port, state_, unskipped(now));
+  // Serve makes the session that later actions name, such as the ReadFrom of a fault.
   actions.emplace_back(Serve{connection.id});
+  // Observers are in no figures and change neither settings nor the rate of pings.
   if (connection.role == Role::observer) return;
   connection.number = ++figures_.clients;
   on_membership(now, actions);
@@ -162,6 +164,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool
   if (connection == nullptr) return actions;
   const Role connection_role = connection->role;
   const bool was_client = connection_role == Role::client && connection->state == Connection::State::served;
+  // Pings that a fault holds back are offered to the outbox before it drops them, so that the accounts balance.
   for (Connection::Held& held : connection->held) connection->outbox.push_ping(std::move(held.ping));
   connection->outbox.end(connection->finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection->peer.name, connection->role, connection->state != Connection::State::waiting,
@@ -178,6 +181,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool
     on_membership(now, actions);
     return actions;
   }
+  // Before serve(), which calls on_membership(): then the next client counts as audience, and the settings would stay.
   if (!connections_.has_audience()) use_initial_settings();
   serve(*next, now, actions);
   return actions;
@@ -213,6 +217,7 @@ Actions Sonar::on_bytes(ConnectionId id, protocol::BytesView bytes, Time now) {
   Connection* const from = connections_.find(id);
   if (from == nullptr || from->dialogue == nullptr) return actions;
   from->bytes_read += bytes.size();
+  // The bytes may make the dialogue's next tick due at once.
   from->not_before = {};
   if (from->finishing) return actions;
   if (const auto verdict = faults_.on_bytes(from->peer.name, now);
@@ -295,6 +300,7 @@ void Sonar::on_written(ConnectionId id, const Outbox::Message& message, Time now
   if (to == nullptr) return;
   to->outbox.written();
   if (to->role == Role::observer || message.ping == 0) return;
+  // The datagrams of a stream count for each client that receives them.
   for (Connection& c : connections_.all()) {
     if (to->role != Role::stream || c.role != Role::client || !c.receives(to->receivers.front().stream)) continue;
     ++c.streamed_pings;

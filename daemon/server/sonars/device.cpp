@@ -4,7 +4,6 @@
 #include <array>
 
 #include "daemon/server/system/listen.hpp"
-#include "protocol/doctor/check_status.hpp"
 
 namespace sonar {
 namespace {
@@ -90,7 +89,7 @@ Result<DatagramPort*> Device::datagram_port(std::uint16_t number) {
   for (DatagramPort& port : datagram_ports_)
     if (number != 0 && port.number() == number) return &port;
   DatagramPort& port = datagram_ports_.emplace_back(network_.io);
-  // Where devices are searched for, hosts bind that port too. That a sonar is started twice shows at its other ports.
+  // Hosts bind the port of discovery too, so it is shared. A sonar that is started twice is noticed at its other ports.
   const auto ports = sonar_.vendor().ports();
   const bool shared = std::any_of(ports.begin(), ports.end(), [&](const protocol::Port& p) {
     return p.kind == protocol::Port::Kind::udp_answer && p.number == number;
@@ -108,13 +107,6 @@ Result<void> Device::open_observers() {
 
 Endpoint Device::data_endpoint() const { return tcp_ports_.empty() ? Endpoint{} : tcp_ports_.front().listener.at(); }
 
-std::vector<protocol::DriverAddress> Device::addresses() const {
-  std::vector<Endpoint> status_to;
-  for (const udp::endpoint& to : status_destinations()) status_to.push_back({to.address().to_v4().to_bytes(), to.port()});
-  const Ipv4 ip = config().bind_ip == Ipv4{} ? sonar_.state().advertise_ip : config().bind_ip;
-  return protocol::driver_addresses(sonar_.vendor(), ip, status_to);
-}
-
 void Device::start() {
   started_ = true;
   const auto fault = [this](const std::string& what) { on_fault(what); };
@@ -131,13 +123,14 @@ void Device::start() {
 
 void Device::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
+  // Listeners first: no client may arrive while the present ones are finished.
   for (TcpPort& tcp : tcp_ports_) tcp.listener.stop();
   observer_listener_.stop();
   beacon_.stop();
   timer_.cancel();
   for (SonarHttp& http : http_) http.stop();
   visits_.end();
-  if (started_) parent_.on_stop(*this, why);  // else one of the same name may go on
+  if (started_) parent_.on_stop(*this, why);  // a device that was never started may have the name of one that goes on
   perform(sonar_.stop(why));
   for (DatagramPort& port : datagram_ports_) port.stop();
   if (!started_) streams_.clear();
@@ -156,6 +149,7 @@ void Device::on_client_socket(tcp::socket socket, const protocol::Port& port) {
 }
 
 void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port) {
+  // A slot whose client has hung up must be free before this one is judged.
   forget_who_left();
   const ConnectionId id = ++last_connection_;
   Peer peer = peer_of(socket);
@@ -240,18 +234,14 @@ void Device::on_over(ConnectionId id, const std::string& why, bool by_client) {
     digests_.push_back({connection->number, session->digest().size(), session->digest().hex()});
   sessions_.remove(session);
   streams_.remove_if([id](const StreamPointer& s) { return s->id() == id; });
+  // The freed slot goes to the client that has waited longest: not to one that has hung up.
   forget_who_left();
   perform(sonar_.on_closed(id, why, network_.clock.now(), by_client));
 }
 
-std::vector<StreamDigest> Device::digests() const {
-  auto all = digests_;
-  std::sort(all.begin(), all.end(), [](const StreamDigest& a, const StreamDigest& b) { return a.client < b.client; });
-  return all;
-}
-
 // ---- actions
 
+/// Actions are carried out in order: later ones may name the session that a Serve among them makes.
 void Device::perform(Actions actions) {
   for (Action& action : actions) std::visit([this](auto& a) { carry_out(a); }, action);
   arm();
@@ -259,6 +249,7 @@ void Device::perform(Actions actions) {
 }
 
 void Device::arm() {
+  // In stepped time the Stepper ticks the sonar.
   if (stopping_ || network_.clock.stepped()) return;
   const auto next = sonar_.next_tick();
   const auto at = next ? std::optional(network_.clock.timer_at(*next)) : std::nullopt;
@@ -328,6 +319,7 @@ void Device::carry_out(const Refuse& action) {
   }
   const std::string most = std::to_string(config().max_clients);
   report_visit(from.role, VisitLog::Kind::refused, "client refused: " + most + " already connected", {});
+  // Beyond the limit the socket is closed without reading: the client may see a reset in place of a FIN.
   if (refusing_ >= most_refused_at_once || stopping_) return;
   ++refusing_;
   asio::co_spawn(
