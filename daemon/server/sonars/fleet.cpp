@@ -56,7 +56,7 @@ std::string Fleet::problem() const {
   return {};
 }
 
-/// The place in the configuration, unless a sonar has it that goes on or was given it just now.
+/// The position in the configuration, or the first free index if a sonar that continues or was just opened has that.
 std::uint32_t Fleet::free_index(std::size_t wanted, const std::vector<Opening>& given) const {
   const auto taken = [&](std::uint32_t index) {
     return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) { return d.sonar().index() == index; }) ||
@@ -108,7 +108,7 @@ bool Fleet::is_held(Ipv4 ip) const {
   });
 }
 
-/// Sonars that live on move to where the new configuration has them; what is to be opened anew is returned.
+/// Sonars that continue get the mount and vehicle of the new configuration; those to be opened are returned.
 std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& next, Outcomes& outcomes) {
   std::vector<Opening> openings;
   for (auto it = devices_.begin(); it != devices_.end();) {
@@ -131,7 +131,7 @@ std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& nex
   return openings;
 }
 
-/// The one before goes on, if its vehicle does.
+/// The previous sonar continues if its vehicle is in the new configuration.
 void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Config& next) {
   SonarConfig is = device->config();
   const auto vehicle = std::find_if(next.vehicles.begin(), next.vehicles.end(),
@@ -145,7 +145,9 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   Change change;
   Outcomes outcomes;
   std::vector<Opening> openings = sort_out(now, next, outcomes);
-  std::vector<Opening> after;  // at an address that a sonar still holds which will be stopped
+  std::vector<Opening> after;  // at addresses that a sonar still holds which will be stopped
+  // Three passes, so that sonars can swap addresses and none stops in vain: open at free addresses while the previous sonar still
+  // serves, stop those whose address is needed, open at these addresses.
   for (const Opening& o : openings) {
     const bool changed = o.before != devices_.end();
     outcomes[o.sonar->name] = changed ? "changed" : "added";
