@@ -44,6 +44,7 @@ std::size_t Connections::count(Role role, State state) const {
       std::count_if(all_.begin(), all_.end(), [&](const Connection& c) { return c.role == role && c.state == state; }));
 }
 
+/// Connections are in the order of their arrival.
 Connection* Connections::oldest_client() {
   const auto it = std::find_if(all_.begin(), all_.end(),
                                [](const Connection& c) { return c.role == Role::client && c.state == State::served; });
@@ -65,6 +66,7 @@ std::vector<protocol::Endpoint> Connections::receivers(const Connection& stream)
   const std::size_t number = stream.receivers.front().stream;
   std::vector<protocol::Endpoint> all;
   for (const Connection& c : all_) {
+    // The list of the device belongs to the stream itself; those of clients count while they are served.
     const bool counts = c.role == Role::stream ? c.id == stream.id : !c.finishing && c.state == State::served;
     for (const protocol::SetReceivers& list : c.receivers)
       for (const protocol::Endpoint& to : list.to)
