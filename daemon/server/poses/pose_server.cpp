@@ -193,7 +193,7 @@ asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
   }
 }
 
-/// Some of the lines that have come; what they cost is added.
+/// Processes lines of up to work_of_a_turn bytes and adds their cost to `work`.
 PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   for (std::size_t taken = 0; taken < work_of_a_turn;) {
     const auto line = c.lines.next();
@@ -212,7 +212,7 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   return Turn::not_over;
 }
 
-/// The others' turns; longer when it sends more than limits allow it, or its share of all.
+/// Gives other connections their turns. The pause is longer if this one sent more than its limit or its share of all.
 asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
   const auto pause = std::max(c.rate.pause_after(work.bytes, now), together_.pause_after(c.of_all, work.bytes, now));
