@@ -22,8 +22,8 @@ using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 using Kind = protocol::HostPort::Kind;
 
-constexpr auto probe_patience = 300ms;         // where any make may be
-constexpr auto answer_patience = 3000ms;       // minimum for a sonar that is there, which may be computing
+constexpr auto probe_patience = 300ms;         // for each make, while the make is not known
+constexpr auto answer_patience = 3000ms;       // minimum for a sonar that is there: it may be computing
 constexpr auto connect_patience = 2000ms;      // for streams, before other kinds of ports are tried
 constexpr int receive_buffer_bytes = 4 << 20;  // a few pings
 constexpr const char* is_sonard_there = ". Is sonard running there? Its banner names the address of each sonar";
@@ -118,7 +118,7 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
       if (is_over(stream) || (by_http && make != nullptr)) return stream;  // in a search another web server may be there
       if (streams.empty()) failed = stream.error();
     }
-    ::poll(nullptr, 0, 20);  // a port that refuses does so at once
+    ::poll(nullptr, 0, 20);  // no busy loop: a port that refuses answers at once
   }
 }
 

@@ -31,12 +31,12 @@ const SonarConfig* sonar_named(const std::vector<SonarConfig>& sonars, const std
   return it == sonars.end() ? nullptr : &*it;
 }
 
-Fate fate_of(const SonarConfig& running, const Config& now, const Config& next) {
+SonarChange sonar_change(const SonarConfig& running, const Config& now, const Config& next) {
   const SonarConfig* const wanted = sonar_named(next.sonars, running.name);
-  if (wanted == nullptr) return Fate::removed;
-  if (!is_same_device(running, *wanted)) return Fate::changed;
+  if (wanted == nullptr) return SonarChange::removed;
+  if (!is_same_device(running, *wanted)) return SonarChange::changed;
   const bool stays = now.vehicles[running.vehicle].name == next.vehicles[wanted->vehicle].name && running.mount == wanted->mount;
-  return stays ? Fate::untouched : Fate::moved;
+  return stays ? SonarChange::untouched : SonarChange::moved;
 }
 
 }  // namespace sonar

@@ -8,9 +8,9 @@
 namespace sonar {
 
 /// untouched and moved: it keeps its clients; changed: it is replaced; removed: it stops.
-enum class Fate { untouched, moved, changed, removed };
-/// Outcome for a sonar that runs as `running`, when `next` takes the place of `now`.
-Fate fate_of(const SonarConfig& running, const Config& now, const Config& next);
+enum class SonarChange { untouched, moved, changed, removed };
+/// Change of a sonar that runs as `running`, when `next` takes the place of `now`.
+SonarChange sonar_change(const SonarConfig& running, const Config& now, const Config& next);
 
 /// Null when there is none.
 const SonarConfig* sonar_named(const std::vector<SonarConfig>& sonars, const std::string& name);

@@ -86,10 +86,10 @@ void App::log_new_notes() {
 }
 
 Result<void> App::open() {
-  if (options_.handle_signals) {  // before anybody can read that we are ready
+  if (options_.handle_signals) {  // before a program can read that sonard is ready
     signals_.add(SIGINT);
     signals_.add(SIGTERM);
-    signals_.add(SIGHUP);  // else it would end us at once, without a word to the clients
+    signals_.add(SIGHUP);  // by default it ends the process in the middle of messages
   }
   if (!config_.faults.journal.empty())
     if (auto r = fault_log_.open(config_.faults.journal); !r) return r;
@@ -156,7 +156,7 @@ void App::stop(const std::string& why) {
   changes_.stop();
   fleet_.stop();
   recordings_.finish();
-  // Clients have been sent away by then. What still holds us up, a long ping say, is not waited for.
+  // Clients are finished by then. A long ping, for example, is not waited for.
   stop_timer_.expires_after(stop_limit);
   stop_timer_.async_wait([this](const error_code& ec) {
     if (ec) return;
@@ -206,6 +206,7 @@ void App::take_over(Config next) {
   const bool other_water = !(config_.water == next.water);
   std::swap(config_, next);  // devices read it through their context
   const Config& before = next;
+  // The World before the fleet: sonars that move or open look up their vehicle in it.
   world_.use_rules(pose_rules(config_));
   world_.use_vehicles(vehicles_of(config_), clock_.now());
   world_.use_objects(bodies_of(scene(), config_), clock_.now());

@@ -25,7 +25,7 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   if (!std::all_of(devices.begin(), devices.end(), [](const Device& d) { return d.sonar().settled(); })) return false;
   const Due due = next_due();
   const SteppedTime::Bound bound = time_.bound(is_first(due.request, due.ping) ? due.request : due.ping);
-  // Before the ping that is due at the same moment.
+  // A conversation comes before the ping that is due at the same moment.
   const bool converses = is_first(due.conversation, due.ping) || due.conversation == due.ping;
   const std::optional<Time> next = converses ? due.conversation : due.ping;
   // A tick at this very moment needs no time to pass.
@@ -37,7 +37,7 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   if (!may_come) return false;
   advance(time_.tick_at(*next));
   if (converses)
-    on_change_();  // what it made them say, or ask for, may be taken or due before the rest
+    on_change_();  // replies and requests that the tick caused may come before the next ping
   else
     due.pings->step();
   return false;
@@ -48,7 +48,7 @@ void Stepper::advance(Time to) {
   for (Device& d : fleet_.devices()) d.tick_sessions();
 }
 
-/// Stamps that time follows began, or jumped ahead.
+/// With clock: follow, time jumps to the first stamp, and ahead with the stamps of a single vehicle.
 void Stepper::skip() {
   const auto skipped = world_.take_skipped();
   if (skipped.count() == 0) return;

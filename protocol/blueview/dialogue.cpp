@@ -35,6 +35,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     framer_.append(received);
     while (const auto frame = framer_.next()) {
       on_frame(*frame, now, reaction);
+      // Frames behind one that closes the connection have no effect.
       if (!reaction.events.empty() && std::holds_alternative<Close>(reaction.events.back())) return reaction;
     }
     if (!framer_.broken().empty()) reaction.events.emplace_back(Close{framer_.broken()});
@@ -53,6 +54,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
       subscription_->wanted = true;
       // A single ping that a host requested of another head comes first; else a quick subscription would always be served.
       if (!ping_pending || settings_.active_head == subscription_->head) ask_for_ping(subscription_->head, reaction);
+      // Intervals that have passed are skipped: a late tick asks for one ping, not for a burst.
       subscription_->next += ((now - subscription_->next) / subscription_->interval + 1) * subscription_->interval;
     }
     if (now >= spoke_at_ + keep_alive_after) reaction.replies.push_back(make_frame(FrameType::keep_alive, 0, {}));
@@ -94,7 +96,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
       subscription_->wanted = false;
     }
     const bool subscriber_waits = subscription_ && subscription_->wanted;
-    if (!waiting_.empty() || subscriber_waits) {  // for another head, or with other settings: that one is next
+    if (!waiting_.empty() || subscriber_waits) {  // for another head, or with other settings: that ping is requested next
       Reaction reaction;
       settings_ = settings_from(device_.settings.get(), device_);
       ask_for_ping(waiting_.empty() ? subscription_->head : waiting_.front().head, reaction);
@@ -152,6 +154,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const auto head = head_of(id);
     if (reader.ok() && !head) return refuse(frame, Code::no_head, "no head " + std::to_string(id), reaction);
     if (head) on_head_frame(frame, *head, reader, now, reaction);
+    // Handlers of a frame that is too short return without a reply; it is refused here, once.
     if (!reader.ok()) refuse(frame, Code::bad_parameter, reader.failure_text(), reaction);
   }
 

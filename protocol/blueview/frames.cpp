@@ -94,6 +94,7 @@ std::optional<Frame> Framer::next() {
   Frame frame;
   wire::Reader reader(left.first(header_size));
   fields(reader, frame.header);
+  // Lengths of a broken frame cannot be trusted, so there is no way back into the stream: the connection ends.
   if (frame.header.magic != magic) {
     broken_ = "is not a BVE1 link: a frame has another magic number";
     return std::nullopt;

@@ -36,6 +36,7 @@ Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, 
                 static_cast<double>(stop), static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m));
   if (!fine && strict) return refused(Code::bad_range, text);
   const float shortest = std::max(0.1f, 0.01f * mode.max_range_m);
+  // The stop first: the start then has room below it.
   head.stop_m = std::clamp(stop, mode.min_range_m + shortest, mode.max_range_m);
   head.start_m = std::clamp(start, 0.0f, head.stop_m - shortest);
   if (key == Key::range) return {Value(FloatPair{head.start_m, head.stop_m}), {}};
@@ -184,13 +185,15 @@ PingSettings ping_settings(const SonarSettings& all, const protocol::DeviceState
   s.range_bin_m = grid.bin_m;
   s.row_centre = grid.row_centre;
   s.range_m = s.range_bin_count * grid.bin_m;
-  s.pulse_width_m = static_cast<float>(grid.bin_m);  // DS: the pulse is as long as the bin
+  s.pulse_width_m = static_cast<float>(grid.bin_m);  // data sheets: the pulse is as long as the bin
   s.rate_hz = head.ping_interval_ms > 0 ? std::min(1000.0f / static_cast<float>(head.ping_interval_ms), device.model->max_rate_hz)
                                         : device.model->max_rate_hz;
+  // A head transmits on request only; a subscription requests each of its pings.
   s.triggered = true;
   s.transmit = head.transmit != 0;
   s.gain_db = base_gain_db + head.gain_db;
   s.device_sound_speed_mps = static_cast<float>(head.sound_speed_mps);
+  // Salt and fresh water are assumptions of the host; `other` takes the water as it is.
   Water believed = device.water;
   if (head.fluid == 0) believed.salinity_psu = std::max(believed.salinity_psu, 30.0);
   if (head.fluid == 1) believed.salinity_psu = 0;

@@ -13,8 +13,8 @@ namespace {
 
 using text::format;
 
-constexpr double soon_s = 1;     // a driver that does right has fired and has read within
-constexpr double recent_s = 60;  // visits before are of no interest
+constexpr double soon_s = 1;     // a correct driver has fired and has read within
+constexpr double recent_s = 60;  // older visits are not reported
 constexpr double enough_of_rate = 0.9;
 constexpr std::size_t most_elsewhere = 4;
 
@@ -61,7 +61,7 @@ const v1::ClientStatus* find(const v1::SonarStatus* in, const std::string& addre
   return nullptr;
 }
 
-/// Those that act, one finding for what was asked for: its kinds are faults of their own.
+/// One finding for each fault or trouble that acts; a trouble lists its kinds, which are faults of their own.
 void check_faults(const v1::DaemonStatus& status, std::vector<Finding>& findings) {
   std::map<std::pair<std::string, std::string>, std::string> codes;  // of what, by sonar and what
   std::set<std::pair<std::string, std::string>> ending;
@@ -115,15 +115,14 @@ class SonarJudge {
     if (sonar_.waiting() > 0)
       add(Level::warn, "places",
           counted(sonar_.waiting(), "client") + " of " + sonar_.name() + (sonar_.waiting() == 1 ? " waits" : " wait") +
-              " for a place" + holders,
+              " for a slot" + holders,
           free_a_place);
     if (is_recent(visit) && find(&sonar_, visit.address()) == nullptr)
       add(Level::fail, "places",
-          visit.address() + " was turned away from " + sonar_.name() + " at " + utc_text(visit.utc_ns()) + ": " + visit.why() +
-              holders,
+          visit.address() + " was refused by " + sonar_.name() + " at " + utc_text(visit.utc_ns()) + ": " + visit.why() + holders,
           free_a_place, visit.address());
     else if (sonar_.waiting() == 0)
-      add(Level::ok, "places", "No client of " + sonar_.name() + " was turned away in the last minute");
+      add(Level::ok, "places", "No client of " + sonar_.name() + " was refused in the last minute");
   }
 
   void check_absence() {
@@ -222,6 +221,7 @@ class SonarJudge {
                  "see the reason in sonard's log");
     if (status_.clock() != "realtime") return;
     const auto made = static_cast<double>(f.pings() - std::min(f.pings(), then.pings()));
+    // Both statuses have the mean computing time since the start; this is the mean between them.
     const double ms =
         made > 0
             ? (f.simulation_ms() * static_cast<double>(f.pings()) - then.simulation_ms() * static_cast<double>(then.pings())) /
@@ -245,7 +245,7 @@ class SonarJudge {
   std::vector<Finding>& findings_;
 };
 
-/// Finds what time waits for where it does not pass by itself.
+/// In stepped time: finds what the time waits for.
 void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, std::vector<Finding>& findings) {
   if (now.clock() == "realtime") return findings.push_back({Level::ok, "clock", "Time runs: clock: realtime", ""});
   const v1::ClientStatus* slowest = nullptr;

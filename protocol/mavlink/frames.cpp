@@ -107,6 +107,7 @@ std::optional<Frame> FrameReader::checked(const Header& h) {
     return std::nullopt;
   }
   const std::size_t behind = h.before + h.frame.payload_size;
+  // The checksum ends with the CRC_EXTRA of the message: a dialect with another layout under this number fails here.
   const std::uint16_t is = checksum(std::array{std::byte{message->crc_extra}}, checksum(rest_.subspan(1, behind - 1)));
   const auto stated = std::to_integer<unsigned>(rest_[behind]) | std::to_integer<unsigned>(rest_[behind + 1]) << 8;
   if (is != stated) {
@@ -141,6 +142,7 @@ std::optional<Frame> FrameReader::next() {
 
 Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Identity& sender) {
   payload = payload.first(std::min(payload.size(), largest_payload));
+  // MAVLink 2 omits zeros at the end of a payload, but keeps its first byte.
   while (payload.size() > 1 && payload.back() == std::byte{0}) payload = payload.first(payload.size() - 1);
   Bytes out;
   out.reserve(header_2 + largest_payload + checksum_size);

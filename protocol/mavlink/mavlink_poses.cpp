@@ -56,6 +56,7 @@ MavlinkPoses::MavlinkPoses(Settings settings, InjectFailure inject) : settings_(
 // ---- selection of the vehicle
 
 void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
+  // The state below belongs to the previous vehicle.
   system_ = self_.system = system;
   found_at_ = now;
   next_request_ = now;
@@ -122,7 +123,7 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   }
   FrameReader frames(datagram);
   while (const auto frame = frames.next()) {
-    if (frame->id == CommandLong::id) {  // of a ground station, as a rule
+    if (frame->id == CommandLong::id) {  // usually sent by a ground station, not by the vehicle
       on_command(message_in<CommandLong>(*frame), *frame, out);
       continue;
     }
@@ -138,7 +139,7 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   return out;
 }
 
-/// Obeys one command only, addressed to this very component: others of the system have failures of their own.
+/// Accepts one command only, addressed to this component: other components of the system have failures of their own.
 void MavlinkPoses::on_command(const CommandLong& command, const Frame& frame, Reaction& out) {
   const bool is_ours = command.target_system == self_.system && command.target_component == own_component;
   if (!is_ours || command.command != CommandLong::inject_failure) return;
@@ -176,6 +177,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
     case Heartbeat::id:
       return handle(message_in<Heartbeat>(frame), frame);
     case Attitude::id:
+      // Autopilots send one attitude in both forms: that with a quaternion has priority.
       if (!received_within(AttitudeQuaternion::id, at.now, source_silence)) handle(attitude_of(message_in<Attitude>(frame)), at);
       return;
     case AttitudeQuaternion::id:
@@ -227,6 +229,7 @@ void MavlinkPoses::handle(const GlobalPositionInt& m, Moment at) {
   const auto fix = geodetic_of(m);
   global_has_fix_ = fix && fix->has_value();
   const auto place = placed(GlobalPositionInt::name, fix, at);
+  // Without a fix, or of a submarine without world.origin, the message still gives the depth.
   const bool is_depth = fix && !place && (!global_has_fix_ || (is_submarine_ && !settings_.origin));
   if (is_depth)
     depth_ = Depth{m.boot_ms, -1e-3 * m.height_mm, 0.01 * m.down_cmps, at.now, GlobalPositionInt::id};
@@ -313,6 +316,7 @@ std::optional<Pose> MavlinkPoses::placed(std::string_view message, const Result<
 }
 
 void MavlinkPoses::add_pose(Source source, const RawPose& raw, Stamp stamp, const Pose& enu_in_world, Moment at) {
+  // Sources are in the order of preference: a pose is dropped while a better source sends.
   for (std::size_t better = 0; better < index_of(source); ++better)
     if (last_pose_[better] && at.now - *last_pose_[better] <= source_silence) return;
   if (settings_.needs_time && stamp.domain == ClockDomain::arrival) {
@@ -343,6 +347,7 @@ Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
 }
 
 void MavlinkPoses::note_boot_time(std::int64_t ms) {
+  // A clock that goes back further than late packets do is that of a restarted autopilot.
   if (ms < newest_boot_ms_ - late_ms) clear_histories();
   newest_boot_ms_ = std::max(newest_boot_ms_, ms);
 }

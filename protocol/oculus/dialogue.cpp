@@ -20,7 +20,7 @@ using protocol::RequestPing;
 using protocol::StoreAddress;
 
 constexpr std::size_t notices_per_call = 8;               // bounds the log output that a hostile client can cause
-constexpr auto greeting_after = std::chrono::seconds(2);  // without a fire message: drivers that fire by themselves do so at once
+constexpr auto greeting_after = std::chrono::seconds(2);  // silence before the text of 6.1; drivers that do not wait fire earlier
 
 /// One client's conversation (docs/protocols/oculus.md, section 1). Three states:
 /// - Until the first valid fire message: a dummy after each period of silence, and the text of 6.1 to a client that stays silent.
@@ -39,6 +39,7 @@ class OculusDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
+    // The events of this call act after it: a write is kept here for a read in the same bytes.
     stored_ = device_.stored_address;
     const std::uint64_t skipped_before = framer_.skipped_bytes();
     framer_.append(received);
@@ -67,6 +68,7 @@ class OculusDialogue final : public protocol::Dialogue {
   }
   void on_ping_queued(Time now) override {
     is_not_waiting();
+    // Remembered, because another client's settings may replace those that this one fired.
     is_heard_ = is_heard();
     requested_ping_ = false;
     postpone_dummy(now);
@@ -107,6 +109,7 @@ class OculusDialogue final : public protocol::Dialogue {
     last_request_ = request;
     // Drivers repeat a fire message for every ping: a repeat is applied again, but its standby is not acknowledged again.
     const bool one_ping = resolved.settings.triggered && !standby;
+    // Before fired_ is replaced: is_heard() compares it with the settings of the device.
     is_heard_ = is_heard();
     fired_ = std::make_shared<HeldFire>(*fire);
     reaction.events.emplace_back(ChangeSettings{resolved.settings, fired_, summary(*fire, resolved)});
@@ -118,15 +121,16 @@ class OculusDialogue final : public protocol::Dialogue {
     }
   }
 
-  /// A driver may take a dummy as the echo of standby, and stores that as its ping rate: there is none while it waits for pings,
-  /// however long they take. With network trigger the device waits for the client. An observer's fire messages change nothing.
+  /// A client that waits for pings is sent no dummy, however long they take: the driver of ENSTA takes a dummy as the echo of
+  /// standby and stores that as its ping rate. With network trigger the device waits for the client, so dummies are sent. Fire
+  /// messages of an observer change nothing.
   bool expects_pings() const {
     const auto* held = dynamic_cast<const HeldFire*>(device_.settings.get());
     if (!is_heard() || held == nullptr || table_rate_hz(held->fire.settings.ping_rate) <= 0) return false;
     return requested_ping_ || (held->fire.settings.flags & flag::network_trigger) == 0;
   }
 
-  /// The device has taken settings of this client, now or earlier.
+  /// Whether the device uses settings of this client or has used them.
   bool is_heard() const { return is_heard_ || (fired_ != nullptr && device_.settings == fired_); }
 
   static std::string summary(const FireRequest& fire, const ResolvedSettings& resolved) {
@@ -145,6 +149,7 @@ class OculusDialogue final : public protocol::Dialogue {
       stored_ = {config.ip_address, config.ip_mask, config.dhcp_enable != 0};
       reaction.events.emplace_back(StoreAddress{stored_});
     }
+    // A write is not answered by default: the vendor's viewer reads the values back itself.
     if (write && text_option(device_.options, option_name::user_config_write) != "reply") return;
     reaction.replies.push_back(make_user_config(device_.id, stored_, device_));
     postpone_dummy(now);  // the only client that reads it accepts the first 28 bytes as its answer
@@ -171,7 +176,7 @@ class OculusDialogue final : public protocol::Dialogue {
   std::shared_ptr<const VendorSettings> fired_;  // by the last fire message
   bool is_heard_ = false, requested_ping_ = false;
   std::optional<Time> greeting_at_;
-  bool greets_silent_ = false;  // only a client that has neither fired nor been sent a ping by then
+  bool greets_silent_ = false;  // the text is for a client that by then has neither fired nor been sent a ping
   std::size_t notices_ = 0;
 };
 

@@ -31,6 +31,7 @@ std::optional<std::size_t> message_length(const MessageHeader& header, Sender se
     if (header.payload_size > reply_limit - header_size) return std::nullopt;
     return header_size + header.payload_size;
   }
+  // Several drivers send payload size 0 before 37 bytes of payload: 0 means the natural length of the type.
   if (header.payload_size > request_payload_limit) return std::nullopt;
   return header.payload_size == 0 ? natural_length(header) : header_size + header.payload_size;
 }
@@ -45,6 +46,7 @@ std::optional<wire::BytesView> Framer::next() {
   while (buffered_bytes() > 0) {
     const auto waiting = wire::BytesView(buffer_).subspan(begin_);
     const bool starts_like_header = waiting[0] == first_magic && (waiting.size() < 2 || waiting[1] == second_magic);
+    // Bytes that may become a header wait for the rest of it.
     if (starts_like_header && waiting.size() < header_size) return std::nullopt;
     const auto length = starts_like_header ? message_length(header_of(waiting), sender_) : std::nullopt;
     if (length) {
@@ -52,6 +54,7 @@ std::optional<wire::BytesView> Framer::next() {
       begin_ += *length;
       return waiting.first(*length);
     }
+    // One byte at a time: a false start hides no message.
     ++begin_;
     ++skipped_;
   }

@@ -93,7 +93,7 @@ class OculusHost final : public protocol::Host {
     is_satisfied_ = is_satisfied_ || out.echo_mismatches.empty();
     out.picture = [kept = std::make_shared<const DecodedPing>(std::move(ping))] { return picture_of(*kept); };
     actions.emplace_back(std::move(out));
-    // As strict drivers: the request is repeated until an echo matches it. A network trigger: one ping a request.
+    // As strict drivers do, the request is repeated until an echo matches it. With network trigger each ping needs a request.
     if (triggered_ || !is_satisfied_) ask(actions);
   }
 
@@ -120,6 +120,7 @@ Result<FireRequest> fire_from(const protocol::Wanted& wanted) {
   };
   const protocol::SettingsOverride& from = wanted.settings;
   FireRequest fire;
+  // 32-bit samples and the time in seconds need the long form of version 2.
   fire.version = static_cast<std::uint16_t>(from.sample_bits == 32u ? 2 : number("version", wanted.stamped ? 2 : 0));
   FireSettings& s = fire.settings;
   if (from.mode > 1u) return failure(ErrorKind::usage, "an Oculus has modes 1 and 2");

@@ -58,6 +58,7 @@ double highest_rate_hz(const FireSettings& fire, const PingSettings& settings, c
 
 }  // namespace
 
+/// Exact in the captured pings; the authors of liboculus measured the doubling on an M1200d (docs/protocols/oculus.md, 5.4).
 RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz) {
   RowGrid law{sound_speed_mps / (2 * rate_hz), 1};
   while (range_m / law.spacing_m > row_limit) law.spacing_m *= 2;
@@ -106,12 +107,15 @@ bool asks_for_gain_assist(const FireSettings& fire, std::string_view option) {
   return (option == "flag_set" && bit) || (option == "flag_clear" && !bit);
 }
 
+/// In the high mode the echo is 40 + 0.6 g, which the driver of ENSTA inverts. With gain assist it repeats the request, as in the
+/// captured pings (docs/protocols/oculus.md, 5.5).
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo) {
   const bool high_frequency = fire.mode == 2;
   const bool mapped = gain_echo == "mapped" || (gain_echo != "verbatim" && (fire.flags & flag::gain_assist) == 0);
   return high_frequency && mapped ? 40 + 0.6 * fire.gain_percent : fire.gain_percent;
 }
 
+/// The gain used plus 20 log r: close to the row gains that an M750d stated (docs/protocols/oculus.md, 5.2).
 std::vector<std::uint32_t> digital_row_gains(const PingSettings& settings) {
   std::vector<std::uint32_t> gains;
   gains.reserve(static_cast<std::size_t>(settings.range_bin_count));
@@ -171,6 +175,7 @@ ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& d
   FireSettings used = asked;
   used.gain_percent = clamped(asked.gain_percent, 0, 100, "gain", "%", out.clamped);
   const bool scientific = settings.format.bits == 32;
+  // 32 bits carry the gain as requested, without the mapping of the echo.
   const double percent =
       scientific ? used.gain_percent : echoed_gain_percent(used, text_option(device.options, option_name::gain_echo));
   settings.gain_db = static_cast<float>(db_per_percent * percent);

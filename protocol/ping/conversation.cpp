@@ -25,7 +25,7 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
   protocol::Reaction reaction;
   framer_.append(received);
   while (const auto frame = framer_.next()) {
-    // One answer a datagram: its sender may be another than it says.
+    // One answer a datagram, because the address of its sender may be forged.
     const bool is_all = header_size + frame->header.length + sum_size == received.size();
     if (!by_datagrams_ || frame->sum_is_right || is_all) on_frame(*frame, now, reaction);
     if (by_datagrams_ && frame->sum_is_right) break;
@@ -60,7 +60,7 @@ void Conversation::on_general_request(const Frame& frame, Time now, protocol::Re
     answer = framed_message(wanted, id_, ProtocolVersion{});
   else
     answer = message_now(wanted, now);
-  // The number of the message that is not there: a host waits for that one.
+  // The nack has the number of the missing message, because the host waits for that one.
   reaction.replies.push_back(answer.empty() ? nack(wanted, id_, "unknown message") : std::move(answer));
 }
 

@@ -84,7 +84,7 @@ PingSettings ping_settings(const Settings& settings) {
   const double shortest_s = 2 * s.range_m / static_cast<double>(settings.speed_mps) + processing_s;
   s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
   s.gain_db = static_cast<float>(db_per_gain * std::max<int>(p.gain, 0));
-  s.tvg = false;  // hosts do that
+  s.tvg = false;  // hosts apply it
   s.device_sound_speed_mps = settings.speed_mps;
   s.format = {.bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -80, .ceiling_db = 80};
   return s;

@@ -32,11 +32,15 @@ class Ping360Dialogue final : public Conversation {
   Reaction on_tick(Time now, bool ping_pending) override {
     Reaction reaction;
     if (now < next_tick()) return reaction;
-    if (fired_ && ping_pending) return fired_at_ = now, reaction;  // the one before it is late
-    if (fired_) return late_ = fired_, advance(now), reaction;     // no ping came of it yet
+    // Here fired_ means that longest_wait is over. A request that has not been started, because an earlier ping is still being
+    // computed, gets the whole time again.
+    if (fired_ && ping_pending) return fired_at_ = now, reaction;
+    // A request that was started has brought no ping yet: the task goes on, and the ping is still sent if it comes.
+    if (fired_) return late_ = fired_, advance(now), reaction;
     Settings s = settings();
     s.id = id_;
     s.ping.angle = head_.target();
+    // The head has arrived. A request without transmission is answered by the state of the device alone.
     if (task_ == Task::turn) {
       reaction.replies.push_back(state_message(now));
       task_ = Task::none;
@@ -53,16 +57,16 @@ class Ping360Dialogue final : public Conversation {
     return fired_ ? fired_at_ + longest_wait : due_;
   }
   std::optional<Time> next_ping_request() const override {
-    return task_ != Task::none && !fired_ ? std::optional(due_) : std::nullopt;  // stepped time comes to a mere turn too
+    return task_ != Task::none && !fired_ ? std::optional(due_) : std::nullopt;  // a turn without a ping counts too
   }
-  bool hosts_fall_silent() const override { return task_ != Task::none; }  // ping-python while it scans
+  bool hosts_fall_silent() const override { return task_ != Task::none; }  // ping-python sends nothing while it scans
   protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
     if (late_ && made_with == late_.get())
       late_.reset();
     else if (fired_ && made_with == fired_.get())
       advance(now);
     else
-      return {};  // of a request that another has replaced
+      return {};  // made for a request that a newer one has replaced
     return {{Bytes{}}, {}};
   }
 
@@ -144,6 +148,7 @@ class Ping360Dialogue final : public Conversation {
     const Time turns_at = fired_at_ + after;
     const bool oscillates = text_option(device_.options, option_name::sector_scan) != "wrap";
     head_.turn_to(next_angle(head_.target(), s, back_, oscillates), turns_at);
+    // After a late ping the scan does not catch up: the next one is due now at the earliest.
     due_ = std::max(head_.arrives(), now);
   }
 

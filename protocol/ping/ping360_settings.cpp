@@ -77,6 +77,7 @@ bool HeldSettings::equals(const VendorSettings& other) const {
   const auto* of = dynamic_cast<const HeldSettings*>(&other);
   if (of == nullptr) return false;
   Transducer theirs = of->settings.ping;
+  // The angle does not count: it changes with every ping.
   theirs.angle = settings.ping.angle;
   const auto scan = [](const Settings& s) { return std::tuple(s.scans, s.start, s.stop, s.steps, s.delay_ms); };
   return settings.ping == theirs && scan(settings) == scan(of->settings);
@@ -192,11 +193,14 @@ std::uint16_t Head::angle_at(Time at) const {
 
 void Head::turn_to(std::uint16_t angle, Time at) {
   from = angle_at(at);
+  // The shorter way. `to` may lie outside of a turn; angle_at() folds it.
   const int ahead = ((angle - from) % grads + grads) % grads;
   to = from + (ahead <= grads / 2 ? ahead : ahead - grads);
   since = at;
 }
 
+/// A scan of a sector without angle 0 starts again at its beginning. A sector that holds angle 0 turns around at its ends, or
+/// goes back to its start (option sector_scan).
 std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, bool oscillates) {
   if (scan.start <= scan.stop) {
     const int next = angle + scan.steps;

@@ -559,7 +559,7 @@ class Doctor(unittest.TestCase):
             client.send(fire_message())
             with reading(client), Client(daemon.address) as other:
                 self.assertEqual(other.socket.recv(1), b"")
-                finding = self.named(viewer, "places", self.name_of(other), "was turned away", self.name_of(client))
+                finding = self.named(viewer, "places", self.name_of(other), "was refused", self.name_of(client))
                 self.assertIn("clients.max", finding["cure"])
 
     def test_standby_and_faults(self):

@@ -512,7 +512,7 @@ TEST(Doctor, FailsWhileAnotherDriverGetsNoPing) {
   const auto last = std::make_shared<v1::DaemonStatus>(*facts.control.status);
   last->mutable_sonars(0)->MergeFrom(control::message_from<v1::SonarStatus>(
       R"(clients { address: "127.0.0.1:40300" connected_s: 2 requests: 1 } gone { address: "127.0.0.1:40300" why: "x" ago_s: 1 }
-         turned_away { address: "127.0.0.1:40300" why: "no place is free" ago_s: 1 })"));
+         turned_away { address: "127.0.0.1:40300" why: "no slot is free" ago_s: 1 })"));
   facts.control.latest = last;
   report(facts);
   facts.sonars[0].stream.own = "127.0.0.1:40300";
@@ -537,14 +537,14 @@ TEST(Doctor, OnlyWarnsOfAClientTurnedAwayFromPlacesThatAreUsedWell) {
   front.MergeFrom(control::message_from<v1::SonarStatus>(
       R"(profile: "oculus-m1200d" transmits: true pinging: true
          clients { address: "127.0.0.1:40122" connected_s: 5 requests: 1 pings_written: 9 }
-         turned_away { address: "10.0.0.7:1" why: "no place is free" utc_ns: 3723000000000 ago_s: 5 })"));
+         turned_away { address: "10.0.0.7:1" why: "no slot is free" utc_ns: 3723000000000 ago_s: 5 })"));
   report(facts);
-  expect(line(facts, "places"), Level::warn, "10.0.0.7:1 was turned away", "clients.max");
+  expect(line(facts, "places"), Level::warn, "10.0.0.7:1 was refused", "clients.max");
   EXPECT_FALSE(any_failed(run_checks(facts)));
   front.mutable_clients(0)->set_pings_written(0);
   front.mutable_clients(0)->set_requests(0);
   report(facts);
-  expect(line(facts, "places"), Level::fail, "10.0.0.7:1 was turned away", "clients.max");
+  expect(line(facts, "places"), Level::fail, "10.0.0.7:1 was refused", "clients.max");
 }
 
 TEST(Doctor, WaitsForTheFirstPingAsLongAsItTakes) {

@@ -95,7 +95,7 @@ class Link {
     drain();
   }
   void to_host(std::size_t port, protocol::BytesView bytes) {
-    if (make_.ports[port].kind != protocol::HostPort::Kind::http) obey(host_->on_bytes(port, bytes, now_));
+    if (make_.ports[port].kind != protocol::HostPort::Kind::http) carry_out(host_->on_bytes(port, bytes, now_));
   }
   std::size_t host_ports() const { return make_.ports.size(); }
   void reconnect() { connect(); }
@@ -124,8 +124,8 @@ class Link {
       perform(sonar.on_tick(std::max(*next, now_ - step)));
     }
     if (lost_ || now_ - last_sign_ > patience) connect();
-    obey(host_->on_tick(now_));
-    obey(host_->on_demand(now_));
+    carry_out(host_->on_tick(now_));
+    carry_out(host_->on_demand(now_));
     drain();
   }
 
@@ -142,17 +142,17 @@ class Link {
       perform(sonar.on_connect(id_, Role::client, {"driver", {127, 0, 0, 1}}, now_, port_));
       if (id_ == 0) return;
     }
-    obey(host_->on_open(std::vector<std::uint16_t>(make_.ports.size(), 40000), now_));
+    carry_out(host_->on_open(std::vector<std::uint16_t>(make_.ports.size(), 40000), now_));
   }
 
-  void obey(protocol::HostActions actions) {
+  void carry_out(protocol::HostActions actions) {
     for (protocol::HostAction& action : actions) {
       if (const auto* send = std::get_if<protocol::HostSend>(&action)) {
         if (id_ != 0 && served_) perform(sonar.on_bytes(id_, send->bytes, now_));
       } else if (const auto* ask = std::get_if<protocol::ResourceRequest>(&action)) {
         auto answer = sonar.on_http(*make_.device->port(protocol::Port::Kind::http), *ask, now_);
         perform(std::move(answer.actions));
-        obey(host_->on_reply(answer.reply, now_));
+        carry_out(host_->on_reply(answer.reply, now_));
       } else if (std::holds_alternative<protocol::HostPing>(action)) {
         ++pings;
         last_sign_ = now_;
@@ -175,7 +175,7 @@ class Link {
         perform(sonar.on_ping({.ping = computed(std::move(compute->request)), .seconds = 1e-3}, now_));
       } else if (const auto* serve = std::get_if<Serve>(&action)) {
         served_ = served_ || serve->connection == id_;
-      } else if (const auto* away = std::get_if<TurnAway>(&action)) {
+      } else if (const auto* away = std::get_if<Refuse>(&action)) {
         if (away->connection == id_) id_ = 0, lost_ = true;
       } else if (const auto* finish = std::get_if<Finish>(&action)) {
         finished_.push_back(finish->connection);
@@ -213,7 +213,7 @@ class Link {
     const bool to_all = message.datagrams != nullptr && id != id_;
     for (const Bytes& piece : pieces)
       if (!lost_ && !(to_all && sonar.receivers(id).empty()))
-        obey(host_->on_bytes(to_all ? make_.ports.size() - 1 : 0, piece, now_));
+        carry_out(host_->on_bytes(to_all ? make_.ports.size() - 1 : 0, piece, now_));
     if (message.shape != nullptr && message.shape->end != Outbox::Shape::End::none) lose(id);
   }
 

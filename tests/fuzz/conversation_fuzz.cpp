@@ -80,7 +80,7 @@ void send(SonarClients& talk, std::size_t place, protocol::BytesView bytes, bool
   talk.receive(place, bytes.subspan(cut));
 }
 
-void obey(SonarClients& talk, Script& script) {
+void run_step(SonarClients& talk, Script& script) {
   const char letter = static_cast<char>(script.byte());
   if (letter == 'P') return talk.fire();
   const std::uint8_t first = script.byte();
@@ -135,7 +135,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   sonar.max_clients = 3 - rules / 3 % 3;
   sonar.when_full = static_cast<WhenClientsFull>(rules / 9 % 3);
   SonarClients talk(std::move(sonar));
-  while (!script.ended()) obey(talk, script);
+  while (!script.ended()) run_step(talk, script);
   talk.end();
   return 0;
 }

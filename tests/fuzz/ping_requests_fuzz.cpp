@@ -20,7 +20,7 @@ struct Device {
   protocol::DeviceState state;
 };
 
-void obey(const protocol::Reaction& reaction, protocol::DeviceState& device) {
+void apply(const protocol::Reaction& reaction, protocol::DeviceState& device) {
   for (const auto& event : reaction.events)
     if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
       device.settings = change->vendor_settings;
@@ -50,11 +50,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       for (const protocol::BytesView part : {protocol::BytesView(bytes).first(half), protocol::BytesView(bytes).subspan(half)}) {
         const protocol::Reaction reaction = host->on_bytes(part, Time{});
         for (const protocol::Bytes& reply : reaction.replies) answered += reply.size();
-        obey(reaction, device);
+        apply(reaction, device);
       }
       if (answered > 20 * size + 256) std::abort();
       for (int tick = 0; tick < 4 && host->next_tick() < Time::max(); ++tick)
-        obey(host->on_tick(host->next_tick(), false), device);
+        apply(host->on_tick(host->next_tick(), false), device);
     }
     vendor.is_request(vendor.ports().front(), bytes);
     vendor.field(protocol::Part::ping, protocol::FieldName::gain, bytes);

@@ -96,7 +96,7 @@ void SonarClients::perform(Actions actions) {
       computing_ = std::move(compute->request);
     } else if (const auto* serve = std::get_if<Serve>(&action)) {
       clients_[*place_of(serve->connection)]->served = true;
-    } else if (const auto* away = std::get_if<TurnAway>(&action)) {
+    } else if (const auto* away = std::get_if<Refuse>(&action)) {
       clients_[*place_of(away->connection)].reset();
     } else if (const auto* finish = std::get_if<Finish>(&action)) {
       clients_[*place_of(finish->connection)]->finishing = true;

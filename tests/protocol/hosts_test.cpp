@@ -75,7 +75,7 @@ class Talk {
         in_pieces(send->port, send->bytes, [this](BytesView part) { react(dialogue_->on_bytes(part, now)); });
       } else if (const auto* ask = std::get_if<ResourceRequest>(&action)) {
         const ResourceReply reply = device.on_http(*device.port(Port::Kind::http), *ask, state, now);
-        obey(reply.events);
+        apply(reply.events);
         carry_out(host->on_reply(reply, now));
       } else if (auto* ping = std::get_if<HostPing>(&action)) {
         pings.push_back(std::move(*ping));
@@ -101,9 +101,9 @@ class Talk {
  private:
   void react(const Reaction& reaction) {
     for (const Bytes& reply : reaction.replies) deliver(0, reply);
-    obey(reaction.events);
+    apply(reaction.events);
   }
-  void obey(const std::vector<Event>& events) {
+  void apply(const std::vector<Event>& events) {
     for (const Event& event : events) {
       if (const auto* change = std::get_if<ChangeSettings>(&event)) {
         state.settings = change->vendor_settings;
@@ -156,7 +156,7 @@ class Talk {
         whole.insert(whole.end(), framed->begin(), framed->end());
         deliver(0, whole);
       }
-      obey(delivery.events);
+      apply(delivery.events);
     }
     if (framed && port_->kind == Port::Kind::tcp_stream) return;
     const std::size_t to = make.ports.size() - 1;

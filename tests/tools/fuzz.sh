@@ -25,10 +25,10 @@ export LSAN_OPTIONS="suppressions=$PWD/tests/tools/lsan.supp"
 # figure NAME LOG: one number of libFuzzer's last words.
 figure() { sed -n "s/^stat::$1: *//p" "$2" | tail -n 1; }
 
-# one NAME PLACE: runs it; its words go out in one piece, the last of them to NAME.told. Status 1: fault, or short of the bound.
+# one NAME PLACE: runs the target, prints its result at once and writes it to NAME.result. Status 1: fault, or short of the bound.
 one() {
   local name=$1 corpus=build/fuzz/corpus/$1 findings=build/fuzz/findings/$1 log=build/fuzz/$1.log
-  local told tried status before=$SECONDS
+  local result tried status before=$SECONDS
   mkdir -p "$corpus" "$findings"
   local bound=$runs promised=500000 words=500,000 patience=20
   if [ "$name" = mesh_file ]; then
@@ -48,15 +48,15 @@ one() {
   status=$?
   tried=$(figure number_of_executed_units "$log")
   tried=${tried:-0}
-  told="$tried inputs in $((SECONDS - before)) s, $(grep -oE 'cov: [0-9]+' "$log" | tail -n 1 | cut -d' ' -f2) places reached"
+  result="$tried inputs in $((SECONDS - before)) s, $(grep -oE 'cov: [0-9]+' "$log" | tail -n 1 | cut -d' ' -f2) places reached"
   local verdict=0 ending=
   if [ $status -ne 0 ]; then
-    told="FAULT, input kept in $findings; $told" ending=$(tail -n 40 "$log")$'\n' verdict=1
+    result="FAULT, input kept in $findings; $result" ending=$(tail -n 40 "$log")$'\n' verdict=1
   elif [ "$tried" -lt "$bound" ]; then
-    told="SHORT of $bound, raise SONARD_FUZZ_SECONDS; $told" verdict=1
+    result="SHORT of $bound, raise SONARD_FUZZ_SECONDS; $result" verdict=1
   fi
-  printf '%-20s %s\n' "$name" "$told" >"build/fuzz/$name.told"
-  printf '%s-- [%s] %s\n   %s\n' "$ending" "$2" "$name" "$told"
+  printf '%-20s %s\n' "$name" "$result" >"build/fuzz/$name.result"
+  printf '%s-- [%s] %s\n   %s\n' "$ending" "$2" "$name" "$result"
   # The page judges what is promised, whatever was asked for here.
   python3 tests/reliability/record.py "fuzz-$name" "$tried$([ $status -eq 0 ] || echo ', with a fault')" "$words" \
     "$([ $status -eq 0 ] && [ "$tried" -ge "$promised" ] && echo yes || echo no)" "tests/tools/fuzz.sh $name"
@@ -69,11 +69,11 @@ trap 'kill $(jobs -p) 2>/dev/null; exit 130' INT TERM  # what runs in the backgr
 ended() { wait -n || failed=$((failed + 1)); running=$((running - 1)); }
 for i in "${!names[@]}"; do
   [ $running -lt "$(nproc)" ] || ended
-  rm -f "build/fuzz/${names[$i]}.told"
+  rm -f "build/fuzz/${names[$i]}.result"
   one "${names[$i]}" "$((i + 1))/${#names[@]}" &
   running=$((running + 1))
 done
 while [ $running -gt 0 ]; do ended; done
 say "fuzz targets"
-for name in "${names[@]}"; do cat "build/fuzz/$name.told"; done
+for name in "${names[@]}"; do cat "build/fuzz/$name.result"; done
 [ $failed -eq 0 ] || { echo "$failed of ${#names[@]} with a fault or short of their bound"; exit 1; }

@@ -15,12 +15,12 @@ wished=("$@")
 rows=()
 failures=0
 step() {  # step NAME COMMAND...: runs it, when wished, and remembers how it ended
-  local name=$1 before=$SECONDS told=passed
+  local name=$1 before=$SECONDS result=passed
   shift
   [ ${#wished[@]} -eq 0 ] || [[ " ${wished[*]} " == *" $name "* ]] || return 0
   say "$name: $*"
-  "$@" || { told=FAILED failures=$((failures + 1)); }
-  rows+=("$(printf '%-10s %-7s %6d s   %s' "$name" "$told" $((SECONDS - before)) "$*")")
+  "$@" || { result=FAILED failures=$((failures + 1)); }
+  rows+=("$(printf '%-10s %-7s %6d s   %s' "$name" "$result" $((SECONDS - before)) "$*")")
 }
 
 step load tests/load/load.sh

@@ -13,8 +13,8 @@ using sonar::doctor::computing_text;
 using sonar::doctor::less_to_compute;
 using text::format;
 
-constexpr double fastest_hz = 40;  // that an Oculus can be asked for
-constexpr double soon_s = 1;       // for a driver to ask for pings
+constexpr double fastest_hz = 40;  // highest rate of an Oculus
+constexpr double soon_s = 1;       // a driver asks for pings within
 
 std::string joined(const auto& words) {
   std::string text;
@@ -266,8 +266,9 @@ class SonarChecks {
     std::vector<Finding> found;
     for (Finding& finding : sonar::doctor::judge(now, before)) {
       if (finding.sonar != reported->name() || finding.level == Level::ok || finding.check == "rate") continue;
-      if (finding.check == "places" && all_get_pings) finding.level = Level::warn;  // it can come as soon as one leaves
-      if (has_connected() && (finding.client.empty() || finding.level != Level::fail)) continue;  // pings are there to be had
+      if (finding.check == "places" && all_get_pings)
+        finding.level = Level::warn;  // the refused client gets a slot when one leaves
+      if (has_connected() && (finding.client.empty() || finding.level != Level::fail)) continue;  // this check got pings
       found.push_back(std::move(finding));
     }
     const bool any_fails = std::any_of(found.begin(), found.end(), [](const Finding& f) { return f.level == Level::fail; });
@@ -306,7 +307,7 @@ class SonarChecks {
     return now;
   }
 
-  /// A driver that does right has a ping within.
+  /// Time in which a correct driver gets its first ping.
   static double first_ping_within_s(const v1::ClientStatus& client, const v1::SonarStatus& of) {
     if (client.requests() == 0 || of.rate_hz() <= 0) return soon_s;
     return std::max(soon_s, 2 / of.rate_hz() + 2e-3 * of.figures().simulation_ms());

@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 using Outcome = StreamFacts::Outcome;
 
 constexpr std::uint64_t enough_pings = 15;
-constexpr double usual_hz = 10;  // of a driver that wants no other rate
+constexpr double usual_hz = 10;  // the rate of a driver that sets none
 constexpr auto connect_patience = 1000ms, watch_time = 1600ms;
 
 double unix_now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
@@ -104,7 +104,7 @@ class Watch {
   std::vector<double> behind_stamp_s_;
 };
 
-/// The outcome that a failed connection, or a failed greeting of a head, stands for.
+/// The outcome of a failed connection or greeting.
 Outcome outcome_of(const Error& error, const Endpoint& at, const Make& make) {
   using Kind = protocol::HostPort::Kind;
   const Kind first = make.ports.front().kind;
@@ -128,6 +128,7 @@ void set_latency(SonarFacts& sonar, const std::vector<double>& delays_s, Control
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks) {
   StreamFacts& facts = sonar.stream;
   Wanted wanted;
+  // Beside a client the check changes no settings.
   wanted.as_it_is = !sonar.clients.empty();
   wanted.stamped = true;
   facts.asked = !wanted.as_it_is || sonar.make->each_ping_requested;

@@ -24,7 +24,7 @@ constexpr std::size_t tar_block = 512;
 
 constexpr std::string_view unfinished_mark = ".tmp";
 
-/// That no other process of any machine chooses.
+/// A name that no other process of any machine chooses.
 std::string unfinished_name(const path& file) {
   std::array<char, 256> host{};
   ::gethostname(host.data(), host.size() - 1);
@@ -76,6 +76,7 @@ Result<DurableFile> DurableFile::open(const path& file) {
     const int fd = ::open(unfinished.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
     if (fd < 0 && errno == EEXIST) continue;
     if (fd < 0) return cannot_write(file, errno);
+    // The lock shows remove_unfinished() of other processes that the file is in use.
     ::flock(fd, LOCK_EX);
     struct stat s {};
     if (::fstat(fd, &s) == 0 && s.st_nlink > 0) return DurableFile(file, unfinished, fd);
@@ -115,6 +116,7 @@ Result<void> DurableFile::commit() {
 
 Result<bool> DurableFile::commit_new() {
   if (::fsync(descriptor_) != 0) return cannot_write(file_, errno);
+  // Unlike rename(), link() fails where the name exists: of two workers the first one wins, and the second compares its bytes.
   if (::link(unfinished_.c_str(), file_.c_str()) != 0) {
     if (errno == EEXIST) return false;
     if (const auto done = commit(); !done) return tl::make_unexpected(done.error());  // a file system without links

@@ -136,7 +136,7 @@ class NatsQueue final : public Queue {
     config.AckPolicy = js_AckExplicit;
     config.AckWait = patience.count() * ns_per_ms;
     config.MaxAckPending = 100'000;
-    // Without the server's MaxDeliver: a shard that it gives up would vanish without a word. Workers count, and bury it.
+    // Without the server's MaxDeliver: a shard that it gives up would disappear without a report. Workers count and bury it.
     jsErrCode code{};
     const natsStatus s = js_AddConsumer(nullptr, jetstream_.get(), stream, &config, nullptr, &code);
     return s == NATS_OK ? Result<void>{} : refused("cannot open job " + job, s, code);
@@ -214,7 +214,7 @@ class NatsQueue final : public Queue {
                                                "; it needs JetStream: nats-server -js -sd FOLDER");
   }
 
-  /// For those who listen; the table is what counts.
+  /// A notice for listeners; the table is what workers and commands read.
   void announce(const std::string& subject, const std::string& words) {
     natsConnection_PublishString(connection_.get(), subject.c_str(), words.c_str());
   }
@@ -235,7 +235,8 @@ class NatsQueue final : public Queue {
     return s == NATS_OK ? Result<void>{} : refused("cannot make the stream FARM", s, code);
   }
 
-  /// NATS_TIMEOUT: the table did not tell its end; an entry may have expired meanwhile, so a second listing may.
+  /// NATS_TIMEOUT: the end of the list did not come, perhaps because an entry has expired meanwhile; a second listing may
+  /// succeed.
   natsStatus list(Table table, std::set<std::string>& found) {
     kvStore* kv = store(table);
     if (!kv) return NATS_NO_SERVER;

@@ -47,7 +47,7 @@ class Worker {
     ::gethostname(host.data(), host.size() - 1);
     name_ = std::string(host.data()) + "." + std::to_string(::getpid());
     for (char& c : name_)
-      if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '.') c = '_';  // of a key
+      if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '.') c = '_';  // keys of the queue allow no others
   }
 
   Result<int> run() {
@@ -85,6 +85,7 @@ class Worker {
     std::optional<FarmJob> first;
     std::string unfit;
     for (const std::string& id : *ids) {
+      // Keys with a dot are marks of jobs, such as JOB.stopped.
       if (id.find('.') != std::string::npos || std::find(ids->begin(), ids->end(), id + ".stopped") != ids->end()) continue;
       const auto waiting = queue_.waiting(id);
       if (!waiting) return tl::make_unexpected(waiting.error());
@@ -165,18 +166,19 @@ class Worker {
   Result<void> refuse(const FarmJob& record, Task& task, const Error& why) {
     const bool is_last = task.delivery() >= most_tries;
     say(dataset::shard_name(task.shard()) + ": " + why.text + (is_last ? "; it is dead" : ""));
-    const auto told = is_last ? task.bury(why.text) : task.again(record.patience / 12);
-    if (!told) say(told.error().text);
-    rest();  // where all fails, as for want of a file, others shall have the next tries
+    const auto sent = is_last ? task.bury(why.text) : task.again(record.patience / 12);
+    if (!sent) say(sent.error().text);
+    rest();  // if every shard fails here, as without a file, other workers get the next tries
     return {};
   }
 
-  /// Errors: what keeps this worker from any work.
+  /// An error keeps this worker from any work.
   Result<void> work(const FarmJob& record, Task& task) {
     if (task.delivery() > most_tries)
-      return refuse(record, task,
-                    {ErrorKind::bug, "its workers ended without a word " + std::to_string(most_tries) +
-                                         " times: killed, or out of memory; see their logs, then submit the job again"});
+      return refuse(
+          record, task,
+          {ErrorKind::bug, "its workers ended " + std::to_string(most_tries) +
+                               " times without an error: killed or out of memory; see their logs, submit the job again"});
     auto made = std::async(std::launch::async, [this, shard = task.shard()]() -> Result<bool> {
       const auto is_there = folder_->holds(shard);
       if (!is_there || *is_there) return is_there;
@@ -184,6 +186,7 @@ class Worker {
       if (!done) return tl::make_unexpected(done.error());
       return false;
     });
+    // After `patience` without a sign the queue gives the shard to another worker; one sign may be lost.
     const milliseconds between_signs = record.patience / 3;
     const milliseconds tick = std::min(between_signs, most_between_beats);
     auto signed_at = Clock::now();
@@ -207,7 +210,7 @@ class Worker {
     const Error& why = is_there.error();
     if (folder_->differs()) {
       say("ALARM: " + why.text + "; the job is stopped");
-      if (const auto told = queue_.put(job_table, record.id + ".stopped", why.text); !told) say(told.error().text);
+      if (const auto put = queue_.put(job_table, record.id + ".stopped", why.text); !put) say(put.error().text);
       task.again({});
       return {};
     }

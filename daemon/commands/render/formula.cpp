@@ -82,6 +82,7 @@ class Parser {
     }
   }
   double sign() {
+    // Every recursion of the grammar passes here, so this bounds the stack. A sign binds weaker than a power: -2^2 is -4.
     if (++depth_ > deepest) return complain("is nested too deeply"), 0;
     const double value = take('-') ? -sign() : power();
     --depth_;
@@ -89,6 +90,7 @@ class Parser {
   }
   double power() {
     const double base = atom();
+    // The exponent may have a sign, and powers group from the right: 2^-1, 2^3^2 = 2^9.
     return take('^') ? std::pow(base, sign()) : base;
   }
   double atom() {

@@ -136,7 +136,7 @@ OutputFolder::~OutputFolder() {
 
 std::string OutputFolder::stem(std::uint64_t number) const { return (options_.folder / number_text(number)).string(); }
 
-/// The sidecar last.
+/// The sidecar is last.
 std::vector<path> OutputFolder::files_of(std::uint64_t number) const {
   const auto with = [&](const char* end) { return path(stem(number) + end); };
   std::vector<path> files;

@@ -45,7 +45,7 @@ struct MadePing {
   Result<std::uint64_t> written = std::uint64_t{0};  // bytes
 };
 
-/// Everything but the sidecar first: where that stands, the ping is whole. Returns how many bytes that was.
+/// The sidecar is written last: a ping that has one is complete. Returns the bytes written.
 Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, const std::string& engine,
                                  const OutputFolder& folder) {
   const OutputOptions& o = folder.options();
@@ -91,8 +91,8 @@ Result<std::unique_ptr<PingEngine>> engine_for(const RenderJob& job, Parallel& p
   return start_engine(make, job.scene);
 }
 
-/// The pings of one job, in batches. A batch comes in one go, which is what a device wants; the CPU takes them one after the
-/// other, each by all threads. While a batch is written, its pings side by side, the device is at the next.
+/// The pings of one job, in batches. A device computes a batch at once, the CPU one ping after the other with all threads. While
+/// a batch is written, its pings in parallel, the device computes the next one.
 class JobRun {
  public:
   JobRun(const std::string& source, const RenderJob& job, const OutputFolder& folder, Parallel& pool, Progress& progress,
@@ -108,7 +108,7 @@ class JobRun {
     batch_.push_back({number, std::move(request), {}, {}, {}});
     return batch_.size() < static_cast<std::size_t>(folder_.options().batch) ? Result<void>{} : take_turns();
   }
-  /// One that is there already ends a batch.
+  /// A ping that exists already ends a batch.
   Result<void> keep() {
     if (!batch_.empty())
       if (auto done = take_turns(); !done) return done;
@@ -154,7 +154,7 @@ class JobRun {
       batch_[i].ping = std::move(pings.at(i));
       batch_[i].count = counts.at(i);
     }
-    const std::string description = engine_->description();  // of all: what a device that fails had begun is made again
+    const std::string description = engine_->description();  // of all: pings that a failed device had begun are made again
     pool_.for_each(batch_.size(),
                    [&](std::size_t i, int) { batch_[i].written = write_ping(job_, batch_[i], description, folder_); });
     for (const MadePing& made : batch_) {
@@ -174,7 +174,7 @@ class JobRun {
   Progress& progress_;
   const std::function<void(const Progress&)>& on_progress_;
   std::unique_ptr<PingEngine> engine_;
-  std::vector<MadePing> batch_, under_way_;  // that is filled, or written; that the engine is at
+  std::vector<MadePing> batch_, under_way_;  // being filled or written; being computed
 };
 
 PingRequest request_of(const RenderJob& job, const World& world, std::uint64_t number, Time at, const OutputOptions& o) {

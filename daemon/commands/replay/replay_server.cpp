@@ -54,7 +54,7 @@ Result<void> ReplayServer::open_http() {
     protocol::ResourceReply reply = device_.vendor->on_http(*device_.http(), request, *device_.state, Clock::system_wall());
     figures_.clients = 1;
     if (!client_) return reply;
-    for (const protocol::Event& event : reply.events) obey(*client_, event);
+    for (const protocol::Event& event : reply.events) apply(*client_, event);
     client_->wake.cancel();
     return reply;
   };
@@ -150,8 +150,8 @@ asio::awaitable<void> ReplayServer::accept() {
     if (ec) continue;
     client->name = peer.address().to_string() + ":" + std::to_string(peer.port());
     if (client_) {
-      ++figures_.turned_away;
-      log_limited(log_, turned_away_limit_, LogLevel::info, "client refused: another one is being served",
+      ++figures_.refused;
+      log_limited(log_, refused_limit_, LogLevel::info, "client refused: another one is being served",
                   {{"client", client->name}});
       continue;  // closes it
     }
@@ -264,15 +264,15 @@ asio::awaitable<void> ReplayServer::send_replies(ClientPointer client) {
 }
 
 /// Requests of a host decide where frames go, and from when on.
-void ReplayServer::obey(Client& client, protocol::BytesView bytes) {
+void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
   client.heard = Steady::now();
   const protocol::Reaction reaction = client.dialogue->on_bytes(bytes, {});
   for (const protocol::Bytes& reply : reaction.replies) client.replies.insert(client.replies.end(), reply.begin(), reply.end());
-  for (const protocol::Event& event : reaction.events) obey(client, event);
+  for (const protocol::Event& event : reaction.events) apply(client, event);
   client.wake.cancel();
 }
 
-void ReplayServer::obey(Client& client, const protocol::Event& event) {
+void ReplayServer::apply(Client& client, const protocol::Event& event) {
   const auto send_to = [&client](const protocol::SetReceivers& set) {
     client.receivers.clear();
     for (const Endpoint& to : set.to) client.receivers.emplace_back(address_of(to.ip == Ipv4{} ? client.ip : to.ip), to.port);
@@ -309,7 +309,7 @@ asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
     if (ec) break;
     figures_.client_bytes += n;
     if (http.speaks_http(std::span(ignored).first(n))) break;
-    if (client->dialogue) obey(*client, protocol::BytesView(ignored).first(n));
+    if (client->dialogue) on_client_bytes(*client, protocol::BytesView(ignored).first(n));
     if (!std::exchange(logged, true)) log_.info("settings of a client have no effect on a recording", {{"client", client->name}});
   }
   client->gone = true;

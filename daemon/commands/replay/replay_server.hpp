@@ -29,7 +29,7 @@ struct ReplayOptions {
 class ReplayServer {
  public:
   struct Figures {
-    std::uint64_t clients = 0, turned_away = 0, messages = 0, bytes = 0, times_through = 0, client_bytes = 0;
+    std::uint64_t clients = 0, refused = 0, messages = 0, bytes = 0, times_through = 0, client_bytes = 0;
   };
 
   /// The recording has been rewound. All must outlive io.run().
@@ -75,8 +75,8 @@ class ReplayServer {
   asio::awaitable<void> send_replies(ClientPointer client);
   asio::awaitable<void> send_datagram(ClientPointer client, const protocol::Bytes& datagram);
   asio::awaitable<void> listen_to(ClientPointer client);
-  void obey(Client& client, protocol::BytesView bytes);
-  void obey(Client& client, const protocol::Event& event);
+  void on_client_bytes(Client& client, protocol::BytesView bytes);
+  void apply(Client& client, const protocol::Event& event);
   Result<void> open_http();
   void end_if_silent();
   asio::awaitable<void> close_stream(ClientPointer client);
@@ -102,7 +102,7 @@ class ReplayServer {
   Admission admission_{limits_, log_};
   std::unique_ptr<SonarHttp> http_;  // of a device with settings over HTTP; then nothing else listens
   ClientPointer client_;
-  LogLimiter turned_away_limit_, unsent_limit_;
+  LogLimiter refused_limit_, unsent_limit_;
   Figures figures_;
   Result<void> outcome_;
   bool stopping_ = false, over_ = false, damage_logged_ = false;

@@ -94,6 +94,7 @@ class Check {
         given.emplace(pair.substr(0, sign), pair.substr(sign + 1));
       }
       all.push_back(of_kind(*find_fault_kind(part.code), given, trouble.default_s));
+      // `after` is a share of the trouble's time; a part that begins later ends with the others.
       all.back().delay = nanoseconds(static_cast<std::int64_t>(part.after * static_cast<double>(all.back().span.time.count())));
       all.back().span.time -= all.back().delay;
       all.back().name = (record_.name.empty() ? std::string(trouble.name) : record_.name) + "." + std::to_string(all.size());
@@ -206,6 +207,7 @@ class Check {
       return wrong("for: pings and count must be from 1 to 1000000000");
     if (lasts.pings && !kind.per_ping() && kind.stage != FaultStage::payload && kind.stage != FaultStage::framing)
       return wrong(std::string(kind.code) + " lasts for a time: give for: {seconds: ...}");
+    // A span is a time or a number of pings: where one is given, the other is 0.
     const double seconds = lasts.seconds.value_or(lasts.pings || kind.per_ping() ? 0 : default_s);
     fault.span.time = nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9)));
     fault.span.pings = lasts.pings.value_or(seconds > 0 ? 0 : 1);

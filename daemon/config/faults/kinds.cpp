@@ -48,7 +48,7 @@ constexpr FaultKind table[] = {
     {"L16", "mtu-hole", 2, S::link, E::harness, "Large packets vanish.", "reports a problem of the link", 6, {}, {}, {}},
     {"L17", "address-lost", 1, S::link, E::harness, "The address is withdrawn and returns.",
      "keeps the connection or reconnects within 3 s of its return", 6, {}, {}, {}},
-    {"L18", "one-way", 1, S::link, E::harness, "What the host sends is lost.", "says that commands are not obeyed", 6, {}, {}, {}},
+    {"L18", "one-way", 1, S::link, E::harness, "What the host sends is lost.", "says that commands have no effect", 6, {}, {}, {}},
     {"L19", "loss-above-rate", 2, S::link, E::harness, "Packets are lost above a rate.", "does not stall", 6, {}, {}, {}},
 
     // ---- shape of the stream: no driver may notice
@@ -190,8 +190,8 @@ constexpr FaultKind table[] = {
      10, F::device_id, {P{.name = "address", .value = "same", .words = "same"}}, "second"},
     {"U07", "two-devices", 1, S::status, E::second_beacon, "A second device announces itself.", "selects by number", 10,
      F::device_id, {P{.name = "address", .value = "next", .words = "next"}}, "second"},
-    {"U08", "status-of-a-stranger", 1, S::status, E::second_beacon, "A stranger announces the device with another address.",
-     "ignores it or warns", 10, F::address, {P{.name = "address", .value = "stranger", .words = "stranger"}}, "second"},
+    {"U08", "foreign-status", 1, S::status, E::second_beacon, "A foreign sender announces the device with another address.",
+     "ignores it or warns", 10, F::address, {P{.name = "address", .value = "foreign", .words = "foreign"}}, "second"},
     {"U09", "owned-by-other", 2, S::status, E::beacon_address, "The status message says that another host is connected.",
      "says which host holds the device", 10, F::connected_address,
      {P{.name = "address", .value = "link-local", .words = "zero loopback link-local"}}, "connected"},
@@ -223,7 +223,7 @@ constexpr FaultKind table[] = {
      {P{"ms", "60", 1, 10000}}, "delay"},
 
     // ---- clients
-    {"M01", "second-refused", 1, S::clients, E::turn_away, "New connections are refused.", "says so, and waits longer each time",
+    {"M01", "second-refused", 1, S::clients, E::refuse, "New connections are refused.", "says so, and waits longer each time",
      10, {}, {end_how}, "admission"},
     {"M02", "take-over", 1, S::clients, E::take_over, "The newest connection replaces the others.", "does not reconnect in a loop",
      30, {}, {}, "admission"},
@@ -236,7 +236,7 @@ constexpr FaultKind table[] = {
      "sees the gaps by number", 30, {}, {}, "outbox"},
     {"M06", "zero-window", 1, S::clients, E::stop_reading, "The device does not read what clients send.", "does not block", 6, {},
      {}, "reading"},
-    {"M08", "no-free-slot", 1, S::clients, E::turn_away, "New connections are reset: no slot is free.", "waits longer each time",
+    {"M08", "no-free-slot", 1, S::clients, E::refuse, "New connections are reset: no slot is free.", "waits longer each time",
      10, {}, {P{.name = "how", .value = "reset", .words = "reset fin"}}, "admission"},
     {"M09", "rejects-host-message", 1, S::clients, E::end_on_request,
      "The device ends the connection when the host sends a command.", "checks what it sends; does not reconnect in a loop", 10, {},

@@ -27,7 +27,7 @@ enum class FaultEffect {
   withhold,
   withhold_pings,
   leave_waiting,
-  turn_away,
+  refuse,
   take_over,
   power_cycle,
   flap,

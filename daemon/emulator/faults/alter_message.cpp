@@ -20,6 +20,7 @@ using protocol::Vendor;
 
 constexpr std::size_t most_message_bytes = 16u << 20;
 
+// Fields with a fixed place are little-endian in every make that has them.
 std::uint64_t read_integer(const Bytes& bytes, const Field& field) {
   std::uint64_t value = 0;
   for (std::size_t i = 0; i < std::min<std::size_t>(field.size, 8); ++i)
@@ -121,10 +122,11 @@ Touch cut_row(const Fault& fault, const MessageContext& c, Bytes& bytes) {
 Touch renumber(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const std::int64_t since = std::int64_t{c.number} - c.first_number;
   const auto other = [&](std::int64_t number) {
+    // D07: numbers approach the wrap of 32 bits. D09: they jump. D10: the first one repeats. D08: they begin again at 0.
     const std::string_view code = fault.kind->code;
     if (code == "D07") return (std::int64_t{1} << 32) - static_cast<std::int64_t>(fault.number("before")) + since;
     if (code == "D09") return number + static_cast<std::int64_t>(fault.number("by"));
-    return code == "D10" ? number - since : since;  // D08
+    return code == "D10" ? number - since : since;
   };
   const auto field = c.vendor.field(Part::ping, FieldName::ping_id, bytes);
   if (!field) return {c.vendor.change_integer(Part::ping, FieldName::ping_id, other, bytes)};
@@ -221,7 +223,7 @@ void write_address(Bytes& bytes, const std::optional<Field>& field, const text::
 Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
   const auto of = [&](FieldName name) { return vendor.field(Part::beacon, name, bytes); };
   const std::string& address = fault.word("address");
-  if (address == "stranger") {
+  if (address == "foreign") {
     write_address(bytes, of(FieldName::address), address_from("link-local"));
     return bytes;
   }
@@ -271,6 +273,7 @@ Touch alter_content(const Fault& fault, const MessageContext& c, MessageEdit& m)
       return {};
     case E::false_sync: {
       Bytes front = filling(fault.word("fill"), static_cast<std::size_t>(fault.number("bytes")), bytes, c.draws);
+      // The two bytes of the magic, and no message behind them.
       std::copy_n(bytes.begin(), std::min<std::size_t>(2, bytes.size()), front.begin());
       put_before(bytes, front);
       return {};
@@ -322,6 +325,8 @@ Touch alter_content(const Fault& fault, const MessageContext& c, MessageEdit& m)
 Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m) {
   using E = FaultEffect;
   const E effect = fault.kind->effect;
+  // These effects leave a message that is right but for one field, so its checksums are corrected. The others damage it as a link
+  // would.
   const bool of_fields = effect == E::set_field || effect == E::add_to_field || effect == E::renumber;
   const Bytes before = of_fields ? m.bytes : Bytes{};
   const Touch touch = alter_content(fault, c, m);

@@ -45,8 +45,8 @@ std::uint32_t scaled(std::uint32_t code, double factor, std::uint32_t most) {
   return static_cast<std::uint32_t>(std::clamp(static_cast<double>(code) * factor, 0.0, static_cast<double>(most)));
 }
 
-/// A sample of a picture is a level; one of a range image is the level above the range of a return, and a pixel without one stays
-/// so.
+/// A sample of a picture is a level. A sample of a range image has the level in its upper 16 bits and the range of the return
+/// below; a pixel without a return gets none.
 class Levels {
  public:
   Levels(const Ping& ping, std::uint32_t full)

@@ -45,6 +45,7 @@ protocol::SettingsOverride override_of(const Fault& fault) {
 
 void Faults::add(Fault fault, bool manual, Time now) {
   forget_old();
+  // Entries are in the order of their stages, in which they act; within a stage in the order in which they were added.
   const auto place =
       std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.fault.kind->stage > fault.kind->stage; });
   Entry& entry = *entries_.emplace(place);
@@ -54,6 +55,8 @@ void Faults::add(Fault fault, bool manual, Time now) {
   if (manual) entry.expires = now + longest_manual_fault;
   const FaultRecord::At& at = entry.fault.at;
   const bool waits = at.ping || at.every || at.time_s || at.probability || entry.fault.on;
+  // Faults that last begin now, those of single pings with the next ping (begin_ping). Three kinds act at once even if they are
+  // counted in pings.
   if (!waits && !entry.fault.kind->per_ping()) begin(entry, now);
   if (!waits && (entry.fault.kind->effect == Effect::power_cycle || entry.fault.kind->effect == Effect::forget_settings ||
                  entry.fault.kind->effect == Effect::clock_restart))
@@ -88,7 +91,7 @@ void Faults::clear(Time now) {
   for (Entry& e : entries_) finish(e, now);
 }
 
-/// It meets no more pings, those that wait in outboxes neither.
+/// The fault acts on no ping any more, not even on one that waits in an outbox.
 void Faults::finish(Entry& e, Time now) {
   end(e, now);
   e.over = true;
@@ -130,6 +133,7 @@ bool Faults::fires(const Entry& e, std::uint32_t ping) const {
 
 void Faults::begin(Entry& e, Time now) {
   if (e.active || e.over) return;
+  // With a delay this call only sets the time; on_tick() calls again when it has come.
   if (!e.begins) e.begins = now + e.fault.delay;
   if (now < *e.begins) return;
   e.begins.reset();
@@ -165,6 +169,7 @@ void Faults::begin_effect(Entry& e, Time now) {
       orders_.emplace_back(SetListening{false});
       orders_.emplace_back(EndClients{e.fault.word("how") == "reset"});
       orders_.emplace_back(RestartDevice{});
+      // A gap below 0: the ports open before the first status message. step() does that.
       if (const double gap = e.fault.number("gap-s"); gap < 0)
         e.step = now + std::max(nanoseconds(0), nanoseconds_from(e.fault.number("boot-s") + gap));
       return;
@@ -196,12 +201,13 @@ void Faults::begin_effect(Entry& e, Time now) {
   }
 }
 
-/// The device is as it would be without this fault.
+/// Restores the device to its state without this fault.
 void Faults::end_effect(Entry& e) {
   switch (e.fault.kind->effect) {
     case Effect::close_ports:
     case Effect::power_cycle:
     case Effect::flap:
+      // Another fault may keep the ports closed.
       if (!any(Effect::close_ports) && !any(Effect::power_cycle)) orders_.emplace_back(SetListening{true});
       return;
     case Effect::change_rate:
@@ -218,6 +224,7 @@ void Faults::end_effect(Entry& e) {
       orders_.emplace_back(ServeWaiting{});
       return;
     case Effect::delay_requests:
+      // Requests that were held back take effect now: the last settings that clients asked for hold.
       for (auto& [at, request] : e.late) orders_.emplace_back(std::move(request));
       e.late.clear();
       return;
@@ -242,6 +249,7 @@ void Faults::on_tick(Time now) {
     const auto& at = e.fault.at;
     if (!e.over && !e.active && at.time_s && e.begun == 0 && now - start_ >= nanoseconds_from(*at.time_s)) begin(e, now);
     if (e.begins && *e.begins <= now) begin(e, now);
+    // Steps, late requests and ends of clients come before the end of the fault: what is due at that moment still happens.
     if (e.active && e.step <= now) step(e, now);
     while (!e.late.empty() && e.late.front().first <= now) {
       orders_.emplace_back(std::move(e.late.front().second));
@@ -305,12 +313,14 @@ void Faults::begin_ping(std::uint32_t number, Time now) {
   }
 }
 
-/// Status faults count status messages.
+/// Faults of status messages count those instead (alter_beacons).
 void Faults::count_ping(Entry& e, Time now) {
   if (e.fault.span.pings == 0 || e.fault.kind->stage == FaultStage::status || --e.pings_left > 0) return;
+  // A power cycle ends by its time.
   if (e.fault.kind->effect != Effect::power_cycle) end(e, now);
 }
 
+/// Pings are remembered by number, because clients are sent a ping long after it was made.
 bool Faults::met(const Entry& e, std::uint32_t ping) const {
   return std::find(e.hits.begin(), e.hits.end(), ping) != e.hits.end();
 }

@@ -107,7 +107,7 @@ class Faults {
   double rate_factor() const;
 
   // ---- clients
-  enum class Admission { as_configured, wait, take_over, turn_away, reset };
+  enum class Admission { as_configured, wait, take_over, refuse, reset };
   Admission admission() const;
   void on_served(const Connection& client, Time now);
   enum class RequestVerdict { apply, ignore, end, reset };

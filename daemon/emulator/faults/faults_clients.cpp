@@ -8,6 +8,7 @@ constexpr std::size_t most_late_requests = 64;
 
 }  // namespace
 
+/// A stream of datagrams is sent to all its receivers at once, so a choice of client does not divide it.
 bool Faults::chosen(const Fault& fault, const Connection& client) const {
   if (client.role == Role::observer) return false;
   using Kind = ClientChoice::Kind;
@@ -29,8 +30,7 @@ Faults::Admission Faults::admission() const {
     if (!e.active) continue;
     if (e.fault.kind->effect == Effect::leave_waiting) return Admission::wait;
     if (e.fault.kind->effect == Effect::take_over) return Admission::take_over;
-    if (e.fault.kind->effect == Effect::turn_away)
-      return e.fault.word("how") == "reset" ? Admission::reset : Admission::turn_away;
+    if (e.fault.kind->effect == Effect::refuse) return e.fault.word("how") == "reset" ? Admission::reset : Admission::refuse;
   }
   return Admission::as_configured;
 }
@@ -47,6 +47,7 @@ void Faults::on_served(const Connection& client, Time now) {
 
 Faults::RequestVerdict Faults::on_request(protocol::ChangeSettings& change, const std::string& who,
                                           const protocol::DeviceState& state, Time now) {
+  // The first fault that withholds the request or ends the client decides; limits of several faults add up.
   on(Occasion::config, now);
   for (Entry& e : entries_) {
     if (!e.active) continue;

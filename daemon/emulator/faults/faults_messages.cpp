@@ -83,7 +83,9 @@ bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
     const bool joins = e.fault.kind->effect == Effect::join_late;
     const bool splices = e.fault.kind->effect == Effect::splice;
     if (!of_message || !chosen(e.fault, to)) continue;
+    // A splice needs the message before this one, also where it did not meet the ping of that message.
     const Bytes earlier = splices && !e.over ? std::exchange(e.before, whole(message)) : Bytes{};
+    // A late join acts on the first ping of a client only.
     if (!(joins ? e.active : met(e, message.ping)) || (joins && to.outbox.pings_written() > 0)) continue;
     if (!edit) edit = MessageEdit{whole(message), {}, Outbox::Shape::End::none, false};
     const Bytes before = edit->bytes;
@@ -146,6 +148,7 @@ void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& st
     alter_bytes_of_datagrams(datagrams, stream, ping, now);
   for (Entry& e : entries_) {
     if (e.fault.kind->stage != FaultStage::datagrams || datagrams.empty() || !chosen(e.fault, stream)) continue;
+    // e.before is the first part of the previous ping (older_part), or the part that waits for this ping (late_part).
     const bool older = e.fault.kind->effect == Effect::older_part, delays = e.fault.kind->effect == Effect::late_part;
     Bytes late = delays ? std::exchange(e.before, {}) : Bytes{};
     if (e.over && e.hits.empty() && late.empty()) continue;
@@ -170,6 +173,7 @@ void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& st
       note(e, FaultEntry::What::injected, now, std::move(more));
     }
     if (older) e.before = first;
+    // The late part follows the first part of this ping.
     if (!late.empty()) datagrams.insert(datagrams.begin() + (datagrams.empty() ? 0 : 1), std::move(late));
   }
 }
@@ -177,11 +181,13 @@ void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& st
 void Faults::alter_beacons(std::vector<Bytes>& beacons, Time now) {
   if (entries_.empty() || beacons.empty()) return;
   on(Occasion::status, now);
+  // A fault whose time is over must not alter this message.
   on_tick(now);
   const std::size_t size = beacons.front().size();
   for (Entry& e : entries_) {
     if (!e.active) continue;
     const Effect effect = e.fault.kind->effect;
+    // The device is off until its boot is over; a silent device may keep its status messages.
     const bool off = (effect == Effect::power_cycle && seconds(now - e.since) < e.fault.number("boot-s")) ||
                      (effect == Effect::withhold && e.fault.word("keep-status") == "no");
     if (off) beacons.clear();

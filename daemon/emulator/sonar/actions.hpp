@@ -32,7 +32,7 @@ struct KeepWaiting {
   ConnectionId connection = 0;
 };
 /// Close it without sending a byte. The Sonar has no record of it.
-struct TurnAway {
+struct Refuse {
   ConnectionId connection = 0;
   bool reset = false;  // RST in place of FIN
 };
@@ -93,7 +93,7 @@ struct EngineFailed {
   Error why;
 };
 
-using Action = std::variant<ComputePing, Serve, KeepWaiting, TurnAway, Listen, ReadFrom, EndPauses, Wake, Finish, Reset, Closed,
+using Action = std::variant<ComputePing, Serve, KeepWaiting, Refuse, Listen, ReadFrom, EndPauses, Wake, Finish, Reset, Closed,
                             Announce, PingQueued, Report, EngineFailed>;
 using Actions = std::vector<Action>;
 

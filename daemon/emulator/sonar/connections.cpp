@@ -44,6 +44,7 @@ std::size_t Connections::count(Role role, State state) const {
       std::count_if(all_.begin(), all_.end(), [&](const Connection& c) { return c.role == role && c.state == state; }));
 }
 
+/// Connections are in the order of their arrival.
 Connection* Connections::oldest_client() {
   const auto it = std::find_if(all_.begin(), all_.end(),
                                [](const Connection& c) { return c.role == Role::client && c.state == State::served; });
@@ -65,6 +66,7 @@ std::vector<protocol::Endpoint> Connections::receivers(const Connection& stream)
   const std::size_t number = stream.receivers.front().stream;
   std::vector<protocol::Endpoint> all;
   for (const Connection& c : all_) {
+    // The list of the device belongs to the stream itself; those of clients count while they are served.
     const bool counts = c.role == Role::stream ? c.id == stream.id : !c.finishing && c.state == State::served;
     for (const protocol::SetReceivers& list : c.receivers)
       for (const protocol::Endpoint& to : list.to)
@@ -80,11 +82,11 @@ bool Connections::has_audience() const {
 
 Connections::Verdict Connections::verdict(Role role) const {
   if (role == Role::observer)
-    return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::turn_away;
+    return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::refuse;
   if (clients() < static_cast<std::size_t>(config_.max_clients)) return Verdict::serve;
   if (config_.when_full == WhenClientsFull::take_over) return Verdict::take_over;
   const bool waits = config_.when_full == WhenClientsFull::queue && waiting() < longest_queue;
-  return waits ? Verdict::wait : Verdict::turn_away;
+  return waits ? Verdict::wait : Verdict::refuse;
 }
 
 Connection& Connections::add(ConnectionId id, Role role, Peer peer, State state, const protocol::Port* port) {

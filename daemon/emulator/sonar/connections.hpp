@@ -92,7 +92,7 @@ class Connections {
   bool has_audience() const;
 
   /// By the rules of max_clients, when_full and max_observers.
-  enum class Verdict { serve, take_over, wait, turn_away };
+  enum class Verdict { serve, take_over, wait, refuse };
   Verdict verdict(Role role) const;
   Connection& add(ConnectionId id, Role role, Peer peer, Connection::State state, const protocol::Port* port);
   void remove(ConnectionId id);

@@ -44,6 +44,7 @@ void Sonar::use_initial_settings() {
   if (initial.receivers)
     if (Connection* const stream = connections_.stream(initial.receivers->stream))
       stream->receivers = {*std::move(initial.receivers)};
+  // A ping that is being computed was requested with the settings of clients that have left: on_ping() drops it.
   busy_unwanted_ = busy_;
 }
 
@@ -143,6 +144,7 @@ std::optional<Time> Sonar::next_tick() const {
 }
 
 Actions Sonar::on_tick(Time now) {
+  // Conversations come first: a ping that one of them requests now is fired in the same tick.
   Actions actions = tick_conversations(now);
   for (Action& action : tick_pacer(now)) actions.push_back(std::move(action));
   return actions;
@@ -174,6 +176,7 @@ Actions Sonar::tick_pacer(Time now) {
 void Sonar::skip(std::chrono::nanoseconds by) {
   state_.skipped += by;
   pacer_.skip(by);
+  // Stamps since power-up omit the skipped time.
   state_.powered_up_at += by;
 }
 
@@ -226,6 +229,7 @@ std::optional<PingRequest> Sonar::preview_request(PingNumber number, Time at) co
   PingRequest request = request_at(at, step ? step->aim : aim_);
   if (step) request.settings = step->settings;
   request.number = number;
+  // Another key of the noise than that of the sonar's pings.
   request.sonar_id = ~index_;
   return request;
 }
@@ -235,6 +239,7 @@ void Sonar::request_ping(Time at, Actions& actions) {
     ++figures_.skipped_stale;
     return;
   }
+  // Before the request reads the settings: the sound speed of the device follows the water at its depth.
   update_depth(at);
   follow_water();
   PingRequest request = request_at(at, aim_);
@@ -275,6 +280,7 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
 }
 
 void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
+  // Faults note that they meet this ping before it is altered, framed or offered; the calls below ask for these notes.
   faults_.begin_ping(static_cast<std::uint32_t>(outcome.ping->request.number), now);
   const auto reported = faults_.altered(outcome.ping, state_, now);
   const auto bytes = vendor_.frame(*reported, state_);
@@ -295,6 +301,7 @@ void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
       });
   }
   state_.framed_at = reported->request.fired_at;
+  // Requests that answer this ping act after all clients were offered it, because they may change the settings.
   for (const auto& [from, event] : events) on_event(source_of(*from), event, now, actions);
   actions.emplace_back(std::move(queued));
   apply_fault_orders(now, actions);

@@ -38,7 +38,7 @@ class Sonar {
   // ---- connections
 
   /// A client or an observer at a port of kind tcp_stream, by default the vendor's first, or a host at one of kind udp_dialogue.
-  /// Serve, KeepWaiting or TurnAway is among the actions.
+  /// Serve, KeepWaiting or Refuse is among the actions.
   Actions on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port = nullptr);
   /// A port of kind udp_stream is open: messages for its receivers can be taken under this id.
   Actions open_stream(ConnectionId id, const protocol::Port& port, Time now);

@@ -22,16 +22,15 @@ Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const
   Actions actions;
   if (port == nullptr) port = vendor_.port(protocol::Port::Kind::tcp_stream);
   // The slots give the verdict; a fault of clients may replace it; a sonar that stops refuses all.
-  Connections::Verdict verdict = stopping_ ? Connections::Verdict::turn_away : connections_.verdict(role);
+  Connections::Verdict verdict = stopping_ ? Connections::Verdict::refuse : connections_.verdict(role);
   const auto admission = role == Role::client && !stopping_ ? faults_.admission() : Faults::Admission::as_configured;
   if (admission == Faults::Admission::wait) verdict = Connections::Verdict::wait;
   if (admission == Faults::Admission::take_over && verdict != Connections::Verdict::serve && connections_.clients() > 0)
     verdict = Connections::Verdict::take_over;
-  if (admission == Faults::Admission::turn_away || admission == Faults::Admission::reset)
-    verdict = Connections::Verdict::turn_away;
-  if (verdict == Connections::Verdict::turn_away) {
+  if (admission == Faults::Admission::refuse || admission == Faults::Admission::reset) verdict = Connections::Verdict::refuse;
+  if (verdict == Connections::Verdict::refuse) {
     if (role == Role::client) ++figures_.refused_clients;
-    actions.emplace_back(TurnAway{id, admission == Faults::Admission::reset});
+    actions.emplace_back(Refuse{id, admission == Faults::Admission::reset});
     return actions;
   }
   if (verdict == Connections::Verdict::wait) {
@@ -55,7 +54,9 @@ void Sonar::serve(Connection& connection, Time now, Actions& actions) {
   update_depth(now);
   connection.state = Connection::State::served;
   connection.dialogue = vendor_.converse(*connection.port, state_, unskipped(now));
+  // Serve makes the session that later actions name, such as the ReadFrom of a fault.
   actions.emplace_back(Serve{connection.id});
+  // Observers are in no figures and change neither settings nor the rate of pings.
   if (connection.role == Role::observer) return;
   connection.number = ++figures_.clients;
   on_membership(now, actions);
@@ -163,6 +164,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool
   if (connection == nullptr) return actions;
   const Role connection_role = connection->role;
   const bool was_client = connection_role == Role::client && connection->state == Connection::State::served;
+  // Pings that a fault holds back are offered to the outbox before it drops them, so that the accounts balance.
   for (Connection::Held& held : connection->held) connection->outbox.push_ping(std::move(held.ping));
   connection->outbox.end(connection->finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection->peer.name, connection->role, connection->state != Connection::State::waiting,
@@ -179,6 +181,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool
     on_membership(now, actions);
     return actions;
   }
+  // Before serve(), which calls on_membership(): then the next client counts as audience, and the settings would stay.
   if (!connections_.has_audience()) use_initial_settings();
   serve(*next, now, actions);
   return actions;
@@ -214,6 +217,7 @@ Actions Sonar::on_bytes(ConnectionId id, protocol::BytesView bytes, Time now) {
   Connection* const from = connections_.find(id);
   if (from == nullptr || from->dialogue == nullptr) return actions;
   from->bytes_read += bytes.size();
+  // The bytes may make the dialogue's next tick due at once.
   from->not_before = {};
   if (from->finishing) return actions;
   if (const auto verdict = faults_.on_bytes(from->peer.name, now);
@@ -296,6 +300,7 @@ void Sonar::on_written(ConnectionId id, const Outbox::Message& message, Time now
   if (to == nullptr) return;
   to->outbox.written();
   if (to->role == Role::observer || message.ping == 0) return;
+  // The datagrams of a stream count for each client that receives them.
   for (Connection& c : connections_.all()) {
     if (to->role != Role::stream || c.role != Role::client || !c.receives(to->receivers.front().stream)) continue;
     ++c.streamed_pings;

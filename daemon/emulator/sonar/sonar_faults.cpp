@@ -91,6 +91,7 @@ void Sonar::apply(const FaultOrder& order, Time now, Actions& actions) {
   } else if (const auto* restart = std::get_if<RestartDevice>(&order)) {
     state_.powered_up_at = now;
     if (restart->clock_only) return;
+    // Pings are numbered from 1 again.
     state_.last_ping = ping_number_ = 0;
     last_served_ = {};
     use_initial_settings();
@@ -149,6 +150,7 @@ void Sonar::deliver(Connection& to, Outbox::Message ping, Time now, Actions& act
   using Kind = Faults::Hold::Kind;
   const Faults::Hold hold = faults_.hold(to, ping.ping, now);
   std::deque<Connection::Held>& held = to.held;
+  // A ping that no fault holds goes out at once, before one that was held to be swapped with it: that one follows.
   if (hold.kind == Kind::pass && (held.empty() || held.front().after_next)) {
     to.outbox.push_ping(std::move(ping));
     actions.emplace_back(Wake{to.id});

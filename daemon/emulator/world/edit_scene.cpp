@@ -53,7 +53,7 @@ std::size_t free_place(Scene& scene) {
   return scene.objects.size() - 1;
 }
 
-/// When nothing rides on it any more. The bodies after it move up by one.
+/// Removes a body on which nothing rides any more. The indices of the bodies after it move up by one.
 void remove_body_if_empty(Scene& scene, int body) {
   const auto rides = [body](const auto& thing) { return thing.body == body; };
   if (std::any_of(scene.objects.begin(), scene.objects.end(), rides) ||

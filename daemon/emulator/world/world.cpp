@@ -72,11 +72,12 @@ World::Track* World::find(PoseSample::Of of, const std::string& name, std::strin
 bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) const {
   const bool known = !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain;
   if (!known) return false;
-  // Where time follows the stamps it cannot show silence; but it shows a simulator that began anew.
+  // With clock: follow time stands still while no stamps come, so silence cannot be seen. A stamp far behind the newest one shows
+  // a simulator that started again.
   return rules_.follows ? at >= track.history.newest().at - rules_.stale_after : now - track.last_arrival <= rules_.stale_after;
 }
 
-/// The sender's clock is mapped by the least delay seen; a jump of more than we would extrapolate is a new relation.
+/// The sender's clock is mapped by the least delay seen. A delay that grows by more than extrapolate_max is a jump of that clock.
 World::Ns World::offset_for(const Track& track, Time at, Time now, bool goes_on) {
   if (rules_.follows) return followed_offset_for(track, at, now);
   const Ns offset = now - at;
@@ -84,7 +85,7 @@ World::Ns World::offset_for(const Track& track, Time at, Time now, bool goes_on)
   return keep ? track.offset : offset;
 }
 
-/// Takes one from the allowance, or says that there is none.
+/// Takes one pose from the allowance; true: none was left.
 bool World::over_rate(Track& track, Time now) const {
   if (rules_.stepped) return false;
   const double refill = rules_.most_per_s * seconds(now - track.allowance_at);
@@ -147,9 +148,10 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
     return out;
   }
 
+  // SIM stamps are of the sender's own clock, in stepped time WALL ones too.
   const bool own_clock = !has_shared_clock(sample) && sample.stamp.domain != ClockDomain::arrival;
   const Ns offset = own_clock ? offset_for(track, at, now, goes_on) : Ns(0);
-  const bool vehicle = sample.of == PoseSample::Of::vehicle;  // other bodies may come seldom
+  const bool vehicle = sample.of == PoseSample::Of::vehicle;  // poses of objects may come seldom
   if (rules_.follows && vehicle && offset != track.offset && track.sender_id == sender.id)
     out.notice = "stamps of " + track.body.name + " do not go on from where they were: taken as the next moments of our time";
   track.offset = offset;
@@ -177,6 +179,7 @@ void World::keep(Track& track, const PoseSample& sample, const Sender& sender, T
   track.hidden_for_now = false;
   track.stale_reported = false;
   const PoseHistory::Sample kept{at, sample.pose, sample.velocity_mps, sample.angular_velocity_radps};
+  // A pose beyond the rate replaces the newest one: the history stays short and ends with the latest news.
   if (over_rate(track, now) && !track.history.empty()) {
     ++counters_.over_rate;
     track.history.replace_newest(kept);

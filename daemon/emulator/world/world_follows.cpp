@@ -5,7 +5,7 @@
 
 namespace sonar {
 namespace {
-__extension__ using Wide = __int128;  // a stranger's stamps and what we make of them may lie further apart than 64 bits reach
+__extension__ using Wide = __int128;  // a foreign stamp and the time it is mapped to may lie further apart than 64 bits reach
 Wide wide(Time t) { return t.time_since_epoch().count(); }
 }  // namespace
 
@@ -13,9 +13,9 @@ bool World::is_followed(const Track& track, Time newest) const {
   return !track.history.empty() && track.history.newest().at + track.offset >= newest - rules_.stale_after;
 }
 
-/// Our time is the stamps' own where it can be. A stamp near the newest one, by a relation that we know, is just the next. Else
-/// the sender's clock has jumped, or this is the first pose: forwards, and without other senders, the time between is skipped;
-/// in all other cases ours goes on from where it is.
+/// Offset from the stamps of a sender to sonard's time. A known offset, or none, is kept while it puts the stamp near the newest
+/// one. Otherwise the sender's clock has jumped, or this is the first pose: if it is ahead, and no other vehicle is followed, the
+/// time between is skipped; in all other cases the stamp becomes the present time.
 World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
   const Time newest = newest_followed_.value_or(now);
   const bool vehicle = std::any_of(vehicles_.begin(), vehicles_.end(), [&](const Track& t) { return &t == &track; });

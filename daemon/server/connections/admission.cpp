@@ -18,6 +18,7 @@ constexpr std::uint64_t most_kept_for_drivers = 64;
 
 int open_reserve() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
 
+/// Reads what has arrived: closing a socket with unread bytes would send RST in place of FIN.
 void close_politely(int descriptor) {
   std::array<char, 4096> dustbin;
   for (int reads = 0; reads < 16 && ::recv(descriptor, dustbin.data(), dustbin.size(), MSG_DONTWAIT) > 0; ++reads) {
@@ -31,7 +32,7 @@ std::uint64_t most_descriptors() {
   return static_cast<std::uint64_t>(limit.rlim_cur);
 }
 
-/// The first number that is not for them; the kernel hands out the lowest free one.
+/// The first descriptor number that this purpose may not use. The kernel hands out the lowest free number.
 std::uint64_t first_spare(const LimitConfig& limits, Admission::Purpose purpose) {
   const std::uint64_t most = most_descriptors();
   const auto spare = std::min(static_cast<std::uint64_t>(limits.spare_descriptors), most / 2);
@@ -70,7 +71,7 @@ void Admission::say(Steady::time_point& last, const char* what) {
 }
 
 bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
-  // The descriptor's number says how many are in use below it: all.
+  // All numbers below that of a new socket are in use: its number is the count of descriptors in use.
   if (number_of(socket) < first_spare(limits_, purpose)) return true;
   ++for_descriptors_;
   say(descriptors_said_, "file descriptors run out: refusing clients until some are free (raise LimitNOFILE or ulimit -n)");
@@ -115,6 +116,8 @@ asio::awaitable<std::optional<tcp::socket>> Admission::next_visitor(tcp::accepto
 
 bool Admission::send_away(tcp::acceptor& acceptor, const error_code& why) {
   if (why.value() != EMFILE && why.value() != ENFILE) return false;
+  // Without a free descriptor accept() fails and the client waits in the backlog: the reserve is given up for a moment to accept
+  // and close its connection.
   if (reserve_ >= 0) ::close(reserve_);
   const int visitor = ::accept4(acceptor.native_handle(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (visitor >= 0) {

@@ -137,7 +137,7 @@ asio::awaitable<void> HttpConnection::read() {
   if (all_sent_) close();
 }
 
-/// Waits for as long as the work of its address exceeds the limit: what costs less than it is worth is paid for before the next.
+/// Counts work for the address of the client, and waits while that address is above its limit.
 asio::awaitable<void> HttpConnection::settle(std::size_t work) {
   const auto pause = services_.pause_after(sender_, work);
   if (pause.count() == 0 || over()) co_return;
@@ -207,7 +207,7 @@ asio::awaitable<void> HttpConnection::write() {
   finish_sending();
 }
 
-/// False: it shows the token, and no slot is free.
+/// False: the request shows the token, but no slot of authenticated clients is free.
 bool HttpConnection::has_slot(const HttpRequest& request) {
   return !services_.token.matches(bearer_token(request.authorization)) || claim_slot();
 }

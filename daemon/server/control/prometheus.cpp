@@ -194,8 +194,8 @@ void write_process(PrometheusText& text, const DaemonFigures& figures) {
   one("sonard_connections", Type::gauge, "Current connections to all sonars, including queued ones.",
       static_cast<double>(figures.clients_now));
   text.family("sonard_connections_refused_total", Type::counter, "Connections closed at once for a limit of the whole daemon.");
-  text.sample({{"reason", "places"}}, static_cast<double>(figures.turned_away_for_places));
-  text.sample({{"reason", "descriptors"}}, static_cast<double>(figures.turned_away_for_descriptors));
+  text.sample({{"reason", "places"}}, static_cast<double>(figures.refused_for_places));
+  text.sample({{"reason", "descriptors"}}, static_cast<double>(figures.refused_for_descriptors));
   one("sonard_viewers", Type::gauge, "Viewers of the live view now.", static_cast<double>(figures.viewers.size()));
   text.family("sonard_viewer_dropped_total", Type::counter, "Messages that newer ones replaced: the viewer was too slow.");
   for (const ViewerFigures& v : figures.viewers)

@@ -15,7 +15,7 @@ using control::StatusCode;
 constexpr std::size_t longest_before_hello = 4096;  // less than a message may have later
 constexpr std::size_t work_of_a_turn = 4096;        // bytes; then other connections have their turn
 constexpr std::size_t least_work = 64;              // cost of a message beside its bytes
-constexpr std::size_t skipping_is_cheaper = 16;     // than taking a pose
+constexpr std::size_t skipping_is_cheaper = 16;     // times: than accepting a pose
 constexpr int receive_buffer = 256 << 10;           // bytes; poses that wait would only be older
 constexpr std::chrono::milliseconds between_looks{10};
 
@@ -88,6 +88,7 @@ asio::awaitable<void> StreamConnection::read() {
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || over()) break;
     received += n;
+    // Any web page can make a browser send an HTTP request here: it must have no effect, even if it parses as protobuf.
     if (http_.speaks_http(std::span(buffer).first(n))) {
       log_refusal(services_, "HTTP request on the control stream, which is protobuf; use control.http for HTTP", sender_.id);
       break;
@@ -105,6 +106,7 @@ asio::awaitable<void> StreamConnection::read() {
       active_at = Steady::now();
       if (greeted_ && control::is_unasked_pose(**message) && is_beyond_pose_rate()) {
         newest_pose_.emplace((*message)->begin(), (*message)->end());
+        // A skipped pose costs a sixteenth of its bytes.
         work.bytes -= std::min(work.bytes, (*message)->size() - (*message)->size() / skipping_is_cheaper);
         continue;
       }
@@ -125,7 +127,7 @@ bool StreamConnection::is_beyond_pose_rate() {
   return targets_.pose_rate.left(*pose_rate_, Steady::now()) == 0;
 }
 
-/// When the rate allows it, or the client has hung up.
+/// Accepts the pose that was kept once the rate allows it, or at once if the client has hung up.
 asio::awaitable<void> StreamConnection::take_newest_pose() {
   if (is_beyond_pose_rate() && !has_left(socket_)) {
     error_code ec;
@@ -153,7 +155,6 @@ asio::awaitable<void> StreamConnection::limit_rate(const Work& work) {
   co_await rest_.async_wait(into(ec));
 }
 
-/// Any web page can make a browser send it; it must have no effect even if it parses as protobuf.
 /// False: close the connection.
 bool StreamConnection::accept(control::BytesView message, Work& work) {
   work.bytes += least_work;
@@ -168,6 +169,7 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
   }
   if (const auto* hello = std::get_if<control::Hello>(&request->op)) return greet(request->id, *hello);
   if (!greeted_) return refuse_and_end(request->id, StatusCode::refused, "the first message must be a Hello");
+  // Poses without an answer have a rate of their own; all else counts as work of the address.
   if (is_unasked(request->id, request->op))
     work.pose_bytes += message.size() + least_work;
   else

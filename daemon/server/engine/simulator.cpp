@@ -72,7 +72,7 @@ void Simulator::work_off() {
   working_ = false;
 }
 
-/// The next, and those after it that go with it. None waits for others to come.
+/// The next job and those that the engine can compute together with it. No job waits for others to arrive.
 std::vector<Simulator::Job> Simulator::take_together() {
   std::vector<Job> jobs;
   while (!waiting_.empty() && !waiting_.front().engine) {
@@ -84,7 +84,7 @@ std::vector<Simulator::Job> Simulator::take_together() {
   return jobs;
 }
 
-/// The job of the sonar that had least of the present engine; of equals the one that has waited longest.
+/// The job whose sonar has used least time of the present engine; among equals the one that has waited longest.
 std::list<Simulator::Job>::iterator Simulator::next_to_run() {
   auto best = waiting_.begin();
   for (auto it = waiting_.begin(); it != waiting_.end() && !it->engine; ++it)
@@ -92,7 +92,8 @@ std::list<Simulator::Job>::iterator Simulator::next_to_run() {
   return best;
 }
 
-/// A ping is under way: lets in one of another sonar that would else wait longer than its own takes.
+/// Called by the engine between two parts of a ping: runs a ping of another sonar first if that sonar had less time and its ping
+/// is done sooner than the rest of this one.
 void Simulator::run_other() {
   queue_.poll();
   if (under_way_ > 1 || waiting_.empty() || waiting_.front().engine) return;
@@ -106,12 +107,13 @@ void Simulator::run_other() {
   const std::uint32_t running = running_;
   const double let_in_s = let_in_s_;
   simulate(std::move(job));
+  // The call above replaced the account of the ping that is under way; its time does not include the ping that was let in.
   running_ = running;
   running_since_ = since;
   let_in_s_ = let_in_s + seconds_since(begin);
 }
 
-/// Several only with an engine that computes them together: the time counts for each of them with its share.
+/// Several jobs only with an engine that computes them together: each sonar is charged an equal share of the time.
 void Simulator::simulate(std::vector<Job> jobs) {
   for (const Job& job : jobs) turns_.begin(job.request.sonar_id);
   running_ = jobs.front().request.sonar_id;
@@ -142,7 +144,7 @@ std::vector<Simulator::Outcome> Simulator::run(const std::vector<Job>& jobs) {
     std::vector<Ping> pings = engine_->run(requests);
     for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i].ping = std::make_shared<const Ping>(std::move(pings.at(i)));
     return outcomes;
-  } catch (const std::exception&) {  // of one of them: the others get theirs, and it its reason
+  } catch (const std::exception&) {  // one of them failed: computed alone, the others succeed and that one gets its reason
   }
   for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i] = run(requests[i]);
   return outcomes;

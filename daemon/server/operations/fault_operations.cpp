@@ -115,7 +115,7 @@ OperationResult FaultOperations::add(const control::FaultRecord& record, bool ma
     if (why_not.empty())
       takers.push_back(&device);
     else if (record.sonar.empty() && why_not.find("has no effect") != std::string::npos)
-      why = std::move(why_not);  // of a product that has no such thing; others may
+      why = std::move(why_not);  // it may have an effect on other sonars
     else
       return refused(std::move(why_not));
   }
@@ -152,7 +152,7 @@ mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureT
   using enum mavlink::MavResult;
   if (unit != mavlink::distance_sensor) return unsupported;
   if (!config_.faults.armed || instance > fleet_.devices().size()) return denied;
-  if (!config_.control.token_file.empty()) {  // HTTP would ask for it, and MAVLink has no place for one
+  if (!config_.control.token_file.empty()) {  // HTTP would require it, and MAVLink has no field for one
     log_.warning("failure refused: a command of MAVLink cannot show the token of control.token_file",
                  {{"client", name_by_mavlink}});
     return denied;

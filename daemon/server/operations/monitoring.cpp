@@ -130,8 +130,8 @@ std::string Monitoring::metrics() const {
   f.fault_entries_lost = of_.faults.lost();
   f.poses = of_.world.counters();
   f.clients_now = of_.admission.now();
-  f.turned_away_for_places = of_.admission.refused_for_places();
-  f.turned_away_for_descriptors = of_.admission.refused_for_descriptors();
+  f.refused_for_places = of_.admission.refused_for_places();
+  f.refused_for_descriptors = of_.admission.refused_for_descriptors();
   f.viewers = of_.view.viewers();
   f.process = figures_of_this_process();
   return metrics_text(f);

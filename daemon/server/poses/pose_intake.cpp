@@ -16,8 +16,8 @@ void PoseIntake::refuse(const std::string& why, const Sender& sender) {
   log_refusal(why, sender);
 }
 
-/// WALL stamps are of the clocks as they are now, also when ours has been set since the start; the World has a time of its
-/// own that never jumps. A shift is kept while it is right to a millisecond, so that equal stamps stay equal.
+/// WALL stamps follow the computer's clock, which may be set while sonard runs; the time of the World never jumps. The shift
+/// between both is kept while it is right to a millisecond, so that equal stamps stay equal.
 void PoseIntake::map_wall(control::Stamp& stamp) {
   if (stamp.domain != control::ClockDomain::wall || clock_.stepped()) return;
   const auto shift = clock_.ahead_of_wall();

@@ -17,10 +17,10 @@ namespace {
 constexpr std::size_t most_connections = 32;
 constexpr std::size_t most_lines_of_a_datagram = 64;
 constexpr std::size_t work_of_a_turn = 4096;            // bytes processed before yielding
-constexpr std::size_t least_work = 64;                  // bytes that cost as much as a read, or a line, does beside its own
-constexpr int most_not_json = 8;                        // lines in a row that begin as JSON objects and are none
-constexpr std::size_t dropped_per_s = 256u << 20;       // reading away costs little, but not nothing
-constexpr std::chrono::milliseconds between_looks{10};  // at what has come meanwhile
+constexpr std::size_t least_work = 64;                  // bytes: cost of a read or of a line, beside its own bytes
+constexpr int most_not_json = 8;                        // lines in a row that are too long or not JSON; then the connection ends
+constexpr std::size_t dropped_per_s = 256u << 20;       // limit of discarded bytes: discarding costs little, but not nothing
+constexpr std::chrono::milliseconds between_looks{10};  // for new input
 constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
 
 Sender sender_of(bool json, const char* transport, const asio::ip::address& ip, std::uint16_t port) {
@@ -134,7 +134,7 @@ asio::awaitable<void> PoseServer::receive(Port& port) {
     udp::endpoint from;
     const std::size_t n = co_await port.datagrams.async_receive_from(asio::buffer(buffer), from, into(ec));
     if (stopping_) co_return;
-    if (ec) continue;  // an ICMP answer to nothing we sent
+    if (ec) continue;  // an ICMP answer; this socket sends nothing
     if (!is_admitted(config_.allow_from, from.address())) {
       intake_.refuse("address is not in poses.allow_from", sender_of(false, "udp", from.address(), from.port()));
       continue;
@@ -193,7 +193,7 @@ asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
   }
 }
 
-/// Some of the lines that have come; what they cost is added.
+/// Processes lines of up to work_of_a_turn bytes and adds their cost to `work`.
 PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   for (std::size_t taken = 0; taken < work_of_a_turn;) {
     const auto line = c.lines.next();
@@ -212,7 +212,7 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   return Turn::not_over;
 }
 
-/// The others' turns; longer when it sends more than limits allow it, or its share of all.
+/// Gives other connections their turns. The pause is longer if this one sent more than its limit or its share of all.
 asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
   const auto pause = std::max(c.rate.pause_after(work.bytes, now), together_.pause_after(c.of_all, work.bytes, now));

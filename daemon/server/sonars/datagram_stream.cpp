@@ -48,7 +48,7 @@ void DatagramStream::send_nothing_to(const Endpoint& to) {
   socket_.send_to(asio::const_buffer(), {address_of(to.ip), to.port}, 0, ignored);
 }
 
-/// For the next message. A host that was silent for too long is given up.
+/// Waits for the next message. A silent host is looked for after half of the permitted time and given up after all of it.
 asio::awaitable<void> DatagramStream::wait() {
   const auto longest = parent_.longest_silence(id_);
   wake_.expires_at(longest ? heard_at_ + (looked_ ? *longest : *longest / 2) : asio::steady_timer::time_point::max());
@@ -86,7 +86,7 @@ asio::awaitable<bool> DatagramStream::send_datagram(const protocol::Bytes& datag
     error_code ec;
     const auto sent_to = udp::endpoint(address_of(to.ip), to.port);
     co_await socket_.async_send_to(asio::buffer(datagram), sent_to, into(ec));
-    // That is the answer to an earlier datagram, perhaps to another host; this one was not sent.
+    // The error answers an earlier datagram, perhaps to another host; this one was not sent.
     if (ec == asio::error::connection_refused) co_await socket_.async_send_to(asio::buffer(datagram), sent_to, into(ec));
     if (!socket_.is_open()) co_return false;
     if (ec)

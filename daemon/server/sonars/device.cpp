@@ -4,12 +4,11 @@
 #include <array>
 
 #include "daemon/server/system/listen.hpp"
-#include "protocol/doctor/check_status.hpp"
 
 namespace sonar {
 namespace {
 
-constexpr int most_turned_away_at_once = 16;
+constexpr int most_refused_at_once = 16;
 
 }  // namespace
 
@@ -90,7 +89,7 @@ Result<DatagramPort*> Device::datagram_port(std::uint16_t number) {
   for (DatagramPort& port : datagram_ports_)
     if (number != 0 && port.number() == number) return &port;
   DatagramPort& port = datagram_ports_.emplace_back(network_.io);
-  // Where devices are searched for, hosts bind that port too. That a sonar is started twice shows at its other ports.
+  // Hosts bind the port of discovery too, so it is shared. A sonar that is started twice is noticed at its other ports.
   const auto ports = sonar_.vendor().ports();
   const bool shared = std::any_of(ports.begin(), ports.end(), [&](const protocol::Port& p) {
     return p.kind == protocol::Port::Kind::udp_answer && p.number == number;
@@ -108,13 +107,6 @@ Result<void> Device::open_observers() {
 
 Endpoint Device::data_endpoint() const { return tcp_ports_.empty() ? Endpoint{} : tcp_ports_.front().listener.at(); }
 
-std::vector<protocol::DriverAddress> Device::addresses() const {
-  std::vector<Endpoint> status_to;
-  for (const udp::endpoint& to : status_destinations()) status_to.push_back({to.address().to_v4().to_bytes(), to.port()});
-  const Ipv4 ip = config().bind_ip == Ipv4{} ? sonar_.state().advertise_ip : config().bind_ip;
-  return protocol::driver_addresses(sonar_.vendor(), ip, status_to);
-}
-
 void Device::start() {
   started_ = true;
   const auto fault = [this](const std::string& what) { on_fault(what); };
@@ -131,31 +123,33 @@ void Device::start() {
 
 void Device::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
+  // Listeners first: no client may arrive while the present ones are finished.
   for (TcpPort& tcp : tcp_ports_) tcp.listener.stop();
   observer_listener_.stop();
   beacon_.stop();
   timer_.cancel();
   for (SonarHttp& http : http_) http.stop();
   visits_.end();
-  if (started_) parent_.on_stop(*this, why);  // else one of the same name may go on
+  if (started_) parent_.on_stop(*this, why);  // a device that was never started may have the name of one that goes on
   perform(sonar_.stop(why));
   for (DatagramPort& port : datagram_ports_) port.stop();
   if (!started_) streams_.clear();
 }
 
 bool Device::gone() const {
-  return sessions_.empty() && streams_.empty() && turning_away_ == 0 && !sonar_.busy() &&
+  return sessions_.empty() && streams_.empty() && refusing_ == 0 && !sonar_.busy() &&
          std::all_of(http_.begin(), http_.end(), [](const SonarHttp& http) { return http.gone(); });
 }
 
 void Device::on_client_socket(tcp::socket socket, const protocol::Port& port) {
   if (auto place = network_.admission.enter(socket)) return on_arrival(std::move(socket), std::move(place), Role::client, &port);
   sonar_.count_refused_client();
-  turned_away_ = Visit{peer_of(socket).name, "sonard has no descriptor or place left for it"};
+  refused_ = Visit{peer_of(socket).name, "sonard has no descriptor or slot left for it"};
   close_politely(socket);
 }
 
 void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port) {
+  // A slot whose client has hung up must be free before this one is judged.
   forget_who_left();
   const ConnectionId id = ++last_connection_;
   Peer peer = peer_of(socket);
@@ -164,7 +158,7 @@ void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, c
 }
 
 /// FIN and no byte. What the client has sent meanwhile is read away, or the kernel would answer it with RST.
-asio::awaitable<void> Device::turn_away(tcp::socket socket, Admission::Place place) {
+asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place) {
   error_code ec;
   socket.shutdown(tcp::socket::shutdown_send, ec);
   bool late = false;
@@ -189,7 +183,7 @@ void Device::forget_who_left() {
     if (has_left(arrived.socket)) left.push_back(id);
   for (const ConnectionId id : left) {
     arrived_.erase(id);
-    perform(sonar_.on_closed(id, "it waited for a place", network_.clock.now()));
+    perform(sonar_.on_closed(id, "it waited for a slot", network_.clock.now()));
   }
   for (const SessionPointer& session : std::vector(sessions_.begin(), sessions_.end())) session->end_if_closed();
 }
@@ -240,18 +234,14 @@ void Device::on_over(ConnectionId id, const std::string& why, bool by_client) {
     digests_.push_back({connection->number, session->digest().size(), session->digest().hex()});
   sessions_.remove(session);
   streams_.remove_if([id](const StreamPointer& s) { return s->id() == id; });
+  // The freed slot goes to the client that has waited longest: not to one that has hung up.
   forget_who_left();
   perform(sonar_.on_closed(id, why, network_.clock.now(), by_client));
 }
 
-std::vector<StreamDigest> Device::digests() const {
-  auto all = digests_;
-  std::sort(all.begin(), all.end(), [](const StreamDigest& a, const StreamDigest& b) { return a.client < b.client; });
-  return all;
-}
-
 // ---- actions
 
+/// Actions are carried out in order: later ones may name the session that a Serve among them makes.
 void Device::perform(Actions actions) {
   for (Action& action : actions) std::visit([this](auto& a) { carry_out(a); }, action);
   arm();
@@ -259,6 +249,7 @@ void Device::perform(Actions actions) {
 }
 
 void Device::arm() {
+  // In stepped time the Stepper ticks the sonar.
   if (stopping_ || network_.clock.stepped()) return;
   const auto next = sonar_.next_tick();
   const auto at = next ? std::optional(network_.clock.timer_at(*next)) : std::nullopt;
@@ -305,17 +296,17 @@ void Device::carry_out(const Serve& action) {
 }
 
 void Device::carry_out(const KeepWaiting&) {
-  visits_.say(VisitLog::Kind::waits, "client waits for a place", {{"waiting", sonar_.connections().waiting()}});
+  visits_.say(VisitLog::Kind::waits, "client waits for a slot", {{"waiting", sonar_.connections().waiting()}});
 }
 
-void Device::carry_out(const TurnAway& action) {
+void Device::carry_out(const Refuse& action) {
   auto arrived = arrived_.extract(action.connection);
   if (arrived.empty()) return;
   Arrived& from = arrived.mapped();
   if (from.role == Role::client)
-    turned_away_ = Visit{peer_of(from.socket).name, action.reset ? "reset by a fault" : "no place is free"};
+    refused_ = Visit{peer_of(from.socket).name, action.reset ? "reset by a fault" : "no slot is free"};
   if (action.reset) {
-    report_visit(from.role, VisitLog::Kind::turned_away, "client refused: reset", {});
+    report_visit(from.role, VisitLog::Kind::refused, "client refused: reset", {});
     error_code ec;
     from.socket.set_option(asio::socket_base::linger(true, 0), ec);
     from.socket.close(ec);  // its destructor would send FIN
@@ -323,19 +314,20 @@ void Device::carry_out(const TurnAway& action) {
   }
   if (from.role == Role::observer) {
     const std::string most = std::to_string(config().max_observers);
-    report_visit(from.role, VisitLog::Kind::turned_away, "observer refused: " + most + " observers connected", {});
+    report_visit(from.role, VisitLog::Kind::refused, "observer refused: " + most + " observers connected", {});
     return close_politely(from.socket);
   }
   const std::string most = std::to_string(config().max_clients);
-  report_visit(from.role, VisitLog::Kind::turned_away, "client refused: " + most + " already connected", {});
-  if (turning_away_ >= most_turned_away_at_once || stopping_) return;
-  ++turning_away_;
+  report_visit(from.role, VisitLog::Kind::refused, "client refused: " + most + " already connected", {});
+  // Beyond the limit the socket is closed without reading: the client may see a reset in place of a FIN.
+  if (refusing_ >= most_refused_at_once || stopping_) return;
+  ++refusing_;
   asio::co_spawn(
       network_.io,
-      [this, s = std::move(from.socket), p = std::move(from.place)]() mutable { return turn_away(std::move(s), std::move(p)); },
+      [this, s = std::move(from.socket), p = std::move(from.place)]() mutable { return refuse(std::move(s), std::move(p)); },
       [this](std::exception_ptr fault) {
         if (fault) on_fault(text_of(fault));
-        --turning_away_;
+        --refusing_;
         parent_.on_change();
       });
 }

@@ -164,7 +164,7 @@ class Device final : public SessionParent {
   void on_receiver_closed(const Endpoint& receiver);
   StreamPointer begin_dialogue(DatagramPort& at, const protocol::Port& port, Peer host);
   void on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port);
-  asio::awaitable<void> turn_away(tcp::socket socket, Admission::Place place);
+  asio::awaitable<void> refuse(tcp::socket socket, Admission::Place place);
   void arm();
   void report_visit(Role role, VisitLog::Kind kind, const std::string& what, std::vector<LogField> fields);
   SessionPointer session_of(ConnectionId id) const;
@@ -173,7 +173,7 @@ class Device final : public SessionParent {
   void carry_out(ComputePing& action);
   void carry_out(const Serve& action);
   void carry_out(const KeepWaiting& action);
-  void carry_out(const TurnAway& action);
+  void carry_out(const Refuse& action);
   void carry_out(const Listen& action);
   void carry_out(const ReadFrom& action);
   void carry_out(const EndPauses& action);
@@ -205,8 +205,8 @@ class Device final : public SessionParent {
   std::list<SessionPointer> sessions_;
   std::list<StreamPointer> streams_;
   std::list<std::pair<Endpoint, std::chrono::steady_clock::time_point>> closed_;  // receivers, and when they are tried again
-  int turning_away_ = 0;
-  std::optional<Visit> turned_away_, gone_, searched_;  // the last ones
+  int refusing_ = 0;
+  std::optional<Visit> refused_, gone_, searched_;  // the last ones
   std::string silenced_by_;
 
   bool started_ = false, stopping_ = false;

@@ -93,7 +93,7 @@ v1::SonarStatus Device::status(Time now) const {
   s.set_asked_by(sonar_.asked_by());
   if (!sonar_.transmits()) s.set_silenced_by(silenced_by_);
   s.set_waiting(static_cast<std::uint32_t>(sonar_.connections().waiting()));
-  if (turned_away_) *s.mutable_turned_away() = message_of(*turned_away_);
+  if (refused_) *s.mutable_turned_away() = message_of(*refused_);
   if (gone_) *s.mutable_gone() = message_of(*gone_);
   if (searched_) *s.mutable_searched() = message_of(*searched_);
   fill(*s.mutable_figures(), figures());
@@ -163,6 +163,19 @@ bool Device::end_faults(const std::string& name) {
   const bool found = sonar_.end_faults(name, network_.clock.now(), actions);
   perform(std::move(actions));
   return found;
+}
+
+std::vector<protocol::DriverAddress> Device::addresses() const {
+  std::vector<Endpoint> status_to;
+  for (const udp::endpoint& to : status_destinations()) status_to.push_back({to.address().to_v4().to_bytes(), to.port()});
+  const Ipv4 ip = config().bind_ip == Ipv4{} ? sonar_.state().advertise_ip : config().bind_ip;
+  return protocol::driver_addresses(sonar_.vendor(), ip, status_to);
+}
+
+std::vector<StreamDigest> Device::digests() const {
+  auto all = digests_;
+  std::sort(all.begin(), all.end(), [](const StreamDigest& a, const StreamDigest& b) { return a.client < b.client; });
+  return all;
 }
 
 }  // namespace sonar

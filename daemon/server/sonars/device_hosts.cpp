@@ -14,7 +14,7 @@ constexpr std::size_t most_closed = 64;
 bool is_multicast(const Ipv4& ip) { return ip[0] >> 4 == 0xE; }
 
 bool is_broadcast(const Ipv4& ip, const SonarConfig& sonar) {
-  constexpr unsigned first_reserved = 240;  // from there on no address is one computer's
+  constexpr unsigned first_reserved = 240;  // addresses from here on belong to no single computer
   if (ip[0] >= first_reserved || ip == Ipv4{127, 255, 255, 255}) return true;
   bool broadcast = sonar.netmask != Ipv4{255, 255, 255, 255};
   for (std::size_t i = 0; i < ip.size(); ++i)
@@ -52,7 +52,7 @@ void Device::on_receiver_closed(const Endpoint& receiver) {
   if (!known && closed_.size() < most_closed) closed_.emplace_back(receiver, std::chrono::steady_clock::now() + closed_for);
 }
 
-/// A host that says nothing may be there all the same: its computer says so when it refuses what is sent to a closed port.
+/// A silent host may still be there: its computer answers a datagram to a closed port (ICMP), which counts as a sign of it.
 void Device::look_for_host(ConnectionId stream) {
   const Connection* const host = sonar_.connections().find(stream);
   const StreamPointer dialogue = stream_of(stream);
@@ -74,7 +74,8 @@ void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, cons
   on_bytes(dialogue->id(), datagram);
 }
 
-/// Without a connection, that is how a host's end is noticed.
+/// The computer of a host has answered that a port is closed. For the host's port this is the only sign of its end, because there
+/// is no connection; for the port of look_for_host() it is a sign of life.
 void Device::on_host_closed(const protocol::Port& port, const Endpoint& host) {
   const StreamPointer dialogue = host_of(port);
   if (!dialogue) return;
@@ -94,14 +95,14 @@ Device::StreamPointer Device::host_of(const protocol::Port& port) const {
   return nullptr;
 }
 
-/// Null: no place is free. A datagram does not wait for one.
+/// Null: no slot is free. A datagram does not wait for one.
 Device::StreamPointer Device::begin_dialogue(DatagramPort& at, const protocol::Port& port, Peer host) {
   const ConnectionId id = ++last_connection_;
   perform(sonar_.on_connect(id, Role::client, host, network_.clock.now(), &port));
   const Connection* const connection = sonar_.connections().find(id);
   if (connection == nullptr || connection->state != Connection::State::served) {
-    turned_away_ = Visit{host.name, "no place is free"};
-    if (connection != nullptr) perform(sonar_.on_closed(id, "no place is free", network_.clock.now()));
+    refused_ = Visit{host.name, "no slot is free"};
+    if (connection != nullptr) perform(sonar_.on_closed(id, "no slot is free", network_.clock.now()));
     return nullptr;
   }
   report_visit(Role::client, VisitLog::Kind::connected, "client connected", {{"client", host.name}});

@@ -56,7 +56,7 @@ std::string Fleet::problem() const {
   return {};
 }
 
-/// The place in the configuration, unless a sonar has it that goes on or was given it just now.
+/// The position in the configuration, or the first free index if a sonar that continues or was just opened has that.
 std::uint32_t Fleet::free_index(std::size_t wanted, const std::vector<Opening>& given) const {
   const auto taken = [&](std::uint32_t index) {
     return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) { return d.sonar().index() == index; }) ||
@@ -108,21 +108,21 @@ bool Fleet::is_held(Ipv4 ip) const {
   });
 }
 
-/// Sonars that live on move to where the new configuration has them; what is to be opened anew is returned.
-std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& next, Fates& fates) {
+/// Sonars that continue get the mount and vehicle of the new configuration; those to be opened are returned.
+std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& next, Outcomes& outcomes) {
   std::vector<Opening> openings;
   for (auto it = devices_.begin(); it != devices_.end();) {
     const auto device = it++;
     const SonarConfig& is = device->config();
     const SonarConfig* const wanted = sonar_named(next.sonars, is.name);
-    const Fate fate = fate_of(is, now, next);
-    if (fate == Fate::removed) {
-      fates[is.name] = "removed";
+    const SonarChange change = sonar_change(is, now, next);
+    if (change == SonarChange::removed) {
+      outcomes[is.name] = "removed";
       retire(device);
-    } else if (fate == Fate::changed) {
+    } else if (change == SonarChange::changed) {
       openings.push_back({wanted, device->sonar().index(), device});
     } else {
-      fates[is.name] = fate == Fate::untouched ? "untouched" : "moved";
+      outcomes[is.name] = change == SonarChange::untouched ? "untouched" : "moved";
       device->use_place(*wanted);
     }
   }
@@ -131,7 +131,7 @@ std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& nex
   return openings;
 }
 
-/// The one before goes on, if its vehicle does.
+/// The previous sonar continues if its vehicle is in the new configuration.
 void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Config& next) {
   SonarConfig is = device->config();
   const auto vehicle = std::find_if(next.vehicles.begin(), next.vehicles.end(),
@@ -143,34 +143,36 @@ void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Co
 
 Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   Change change;
-  Fates fates;
-  std::vector<Opening> openings = sort_out(now, next, fates);
-  std::vector<Opening> after;  // at an address that a sonar still holds which will be stopped
+  Outcomes outcomes;
+  std::vector<Opening> openings = sort_out(now, next, outcomes);
+  std::vector<Opening> after;  // at addresses that a sonar still holds which will be stopped
+  // Three passes, so that sonars can swap addresses and none stops in vain: open at free addresses while the previous sonar still
+  // serves, stop those whose address is needed, open at these addresses.
   for (const Opening& o : openings) {
     const bool changed = o.before != devices_.end();
-    fates[o.sonar->name] = changed ? "changed" : "added";
+    outcomes[o.sonar->name] = changed ? "changed" : "added";
     if (is_held(o.sonar->bind_ip)) {
       after.push_back(o);
     } else if (add(*o.sonar, o.index, change)) {
       if (changed) retire(o.before);
     } else {
-      fates[o.sonar->name] = changed ? "as before" : "missing";
+      outcomes[o.sonar->name] = changed ? "as before" : "missing";
       if (changed) stay(o.before, now, next);
     }
   }
   for (const Opening& o : after)
     if (o.before != devices_.end()) retire(o.before);
   for (const Opening& o : after)
-    if (!add(*o.sonar, o.index, change)) fates[o.sonar->name] = "missing";
+    if (!add(*o.sonar, o.index, change)) outcomes[o.sonar->name] = "missing";
 
   for (const SonarConfig& sonar : next.sonars) {  // the configuration's order
     const auto device =
         std::find_if(devices_.begin(), devices_.end(), [&](const Device& d) { return d.config().name == sonar.name; });
     if (device != devices_.end()) devices_.splice(devices_.end(), devices_, device);
-    change.summary += (change.summary.empty() ? "" : ", ") + sonar.name + " " + fates[sonar.name];
-    fates.erase(sonar.name);
+    change.summary += (change.summary.empty() ? "" : ", ") + sonar.name + " " + outcomes[sonar.name];
+    outcomes.erase(sonar.name);
   }
-  for (const auto& [name, fate] : fates) change.summary += ", " + name + " " + fate;
+  for (const auto& [name, outcome] : outcomes) change.summary += ", " + name + " " + outcome;
   missing_ = change.errors;
   return change;
 }

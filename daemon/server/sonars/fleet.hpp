@@ -78,9 +78,10 @@ class Fleet final : public DeviceParent {
     std::uint32_t index = 0;
     std::list<Device>::iterator before;  // the one it replaces, or end()
   };
-  using Fates = std::map<std::string, std::string>;
+  /// By the name of a sonar: the word of the summary for what the reload did to it.
+  using Outcomes = std::map<std::string, std::string>;
   bool is_held(Ipv4 ip) const;
-  std::vector<Opening> sort_out(const Config& now, const Config& next, Fates& fates);
+  std::vector<Opening> sort_out(const Config& now, const Config& next, Outcomes& outcomes);
   void stay(std::list<Device>::iterator device, const Config& now, const Config& next);
   std::uint32_t free_index(std::size_t wanted, const std::vector<Opening>& given) const;
   void retire(std::list<Device>::iterator device);

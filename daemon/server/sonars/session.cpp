@@ -27,7 +27,7 @@ void prepare(tcp::socket& socket, const LimitConfig& limits) {
   socket.set_option(tcp::no_delay(true), ec);
   using UnsentLimit = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
   socket.set_option(UnsentLimit(unsent_limit_bytes), ec);
-  end_when_silent(socket, limits.dead_peer);  // one that is gone without a word, while little or nothing is sent to it
+  end_when_silent(socket, limits.dead_peer);  // notices a peer that vanished without a FIN while it is sent little or nothing
 }
 
 }  // namespace
@@ -79,6 +79,7 @@ asio::awaitable<void> Session::read() {
       over_after(ec);
       co_return;
     }
+    // A fault may stop the reading: these bytes wait here, later ones in the kernel.
     while (!reading_ && !finishing_ && !over_) co_await rest(never);
     if (over_) co_return;
     received_at_ = Steady::now();
@@ -139,6 +140,7 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
 
 asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Outbox::Shape& shape) {
   for (std::size_t done = 0; const Outbox::Shape::Pause& pause : shape.pauses) {
+    // Places of pauses count from the start of the message; `bytes` is what is left of it.
     const std::size_t count = std::clamp(pause.before, done, done + bytes.size()) - done;
     if (!co_await write_bytes(bytes.first(count)) || !co_await pause_writing(pause.length)) co_return false;
     bytes = bytes.subspan(count);
@@ -161,6 +163,7 @@ asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
 }
 
 void Session::end_pauses() {
+  // Only the message that is being written hurries: the next one has pauses of its own.
   hurries_ = writing_;
   pause_.cancel();
 }
@@ -225,6 +228,7 @@ asio::awaitable<void> Session::write() {
 Session::Steady::time_point Session::watch_until() const {
   auto until = Steady::now() + idle_watch;
   if (finishing_) until = std::min(until, finish_by_);
+  // After our FIN the kernel is asked often whether the client has confirmed all bytes.
   if (sent_fin_ && !fin_by_fault_) until = std::min(until, std::max(fin_at_ + fin_limit, Steady::now() + fin_watch));
   return until;
 }
@@ -280,6 +284,7 @@ void Session::reset(std::string why) {
 
 void Session::end_if_closed() {
   error_code ec;
+  // Unread bytes of a client that has hung up are still read and act; the reader then comes to its FIN.
   if (over_ || !has_left(socket_) || socket_.available(ec) > 0) return;
   int fault = 0;
   socklen_t size = sizeof fault;

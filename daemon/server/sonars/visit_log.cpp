@@ -39,7 +39,7 @@ void VisitLog::sum_up() {
   log_.info("clients come and go", {{"sonar", sonar_},
                                     {"connected", count(Kind::connected)},
                                     {"gone", count(Kind::gone)},
-                                    {"turned_away", count(Kind::turned_away)},
+                                    {"refused", count(Kind::refused)},
                                     {"wait", count(Kind::waits)},
                                     {"within_s", spell_.count() / 1000},
                                     {"last", last_unsaid_}});

@@ -14,7 +14,7 @@ namespace sonar {
 
 class VisitLog {
  public:
-  enum class Kind { connected, gone, turned_away, waits, kinds };
+  enum class Kind { connected, gone, refused, waits, kinds };
   static constexpr int lines_a_spell = 8;
 
   /// `spell`: up to lines_a_spell visits within one are logged as they happen.

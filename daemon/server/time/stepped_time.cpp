@@ -6,6 +6,7 @@
 namespace sonar {
 
 SteppedTime::Bound SteppedTime::bound(std::optional<Time> for_pings) const {
+  // A ping that is due exactly at the end of a step belongs to the next one.
   if (mode_ == ClockMode::lockstep) return {asked_ - std::chrono::nanoseconds(1), asked_};
   if (mode_ != ClockMode::follow) return {std::max(for_pings.value_or(Time::min()), clock_.now()), {}};
   const std::optional<Time> stamped = world_.followed_until();
@@ -17,6 +18,7 @@ Time SteppedTime::tick_at(Time due) const {
   if (mode_ != ClockMode::follow || !now.then) return due;  // before the first pose there is no lead
   const bool is_waited_for =
       std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return w.until.last_tick >= due; });
+  // A ping that no request waits for lags at most most_lead behind the stamps; then time goes on and ticks are skipped.
   return is_waited_for ? due : std::max(due, now.last_tick - most_lead);
 }
 
@@ -37,8 +39,8 @@ std::string SteppedTime::step(double dt_s) {
 void SteppedTime::wait(Reached reached) { waiting_.push_back({bound(), std::move(reached)}); }
 
 bool SteppedTime::answer(std::optional<Time> next) {
-  // One that is answered may ask for more. The bound falls when a vehicle that is behind joins those that are followed: who
-  // waited for more is answered then, or all would wait for each other.
+  // The bound falls when a vehicle that is behind joins those that are followed. A request that waits for a later time is
+  // answered then, or sender and sonard would wait for each other. An answered request may add another.
   bool any = false;
   while (!waiting_.empty() && (!next || *next > std::min(waiting_.front().until.last_tick, bound().last_tick))) {
     const Waiting done = std::move(waiting_.front());

@@ -15,10 +15,10 @@ namespace {
 using control::StatusCode;
 constexpr std::array<std::string_view, 2> protocols = {"foxglove.websocket.v1", "foxglove.sdk.v1"};
 
-HttpAnswer turned_away(unsigned status, const std::string& text) { return answer_of(status, StatusCode::refused, text); }
+HttpAnswer socket_refusal(unsigned status, const std::string& text) { return answer_of(status, StatusCode::refused, text); }
 /// `cure` is for the log only: what the configuration would say.
-HttpAnswer turned_away(unsigned status, const std::string& text, const std::string& cure) {
-  HttpAnswer answer = turned_away(status, text);
+HttpAnswer socket_refusal(unsigned status, const std::string& text, const std::string& cure) {
+  HttpAnswer answer = socket_refusal(status, text);
   answer.why = text + "; " + cure;
   return answer;
 }
@@ -66,15 +66,15 @@ std::string value_of(const std::vector<std::pair<std::string, std::string>>& que
 }
 
 std::optional<HttpAnswer> wrong_handshake(const HttpRequest& request) {
-  if (request.http_1_0) return turned_away(400, "a WebSocket needs HTTP/1.1");
-  if (!names(request.connection, "upgrade")) return turned_away(400, "a WebSocket needs Connection: Upgrade");
+  if (request.http_1_0) return socket_refusal(400, "a WebSocket needs HTTP/1.1");
+  if (!names(request.connection, "upgrade")) return socket_refusal(400, "a WebSocket needs Connection: Upgrade");
   if (request.socket_version != "13") {
-    HttpAnswer answer = turned_away(426, "say Sec-WebSocket-Version: 13");
+    HttpAnswer answer = socket_refusal(426, "say Sec-WebSocket-Version: 13");
     answer.headers.emplace_back("Sec-WebSocket-Version", "13");
     return answer;
   }
-  if (!is_key(request.socket_key)) return turned_away(400, "Sec-WebSocket-Key must be 16 bytes in base64");
-  if (request.bytes_behind) return turned_away(400, "bytes behind the request, before the answer");
+  if (!is_key(request.socket_key)) return socket_refusal(400, "Sec-WebSocket-Key must be 16 bytes in base64");
+  if (request.bytes_behind) return socket_refusal(400, "bytes behind the request, before the answer");
   return std::nullopt;
 }
 
@@ -116,10 +116,11 @@ std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
   for (const std::string& offered : words_of(request.socket_protocols))
     if (welcome.protocol.empty() && std::find(protocols.begin(), protocols.end(), offered) != protocols.end())
       welcome.protocol = offered;
-  if (welcome.protocol.empty()) return turned_away(400, "say Sec-WebSocket-Protocol: foxglove.sdk.v1 or foxglove.websocket.v1");
+  if (welcome.protocol.empty())
+    return socket_refusal(400, "say Sec-WebSocket-Protocol: foxglove.sdk.v1 or foxglove.websocket.v1");
   if (const std::string most = value_of(query, "max_hz"); !most.empty()) {
     const auto number = text::parse_decimal(most);
-    if (!number || !(*number > 0 && *number <= 1000)) return turned_away(400, "max_hz must be a number above 0, at most 1000");
+    if (!number || !(*number > 0 && *number <= 1000)) return socket_refusal(400, "max_hz must be a number above 0, at most 1000");
     welcome.most_hz = *number;
   }
   welcome.playback = value_of(query, "playback");
@@ -128,16 +129,16 @@ std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
   welcome.may_steer = true;
   if (shows_secret(request, query, door, now)) return welcome;
   if (door.token.needed())
-    return turned_away(401, "token required: open ws://...?token=TOKEN, or send Authorization: Bearer TOKEN",
-                       "it is in control.token_file");
+    return socket_refusal(401, "token required: open ws://...?token=TOKEN, or send Authorization: Bearer TOKEN",
+                          "it is in control.token_file");
   if (!request.has_origin || origin_allowed(request.origin, door.reached, door.config.hosts)) return welcome;
   const auto& listed = door.config.view_origins;
   const auto found = std::find_if(listed.begin(), listed.end(), [&](const ViewOrigin& o) { return o.origin == request.origin; });
   if (found == listed.end()) {
     const std::string origin = request.origin.substr(0, 200);
-    return turned_away(403, "pages of other sites may not look without the key that sonard prints at its start",
-                       origin.starts_with("http") ? "this would allow it: control: {view_origins: [\"" + origin + "\"]}"
-                                                  : "Origin " + origin + " cannot be listed in control.view_origins");
+    return socket_refusal(403, "pages of other sites may not look without the key that sonard prints at its start",
+                          origin.starts_with("http") ? "this would allow it: control: {view_origins: [\"" + origin + "\"]}"
+                                                     : "Origin " + origin + " cannot be listed in control.view_origins");
   }
   welcome.may_steer = found->steer;
   return welcome;

@@ -332,7 +332,7 @@ void ViewFeed::tick() {
   }
   sync_sonars();
   const Time now = of_.clock.now();
-  if (of_.clock.stepped() && std::exchange(told_, now) != now)
+  if (of_.clock.stepped() && std::exchange(last_sent_time_, now) != now)
     each([now](ViewConnection& c) {
       if (c.viewer().playback().empty()) c.viewer().set_time(now);
       c.wake();
@@ -372,8 +372,8 @@ void ViewFeed::offer_status() {
   if (wanted(status_)) offer(status_, status());
   if (wanted(faults_)) {
     ViewPayloadPointer now = faults();
-    const bool is_news = !faults_said_ || *now->pieces.front().bytes != *faults_said_->pieces.front().bytes;
-    if (is_news) offer(faults_, faults_said_ = now);
+    const bool is_news = !last_sent_faults_ || *now->pieces.front().bytes != *last_sent_faults_->pieces.front().bytes;
+    if (is_news) offer(faults_, last_sent_faults_ = now);
   }
   push_parameters();
   if (wanted(tf_) && status_at_ - ping_at_ >= status_period) offer(tf_, places());

@@ -164,11 +164,11 @@ class ViewFeed final : public ViewerHost {
   SceneShapes shapes_;
   ViewDoctor doctor_{of_.operations, of_.clock};
   std::deque<ViewPayloadPointer> lines_;
-  ViewPayloadPointer faults_said_;
+  ViewPayloadPointer last_sent_faults_;
   std::vector<foxglove::Parameter> pushed_;
   asio::steady_timer timer_;
   bool armed_ = false, stopping_ = false, changed_ = false;
-  Time told_{Time::min()};  // the daemon's time, last said to viewers
+  Time last_sent_time_{Time::min()};  // the daemon's time, last sent to viewers
   Steady::time_point status_at_{}, ping_at_{};
   std::string session_;
   std::uint64_t sessions_ = 0;

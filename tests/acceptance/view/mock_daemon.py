@@ -386,7 +386,7 @@ class Viewer:
                 if kind == BINARY:
                     self.call(payload)
                 else:
-                    self.obey(json.loads(payload))
+                    self.handle(json.loads(payload))
 
     def call(self, payload):
         service, call, size = struct.unpack_from("<III", payload, 1)
@@ -395,7 +395,7 @@ class Viewer:
         self.mock.frozen_ns += int(request["dt_s"] * 1e9)
         self.send(BINARY, struct.pack("<BIII", 3, service, call, 4) + b"json{}")
 
-    def obey(self, word):
+    def handle(self, word):
         if word["op"] == "subscribe":
             for one in word["subscriptions"]:
                 self.subscriptions[self.channels[one["channelId"]]] = one["id"]

@@ -13,7 +13,7 @@ using protocol::Reaction;
 using protocol::RequestPing;
 using test::at_s;
 
-/// One host on a device that obeys requests, as the daemon's would.
+/// One host on a device that applies requests, as the daemon does.
 struct Host {
   explicit Host(protocol::DeviceState& d) : device(d), dialogue(make_dialogue(d, at_s(0))) {}
   Reaction say(const wire::Bytes& bytes, double s = 0) { return heed(dialogue->on_bytes(bytes, at_s(s))); }

@@ -61,7 +61,7 @@ inline v1::DaemonStatus full_status() {
            clients { address: "127.0.0.1:40000" pings_written: 1 pings_dropped: 2 bytes_written: 3 connected_s: 4.5
                      bytes_read: 9 requests: 10 complaint: "odd" unread_s: 0.5 taking: 11 unsent_bytes: 12 }
            asked_by: "127.0.0.1:40000" silenced_by: "http 127.0.0.1" waiting: 1 asking_observer: "127.0.0.1:40002"
-           turned_away { address: "10.0.0.9:1" why: "no place is free" utc_ns: 1234567890123456780 ago_s: 5.5 }
+           turned_away { address: "10.0.0.9:1" why: "no slot is free" utc_ns: 1234567890123456780 ago_s: 5.5 }
            clients { address: "127.0.0.1:40001" pings_written: 5 pings_dropped: 6 bytes_written: 7 connected_s: 8.5 }
            figures {
              pings: 1 refused: 2 served: 3 dropped: 4 skipped_ticks: 5 clients: 6 refused_clients: 7

@@ -146,13 +146,13 @@ TEST(Judge, OneThatDoesNotRead) {
 }
 
 TEST(Judge, OneThatWasTurnedAwayOrWaits) {
-  const std::string away = R"(turned_away { address: "10.0.0.7:1" why: "no place is free" utc_ns: 3723000000000 ago_s: )";
+  const std::string away = R"(turned_away { address: "10.0.0.7:1" why: "no slot is free" utc_ns: 3723000000000 ago_s: )";
   const Finding f = trouble(with(pinging + driver + away + "5 }"), "places");
   EXPECT_EQ(f.level, Level::fail);
-  EXPECT_EQ(f.text, "10.0.0.7:1 was turned away from front at 01:02:03 UTC: no place is free (127.0.0.1:40122)");
+  EXPECT_EQ(f.text, "10.0.0.7:1 was refused by front at 01:02:03 UTC: no slot is free (127.0.0.1:40122)");
   EXPECT_THAT(f.cure, HasSubstr("clients.max"));
   EXPECT_THAT(troubles(judge(with(pinging + driver + away + "90 }"), nullptr)), IsEmpty());
-  EXPECT_THAT(trouble(with(pinging + driver + "waiting: 1"), "places").text, HasSubstr("1 client of front waits for a place"));
+  EXPECT_THAT(trouble(with(pinging + driver + "waiting: 1"), "places").text, HasSubstr("1 client of front waits for a slot"));
 }
 
 TEST(Judge, OneThatWasDisconnected) {

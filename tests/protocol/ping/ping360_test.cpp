@@ -137,7 +137,7 @@ TEST(Ping360, AnyNewRequestEndsAScan) {
     talk.say(scan(0, 399));
     talk.run_to(0.05);
     talk.take();
-    talk.obey(talk.dialogue->on_tick(talk.dialogue->next_tick(), false));  // a ping is under way
+    talk.apply(talk.dialogue->on_tick(talk.dialogue->next_tick(), false));  // a ping is under way
     talk.say(end, 0.06);
     talk.deliver(0.061);
     talk.run_to(5);
@@ -198,7 +198,7 @@ TEST(Ping360, ItsNumberMayBeSet) {
 TEST(Ping360, APingThatIsNotMadeDoesNotEndAScan) {
   Talk talk("ping360");
   talk.say(scan(0, 399));
-  talk.obey(talk.dialogue->on_tick(at_s(0), false));  // asked for, never delivered
+  talk.apply(talk.dialogue->on_tick(at_s(0), false));  // asked for, never delivered
   talk.run_to(3);
   EXPECT_GT(talk.pings, 10);
 }
@@ -206,7 +206,7 @@ TEST(Ping360, APingThatIsNotMadeDoesNotEndAScan) {
 TEST(Ping360, ASinglePingThatIsLateIsAnswered) {
   Talk talk("ping360");
   talk.say(ping_at(0));
-  talk.obey(talk.dialogue->on_tick(at_s(0), false));
+  talk.apply(talk.dialogue->on_tick(at_s(0), false));
   talk.run_to(3);
   EXPECT_EQ(talk.pings, 1) << "it is not asked for again";
   talk.deliver(3.5);
@@ -220,7 +220,7 @@ TEST(Ping360, ASinglePingThatIsLateIsAnswered) {
 TEST(Ping360, AScanLosesNoPingThatIsLate) {
   Talk talk("ping360");
   talk.say(scan(0, 399));
-  const auto tick = [&](bool pending) { talk.obey(talk.dialogue->on_tick(talk.dialogue->next_tick(), pending)); };
+  const auto tick = [&](bool pending) { talk.apply(talk.dialogue->on_tick(talk.dialogue->next_tick(), pending)); };
   tick(false);
   const protocol::RequestPing first = talk.aim;
   tick(false);  // too late

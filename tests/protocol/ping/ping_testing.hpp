@@ -60,15 +60,15 @@ M message_in(const Frame& frame) {
   return message;
 }
 
-/// Obeys what the device asks for, as the daemon does; pings take no time.
+/// Applies the events of the device, as the daemon does; pings take no time.
 struct Talk {
   explicit Talk(const std::string& profile, std::size_t port = 0, const protocol::OptionValues& options = {})
       : vendor(*protocol::find_profile(profile)->vendor), state(device(profile, options)) {
     settings = vendor.initial_settings(state).settings;
     dialogue = vendor.converse(vendor.ports()[port], state, at_s(0));
   }
-  void say(const Bytes& bytes, double at = 0) { obey(dialogue->on_bytes(bytes, at_s(at))); }
-  void obey(protocol::Reaction reaction) {
+  void say(const Bytes& bytes, double at = 0) { apply(dialogue->on_bytes(bytes, at_s(at))); }
+  void apply(protocol::Reaction reaction) {
     for (Bytes& reply : reaction.replies) replies.push_back(std::move(reply));
     for (protocol::Event& event : reaction.events) {
       if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
@@ -88,7 +88,7 @@ struct Talk {
     while (dialogue->next_tick() <= at_s(at)) {
       const Time now = dialogue->next_tick();
       const int before = pings;
-      obey(dialogue->on_tick(now, false));
+      apply(dialogue->on_tick(now, false));
       last = seconds(now - at_s(0));
       if (pings > before) deliver(last + ping_takes);
     }

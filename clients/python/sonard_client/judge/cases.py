@@ -34,7 +34,7 @@ D08 id-reset,D11 sample-width-switch,D12 gain-rows-switch,D13 beam-count-switch,
 D17 thermal-stop,D18 transmit-fail,D19 boot-or-paused,D21 part-number,D22 mute-until-fired,D26 env-values-wild,D27 scale-zero
 D28 bearing-table,D31 announced-shutdown
 U01 never-announced,U02 status-gap,U03 status-short,U04 status-long,U05 wrong-address-inside,U06 address-conflict,U07 two-devices
-U08 status-of-a-stranger,U12 foreign-datagrams,U13 late-first-status
+U08 foreign-status,U12 foreign-datagrams,U13 late-first-status
 T01 jump-forward,T02 jump-back,T03 frozen,T04 constant-offset,T05 drift,T06 wrap,T08 restart-at-connect,T10 delayed-delivery
 T11 slow,T12 pacing-jitter
 M01 second-refused,M02 take-over,M03 queued-silently,M04 config-fight,M05 slow-reader-policy,M06 zero-window,M08 no-free-slot
@@ -266,7 +266,7 @@ CASES: List[Case] = [
     row("U05.1", {"address": "zero"}, "2.2 s", "The status names the address 0.0.0.0."),
     row("U06.1", {}, "2.2 s", "Two devices announce the same address."),
     row("U07.1", {}, "2.2 s", "A second device announces itself."),
-    row("U08.1", {}, "2.2 s", "A stranger sends the status."),
+    row("U08.1", {}, "2.2 s", "A foreign sender sends the status."),
     row("U12.1", {}, "2.2 s", "Datagrams of other protocols arrive on the status port."),
     row("U13.1", {}, "2.5 s", "The first status comes 2.5 s late.", at="start"),
 

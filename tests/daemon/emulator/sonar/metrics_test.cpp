@@ -88,7 +88,7 @@ DaemonFigures two_sonars() {
   f.sonars[1].second.dropped_by[static_cast<std::size_t>(DropReason::gone)] = 4;
   f.sonars[1].second.skipped.busy = 5;
   f.poses.late = 6;
-  f.turned_away_for_descriptors = 8;
+  f.refused_for_descriptors = 8;
   return f;
 }
 

@@ -89,8 +89,8 @@ class VirtualTime {
     const Config next = parsed(yaml);
     for (auto it = sonars.begin(); it != sonars.end();) {
       const auto s = it++;
-      const Fate fate = fate_of(s->config(), config, next);
-      if (fate == Fate::removed || fate == Fate::changed) {
+      const SonarChange change = sonar_change(s->config(), config, next);
+      if (change == SonarChange::removed || change == SonarChange::changed) {
         perform(*s, s->stop("the configuration changed"));
         retired.splice(retired.end(), sonars, s);
       } else {
@@ -133,7 +133,7 @@ class VirtualTime {
         clients[serve->connection].waits = false;
       } else if (const auto* wait = std::get_if<KeepWaiting>(&action)) {
         clients[wait->connection].waits = true;
-      } else if (const auto* away = std::get_if<TurnAway>(&action)) {
+      } else if (const auto* away = std::get_if<Refuse>(&action)) {
         clients[away->connection].closed = true;
         clients[away->connection].reset = away->reset;
       } else if (const auto* finish = std::get_if<Finish>(&action)) {

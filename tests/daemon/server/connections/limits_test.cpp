@@ -30,7 +30,7 @@ TEST(Limits, PlacesOfTheWholeDaemonCountThoseWhoWaitToo) {
   served->fire(fire_at(PingRate::hz40));
   ASSERT_TRUE(served->next_ping());
   Client waits(daemon.address());
-  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("client waits for a place") != std::string::npos; }));
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("client waits for a slot") != std::string::npos; }));
   for (int i = 0; i < 3; ++i) {
     Client newcomer(daemon.address());
     EXPECT_TRUE(newcomer.read_to_end());

@@ -121,12 +121,12 @@ TEST_F(DeviceActions, StopWhileThePortIsClosed) {
   EXPECT_TRUE(refuses(52100));
 }
 
-TEST_F(DeviceActions, TurnAwayByReset) {
+TEST_F(DeviceActions, RefuseByReset) {
   Client served(setup.address);
   ASSERT_TRUE(soon([&] { return device.sonar().connections().clients() == 1; }));
   Client waits(setup.address);
   ASSERT_TRUE(soon([&] { return device.sonar().connections().waiting() == 1; }));
-  device.perform({TurnAway{2, true}});
+  device.perform({Refuse{2, true}});
   EXPECT_FALSE(waits.read_to_end());
   EXPECT_TRUE(waits.was_reset);
   EXPECT_THAT(log_text, HasSubstr("client refused: reset"));

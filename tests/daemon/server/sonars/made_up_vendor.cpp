@@ -65,7 +65,7 @@ std::optional<protocol::Endpoint> endpoint_of(const std::string& text) {
 }
 
 /// Carries out a line; the reply is "ok" or a refusal.
-protocol::Reaction obey(const std::string& line, const DeviceState& device) {
+protocol::Reaction run_command(const std::string& line, const DeviceState& device) {
   std::istringstream words(line);
   std::string command, reply = "ok";
   words >> command;
@@ -106,7 +106,7 @@ class LineDialogue final : public protocol::Dialogue {
         if (line_.size() < 200) line_ += c;
         continue;
       }
-      protocol::Reaction one = obey(limit_silence(std::exchange(line_, {})), device_);
+      protocol::Reaction one = run_command(limit_silence(std::exchange(line_, {})), device_);
       std::move(one.events.begin(), one.events.end(), std::back_inserter(all.events));
       std::move(one.replies.begin(), one.replies.end(), std::back_inserter(all.replies));
     }
@@ -169,7 +169,7 @@ class MadeUpVendor final : public protocol::Vendor {
   }
   protocol::Reaction on_datagram(const protocol::Port&, BytesView datagram, const DeviceState& device, Time) const override {
     if (text_of(datagram) == "fault") throw std::runtime_error("a mistake in the vendor's code");
-    return obey(text_of(datagram), device);
+    return run_command(text_of(datagram), device);
   }
   protocol::ResourceReply on_http(const protocol::Port&, const protocol::ResourceRequest& request, const DeviceState& device,
                                   Time) const override {
@@ -177,7 +177,7 @@ class MadeUpVendor final : public protocol::Vendor {
     if (request.method == "GET" && request.path == "/range")
       return {200, std::to_string(static_cast<int>(range_of(device))), "application/json"};
     if (request.method != "PUT") return {405, "", "", request.path == "/range" ? "GET, HEAD, PUT" : "PUT"};
-    protocol::Reaction reaction = obey(request.path.substr(1) + " " + request.body, device);
+    protocol::Reaction reaction = run_command(request.path.substr(1) + " " + request.body, device);
     if (reaction.events.empty()) return {400, text_of(reaction.replies.front()), "text/plain"};
     return {204, "", "", "", std::move(reaction.events)};
   }

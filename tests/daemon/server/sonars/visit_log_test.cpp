@@ -43,7 +43,7 @@ TEST(VisitLog, ManyAreSummedUpAndNoneIsForgotten) {
   bench.io.run_one();
   ASSERT_THAT(bench.lines, SizeIs(VisitLog::lines_a_spell + 1));
   EXPECT_THAT(bench.lines.back(), HasSubstr("clients come and go"));
-  EXPECT_THAT(bench.lines.back(), HasSubstr("connected=6  gone=6  turned_away=0"));
+  EXPECT_THAT(bench.lines.back(), HasSubstr("connected=6  gone=6  refused=0"));
   EXPECT_THAT(bench.lines.back(), HasSubstr("closed by the client"));
   bench.come_and_go(3);
   bench.io.run_one();
