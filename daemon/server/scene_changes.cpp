@@ -82,7 +82,7 @@ void SceneChanges::build_next() {
 
 namespace {
 
-/// What `work` returns; what it throws becomes an error.
+/// Returns what `work` returns; an exception becomes an error.
 template <class Work>
 auto caught(const Work& work) -> decltype(work()) {
   try {

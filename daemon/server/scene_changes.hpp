@@ -72,7 +72,7 @@ class SceneChanges {
   void begin();
   void build_next();
   std::chrono::steady_clock::duration pause_before_engine();
-  /// Of the Changes that wait, those which share the next engine: the first one at least.
+  /// The waiting Changes that share the next engine: the first one at least.
   std::vector<Make> next_makes() const;
   Built build(const std::vector<Make>& makes, const ScenePointer& now) const;
   void finish(Built built);

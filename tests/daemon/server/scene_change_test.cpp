@@ -133,7 +133,7 @@ TEST(SceneChange, WhileADriverIsServedEnginesAreMadeSoOften) {
   EXPECT_EQ(objects_in(daemon.status()), 2 + SceneChanges::most_at_once + beyond) << "none is lost";
 }
 
-/// What waits together costs the driver one engine; an edit that cannot be made fails alone.
+/// Edits that wait together cost the driver one engine; an edit that cannot be made fails alone.
 TEST(SceneChange, EditsThatWaitShareAnEngine) {
   auto gate = std::make_shared<Gate>();
   DaemonSetup setup;
