@@ -156,7 +156,8 @@ Echo find_echo(const Ping& ping) {
   // Between the last point below half the peak and the first one above.
   const double below = front > 0 ? code(front - 1) : half;
   const double part = front > 0 && below < half ? (code(front) - half) / (code(front) - below) : 0;
-  echo.range_m = s.range_of_row(front - part);
+  // The amplitude of an even bed is at half its peak at its distance, that of a mirror 0.7 pulses before: a middle way.
+  echo.range_m = s.range_of_row(front - part) + static_cast<double>(s.pulse_width_m) / 2;
   const double snr_db = 20 * std::log10(echo.peak / std::max<double>(*middle, 1));
   echo.confidence =
       static_cast<int>(std::lround(100 * std::clamp((snr_db - least_snr_db) / (certain_snr_db - least_snr_db), 0.0, 1.0)));

@@ -15,7 +15,7 @@ namespace sonar::ping::ping1d {
 std::span<const std::shared_ptr<const SonarModel>> models();
 
 struct Parameters {
-  ScanRange range{0, 10000};
+  ScanRange range{0, 5000};
   std::uint32_t speed_mm_per_s = 1500000;
   std::uint16_t interval_ms = 100;
   std::uint8_t gain = 3, mode_auto = 1, enable = 1;

@@ -53,7 +53,7 @@ TEST(Ping1D, AnswersByTheBytesOfTheDefinitions) {
   ASSERT_EQ(talk.replies.size(), 3u);
   EXPECT_EQ(talk.replies[0], hex("42 52 04 00 05 00 01 00 01 00 00 00 9f 00"));
   EXPECT_EQ(frames_in({talk.replies[1]}).at(0).header.id, Id::nack);
-  EXPECT_EQ(talk.replies[2], hex("42 52 08 00 b4 04 01 00 00 00 00 00 10 27 00 00 8c 01"));
+  EXPECT_EQ(talk.replies[2], hex("42 52 08 00 b4 04 01 00 00 00 00 00 88 13 00 00 f0 01"));
 }
 
 TEST(Ping1D, SettingsAreReadBack) {
@@ -205,7 +205,8 @@ TEST(Ping1DDetector, NoiseAloneIsNoEcho) {
 }
 
 TEST(Ping1DAutomatic, RangeFollowsTheEcho) {
-  Parameters p;  // 10 m
+  Parameters p;
+  p.range.length_mm = 10000;
   EXPECT_EQ(adjusted(p, {.range_m = 6, .peak = 150, .confidence = 100}), p) << "it lies well";
   EXPECT_EQ(adjusted(p, {.range_m = 9, .peak = 150, .confidence = 100}).range.length_mm, 15000u);
   EXPECT_EQ(adjusted(p, {.range_m = 0.7, .peak = 150, .confidence = 100}).range.length_mm, 1500u);
@@ -216,6 +217,7 @@ TEST(Ping1DAutomatic, RangeFollowsTheEcho) {
 
 TEST(Ping1DAutomatic, GainKeepsTheEchoBelowFullScale) {
   Parameters p;
+  p.range.length_mm = 10000;
   EXPECT_EQ(adjusted(p, {.range_m = 6, .peak = 255, .confidence = 100}).gain, 2);
   EXPECT_EQ(adjusted(p, {.range_m = 6, .peak = 80, .confidence = 100}).gain, 4);
   EXPECT_EQ(adjusted(p, {.range_m = 6, .peak = 2, .confidence = 0}).gain, 6);
