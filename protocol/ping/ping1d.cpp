@@ -28,7 +28,6 @@ class Ping1DVendor final : public StreamingVendor {
   double gain_percent(const protocol::DeviceState& device) const override {
     return 100.0 / 6 * settings_from(device.settings.get()).parameters.gain;
   }
-  bool pings_before_first_request(const protocol::DeviceState&) const override { return true; }  // it is enabled as it comes
   std::optional<protocol::ChangeSettings> after_ping(const Ping& ping, const protocol::DeviceState& device) const override {
     Settings s = settings_from(device.settings.get());
     if (s.parameters.mode_auto == 0) return std::nullopt;

@@ -1,6 +1,7 @@
 #include "protocol/ping/ping1d_dialogue.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "protocol/ping/ping1d_settings.hpp"
 #include "protocol/ping/streaming.hpp"
@@ -99,7 +100,7 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
       if (s.parameters.enable == 0)
         reaction.replies.push_back(nack(wanted_id, id_, "pings are disabled"));
       else
-        want(once_, result, now);
+        want(once_, result, now, reaction);
       return true;
     }
     if (Bytes message = message_of(wanted_id, s.parameters); !message.empty())
@@ -118,7 +119,8 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
   }
   bool is_enabled() const { return settings().parameters.enable != 0; }
   /// The ping under way, if any, is not made for the new result: the next one follows it.
-  void want(Results& results, Results result, Time now) {
+  void want(Results& results, Results result, Time now, Reaction& reaction) {
+    if (!std::exchange(has_asked_, true)) change(reaction, [](Settings&) {});  // pings are enabled as it comes: now they are made
     if (wanted() == no_result) due_ = now;
     results |= result;
   }
@@ -131,7 +133,7 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
     const Results result = results_of(id);
     if (result == no_result) return refuse(frame, "that message is not streamed", reaction);
     if (frame.header.id == Id::ping1d_continuous_start) {
-      want(streamed_, result, now);
+      want(streamed_, result, now, reaction);
     } else {
       streamed_ &= ~result;
     }
@@ -203,6 +205,7 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
   Time due_{};                                       // of the next request for a ping, when none is under way
   std::shared_ptr<const HeldSettings> fired_;        // the ping that is being made
   Time fired_at_{};
+  bool has_asked_ = false;
 };
 
 }  // namespace
