@@ -6,6 +6,7 @@ import select
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -321,6 +322,19 @@ class Ping1DLink(unittest.TestCase):
         listener = run(SONARCTL, "listen", f"{self.daemon.address}:{PING1D}", "--pings", 5, "--wait", 60)
         self.assertEqual(listener.returncode, 0, listener.stderr)
         self.assertEqual(len(re.findall(r"distance \d\.\d{3} m, confidence \d+ %", listener.stdout)), 5, listener.stdout)
+
+
+class AltitudeHold(unittest.TestCase):
+    def test_the_example_brings_a_vehicle_to_its_altitude_and_keeps_it_there(self):
+        with Sonard(profile="ping1d", mount=DOWN) as daemon:
+            done = run(sys.executable, ROOT / "docs/examples/altitude_hold.py", "--sonar", daemon.address, "--sonard", daemon.address,
+                       "--altitude", 1, "--pings", 150, patience_s=600)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        held = [float(metres) for metres in re.findall(r"distance (\d+\.\d{3}) m", done.stdout)]
+        self.assertEqual(len(held), 150)
+        self.assertGreater(held[0], 1.5)
+        for distance in held[-30:]:
+            self.assertAlmostEqual(distance, 1, delta=0.15)
 
 
 class Tools(unittest.TestCase):
