@@ -7,6 +7,7 @@
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/ping/host.hpp"
 #include "protocol/ping/omniscan.hpp"
+#include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping360.hpp"
 #include "protocol/ping/surveyor.hpp"
 #include "protocol/waterlinked/host.hpp"
@@ -88,6 +89,17 @@ std::vector<Make> product_makes() {
        .own_numbers = true,
        .demo_name = "omniscan",
        .demo_mount = RollPitchYaw{0, pi / 6, -pi / 2},  // to starboard
+       .picture = PictureKind::waterfall},
+      {.device = &ping::ping1d::vendor(),
+       .title = "a Ping1D",
+       .request = "request",
+       .remedy = "request distance (1212) or profile (1300), or send continuous_start (1400)",
+       .ports = ping::ping1d::host_ports,
+       .host = ping::ping1d::make_host,
+       .codec = ping::ping1d::codec(),
+       .usual_settings = "--rate 10",
+       .own_numbers = true,
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
        .picture = PictureKind::waterfall},
   };
 }

@@ -75,6 +75,11 @@ class Vendor {
   /// The gain as SettingsOverride::gain_percent has it: 0 to 100 of what a client can turn it.
   virtual double gain_percent(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;
+  /// The settings to which the device itself changes once it has that ping, such as an automatic range. Nothing: they stay.
+  virtual std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const {
+    static_cast<void>(ping), static_cast<void>(device);
+    return std::nullopt;
+  }
   /// The ping of that number, from 1, of a mechanical scan, as a usual host requests it. Other sonars: nothing.
   struct ScanStep {
     RequestPing aim;

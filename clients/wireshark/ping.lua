@@ -1,5 +1,5 @@
 -- Wireshark dissector for the ping protocol of Blue Robotics and Cerulean: Ping360 on UDP 12345 and 9092, Surveyor on TCP and UDP
--- 62312, Omniscan on 51200. It shares nothing with the C++ code, so that the two can judge each other
+-- 62312, Omniscan on 51200, Ping1D on 9090. It shares nothing with the C++ code, so that the two can judge each other
 -- (tests/acceptance/ping_link_test.py). Layouts: docs/protocols/ping.md; how to install it: docs/wireshark.md.
 
 local ping = Proto("brping", "Blue Robotics ping protocol")
@@ -23,7 +23,36 @@ local messages = {
   [118] = {"water_stats", {{"temp_C", "f32"}, {"pressure_bar", "f32"}}},
   [504] = {"attitude_report", {{"up_x", "f32"}, {"up_y", "f32"}, {"up_z", "f32"}, {"skip", 12}, {"utc_msec", "u64"},
     {"pwr_up_msec", "u32"}}},
+  [1000] = {"set_device_id", {{"device_id", "u8"}}},
+  [1001] = {"set_range", {{"scan_start", "u32"}, {"scan_length", "u32"}}},
   [1002] = {"set_speed_of_sound", {{"speed_of_sound", "u32"}}},
+  [1003] = {"set_mode_auto", {{"mode_auto", "u8"}}},
+  [1004] = {"set_ping_interval", {{"ping_interval", "u16"}}},
+  [1005] = {"set_gain_setting", {{"gain_setting", "u8"}}},
+  [1006] = {"set_ping_enable", {{"ping_enabled", "u8"}}},
+  [1100] = {"goto_bootloader", {}},
+  [1200] = {"firmware_version", {{"device_type", "u8"}, {"device_model", "u8"}, {"firmware_version_major", "u16"},
+    {"firmware_version_minor", "u16"}}},
+  [1201] = {"device_id", {{"device_id", "u8"}}},
+  [1202] = {"voltage_5", {{"voltage_5", "u16"}}},
+  [1203] = {"speed_of_sound", {{"speed_of_sound", "u32"}}},
+  [1204] = {"range", {{"scan_start", "u32"}, {"scan_length", "u32"}}},
+  [1205] = {"mode_auto", {{"mode_auto", "u8"}}},
+  [1206] = {"ping_interval", {{"ping_interval", "u16"}}},
+  [1207] = {"gain_setting", {{"gain_setting", "u32"}}},
+  [1208] = {"transmit_duration", {{"transmit_duration", "u16"}}},
+  [1210] = {"general_info", {{"firmware_version_major", "u16"}, {"firmware_version_minor", "u16"}, {"voltage_5", "u16"},
+    {"ping_interval", "u16"}, {"gain_setting", "u8"}, {"mode_auto", "u8"}}},
+  [1211] = {"distance_simple", {{"distance", "u32"}, {"confidence", "u8"}}},
+  [1212] = {"distance", {{"distance", "u32"}, {"confidence", "u16"}, {"transmit_duration", "u16"}, {"ping_number", "u32"},
+    {"scan_start", "u32"}, {"scan_length", "u32"}, {"gain_setting", "u32"}}},
+  [1213] = {"processor_temperature", {{"processor_temperature", "u16"}}},
+  [1214] = {"pcb_temperature", {{"pcb_temperature", "u16"}}},
+  [1215] = {"ping_enable", {{"ping_enabled", "u8"}}},
+  [1300] = {"profile", {{"distance", "u32"}, {"confidence", "u16"}, {"transmit_duration", "u16"}, {"ping_number", "u32"},
+    {"scan_start", "u32"}, {"scan_length", "u32"}, {"gain_setting", "u32"}, {"profile_data_length", "u16"}, {"profile_data", "rest"}}},
+  [1400] = {"continuous_start", {{"id", "u16"}}},
+  [1401] = {"continuous_stop", {{"id", "u16"}}},
   [2000] = {"set_device_id", {{"device_id", "u8"}, {"reserved", "u8"}}},
   [2197] = {"os_ping_params", {{"start_mm", "u32"}, {"length_mm", "u32"}, {"msec_per_ping", "u32"}, {"skip", 8},
     {"pulse_len_percent", "f32"}, {"filter_duration_percent", "f32"}, {"gain_index", "i16"}, {"num_results", "u16"},
@@ -149,5 +178,5 @@ function ping.dissector(tvb, pinfo, tree)
   return tvb:len()
 end
 
-for _, port in ipairs({12345, 9092, 62312, 51200}) do DissectorTable.get("udp.port"):add(port, ping) end
-for _, port in ipairs({62312, 51200}) do DissectorTable.get("tcp.port"):add(port, ping) end
+for _, port in ipairs({12345, 9092, 62312, 51200, 9090}) do DissectorTable.get("udp.port"):add(port, ping) end
+for _, port in ipairs({62312, 51200, 9090}) do DissectorTable.get("tcp.port"):add(port, ping) end

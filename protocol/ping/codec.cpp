@@ -6,6 +6,7 @@
 #include "protocol/ping/host.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/omniscan.hpp"
+#include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping360.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/ping/surveyor.hpp"
@@ -35,6 +36,31 @@ bool is_known(Id id) {
     case Id::water_stats:
     case Id::attitude_report:
     case Id::set_sound_speed_before:
+    case Id::ping1d_set_device_id:
+    case Id::ping1d_set_range:
+    case Id::ping1d_set_mode_auto:
+    case Id::ping1d_set_interval:
+    case Id::ping1d_set_gain:
+    case Id::ping1d_set_enable:
+    case Id::ping1d_goto_bootloader:
+    case Id::ping1d_firmware_version:
+    case Id::ping1d_device_id:
+    case Id::ping1d_voltage_5:
+    case Id::ping1d_sound_speed:
+    case Id::ping1d_range:
+    case Id::ping1d_mode_auto:
+    case Id::ping1d_interval:
+    case Id::ping1d_gain:
+    case Id::ping1d_transmit_duration:
+    case Id::ping1d_general_info:
+    case Id::ping1d_distance_simple:
+    case Id::ping1d_distance:
+    case Id::ping1d_processor_temperature:
+    case Id::ping1d_pcb_temperature:
+    case Id::ping1d_enable:
+    case Id::ping1d_profile:
+    case Id::ping1d_continuous_start:
+    case Id::ping1d_continuous_stop:
     case Id::ping360_set_device_id:
     case Id::os_ping_params:
     case Id::os_mono_profile:
@@ -101,6 +127,13 @@ recording::Codec surveyor::codec() {
 recording::Codec omniscan::codec() {
   return {.framing = &framing, .files = kinds, .sender = [](const RecordedMessage& message) {
             return holds(message, {Id::os_mono_profile}) ? one_of(vendor()) : std::nullopt;
+          }};
+}
+
+recording::Codec ping1d::codec() {
+  return {.framing = &framing, .sender = [](const RecordedMessage& message) {
+            return holds(message, {Id::ping1d_distance_simple, Id::ping1d_distance, Id::ping1d_profile}) ? one_of(vendor())
+                                                                                                         : std::nullopt;
           }};
 }
 

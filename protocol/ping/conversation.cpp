@@ -52,7 +52,11 @@ void Conversation::on_general_request(const Frame& frame, Time now, protocol::Re
   wire::Reader reader(frame.payload);
   reader("requested_id", wanted);
   if (!reader.ok()) return refuse(frame, reader.failure_text(), reaction);
-  if (comes_with_pings(wanted)) return;
+  answer(wanted, now, reaction);
+}
+
+void Conversation::answer(Id wanted, Time now, protocol::Reaction& reaction) {
+  if (comes_with_pings(wanted) || on_wanted(wanted, now, reaction)) return;
   Bytes answer;
   if (wanted == Id::device_information)
     answer = framed_message(wanted, id_, identity_);

@@ -41,6 +41,11 @@ class Conversation : public protocol::Dialogue {
   virtual Bytes message_now(Id wanted, Time now) = 0;
   /// It is sent with every ping, and pings are enabled: the next one is the answer.
   virtual bool comes_with_pings(Id) const { return false; }
+  /// It answers the request for that message by itself.
+  virtual bool on_wanted(Id wanted, Time now, protocol::Reaction& reaction) {
+    static_cast<void>(wanted), static_cast<void>(now), static_cast<void>(reaction);
+    return false;
+  }
   /// A host has set id_.
   virtual void on_new_id(protocol::Reaction&) {}
 
@@ -54,6 +59,8 @@ class Conversation : public protocol::Dialogue {
   }
   void refuse(const Frame& frame, const std::string& why, protocol::Reaction& reaction) const;
   void set_id(const Frame& frame, protocol::Reaction& reaction);
+  /// Answers a request for that message.
+  void answer(Id wanted, Time now, protocol::Reaction& reaction);
 
   const protocol::DeviceState& device_;
   const bool by_datagrams_;

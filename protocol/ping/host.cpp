@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
-#include <tuple>
 
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
+#include "protocol/ping/ping_host.hpp"
 #include "protocol/ping/surveyor.hpp"
 
 namespace sonar::ping {
@@ -21,17 +20,7 @@ using text::format;
 constexpr double sample_unit_s = 25e-9, sound_mps = 1500;
 constexpr int grads = 400, sector = 201, first_grad = 300;  // of a scan: half a circle, port to starboard
 constexpr int astern = 200;                                 // where the beams of a turn begin
-constexpr double shown_db = 60;                             // of a waterfall, below its strongest echo
-constexpr double usual_range_m = 10;
-constexpr std::size_t point_rows = 300;  // of a picture of points
-
-using Line = std::vector<float>;  // of one beam
-
-/// 0: as the device likes.
-double period_ms_of(const protocol::SettingsOverride& wanted) {
-  const double rate_hz = wanted.rate_hz.value_or(0);
-  return rate_hz > 0 ? std::clamp(1000 / rate_hz, 1.0, 30000.0) : 0;
-}
+constexpr std::size_t point_rows = 300;                     // of a picture of points
 
 Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
   PingParameters p{.end_mm = static_cast<std::int32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
@@ -63,15 +52,6 @@ Bytes ping360_request(const protocol::SettingsOverride& wanted) {
   t.start = first_grad;
   t.stop = (first_grad + sector - 1) % grads;
   return framed_message(Id::auto_transmit, 0, t);
-}
-
-/// Reads a message off the front of the payload; returns the rest.
-template <class M>
-std::optional<BytesView> read_front(const Frame& frame, M& message) {
-  wire::Reader reader(frame.payload);
-  fields(reader, message);
-  if (!reader.ok()) return std::nullopt;
-  return BytesView(frame.payload).subspan(wire::wire_size<M>());
 }
 
 using Points = std::vector<std::pair<double, double>>;  // azimuth, range
@@ -144,22 +124,8 @@ HostPing ping_of(std::uint32_t number, double end_m, Points polar) {
   return found;
 }
 
-SonarPicture picture_of(const std::deque<std::shared_ptr<const Line>>& waterfall, double start_m, double row_m) {
-  SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};
-  seen.image.rows = waterfall.size();
-  seen.image.beams = waterfall.front()->size();
-  seen.image.row_spacing_m = row_m;
-  seen.image.start_m = start_m;
-  float most_db = -1000;
-  for (const auto& profile : waterfall) most_db = std::max(most_db, *std::max_element(profile->begin(), profile->end()));
-  for (const auto& profile : waterfall)
-    for (const float db : *profile)
-      seen.image.samples.push_back(std::clamp(255 * (1 + (db - most_db) / static_cast<float>(shown_db)), 0.0f, 255.0f));
-  return seen;
-}
-
-/// `waterfall`: the profiles before it, the newest first, each [dB]; this one is added.
-HostPing profile_of(const OsMonoProfile& data, BytesView rest, std::deque<std::shared_ptr<const Line>>& waterfall) {
+/// It is added to the waterfall.
+HostPing profile_of(const OsMonoProfile& data, BytesView rest, Waterfall& waterfall) {
   HostPing found;
   std::vector<std::uint16_t> powers;
   wire::Reader reader(rest);
@@ -180,14 +146,10 @@ HostPing profile_of(const OsMonoProfile& data, BytesView rest, std::deque<std::s
     return failure(ErrorKind::usage, "one ping of one beam makes no picture: sonarctl listen prints the profiles of an Omniscan");
   };
   if (powers.empty()) return found;
-  auto profile = std::make_shared<Line>();
+  Line profile;
   for (const std::uint16_t power : powers)
-    profile->push_back(data.lowest_db + static_cast<float>(power) / 65535 * (data.highest_db - data.lowest_db));
-  if (!waterfall.empty() && waterfall.front()->size() != profile->size()) waterfall.clear();
-  waterfall.push_front(std::move(profile));
-  if (waterfall.size() > waterfall_rows) waterfall.pop_back();
-  found.is_whole = waterfall.size() >= waterfall_fewest_rows;
-  found.drawing = [waterfall, start_m, row_m] { return picture_of(waterfall, start_m, row_m); };
+    profile.push_back(data.lowest_db + static_cast<float>(power) / 65535 * (data.highest_db - data.lowest_db));
+  waterfall.add(std::move(profile), start_m, row_m, found);
   const auto top = std::max_element(powers.begin(), powers.end());
   const double db = static_cast<double>(data.lowest_db) +
                     static_cast<double>(*top) / 65535 * static_cast<double>(data.highest_db - data.lowest_db);
@@ -195,49 +157,6 @@ HostPing profile_of(const OsMonoProfile& data, BytesView rest, std::deque<std::s
       format("strongest %.1f dB at %.2f m", db, start_m + (static_cast<double>(top - powers.begin()) + 0.5) * row_m);
   return found;
 }
-
-class PingHost : public protocol::Host {
- public:
-  PingHost(std::string_view title, std::optional<Bytes> request) : title_(title), request_(std::move(request)) {}
-
-  HostActions on_open(std::span<const std::uint16_t>, Time) override {
-    HostActions actions;
-    ask(actions);
-    return actions;
-  }
-  HostActions on_bytes(std::size_t, BytesView received, Time) override {
-    HostActions actions;
-    framer_.append(received);
-    while (const auto frame = framer_.next()) {
-      if (!frame->sum_is_right) continue;
-      on_frame(*frame, actions);
-      if (frame->header.id == Id::nack) {
-        std::string why;
-        for (std::size_t i = 2; i < frame->payload.size(); ++i) why += static_cast<char>(frame->payload[i]);
-        actions.emplace_back(Error{ErrorKind::bad_data, "refused a request: " + why});
-      }
-      if (auto ping = ping_from(*frame)) {
-        ping->facts.message_size = header_size + frame->payload.size() + sum_size;
-        actions.emplace_back(*std::move(ping));
-      }
-    }
-    return actions;
-  }
-  std::string about() const override { return std::string(title_); }
-
- protected:
-  bool asks() const { return request_.has_value(); }
-  void ask(HostActions& actions) const {
-    if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
-  }
-  virtual void on_frame(const Frame&, HostActions&) {}
-  virtual std::optional<HostPing> ping_from(const Frame& frame) = 0;
-
- private:
-  std::string_view title_;
-  std::optional<Bytes> request_;  // for pings; empty: none are requested
-  Framer framer_{65535};
-};
 
 class SurveyorHost final : public PingHost {
  public:
@@ -271,13 +190,10 @@ class OmniscanHost final : public PingHost {
     OsMonoProfile data;
     const auto rest = frame.header.id == Id::os_mono_profile ? read_front(frame, data) : std::nullopt;
     if (!rest) return std::nullopt;
-    if (data.start_mm != start_mm_ || data.length_mm != length_mm_) waterfall_.clear();
-    std::tie(start_mm_, length_mm_) = std::tie(data.start_mm, data.length_mm);
     return profile_of(data, *rest, waterfall_);
   }
 
-  std::deque<std::shared_ptr<const Line>> waterfall_;
-  std::uint32_t start_mm_ = 0, length_mm_ = 0;
+  Waterfall waterfall_;
 };
 
 /// Bearing of a beam: beam 0 looks astern, the next ones over port back to astern.
@@ -366,14 +282,6 @@ class Ping360Host final : public PingHost {
   Turn turn_;
   std::uint32_t pings_ = 0;  // which a Ping360 does not number
 };
-
-template <class Product>
-Result<std::unique_ptr<protocol::Host>> host_of(std::string_view title, Bytes (*request)(const protocol::SettingsOverride&),
-                                                std::initializer_list<std::string_view> known, const protocol::Wanted& wanted) {
-  if (auto accepted = protocol::accept_settings(wanted, title, known); !accepted) return tl::unexpected(accepted.error());
-  if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, std::string(title) + " has one mode only");
-  return std::make_unique<Product>(title, wanted.as_it_is ? std::nullopt : std::optional(request(wanted.settings)));
-}
 
 }  // namespace
 

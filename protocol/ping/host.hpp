@@ -1,4 +1,4 @@
-// Hosts of the ping protocol (docs/protocols/ping.md): of a Ping360 by UDP, of a Surveyor or an Omniscan by TCP.
+// Hosts of the ping protocol (docs/protocols/ping.md): of a Ping360 by UDP, of a Surveyor, an Omniscan or a Ping1D by TCP.
 #pragma once
 
 #include <array>
@@ -24,5 +24,11 @@ inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPo
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();
 }  // namespace omniscan
+
+namespace ping1d {
+inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 9090}}};
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+recording::Codec codec();
+}  // namespace ping1d
 
 }  // namespace sonar::ping

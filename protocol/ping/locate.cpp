@@ -1,6 +1,7 @@
 #include "protocol/ping/locate.hpp"
 
 #include "protocol/ping/omniscan_messages.hpp"
+#include "protocol/ping/ping1d_messages.hpp"
 
 namespace sonar::ping {
 namespace {
@@ -64,6 +65,19 @@ std::optional<Field> of_ping360(FieldName name, BytesView frame) {
   }
 }
 
+/// Offset of the frame of that message among the frames of a ping; of no frames: 0.
+std::optional<std::size_t> frame_of(Id id, BytesView frames) {
+  std::size_t at = 0;
+  while (!frames.empty() && at < frames.size() && !is_of(id, frames.subspan(at))) {
+    Header header;
+    wire::Reader reader(frames.subspan(at));
+    fields(reader, header);
+    if (!reader.ok()) return std::nullopt;
+    at += header_size + header.length + sum_size;
+  }
+  return frames.empty() || at < frames.size() ? std::optional(at) : std::nullopt;
+}
+
 /// A region of a frame that is fields, then samples.
 std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields_size) {
   if (region == Region::bearings) return std::nullopt;
@@ -122,6 +136,37 @@ std::optional<Field> locate_omniscan(FieldName name, BytesView frame) {
 
 std::optional<Place> locate_omniscan(Region region, BytesView frame) {
   return one_beam(region, frame, wire::wire_size<OsMonoProfile>());
+}
+
+std::optional<Field> locate_ping1d(FieldName name, BytesView frames) {
+  if (const auto header = in_header(name, frames)) return header;
+  auto at = frame_of(Id::ping1d_profile, frames);
+  const bool has_profile = at.has_value();
+  if (!at) at = frame_of(Id::ping1d_distance, frames);
+  if (!at) return std::nullopt;
+  const auto of = [&](std::string_view field) {
+    return has_profile ? inside<Profile>(field, *at + header_size, frames) : inside<Distance>(field, *at + header_size, frames);
+  };
+  switch (name) {
+    case FieldName::ping_id:
+      return of("ping_number");
+    case FieldName::range:
+      return of("scan_length");
+    case FieldName::gain:
+      return of("gain_setting");
+    case FieldName::rows:
+      return has_profile ? of("profile_data_length") : std::nullopt;
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<Place> locate_ping1d(Region region, BytesView frames) {
+  const auto at = frame_of(Id::ping1d_profile, frames);
+  if (!at) return std::nullopt;
+  auto place = one_beam(region, frames.empty() ? frames : frames.subspan(*at), wire::wire_size<Profile>());
+  if (place && !frames.empty()) place->first += *at;
+  return place;
 }
 
 std::optional<Field> locate_surveyor(FieldName name, BytesView frames) {

@@ -22,4 +22,8 @@ std::optional<Place> locate_surveyor(protocol::Region region, protocol::BytesVie
 std::optional<protocol::Field> locate_omniscan(protocol::FieldName name, protocol::BytesView frame);
 std::optional<Place> locate_omniscan(protocol::Region region, protocol::BytesView frame);
 
+/// The frames are those of a ping of a Ping1D: the profile, or else the distance.
+std::optional<protocol::Field> locate_ping1d(protocol::FieldName name, protocol::BytesView frames);
+std::optional<Place> locate_ping1d(protocol::Region region, protocol::BytesView frames);
+
 }  // namespace sonar::ping

@@ -1,5 +1,4 @@
-// The common part of Surveyor and Omniscan: a host sets everything in one request and enables pings, which come by TCP or UDP
-// until it disables them.
+// The common part of Surveyor, Omniscan and Ping1D: their pings come by TCP or UDP, as long as a host enables them.
 #pragma once
 
 #include <array>
@@ -19,10 +18,10 @@ constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number) {
 template <class Settings, Settings (*settings_from)(const VendorSettings*)>
 class StreamingConversation : public Conversation {
  public:
-  StreamingConversation(const protocol::DeviceState& device, const protocol::Port& port)
-      : Conversation(device, port,
-                     {.type = static_cast<std::uint8_t>(number_option(device.options, option_name::device_type)), .major = 1},
-                     settings_from(device.settings.get()).id) {}
+  /// `identity` without its type, which is an option.
+  StreamingConversation(const protocol::DeviceState& device, const protocol::Port& port,
+                        DeviceInformation identity = {.major = 1})
+      : Conversation(device, port, typed(identity, device), settings_from(device.settings.get()).id) {}
 
   protocol::Reaction on_tick(Time, bool) override { return {}; }
   Time next_tick() const override { return Time::max(); }
@@ -36,14 +35,25 @@ class StreamingConversation : public Conversation {
     change(reaction, [](Settings&) {});
   }
   Settings settings() const { return settings_from(device_.settings.get()); }
+  /// With the changes of the same call, which are not in force yet.
+  Settings settings_after(const protocol::Reaction& reaction) const {
+    Settings s = settings();
+    for (const protocol::Event& event : reaction.events)
+      if (const auto* earlier = std::get_if<protocol::ChangeSettings>(&event)) s = settings_from(earlier->vendor_settings.get());
+    return s;
+  }
   template <class Change>
   void change(protocol::Reaction& reaction, Change apply) {
-    Settings s = settings();
-    for (const protocol::Event& event : reaction.events)  // of the same call: not in force yet
-      if (const auto* earlier = std::get_if<protocol::ChangeSettings>(&event)) s = settings_from(earlier->vendor_settings.get());
+    Settings s = settings_after(reaction);
     apply(s);
     s.id = id_;
     reaction.events.emplace_back(change_to(s));
+  }
+
+ private:
+  static DeviceInformation typed(DeviceInformation identity, const protocol::DeviceState& device) {
+    identity.type = static_cast<std::uint8_t>(number_option(device.options, option_name::device_type));
+    return identity;
   }
 };
 

@@ -27,7 +27,8 @@ MAKES = {"oculus-m1200d": (52100, "--range", 3, "--gain", 60, "--rate", 5, "--mo
          "waterlinked-3d15": (80, "--range", 3, "--mode", 2),
          "ping360": (12345, "--range", 3, "--gain", 60),
          "surveyor-240": (62312, "--range", 3, "--gain", 60, "--rate", 5),
-         "omniscan-450": (51200, "--range", 3, "--gain", 60, "--rate", 5)}
+         "omniscan-450": (51200, "--range", 3, "--gain", 60, "--rate", 5),
+         "ping1d": (9090, "--range", 3, "--gain", 60, "--rate", 5)}
 PINGS = 4
 LONGEST_BEACON = 142  # bytes; beacons hold the address, which differs from run to run
 PATIENCE = ("--wait", 120)

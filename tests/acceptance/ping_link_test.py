@@ -1,4 +1,4 @@
-"""An emulated Ping360, Surveyor and Omniscan as hosts of the ping protocol meet them; and under tshark."""
+"""An emulated Ping360, Surveyor, Omniscan and Ping1D as hosts of the ping protocol meet them; and under tshark."""
 import math
 import pathlib
 import re
@@ -6,6 +6,7 @@ import select
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -15,7 +16,7 @@ from pcap_writer import Capture
 from running_sonard import ROOT, SONARCTL, SONARD, Sonard, eventually, expect_quiet, run
 
 DISSECTOR = ROOT / "clients/wireshark/ping.lua"
-PING360, DISCOVERY, SURVEYOR, OMNISCAN = 12345, 30303, 62312, 51200
+PING360, DISCOVERY, SURVEYOR, OMNISCAN, PING1D = 12345, 30303, 62312, 51200, 9090
 B, C = (3.9, 10), (6.9, -8)  # range m, bearing deg clockwise: points of scenes/l-targets.yaml
 SIDE = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -30, 90]}"
 DOWN = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}"
@@ -288,11 +289,60 @@ class OmniscanLink(unittest.TestCase):
             replay.communicate(timeout=20)
 
 
+class Ping1DLink(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Sonard(profile="ping1d", mount=DOWN, pose="{frame: ENU_FLU, xyz_m: [-7, 0, -3]}").__enter__()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.daemon.__exit__()
+
+    def test_measurements_come_when_they_are_requested(self):
+        host = Host(self.daemon.address, PING1D)
+        eventually(lambda: host.is_answered(general(5)))
+        self.assertEqual(host.ask(frame(1210), 1210)[0][8:10], bytes([3, 1]), "gain 3, automatic")
+        for _ in range(20):
+            distance, confidence, _, ping, start, length, _ = struct.unpack("<IHHIIII", host.ask(general(1212), 1212)[0])
+        self.assertGreater(confidence, 50)
+        self.assertEqual(start, 0)
+        self.assertAlmostEqual(distance / 1000, 2, delta=0.35)  # ripples and relief of the harbour's bed, 2 m below
+        self.assertTrue(0.3 < distance / length < 0.9, (distance, length))
+        self.assertEqual(struct.unpack("<IB", host.ask(frame(1211), 1211)[0])[1] > 50, True)
+        host.send(frame(1003, b"\0"))
+        host.send(frame(1001, struct.pack("<II", 500, 4000)))
+        self.assertEqual(struct.unpack("<II", host.ask(frame(1204), 1204)[0]), (500, 4000))
+        profile = host.ask(general(1300), 1300)[0]
+        self.assertEqual(len(profile), 26 + 200)
+        self.assertGreater(struct.unpack_from("<I", profile, 8)[0], ping)
+        self.assertEqual(struct.unpack_from("<II", profile, 12), (500, 4000))
+        host.send(frame(1003, b"\1"))
+
+    def test_a_stream_comes_by_tcp(self):
+        listener = run(SONARCTL, "listen", f"{self.daemon.address}:{PING1D}", "--pings", 5, "--wait", 60)
+        self.assertEqual(listener.returncode, 0, listener.stderr)
+        self.assertEqual(len(re.findall(r"distance \d\.\d{3} m, confidence \d+ %", listener.stdout)), 5, listener.stdout)
+
+
+class AltitudeHold(unittest.TestCase):
+    def test_the_example_brings_a_vehicle_to_its_altitude_and_keeps_it_there(self):
+        with Sonard(profile="ping1d", mount=DOWN) as daemon:
+            done = run(sys.executable, ROOT / "docs/examples/altitude_hold.py", "--sonar", daemon.address, "--sonard", daemon.address,
+                       "--altitude", 1, "--pings", 150, patience_s=600)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        held = [float(metres) for metres in re.findall(r"distance (\d+\.\d{3}) m", done.stdout)]
+        self.assertEqual(len(held), 150)
+        self.assertGreater(held[0], 1.5)
+        for distance in held[-30:]:
+            self.assertAlmostEqual(distance, 1, delta=0.15)
+
+
 class Tools(unittest.TestCase):
     def test_sonarctl_listens_views_and_examines(self):
         for profile, port, mount, line in (("ping360", PING360, "{frame: FLU, xyz_m: [0, 0, 0]}", r"x 1  8 bit .* angle \d+ grad"),
                                            ("surveyor-240", SURVEYOR, DOWN, r"points from \d+\.\d\d to \d+\.\d\d m"),
-                                           ("omniscan-450", OMNISCAN, SIDE, r"strongest -?\d+\.\d dB at \d+\.\d\d m")):
+                                           ("omniscan-450", OMNISCAN, SIDE, r"strongest -?\d+\.\d dB at \d+\.\d\d m"),
+                                           ("ping1d", PING1D, DOWN, r"distance \d\.\d{3} m, confidence \d+ %")):
             with self.subTest(profile), Sonard(profile=profile, mount=mount) as daemon, tempfile.TemporaryDirectory() as folder:
                 at = f"{daemon.address}:{port}"
                 examined = daemon.ctl("doctor", "--within", 60, "--control", f"{daemon.address}:14770")
@@ -319,6 +369,9 @@ class Dissected(unittest.TestCase):
             side = Host(daemon.address, OMNISCAN)
             side.send(side_scan(1, results=200))
             side.next(2198)
+        with Sonard(profile="ping1d", mount=DOWN) as daemon:
+            down = Host(daemon.address, PING1D)
+            down.ask(general(1300), 1300)
         capture = Capture(device_port=SURVEYOR)
         capture.connect()
         whole = general(4) + settings(1)
@@ -327,7 +380,9 @@ class Dissected(unittest.TestCase):
         for datagram in host.datagrams:
             capture.udp(datagram, PING360)
         capture.udp(side.datagrams[0], OMNISCAN)
+        capture.udp(down.datagrams[0], PING1D)
         capture.tcp("client", side_scan(1))
+        capture.tcp("client", frame(1300))  # as older hosts request it, without a payload
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "ping.pcap"
             capture.write(path)
@@ -339,7 +394,7 @@ class Dissected(unittest.TestCase):
             capture.udp(host.datagrams[0][:-3], PING360)
             capture.write(path)
             broken = shark.tshark("-r", path, "-Y", "brping.expert.broken || brping.expert.checksum", dissector=DISSECTOR)
-        for name in ("general_request", "set_ping_parameters", "device_information", "device_data", "os_ping_params", "os_mono_profile"):
+        for name in ("general_request", "set_ping_parameters", "device_information", "device_data", "os_ping_params", "os_mono_profile", "profile"):
             self.assertIn(name, lines)
         self.assertEqual(values, ["17", "1200", "2"])
         self.assertEqual(wrong.strip(), "")

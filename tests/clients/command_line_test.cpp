@@ -56,9 +56,9 @@ TEST(CommandLine, HelpNamesTheDefaultsOfSettings) {
   CLI::App app("", "sonarctl");
   const auto command = add_listen(app);
   const std::string help = app.get_subcommand("listen")->help();
-  for (const char* words :
-       {"default: the make's own; of an Oculus --mode 2 --range 10 --gain 50 --rate 10; of an Omniscan --rate 10", "default: 512",
-        "Default: 127"})
+  for (const char* words : {"default: the make's own; of an Oculus --mode 2 --range 10 --gain 50 --rate 10; of an Omniscan "
+                            "--rate 10; of a Ping1D --rate 10",
+                            "default: 512", "Default: 127"})
     EXPECT_THAT(unwrapped(help), HasSubstr(words));
 }
 

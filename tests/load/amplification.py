@@ -39,6 +39,7 @@ ASKED = [
      frame(3023, struct.pack("<iifhhHBBBBBBiHHf", 0, 5000, 1500.0, -1, 50, 0, 0, 1, 0, 0, 1, 1, 240000, 400, 0, 1.5))),
     ("omniscan-450", "2197, pings", 51200,
      frame(2197, struct.pack("<IIIffffhHBBBB", 0, 5000, 0, 0, 0, 0.002, 0.0015, -1, 1200, 1, 0, 0, 0))),
+    ("ping1d", "1400, profiles", 9090, frame(1400, struct.pack("<H", 1300))),
 ]
 
 

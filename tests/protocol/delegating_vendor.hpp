@@ -29,6 +29,9 @@ class DelegatingVendor : public Vendor {
   double gain_percent(const DeviceState& device) const override { return of_.gain_percent(device); }
   PingsBy pings_by() const override { return of_.pings_by(); }
   bool pings_before_first_request(const DeviceState& device) const override { return of_.pings_before_first_request(device); }
+  std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const override {
+    return of_.after_ping(ping, device);
+  }
   Bytes beacon(const DeviceState& device, Time now) const override { return of_.beacon(device, now); }
   Reaction on_datagram(const Port& port, BytesView datagram, const DeviceState& device, Time now) const override {
     return of_.on_datagram(port, datagram, device, now);

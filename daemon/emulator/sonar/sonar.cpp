@@ -263,6 +263,8 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
                                            around_.config.sonars.size() > 1))
       report(Report::Topic::state, LogLevel::warning, *slow, {}, actions);
   if (outcome.ping) gain_assist_.look_at(*outcome.ping);
+  if (outcome.ping && !stopping_ && !busy_unwanted_ && !outcome.ping->request.blank)
+    if (const auto change = vendor_.after_ping(*outcome.ping, state_)) change_settings(*change, "the sonar itself", now, actions);
   if (outcome.ping) note_water(outcome.ping->request, now, actions);
   if (outcome.refused) {
     ++figures_.refused;

@@ -1,10 +1,12 @@
-// Pictures of a Ping360, an Omniscan and a Surveyor of bodies at known places, through the whole engine, in closed form.
+// Pictures of a Ping360, an Omniscan, a Surveyor and a Ping1D of bodies at known places, through the whole engine, in closed
+// form.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <tuple>
 
 #include "protocol/ping/omniscan_settings.hpp"
+#include "protocol/ping/ping1d_settings.hpp"
 #include "protocol/ping/ping360_settings.hpp"
 #include "protocol/ping/surveyor_settings.hpp"
 #include "tests/core/pipeline/scenes.hpp"
@@ -267,6 +269,78 @@ TEST(SurveyorAcoustics, RollIsInTheUpVectorAndInThePoints) {
 TEST(SurveyorAcoustics, NoBottomNoPoints) {
   Sounder sounder(SceneMaker().add_point({0, 0, 50}, -40).make());
   EXPECT_EQ(message_in<AtofPointData>(sounder.ping(1)[1]).points, 0);
+}
+
+// ---- Ping1D
+
+/// An altimeter that looks down, in automatic mode.
+struct Altimeter {
+  explicit Altimeter(std::shared_ptr<const Scene> scene, double speed_mps = 1500) {
+    settings.parameters.speed_mm_per_s = static_cast<std::uint32_t>(1000 * speed_mps);
+    sounding = std::make_unique<Sounding>(scene, state.model->modes[0], ping1d::ping_settings(settings));
+    sounding->request.switches.noise = true;
+  }
+  /// The echo of a ping from there, pitched so far from straight down, once range and gain have settled.
+  ping1d::Echo echo(double x_m = 0, double pitch_rad = 0) {
+    ping1d::Echo found;
+    for (int i = 0; i < 12; ++i) {
+      sounding->request.settings = ping1d::ping_settings(settings);
+      sounding->request.vendor_settings = std::make_shared<ping1d::HeldSettings>(settings);
+      sounding->request.sonar_in_world = {{x_m, 0, 0}, quat_from_rpy({0, pi / 2 + pitch_rad, 0})};
+      sounding->request.number = PingNumber(static_cast<std::uint32_t>(i + 1));
+      found = ping1d::find_echo(sounding->ping());
+      const ping1d::Parameters next = ping1d::adjusted(settings.parameters, found);
+      if (next == settings.parameters) return found;
+      settings.parameters = next;
+    }
+    ADD_FAILURE() << "range and gain do not settle";
+    return found;
+  }
+  protocol::DeviceState state = device("ping1d");
+  ping1d::Settings settings;
+  std::unique_ptr<Sounding> sounding;
+};
+
+TEST(Ping1DAcoustics, TheBedIsAtItsDistance) {
+  for (const double altitude_m : {0.6, 1.5, 5.0, 20.0})
+    for (const double strength_db : {-15.0, -35.0}) {
+      Altimeter altimeter(bed(0, altitude_m, strength_db));
+      for (const double x_m : {0.0, 0.1, 0.2, 0.3}) {
+        const ping1d::Echo echo = altimeter.echo(x_m * altitude_m);
+        const auto pulse_m = static_cast<double>(altimeter.sounding->request.settings.pulse_width_m);  // at least a point
+        EXPECT_NEAR(echo.range_m, altitude_m, 1.5 * pulse_m) << altitude_m << " m, " << strength_db << " dB";
+        EXPECT_GE(echo.confidence, 50);
+      }
+    }
+}
+
+TEST(Ping1DAcoustics, ATiltedBeamMeasuresToTheNearestGround) {
+  for (const double pitch_deg : {0.0, 5.0, 10.0, 15.0, 20.0, 30.0}) {
+    Altimeter altimeter(bed(0));
+    const ping1d::Echo echo = altimeter.echo(0, rad_from_deg(pitch_deg));
+    EXPECT_NEAR(echo.range_m, 5, 0.1) << pitch_deg;  // its beam is wide enough to hear the ground straight below
+  }
+}
+
+TEST(Ping1DAcoustics, AnotherSoundSpeedScalesTheDistance) {
+  Altimeter altimeter(bed(0), 1350);  // the water has 1500 m/s
+  EXPECT_NEAR(altimeter.echo().range_m, 4.5, 0.1);
+}
+
+TEST(Ping1DAcoustics, AWallAheadIsMeasuredByABeamThatLooksAhead) {
+  Altimeter altimeter(SceneMaker().add(wall(4, 4), -25, {3, 0, 0}).make());
+  EXPECT_NEAR(altimeter.echo(0, -pi / 2).range_m, 3, 0.06);
+}
+
+TEST(Ping1DAcoustics, OpenWaterHasNoDistanceToTrust) {
+  Altimeter altimeter(SceneMaker().add_point({0, 0, 50}, -40).make());
+  altimeter.settings.parameters = {.range = {0, 20000}, .gain = 6, .mode_auto = 0};
+  altimeter.sounding->request.settings = ping1d::ping_settings(altimeter.settings);
+  altimeter.sounding->request.sonar_in_world = {{}, quat_from_rpy({0, pi / 2, 0})};
+  for (std::uint32_t number = 1; number <= 20; ++number) {
+    altimeter.sounding->request.number = PingNumber(number);
+    EXPECT_LT(ping1d::find_echo(altimeter.sounding->ping()).confidence, 20);
+  }
 }
 
 }  // namespace

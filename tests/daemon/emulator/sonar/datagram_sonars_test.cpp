@@ -1,7 +1,8 @@
-// A Sonar 3D-15 and a Surveyor by UDP in virtual time: what their receivers are sent, with faults too.
+// A Sonar 3D-15, a Surveyor and a Ping1D by UDP in virtual time: what their receivers are sent, with faults too.
 #include <gmock/gmock.h>
 
 #include "protocol/ping/messages.hpp"
+#include "protocol/ping/ping1d_messages.hpp"
 #include "protocol/waterlinked/messages.hpp"
 #include "protocol/waterlinked/rip.hpp"
 #include "tests/daemon/emulator/sonar/virtual_time.hpp"
@@ -208,6 +209,71 @@ TEST(SurveyorInVirtualTime, TellsTheTimeThatItWasToldWhateverItSkipped) {
   sounder.time.now += seconds(1000);
   sounder.send(ping::framed_message(ping::Id::utc_response, 0, ping::UtcResponse{.utc_ms = utc_ms}));
   EXPECT_NEAR(static_cast<double>(sounder.atof().utc_ms - utc_ms), 100, 100);
+}
+
+// ---- Ping1D
+
+struct Altimeter : Talk {
+  Altimeter() : Talk("ping1d") {
+    time.clients[stream].sonar = &sonar();
+    time.clients[stream].reads = false;  // pings() does
+    const protocol::Port& port = *sonar().vendor().port(protocol::Port::Kind::udp_dialogue);
+    sonar().on_connect(stream, Role::client, {"host", {10, 0, 0, 5}, 5000}, time.now, &port);
+  }
+  template <class T>
+  void send(ping::Id id, T value) {
+    Bytes payload;
+    wire::Writer write(payload);
+    write("value", value);
+    time.send(stream, ping::framed(id, 0, payload));
+  }
+  /// The distances of the profiles that arrive meanwhile.
+  std::vector<ping::Distance> profiles(milliseconds length) {
+    std::vector<ping::Distance> all;
+    for (const auto& datagrams : pings(length))
+      for (const Bytes& datagram : datagrams) {
+        ping::Framer framer(65535, true);
+        framer.append(datagram);
+        const auto frame = framer.next();
+        if (!frame || frame->header.id != ping::Id::ping1d_profile) continue;
+        wire::Reader reader(frame->payload);
+        fields(reader, all.emplace_back());
+      }
+    return all;
+  }
+};
+
+TEST(Ping1DInVirtualTime, PingsComeAtTheIntervalUntilTheStreamIsStopped) {
+  Altimeter altimeter;
+  EXPECT_THAT(altimeter.profiles(seconds(1)), IsEmpty());
+  altimeter.send<std::uint8_t>(ping::Id::ping1d_set_mode_auto, 0);
+  altimeter.send(ping::Id::ping1d_continuous_start, ping::Id::ping1d_profile);
+  EXPECT_NEAR(static_cast<double>(altimeter.profiles(seconds(10)).size()), 100, 1);
+  altimeter.send<std::uint16_t>(ping::Id::ping1d_set_interval, 20);
+  EXPECT_NEAR(static_cast<double>(altimeter.profiles(seconds(10)).size()), 500, 5);
+  altimeter.send<std::uint8_t>(ping::Id::ping1d_set_enable, 0);
+  EXPECT_THAT(altimeter.profiles(seconds(1)), IsEmpty());
+  altimeter.send<std::uint8_t>(ping::Id::ping1d_set_enable, 1);
+  EXPECT_FALSE(altimeter.profiles(seconds(1)).empty());
+  altimeter.send(ping::Id::ping1d_continuous_stop, ping::Id::ping1d_profile);
+  EXPECT_THAT(altimeter.profiles(seconds(1)), IsEmpty());
+}
+
+/// Pings of virtual time hold zeros.
+TEST(Ping1DInVirtualTime, WithoutAnEchoItsAutomaticModeSearches) {
+  Altimeter altimeter;
+  altimeter.send(ping::Id::ping1d_continuous_start, ping::Id::ping1d_profile);
+  const auto seen = altimeter.profiles(seconds(2));
+  ASSERT_GT(seen.size(), 7u);
+  std::vector<std::uint32_t> lengths;
+  for (std::size_t i = 0; i < 7; ++i) lengths.push_back(seen[i].length_mm);
+  EXPECT_THAT(lengths, ElementsAre(5000, 10000, 20000, 40000, 80000, 100000, 5000));
+  EXPECT_EQ(seen.back().gain, 6u);
+  altimeter.send<std::uint8_t>(ping::Id::ping1d_set_mode_auto, 0);
+  altimeter.profiles(milliseconds(300));
+  const auto manual = altimeter.profiles(seconds(2));
+  ASSERT_GT(manual.size(), 5u);
+  for (const ping::Distance& one : manual) EXPECT_EQ(one.length_mm, manual.front().length_mm);
 }
 
 }  // namespace

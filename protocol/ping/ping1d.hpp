@@ -1,0 +1,11 @@
+// Ping1D: an altimeter, one wide beam that measures the distance to what it looks at. TCP and UDP; a host requests single
+// measurements, or a stream of them.
+#pragma once
+
+#include "protocol/vendor.hpp"
+
+namespace sonar::ping::ping1d {
+
+const protocol::Vendor& vendor();
+
+}  // namespace sonar::ping::ping1d

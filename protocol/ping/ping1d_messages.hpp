@@ -1,0 +1,83 @@
+// The messages that only a Ping1D has, as messages.hpp describes the others. Those of one number are written and read by value.
+#pragma once
+
+#include "protocol/ping/messages.hpp"
+
+namespace sonar::ping {
+
+/// The range that a host sets, and that the device reports.
+struct ScanRange {
+  std::uint32_t start_mm = 0, length_mm = 0;
+};
+template <class V, wire::Like<ScanRange> M>
+constexpr void fields(V& visit, M& m) {
+  visit("scan_start", m.start_mm);
+  visit("scan_length", m.length_mm);
+}
+
+struct FirmwareVersion {
+  std::uint8_t type = 1, model = 1;
+  std::uint16_t major = 0, minor = 0;
+};
+template <class V, wire::Like<FirmwareVersion> M>
+constexpr void fields(V& visit, M& m) {
+  visit("device_type", m.type);
+  visit("device_model", m.model);
+  visit("firmware_version_major", m.major);
+  visit("firmware_version_minor", m.minor);
+}
+
+struct GeneralInfo {
+  std::uint16_t major = 0, minor = 0, voltage_mv = 0, interval_ms = 0;
+  std::uint8_t gain = 0, mode_auto = 0;
+};
+template <class V, wire::Like<GeneralInfo> M>
+constexpr void fields(V& visit, M& m) {
+  visit("firmware_version_major", m.major);
+  visit("firmware_version_minor", m.minor);
+  visit("voltage_5", m.voltage_mv);
+  visit("ping_interval", m.interval_ms);
+  visit("gain_setting", m.gain);
+  visit("mode_auto", m.mode_auto);
+}
+
+struct DistanceSimple {
+  std::uint32_t distance_mm = 0;
+  std::uint8_t confidence = 0;
+};
+template <class V, wire::Like<DistanceSimple> M>
+constexpr void fields(V& visit, M& m) {
+  visit("distance", m.distance_mm);
+  visit("confidence", m.confidence);
+}
+
+struct Distance {
+  std::uint32_t distance_mm = 0;
+  std::uint16_t confidence = 0, transmit_us = 0;
+  std::uint32_t ping = 0, start_mm = 0, length_mm = 0, gain = 0;
+};
+template <class V, wire::Like<Distance> M>
+constexpr void fields(V& visit, M& m) {
+  visit("distance", m.distance_mm);
+  visit("confidence", m.confidence);
+  visit("transmit_duration", m.transmit_us);
+  visit("ping_number", m.ping);
+  visit("scan_start", m.start_mm);
+  visit("scan_length", m.length_mm);
+  visit("gain_setting", m.gain);
+}
+
+/// Followed by `count` strengths of a byte.
+struct Profile : Distance {
+  std::uint16_t count = 0;
+};
+template <class V, wire::Like<Profile> M>
+constexpr void fields(V& visit, M& m) {
+  fields(visit, static_cast<std::conditional_t<std::is_const_v<M>, const Distance, Distance>&>(m));
+  visit("profile_data_length", m.count);
+}
+
+static_assert(wire::wire_size<DistanceSimple>() == 5 && wire::wire_size<Distance>() == 24 && wire::wire_size<Profile>() == 26);
+static_assert(wire::wire_size<FirmwareVersion>() == 6 && wire::wire_size<GeneralInfo>() == 10);
+
+}  // namespace sonar::ping

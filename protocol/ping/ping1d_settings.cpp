@@ -1,0 +1,221 @@
+#include "protocol/ping/ping1d_settings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::ping::ping1d {
+namespace {
+
+constexpr std::array<double, 7> gains{0.6, 1.8, 5.5, 12.9, 30.2, 66.1, 144};  // DEF: of gain_setting
+constexpr int most_gain = static_cast<int>(gains.size()) - 1;
+constexpr int points = 200;                                        // recalled, like the ones that follow
+constexpr std::uint32_t least_length_mm = 1000, most_mm = 100000;  // DEF and manual
+constexpr double shortest_pulse_us = 26;  // at 1 m, as a user saw (ping-python, issue 157); unknown: chosen farther away
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
+
+SonarModel make_model() {
+  FrequencyMode mode;
+  mode.name = "115 kHz";
+  mode.centre_hz = 115e3f;
+  mode.min_range_m = 0.3f;
+  mode.max_range_m = 1e-3f * most_mm;
+  mode.source_level_db = 190;  // unknown: level and full scale; chosen so that sand takes the lowest gain at 0.5 m
+  mode.beam_spacing = BeamSpacing::listed;
+  mode.beam_azimuths_rad = {0};
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(30));  // manual; a newer edition has 25
+  mode.pattern.elevation_width_rad = mode.pattern.azimuth_width_rad;
+  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(76));  // its main lobe down to -20 dB
+  mode.receiver.full_scale_upa = 1.4e8f;
+  SonarModel model;
+  model.profile = "ping1d";
+  model.name = "Ping1D";
+  model.max_rate_hz = 50;
+  model.modes = {mode};
+  return model;
+}
+
+std::uint32_t end_mm(const ScanRange& r) { return r.start_mm + r.length_mm; }
+
+}  // namespace
+
+std::span<const std::shared_ptr<const SonarModel>> models() {
+  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
+  return all;
+}
+
+bool HeldSettings::equals(const VendorSettings& other) const {
+  const auto* of = dynamic_cast<const HeldSettings*>(&other);
+  return of != nullptr && of->settings.id == settings.id && of->settings.parameters == settings.parameters;
+}
+
+Settings settings_from(const VendorSettings* held) {
+  const auto* of = dynamic_cast<const HeldSettings*>(held);
+  return of != nullptr ? of->settings : Settings{};
+}
+
+std::string complaint(const Parameters& p) {
+  if (p.range.length_mm < least_length_mm || p.range.length_mm > most_mm || p.range.start_mm > most_mm ||
+      end_mm(p.range) > most_mm)
+    return "scan_length is from 1000, its end to 100000";
+  if (p.speed_mm_per_s < 1000000 || p.speed_mm_per_s > 2000000) return "speed_of_sound is not in 1000000..2000000";
+  if (p.gain > most_gain) return "gain_setting is not in 0..6";
+  if (p.mode_auto > 1) return "mode_auto is 0 or 1";
+  if (p.enable > 1) return "ping_enabled is 0 or 1";
+  return {};
+}
+
+std::uint16_t transmit_us(const Parameters& p) {
+  const double us_of_point = 2e6 * p.range.length_mm / points / p.speed_mm_per_s;
+  return static_cast<std::uint16_t>(std::lround(std::max(us_of_point, shortest_pulse_us)));
+}
+
+PingSettings ping_settings(const Settings& settings) {
+  const Parameters& p = settings.parameters;
+  const double speed_mps = 1e-3 * p.speed_mm_per_s;
+  PingSettings s;
+  s.beam_count = 1;
+  s.range_bin_count = points;
+  s.range_start_m = 1e-3 * p.range.start_mm;
+  s.range_m = 1e-3 * end_mm(p.range);
+  s.range_bin_m = 1e-3 * p.range.length_mm / points;
+  s.samples_per_row = 4;
+  s.pulse_width_m = static_cast<float>(1e-6 * transmit_us(p) * speed_mps / 2);
+  s.rate_hz = p.enable == 0 ? 0 : 1000.0f / static_cast<float>(std::max<int>(p.interval_ms, 1));
+  s.triggered = true;
+  s.gain_db = static_cast<float>(20 * std::log10(gains[p.gain]));
+  s.tvg = false;  // unknown: chosen, since its gains reach from the nearest bottom to the farthest
+  s.device_sound_speed_mps = static_cast<float>(speed_mps);
+  s.format = {.bits = 8, .max_code = 255};
+  return s;
+}
+
+protocol::ChangeSettings change_to(const Settings& settings) {
+  const PingSettings s = ping_settings(settings);
+  const Parameters& p = settings.parameters;
+  char text[160];
+  std::snprintf(text, sizeof text, "%s, %s, %.2f to %.2f m, gain %d, at most %.4g Hz, sound speed %g m/s",
+                p.enable != 0 ? "pings as requested" : "standby", p.mode_auto != 0 ? "automatic" : "manual", s.range_start_m,
+                s.range_m, p.gain, static_cast<double>(s.rate_hz), static_cast<double>(s.device_sound_speed_mps));
+  return {s, std::make_shared<HeldSettings>(settings), text};
+}
+
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
+  Settings s = settings_from(device.settings.get());
+  Parameters& p = s.parameters;
+  if (wanted.range_m) {
+    p.range.length_mm = static_cast<std::uint32_t>(std::lround(std::clamp(1000 * *wanted.range_m - p.range.start_mm, 0.0, 1e6)));
+    p.mode_auto = 0;
+  }
+  if (wanted.rate_hz) {
+    p.enable = *wanted.rate_hz > 0 ? 1 : 0;
+    if (p.enable != 0) p.interval_ms = static_cast<std::uint16_t>(std::lround(std::clamp(1000 / *wanted.rate_hz, 1.0, 30000.0)));
+  }
+  if (wanted.gain_percent) {
+    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
+    p.gain = static_cast<std::uint8_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
+    p.mode_auto = 0;
+  }
+  if (wanted.mode && *wanted.mode != 0) return refused("a Ping1D has one mode, 0");
+  if (wanted.beams && *wanted.beams != 1) return refused("a Ping1D has one beam");
+  if (wanted.sample_bits && *wanted.sample_bits != 8) return refused("a Ping1D sends samples of 8 bits");
+  if (wanted.row_gains && *wanted.row_gains) return refused("a Ping1D sends no row gains");
+  if (const std::string why = complaint(p); !why.empty()) return refused("Ping1D: " + why);
+  return change_to(s);
+}
+
+Echo find_echo(const Ping& ping) {
+  constexpr double least_snr_db = 10;  // unknown: chosen, above what noise alone reaches in 200 points
+  constexpr double certain_snr_db = 30;
+  constexpr int longest_gap = 3;  // points of speckle inside an echo
+  const PingSettings& s = ping.request.settings;
+  const auto code = [&](int row) { return std::to_integer<int>(ping.samples[static_cast<std::size_t>(row)]); };
+  const int rows = std::min(s.range_bin_count, static_cast<int>(ping.samples.size()));
+  const auto nearest = static_cast<double>(models().front()->modes.front().min_range_m);
+  int first = 0;
+  while (first < rows && s.range_of_row(first) < nearest) ++first;
+  if (first >= rows) return {};
+  std::vector<int> codes;
+  int top = first;
+  for (int row = first; row < rows; ++row) {
+    codes.push_back(code(row));
+    if (code(row) > code(top)) top = row;
+  }
+  const auto middle = codes.begin() + static_cast<std::ptrdiff_t>(codes.size() / 2);
+  std::nth_element(codes.begin(), middle, codes.end());
+  Echo echo{.peak = code(top)};
+  if (echo.peak == 0) return echo;
+  const double half = echo.peak / 2.0;
+  int front = top;
+  for (int row = top - 1; row >= first && front - row <= longest_gap; --row)
+    if (code(row) >= half) front = row;
+  // Between the last point below half the peak and the first one above.
+  const double below = front > 0 ? code(front - 1) : half;
+  const double part = front > 0 && below < half ? (code(front) - half) / (code(front) - below) : 0;
+  // The amplitude of an even bed is at half its peak at its distance, that of a mirror 0.7 pulses before: a middle way.
+  echo.range_m = s.range_of_row(front - part) + static_cast<double>(s.pulse_width_m) / 2;
+  const double snr_db = 20 * std::log10(echo.peak / std::max<double>(*middle, 1));
+  echo.confidence =
+      static_cast<int>(std::lround(100 * std::clamp((snr_db - least_snr_db) / (certain_snr_db - least_snr_db), 0.0, 1.0)));
+  return echo;
+}
+
+Parameters adjusted(const Parameters& made_with, const Echo& echo) {
+  constexpr int sure = 50, loud = 250;  // per cent; a strength that may be cut off
+  constexpr double loudest_wanted = 200;
+  constexpr double nearest_part = 0.35, farthest_part = 0.85, wanted_part = 0.6;  // of the range, where the echo is to lie
+  constexpr std::uint32_t length_step_mm = 500, first_length_mm = 5000;
+  Parameters p = made_with;
+  p.range.start_mm = 0;
+  if (echo.peak >= loud)
+    p.gain = static_cast<std::uint8_t>(std::max(p.gain - 1, 0));
+  else
+    while (p.gain < most_gain && echo.peak * gains[p.gain + 1u] / gains[made_with.gain] <= loudest_wanted) ++p.gain;
+  const double length_mm = p.range.length_mm, at = 1000 * echo.range_m / length_mm;
+  if (echo.confidence < sure) {
+    p.range.length_mm = length_mm >= most_mm ? first_length_mm : std::min(2 * p.range.length_mm, most_mm);
+  } else if (at < nearest_part || at > farthest_part) {
+    const auto steps = static_cast<std::uint32_t>(std::ceil(1000 * echo.range_m / wanted_part / length_step_mm));
+    p.range.length_mm = std::clamp(steps * length_step_mm, least_length_mm, most_mm);
+  }
+  return p;
+}
+
+std::vector<Bytes> frames_of(const Ping& ping) {
+  const Settings s = settings_from(ping.request.vendor_settings.get());
+  const PingSettings& made = ping.request.settings;
+  const Results results = s.results != no_result ? s.results : profile_result;
+  const Echo echo = find_echo(ping);
+  Profile profile;
+  profile.distance_mm = static_cast<std::uint32_t>(std::lround(1000 * echo.range_m));
+  profile.confidence = static_cast<std::uint16_t>(echo.confidence);
+  profile.ping = static_cast<std::uint32_t>(ping.request.number);
+  // How the ping was made, which settings of the same moment may not say.
+  profile.start_mm = static_cast<std::uint32_t>(std::lround(1000 * made.range_start_m));
+  profile.length_mm = static_cast<std::uint32_t>(std::lround(1000 * (made.range_m - made.range_start_m)));
+  profile.transmit_us = static_cast<std::uint16_t>(
+      std::lround(2e6 * static_cast<double>(made.pulse_width_m) / static_cast<double>(made.device_sound_speed_mps)));
+  const double gain = std::pow(10, static_cast<double>(made.gain_db) / 20);
+  profile.gain = static_cast<std::uint32_t>(std::lower_bound(gains.begin(), gains.end() - 1, 0.99 * gain) - gains.begin());
+  profile.count = static_cast<std::uint16_t>(ping.samples.size());
+  std::vector<Bytes> frames;
+  if ((results & simple_result) != 0)
+    frames.push_back(framed_message(Id::ping1d_distance_simple, s.id,
+                                    DistanceSimple{profile.distance_mm, static_cast<std::uint8_t>(profile.confidence)}));
+  if ((results & distance_result) != 0) {
+    const Distance& distance = profile;
+    frames.push_back(framed_message(Id::ping1d_distance, s.id, distance));
+  }
+  if ((results & profile_result) != 0) {
+    Bytes payload = wire::bytes_of(profile);
+    payload.insert(payload.end(), ping.samples.begin(), ping.samples.end());
+    frames.push_back(framed(Id::ping1d_profile, s.id, payload));
+  }
+  return frames;
+}
+
+}  // namespace sonar::ping::ping1d

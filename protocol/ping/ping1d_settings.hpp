@@ -1,0 +1,74 @@
+// The laws of a Ping1D: its settings, the distance in a ping, and what its automatic mode makes of it. Pure functions; sources:
+// docs/protocols/ping1d.md.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "protocol/ping/ping1d_messages.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::ping::ping1d {
+
+std::span<const std::shared_ptr<const SonarModel>> models();
+
+struct Parameters {
+  ScanRange range{0, 5000};
+  std::uint32_t speed_mm_per_s = 1500000;
+  std::uint16_t interval_ms = 100;
+  std::uint8_t gain = 3, mode_auto = 1, enable = 1;
+  bool operator==(const Parameters& other) const {
+    const auto all = [](const Parameters& p) {
+      return std::tuple(p.range.start_mm, p.range.length_mm, p.speed_mm_per_s, p.interval_ms, p.gain, p.mode_auto, p.enable);
+    };
+    return all(*this) == all(other);
+  }
+};
+/// Messages that come of a ping, as bits.
+using Results = unsigned;
+inline constexpr Results no_result = 0, simple_result = 1, distance_result = 2, profile_result = 4;
+inline Results results_of(Id id) {
+  return id == Id::ping1d_distance_simple ? simple_result
+         : id == Id::ping1d_distance      ? distance_result
+         : id == Id::ping1d_profile       ? profile_result
+                                          : no_result;
+}
+
+struct Settings {
+  std::uint8_t id = 1;  // of the device
+  Parameters parameters;
+  Results results = no_result;  // that the ping is fired for; a ping without a host has its profile
+};
+struct HeldSettings final : VendorSettings {
+  explicit HeldSettings(const Settings& s) : settings(s) {}
+  /// But for the results, which differ from ping to ping.
+  bool equals(const VendorSettings& other) const override;
+  Settings settings;
+};
+/// As the device comes, for null.
+Settings settings_from(const VendorSettings* held);
+
+/// Why the device refuses them; empty = it does not.
+std::string complaint(const Parameters& parameters);
+/// Duration of its pulse.
+std::uint16_t transmit_us(const Parameters& parameters);
+PingSettings ping_settings(const Settings& settings);
+protocol::ChangeSettings change_to(const Settings& settings);
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+struct Echo {
+  double range_m = 0;  // in the device's metres
+  int peak = 0;        // the highest strength, 0 to 255
+  int confidence = 0;  // per cent
+};
+/// The strongest echo of a profile: where it begins.
+Echo find_echo(const Ping& ping);
+/// The automatic mode: range and gain after a ping in which that echo was found.
+Parameters adjusted(const Parameters& made_with, const Echo& echo);
+
+/// Those of Settings::results, in the order of their numbers.
+std::vector<Bytes> frames_of(const Ping& ping);
+
+}  // namespace sonar::ping::ping1d

@@ -1,0 +1,72 @@
+// The common part of the family's hosts: frames, refusals, the settings that a user wants, and the picture of one beam.
+#pragma once
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "protocol/host.hpp"
+#include "protocol/ping/messages.hpp"
+
+namespace sonar::ping {
+
+inline constexpr double usual_range_m = 10;
+
+using Line = std::vector<float>;  // of one beam
+
+/// 0: as the device likes.
+double period_ms_of(const protocol::SettingsOverride& wanted);
+
+/// Reads a message off the front of the payload; returns the rest.
+template <class M>
+std::optional<BytesView> read_front(const Frame& frame, M& message) {
+  wire::Reader reader(frame.payload);
+  fields(reader, message);
+  if (!reader.ok()) return std::nullopt;
+  return BytesView(frame.payload).subspan(wire::wire_size<M>());
+}
+
+/// The lines of one beam, ping by ping, the newest first, each [dB].
+class Waterfall {
+ public:
+  /// Begins anew where the rows are others. `ping` gets the drawing.
+  void add(Line line, double start_m, double row_m, protocol::HostPing& ping);
+
+ private:
+  std::deque<std::shared_ptr<const Line>> lines_;
+  double start_m_ = 0, row_m_ = 0;
+};
+
+class PingHost : public protocol::Host {
+ public:
+  PingHost(std::string_view title, std::optional<Bytes> request) : title_(title), request_(std::move(request)) {}
+
+  protocol::HostActions on_open(std::span<const std::uint16_t>, Time) override;
+  protocol::HostActions on_bytes(std::size_t, BytesView received, Time now) override;
+  std::string about() const override { return std::string(title_); }
+
+ protected:
+  bool asks() const { return request_.has_value(); }
+  void ask(protocol::HostActions& actions) const {
+    if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
+  }
+  virtual void on_frame(const Frame&, protocol::HostActions&) {}
+  virtual std::optional<protocol::HostPing> ping_from(const Frame& frame) = 0;
+
+ private:
+  std::string_view title_;
+  std::optional<Bytes> request_;  // for pings; empty: none are requested
+  Framer framer_{65535};
+};
+
+template <class Product>
+Result<std::unique_ptr<protocol::Host>> host_of(std::string_view title, Bytes (*request)(const protocol::SettingsOverride&),
+                                                std::initializer_list<std::string_view> known, const protocol::Wanted& wanted) {
+  if (auto accepted = protocol::accept_settings(wanted, title, known); !accepted) return tl::unexpected(accepted.error());
+  if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, std::string(title) + " has one mode only");
+  return std::make_unique<Product>(title, wanted.as_it_is ? std::nullopt : std::optional(request(wanted.settings)));
+}
+
+}  // namespace sonar::ping
