@@ -208,8 +208,9 @@ SONAR_HD inline void receive(const PingView& p, std::uint32_t i) {
     kept[0] = s[2 * q];
     kept[1] = s[2 * q + 1];
   }
-  const float power = sum / static_cast<float>(p.per_row);
+  float power = sum / static_cast<float>(p.per_row);
   if (p.pressure != nullptr) p.pressure[i] = std::sqrt(power);
+  if (p.beam_power_factor != nullptr) power *= p.beam_power_factor[j];
   const auto max_code = static_cast<float>(p.max_code);
   // Eq. 37 and 40, as codes_of and quantise_levels (core/pipeline/simd/quantise.inl).
   const float octaves = log2_of(larger(power * p.row_power_factor[row], 1e-30f));

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "core/pipeline/check_request.hpp"
+#include "core/pipeline/interleaved_pings.hpp"
 #include "core/pipeline/simulate.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "core/sonar/range_image.hpp"
@@ -64,12 +65,13 @@ class DeviceEngine final : public PingEngine {
   }
   void submit(std::span<const PingRequest> requests) override {
     Call& call = calls_.emplace_back();
-    call.asked.assign(requests.begin(), requests.end());
+    call.pictures.assign(requests.begin(), requests.end());
+    for (const PingRequest& picture : requests)
+      if (call.invalid = why_invalid(picture); !call.invalid.empty()) return;
+    for (const PingRequest& picture : requests)
+      for (PingRequest& ping : pings_of(picture)) call.pings.push_back(std::move(ping));
     std::vector<PingRequest> room;
-    const std::span<const PingRequest> to_compute = in_water(requests, *scene_, room);
-    for (const PingRequest& request : to_compute)
-      if (call.invalid = why_invalid(request); !call.invalid.empty()) return;
-    for (const PingRequest& request : to_compute) wanted_.push_back({request});
+    for (const PingRequest& request : in_water(call.pings, *scene_, room)) wanted_.push_back({request});
     try {
       on_device([this] { begin_open(); });
     } catch (...) {  // collect() tries again, and throws if it has to
@@ -92,8 +94,8 @@ class DeviceEngine final : public PingEngine {
  private:
   using State = WantedPing::State;
   struct Call {
-    std::vector<PingRequest> asked;
-    std::string invalid;  // why; then none of its pings is computed
+    std::vector<PingRequest> pictures, pings;  // as asked for; the pings that they are made of
+    std::string invalid;                       // why; then none of its pings is computed
   };
 
   /// The pings of the first call or of the last.
@@ -101,25 +103,35 @@ class DeviceEngine final : public PingEngine {
     const Call call = std::move(calls_[which]);
     calls_.erase(calls_.begin() + static_cast<std::ptrdiff_t>(which));
     if (!call.invalid.empty()) throw std::invalid_argument(call.invalid);
-    const auto begin = which == 0 ? wanted_.begin() : wanted_.end() - static_cast<std::ptrdiff_t>(call.asked.size());
-    const auto end = begin + static_cast<std::ptrdiff_t>(call.asked.size());
+    const auto begin = which == 0 ? wanted_.begin() : wanted_.end() - static_cast<std::ptrdiff_t>(call.pings.size());
+    const auto end = begin + static_cast<std::ptrdiff_t>(call.pings.size());
     std::vector<Ping> pings;
-    pings.reserve(call.asked.size());
+    std::vector<PingStatistics> statistics;
+    pings.reserve(call.pings.size());
     each_.clear();
     try {
       complete(begin, end);
       for (auto it = begin; it != end; ++it) {
         pings.push_back(std::move(it->ping));
-        each_.push_back(it->statistics);
+        statistics.push_back(it->statistics);
       }
     } catch (...) {  // nothing is under way: on_device() has seen to it
       wanted_.erase(begin, end);
       throw;
     }
     wanted_.erase(begin, end);
+    restore_requested_pose(call.pings, pings);
+    std::vector<Ping> pictures;
+    std::size_t first = 0;
+    for (const PingRequest& picture : call.pictures) {
+      const auto count = static_cast<std::size_t>(pings_in(picture));
+      pictures.push_back(interleaved(picture, std::span(pings).subspan(first, count)));
+      PingStatistics& of_picture = each_.emplace_back();
+      for (std::size_t p = first; p < first + count; ++p) add(of_picture, statistics[p]);
+      first += count;
+    }
     if (!each_.empty()) statistics_ = each_.back();
-    restore_requested_pose(call.asked, pings);
-    return pings;
+    return pictures;
   }
 
   void complete(std::deque<WantedPing>::iterator begin, std::deque<WantedPing>::iterator end) {

@@ -208,6 +208,7 @@ struct PingView {
   std::int32_t point_count, pulse_count;
   // samples
   const float* row_power_factor;                // [rows]
+  const float* beam_power_factor;               // [beams], null = alike
   float half_gamma, per_octave, at_full_scale;  // the latter two of LevelLine
   float code_factor, code_rounding;             // simd::CodeScale
   std::uint32_t max_code;

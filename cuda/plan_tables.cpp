@@ -59,6 +59,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.at_full_scale = static_cast<float>(line.at_full_scale);
   view_.logarithmic = p.settings.format.scale == SampleFormat::Scale::logarithmic ? 1 : 0;
   view_.bytes_a_sample = p.settings.format.bits / 8;
+  if (!p.beam_power_factor.empty()) view_.beam_power_factor = memory_.put(p.beam_power_factor);
   if (!p.noise_profile.is_even()) {
     view_.noise_far = memory_.put(p.noise_profile.far);
     view_.noise_near_less_far = memory_.put(p.noise_profile.near_less_far);

@@ -14,7 +14,7 @@ constexpr double shortest_exact_pulse_in_samples = 0.25;  // by way of the spect
 constexpr double most_column_samples = 1 << 29;           // of all columns, 4 GiB
 constexpr double most_frequencies = 1 << 20;              // of a column by way of the spectrum
 constexpr double tone_band_in_pulses = 20, other_band_in_pulses = 3;  // in 1 / width, at least Pulse::band_hz
-constexpr int most_fixed_rays = 100000;
+constexpr int most_fixed_rays = 100000, most_interleaved_pings = 64;
 constexpr double sector_slack_rad = 1e-6;  // of azimuths in double beside an aperture in float
 constexpr double widest_beam_rad = 1.5, narrowest_width_rad = 1e-4;
 constexpr float widest_level_db = 300;
@@ -106,6 +106,9 @@ std::string why_invalid(const PingRequest& r) {
   if (!std::isfinite(s.gain_db) || !std::isfinite(s.device_absorption_db_per_m)) return "gain and absorption must be finite";
   const FrequencyMode& mode = r.model->modes[static_cast<std::size_t>(s.mode)];
   if (std::string why = why_beams_unlisted(mode, s.beam_count); !why.empty()) return why;
+  if (mode.interleaved_pings < 1 || mode.interleaved_pings > most_interleaved_pings)
+    return "interleaved_pings " + std::to_string(mode.interleaved_pings) + " is not in 1..64";
+  if (!(s.ping_interval_s >= 0 && std::isfinite(s.ping_interval_s))) return "ping_interval_s must be 0 or more, and finite";
   const Waveform& waveform = mode.waveform;
   const double sample_time_s = 2 * s.range_bin_m / s.samples_per_row / static_cast<double>(s.device_sound_speed_mps);
   if (std::string why = why_invalid(waveform, sample_time_s); !why.empty()) return why;

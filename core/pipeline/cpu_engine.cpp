@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "core/pipeline/check_request.hpp"
+#include "core/pipeline/interleaved_pings.hpp"
 #include "core/pipeline/labels.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simulate.hpp"
@@ -27,13 +28,12 @@ class CpuEngine final : public PingEngine, private Interruption {
     pings.reserve(requests.size());
     const bool is_nested = under_way_.request != nullptr;
     if (!is_nested) each_.clear();
-    std::vector<PingRequest> room;
-    for (const PingRequest& request : in_water(requests, *scene_, room)) {
-      if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
-      pings.push_back(run(request));
-      if (!is_nested) each_.push_back(work_[0].statistics());
+    for (const PingRequest& picture : requests) {
+      if (const std::string why = why_invalid(picture); !why.empty()) throw std::invalid_argument(why);
+      PingStatistics statistics;
+      pings.push_back(run_picture(picture, statistics));
+      if (!is_nested) each_.push_back(statistics);
     }
-    restore_requested_pose(requests, pings);
     return pings;
   }
 
@@ -44,10 +44,21 @@ class CpuEngine final : public PingEngine, private Interruption {
            (pool_.threads() == 1 ? " thread, " : " threads, ") + RayScene::version();
   }
 
-  PingStatistics statistics() const override { return work_[0].statistics(); }
+  PingStatistics statistics() const override { return each_.empty() ? PingStatistics{} : each_.back(); }
   std::vector<PingStatistics> statistics_of_each() const override { return each_; }
 
  private:
+  Ping run_picture(const PingRequest& picture, PingStatistics& statistics) {
+    const std::vector<PingRequest> wanted = pings_of(picture);
+    std::vector<Ping> pings;
+    std::vector<PingRequest> room;
+    for (const PingRequest& request : in_water(wanted, *scene_, room)) {
+      pings.push_back(run(request));
+      add(statistics, work_[0].statistics());
+    }
+    restore_requested_pose(wanted, pings);
+    return interleaved(picture, pings);
+  }
   Ping run(const PingRequest& request) {
     const CellFields fields{request.switches.texture, request.switches.grain};
     if (!cells_ || !cells_->serves(request.seed, fields))

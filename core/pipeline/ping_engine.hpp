@@ -39,6 +39,13 @@ struct PingStatistics {
   std::size_t rays = 0, tiles = 0, tiles_built = 0, cells = 0, echoes = 0, cell_bytes = 0;
 };
 
+inline void add(PingStatistics& to, const PingStatistics& more) {
+  for (std::size_t s = 0; s < to.seconds.size(); ++s) to.seconds[s] += more.seconds[s];
+  to.rays += more.rays, to.tiles += more.tiles, to.tiles_built += more.tiles_built, to.cells += more.cells;
+  to.echoes += more.echoes;
+  to.cell_bytes = more.cell_bytes;
+}
+
 /// Runs short pings of other sonars between the parts of a long one.
 class Interruption {
  public:

@@ -168,6 +168,13 @@ void fill_row_gains(PingPlan& plan) {
   }
 }
 
+void fill_channel_gains(PingPlan& p) {
+  const std::vector<float>& gain_db = p.mode.receiver.channel_gain_db;
+  const std::size_t beams = p.beam_sine.size();
+  for (std::size_t j = 0; j < beams && p.switches.uneven && !gain_db.empty(); ++j)
+    p.beam_power_factor.push_back(static_cast<float>(power_from_db(static_cast<double>(gain_db[j * gain_db.size() / beams]))));
+}
+
 void lay_out_noise_profile(PingPlan& p) {
   const BeamProfile& profile = p.mode.receiver.profile;
   if (!p.switches.uneven || profile.noise_db.empty()) return;
@@ -314,6 +321,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.shared_noise = SharedNoiseTable(p, pool);
   p.beam_mix = BeamMix(p);
   fill_row_gains(p);
+  fill_channel_gains(p);
   return p;
 }
 

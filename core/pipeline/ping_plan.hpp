@@ -106,8 +106,9 @@ struct PingPlan {
   NoiseProfile noise_profile;
   SharedNoiseTable shared_noise;
   BeamMix beam_mix;
-  std::vector<float> row_power_factor;  // per row: (gain * TVG / full scale)^2
-  std::vector<std::uint32_t> row_gain;  // when settings.format.row_gains
+  std::vector<float> row_power_factor;   // per row: (gain * TVG / full scale)^2
+  std::vector<std::uint32_t> row_gain;   // when settings.format.row_gains
+  std::vector<float> beam_power_factor;  // per beam: gain of its channel, squared; empty = alike
 
   /// Direction of a place in the sonar's axes: about the array's axis, or for flat beams.
   ConicalDirection direction_of(Vec3d from_sonar) const {

@@ -82,10 +82,11 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
   const auto per_octave = static_cast<float>(line.per_octave), at_full_scale = static_cast<float>(line.at_full_scale);
   // Gain is that of the row in the picture, (36), whatever the window.
   for (int row = 0; row < rows; ++row) {
-    const float* power = scratch.power.data() + static_cast<std::ptrdiff_t>(row) * width;
+    float* power = scratch.power.data() + static_cast<std::ptrdiff_t>(row) * width;
     const std::size_t at = static_cast<std::size_t>(first_row + row) * static_cast<std::size_t>(s.beam_count);
     if (!ping.pressure_upa.empty())
       for (int j = 0; j < s.beam_count; ++j) ping.pressure_upa[at + static_cast<std::size_t>(j)] = std::sqrt(power[j]);
+    for (std::size_t j = 0; j < plan.beam_power_factor.size(); ++j) power[j] *= plan.beam_power_factor[j];
     // Eq. 37: code = max_code (|s| / full scale)^gamma: power times (gain TVG / full scale)^2, to the power gamma / 2.
     const float gain = plan.row_power_factor[static_cast<std::size_t>(first_row + row)];
     std::byte* out = ping.samples.data() + at * static_cast<std::size_t>(bytes);

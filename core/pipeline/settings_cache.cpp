@@ -17,7 +17,7 @@ std::size_t bytes_of(const PingPlan& p) {
   return bytes + of(p.fixed_fan_rays, p.columns.transmit, p.fan.tangent, p.fan.elevation_rad, p.beam_weights.panels,
                     p.beam_weights.weights, p.beam_azimuth_rad, p.beam_sine, p.beam_pattern, p.pulse_rows, p.levels, p.elevation,
                     p.pulse_filter, p.noise_filter, p.noise_profile.far, p.noise_profile.near_less_far, p.noise_profile.decay,
-                    p.row_power_factor, p.row_gain);
+                    p.row_power_factor, p.row_gain, p.beam_power_factor);
 }
 
 }  // namespace

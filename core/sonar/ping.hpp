@@ -83,7 +83,7 @@ inline constexpr std::array<NamedSwitch, 18> named_switches{{
     {"interference", &Switches::interference, "pulses of other sonars nearby"},
     {"grain", &Switches::grain, "sparse strong scatterers of materials that have a grain"},
     {"bandwidth", &Switches::bandwidth, "noise of the receiver's own bandwidth; off: of the pulse's"},
-    {"uneven", &Switches::uneven, "noise and width that differ from beam to beam"},
+    {"uneven", &Switches::uneven, "noise, width and gain that differ from beam to beam"},
     {"defocus", &Switches::defocus, "blur of near echoes off broadside"},
     {"shared_noise", &Switches::shared_noise, "noise and leak that receive channels share, near the sonar"},
     {"truncation", &Switches::truncation, "samples cut off to whole codes; off: rounded"},

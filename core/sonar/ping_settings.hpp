@@ -36,6 +36,7 @@ struct PingSettings {
   float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (docs/acoustics.md, section 4)
   int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples across it
   float rate_hz = 10;             // 0 = standby
+  double ping_interval_s = 0;     // between the pings of a picture, see FrequencyMode::interleaved_pings
   float gain_db = 0;
   bool gain_assist = false;              // the device turns the gain itself, from gain_db on (core/sonar/gain_assist.hpp)
   bool tvg = true;                       // false: no time-varied gain, G0 only (Oculus 32-bit "scientific" data)

@@ -64,6 +64,8 @@ struct ReceiverModel {
   float leak_ring_step_m = 0.003f;
   bool leak_is_shared = false;  // by the channels, as shared_noise is; else its phases are random from column to column
   BeamProfile profile;
+  /// Gains of the receive channels, each of which serves as many neighbouring beams, from port; empty = no difference.
+  std::vector<float> channel_gain_db;
   SharedNoise shared_noise;
   /// 0: receive beams are focused at every range and bearing; 1: with the delays of broadside, which leave near beams off it
   /// blurred (docs/acoustics.md, section 6).
@@ -86,6 +88,8 @@ struct FrequencyMode {
   /// listed: -3 dB width of each beam in azimuth, in its own direction; empty = pattern.azimuth_width_rad at broadside for all,
   /// which widens as 1 / cos(azimuth). The noise level is that of a beam of the pattern's width.
   std::vector<float> beam_widths_rad;
+  /// Neighbouring beams are of so many successive pings, the last beam of the first (docs/acoustics.md, section 6).
+  int interleaved_pings = 1;
   BeamPattern pattern;
   Waveform waveform;
   ReceiverModel receiver;

@@ -103,6 +103,8 @@ FrequencyMode mode_of(const Product& product, const ModeChoice& choice) {
   mode.receiver.tvg_slope_db = tvg_slope_db;
   mode.receiver.tvg_ceiling_db = tvg_ceiling_db;
   mode.receiver.full_scale_upa = full_scale_upa[static_cast<std::size_t>(product.system)];
+  mode.receiver.channel_gain_db.assign(channel_gain_db.rbegin(), channel_gain_db.rend());
+  mode.interleaved_pings = beams / channels;  // LIB: ping p of n forms the beams p, p + n, .. from starboard
   return mode;
 }
 

@@ -157,6 +157,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.samples_per_row =
       std::clamp(static_cast<int>(std::ceil(s.range_bin_m * samples_per_pulse / width_m - 1e-9)), 1, most_samples_per_row);
   s.rate_hz = settings.valid && settings.streaming ? a.frame_rate_hz : 0;
+  s.ping_interval_s = a.cycle_us * 1e-6;
   s.gain_db = a.gain_db;
   s.transmit = a.transmit;
   s.device_sound_speed_mps = static_cast<float>(speed);

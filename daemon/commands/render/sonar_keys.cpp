@@ -89,6 +89,7 @@ void read_receiver(const Node& node, ReceiverModel& law) {
   set(keys.optional("noise_width"), Range::between(0.2, 5), law.noise_width);
   set(keys.optional("defocus"), Range::between(0, 1), law.defocus);
   read_profile(keys.optional("profile"), law.profile);
+  read_table(keys.optional("channel_gain_db"), Range::between(-100, 100), law.channel_gain_db);
   read_shared_noise(keys.optional("shared_noise"), law.shared_noise);
   law.truncates = keys.optional("truncates").boolean_or(law.truncates);
   set(keys.optional("leak_upa"), Range::at_least(0), law.leak_upa);
@@ -128,6 +129,7 @@ void read_model(Map keys, FrequencyMode& mode) {
                           .choice_or(mode.beam_spacing, {{"uniform_in_sine", BeamSpacing::uniform_in_sine},
                                                          {"uniform_in_angle", BeamSpacing::uniform_in_angle}});
   read_beams(keys.optional("beam_azimuths_deg"), keys.optional("beam_widths_deg"), mode);
+  mode.interleaved_pings = static_cast<int>(keys.optional("interleaved_pings").integer_or(mode.interleaved_pings, 1, 64));
   set_deg(keys.optional("azimuth_width_deg"), Range::between(0.01, 60), mode.pattern.azimuth_width_rad);
   set_deg(keys.optional("elevation_width_deg"), Range::between(0.1, 120), mode.pattern.elevation_width_rad);
   mode.pattern.azimuth_taper = keys.optional("azimuth_taper")
@@ -198,6 +200,7 @@ void read_ping(Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& 
   s.row_centre = keys.optional("row_centre").number_or(s.row_centre, Range::between(0, 1));
   s.samples_per_row = static_cast<int>(keys.optional("samples_per_row").integer_or(s.samples_per_row, 1, 64));
   set(keys.optional("rate_hz"), Range::between(0.001, 1000), s.rate_hz);
+  s.ping_interval_s = keys.optional("ping_interval_s").number_or(s.ping_interval_s, Range::between(0, 10));
   set(keys.optional("gain_db"), Range::between(-200, 200), s.gain_db);
   s.tvg = keys.optional("tvg").boolean_or(s.tvg);
   const Node bits = keys.optional("bits");

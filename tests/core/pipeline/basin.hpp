@@ -116,6 +116,13 @@ inline std::vector<std::pair<std::string, PingRequest>> turns() {
     r.model = std::make_shared<const SonarModel>(std::move(model));
     r.settings.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = -80, .ceiling_db = 0};
   });
+  both("interleaved pings, channels of other gain", [](PingRequest& r) {
+    SonarModel model = *r.model;
+    model.modes[0].interleaved_pings = 3;
+    model.modes[0].receiver.channel_gain_db = {1, -2, 3, 0};
+    r.model = std::make_shared<const SonarModel>(std::move(model));
+    r.settings.ping_interval_s = 0.02;
+  });
   both("somewhere else", [](PingRequest& r) {
     r.sonar_in_world = {{1, -0.6, -0.7}, quat_from_rpy({0.1, -0.05, 0.2})};
     r.bodies_in_world = {{{2.8, -0.3, -0.9}, quat_from_rpy({0, 0.4, 0})}};

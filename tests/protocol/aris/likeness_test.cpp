@@ -41,6 +41,24 @@ struct Levels {
       for (const double v : row) sum += std::pow(v, power), ++count;
     return sum / count;
   }
+  double next_beam() const {
+    double sum = 0;
+    for (const auto& row : db) sum += std::inner_product(row.begin(), row.end() - 1, row.begin() + 1, 0.0);
+    return sum / static_cast<double>(db.size() * (beams - 1)) / moment(2);
+  }
+  /// Mean of each channel's beams, less the mean of the channels beside it.
+  std::vector<double> stripes() const {
+    std::vector<double> gains(channels);
+    for (const auto& row : db)
+      for (std::size_t b = 0; b < beams; ++b)
+        gains[b * channels / beams] += row[b] * channels / beams / static_cast<double>(db.size());
+    return stripes_of(gains);
+  }
+  static std::vector<double> stripes_of(const std::vector<double>& gains) {
+    std::vector<double> stripes;
+    for (std::size_t c = 1; c + 1 < gains.size(); ++c) stripes.push_back(gains[c] - (gains[c - 1] + gains[c + 1]) / 2);
+    return stripes;
+  }
   double next_row() const {
     double sum = 0;
     for (std::size_t r = 0; r + 1 < db.size(); ++r) sum += std::inner_product(db[r].begin(), db[r].end(), db[r + 1].begin(), 0.0);
@@ -49,35 +67,47 @@ struct Levels {
 };
 
 struct Statistics {
-  double spread_db, skew, next_row;
+  double spread_db, skew, next_row, next_beam;
+  std::vector<double> stripes_db;
 };
 Statistics statistics_of(const Levels& levels) {
   const Levels wide = levels.less_local_mean(41, 9);
   const double spread = std::sqrt(wide.moment(2));
-  return {spread, wide.moment(3) / (spread * spread * spread), levels.less_local_mean(15, 15).next_row()};
+  return {spread, wide.moment(3) / (spread * spread * spread), levels.less_local_mean(15, 15).next_row(),
+          levels.less_local_mean(15, 15).next_beam(), levels.stripes()};
 }
 void expect_like_recording(const Statistics& s) {
   EXPECT_NEAR(s.spread_db, 4.01, 0.15 * 4.01);  // 4.00 to 4.02; 5.5 with one look a sample
   EXPECT_NEAR(s.skew, -0.39, 0.15);             // -0.37 to -0.40; -1.06
   EXPECT_NEAR(s.next_row, 0.16, 0.08);          // 0.15 to 0.17
+  EXPECT_NEAR(s.next_beam, 0.02, 0.06);         // 0.02 to 0.03; 0.14 where all beams are of one ping
+  const std::vector<double> table = Levels::stripes_of({channel_gain_db.begin(), channel_gain_db.end()});
+  EXPECT_GT(test::correlation(s.stripes_db, table), 0.95);
+  double error = 0;
+  for (std::size_t c = 0; c < table.size(); ++c) error += std::pow(s.stripes_db[c] - table[c], 2);
+  EXPECT_LT(std::sqrt(error / static_cast<double>(table.size())), 0.35);  // of 1.2 dB rms
 }
 
-/// A frame at the recording's settings, of a bed 2 m below.
-Levels emulated() {
+/// A frame at the recording's settings, of a bed 2 m below, which the sonar passes over at 0.5 m/s; beside it, frames of which
+/// all beams are of one ping.
+Levels emulated(bool interleaved = true) {
   const auto state = tests::device("aris-1200");
   Settings settings;
-  settings.acoustics = {1, 6.5f, rows, 4593, 60000, 14, 12, 1, true, Frequency::high, true, 24};
+  settings.acoustics = {1, 6.5f, rows, 4593, 32953, 14, 12, 1, true, Frequency::high, true, 24};
   settings.telephoto = true;
   PingSettings ping = ping_settings(settings, state);
-  const FrequencyMode& mode = state.model->modes[static_cast<std::size_t>(ping.mode)];
+  FrequencyMode mode = state.model->modes[static_cast<std::size_t>(ping.mode)];
+  if (!interleaved) mode.interleaved_pings = 1;
   ping.mode = 0;
   const Mesh bed = test::height_field(-1, 30, -8, 8, 1, [](double, double) { return 0.0; });
   test::Sounding sounding(test::SceneMaker().add(bed, -27).make(), mode, ping);
-  sounding.ping_from({0, 0, 2}, {0, rad_from_deg(9), 0});
+  sounding.request.sonar_moves.velocity_mps = {0.5, 0, 0};
+  const Ping& frame = sounding.ping_from({0, 0, 2}, {0, rad_from_deg(9), 0});
   Levels levels;
-  for (int r = 750; r < 1350; ++r) {
+  for (std::size_t r = 750; r < 1350; ++r) {
     std::vector<double>& row = levels.db.emplace_back();
-    for (int b = 0; b < beams; ++b) row.push_back(20 * std::log10(sounding.pressure(r, beams - 1 - b)));
+    for (std::size_t b = 0; b < beams; ++b)
+      row.push_back(db_per_code * std::to_integer<int>(frame.samples[r * beams + beams - 1 - b]));
   }
   return levels;
 }
@@ -101,6 +131,8 @@ Levels recorded(int frame) {
 }
 
 TEST(ArisLikeness, SamplesHaveTheLooksOfTheRecording) { expect_like_recording(statistics_of(emulated())); }
+
+TEST(ArisLikeness, NeighboursOfOnePingWouldBeAlike) { EXPECT_GT(statistics_of(emulated(false)).next_beam, 0.1); }
 
 TEST(ArisLikeness, TheRecordingHasThoseStatistics) {
   for (int frame = 3; frame < 6; ++frame) {

@@ -1,0 +1,69 @@
+#include "core/pipeline/interleaved_pings.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "core/pipeline/ping_scalars.hpp"
+#include "core/sonar/ping_labels.hpp"
+
+namespace sonar {
+namespace {
+
+/// Takes from [rows][beams] values of `size` elements those of the beams `first`, `first + step`, .. of another ping.
+template <class Values>
+void take_beams(const Values& from, std::size_t beams, std::size_t first, std::size_t step, std::size_t size, Values& to) {
+  if (from.size() != to.size()) return;
+  for (std::size_t row = 0; row < to.size(); row += beams * size)
+    for (std::size_t at = row + first * size; at < row + beams * size; at += step * size)
+      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(at), size, to.begin() + static_cast<std::ptrdiff_t>(at));
+}
+
+}  // namespace
+
+int pings_in(const PingRequest& picture) {
+  return picture.model->modes[static_cast<std::size_t>(picture.settings.mode)].interleaved_pings;
+}
+
+std::vector<PingRequest> pings_of(const PingRequest& picture) {
+  const int count = pings_in(picture);
+  const Twist& twist = picture.sonar_moves;
+  const bool moves = picture.switches.motion && (length(twist.velocity_mps) > 0 || length(twist.angular_rate_radps) > 0);
+  std::vector<PingRequest> pings(static_cast<std::size_t>(count), picture);
+  for (int p = 0; p < count && count > 1; ++p) {
+    PingRequest& ping = pings[static_cast<std::size_t>(p)];
+    const double later_s = p * picture.settings.ping_interval_s;
+    ping.number = static_cast<PingNumber>(static_cast<std::uint32_t>(picture.number) * static_cast<std::uint32_t>(count) +
+                                          static_cast<std::uint32_t>(p));
+    ping.fired_at += nanoseconds_from(later_s);
+    if (moves) ping.sonar_in_world = propagate(picture.sonar_in_world, twist, later_s);
+  }
+  return pings;
+}
+
+Ping interleaved(const PingRequest& picture, std::span<Ping> pings) {
+  const std::size_t count = pings.size(), beams = static_cast<std::size_t>(picture.settings.beam_count);
+  Ping whole = std::move(pings.front());
+  const bool blank = whole.request.blank;
+  whole.request = picture;
+  whole.request.blank = blank;
+  if (count == 1) return whole;
+  std::shared_ptr<PingLabels> labels = whole.labels ? std::make_shared<PingLabels>(*whole.labels) : nullptr;
+  for (std::size_t p = 1; p < count; ++p) {
+    // The last beam is of the first ping.
+    const std::size_t first = (beams - 1 + count - p) % count;
+    const auto take = [&](const auto& from, std::size_t size, auto& to) { take_beams(from, beams, first, count, size, to); };
+    take(pings[p].samples, static_cast<std::size_t>(picture.settings.format.bits / 8), whole.samples);
+    take(pings[p].pressure_upa, 1, whole.pressure_upa);
+    take(pings[p].beam_signal_upa, 1, whole.beam_signal_upa);
+    take(pings[p].truth, 1, whole.truth);
+    if (!labels || !pings[p].labels) continue;
+    take(pings[p].labels->instance, 1, labels->instance);
+    take(pings[p].labels->share, 1, labels->share);
+    take(pings[p].labels->caster, 1, labels->caster);
+  }
+  whole.labels = std::move(labels);
+  return whole;
+}
+
+}  // namespace sonar
