@@ -131,7 +131,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 Echo find_echo(const Ping& ping) {
   constexpr double least_snr_db = 10;  // unknown: chosen, above what noise alone reaches in 200 points
   constexpr double certain_snr_db = 30;
-  constexpr int longest_gap = 3;  // points of speckle inside an echo
+  constexpr int longest_gap = 2;  // points of speckle inside an echo
   const PingSettings& s = ping.request.settings;
   const auto code = [&](int row) { return std::to_integer<int>(ping.samples[static_cast<std::size_t>(row)]); };
   const int rows = std::min(s.range_bin_count, static_cast<int>(ping.samples.size()));
@@ -151,7 +151,7 @@ Echo find_echo(const Ping& ping) {
   if (echo.peak == 0) return echo;
   const double half = echo.peak / 2.0;
   int front = top;
-  for (int row = top - 1; row >= first && front - row <= longest_gap; --row)
+  for (int row = top - 1; row >= first && front - row <= longest_gap + 1; --row)
     if (code(row) >= half) front = row;
   // Between the last point below half the peak and the first one above.
   const double below = front > 0 ? code(front - 1) : half;

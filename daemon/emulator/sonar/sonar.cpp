@@ -56,8 +56,9 @@ void Sonar::change_settings(const protocol::ChangeSettings& change, const std::s
   // Some drivers repeat their settings at ping rate: only a change is worth a line.
   if (!asked_ || !change.vendor_settings->equals(*state_.settings)) {
     state_.settings = change.vendor_settings;
-    asked_by_ = who;
-    report(Report::Topic::settings, LogLevel::info, "settings: " + change.summary, {{"client", who}}, actions);
+    if (!who.empty()) asked_by_ = who;  // empty: the device itself, perhaps with every ping
+    report(Report::Topic::settings, who.empty() ? LogLevel::debug : LogLevel::info, "settings: " + change.summary,
+           {{"client", who.empty() ? "the sonar itself" : who}}, actions);
   }
   settings_ = change.settings;  // of a repeat too: the device's own sound speed follows its depth
   asked_ = true;
@@ -264,7 +265,7 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
       report(Report::Topic::state, LogLevel::warning, *slow, {}, actions);
   if (outcome.ping) gain_assist_.look_at(*outcome.ping);
   if (outcome.ping && !stopping_ && !busy_unwanted_ && !outcome.ping->request.blank)
-    if (const auto change = vendor_.after_ping(*outcome.ping, state_)) change_settings(*change, "the sonar itself", now, actions);
+    if (const auto change = vendor_.after_ping(*outcome.ping, state_)) change_settings(*change, {}, now, actions);
   if (outcome.ping) note_water(outcome.ping->request, now, actions);
   if (outcome.refused) {
     ++figures_.refused;

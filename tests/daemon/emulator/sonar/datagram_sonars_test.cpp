@@ -269,6 +269,7 @@ TEST(Ping1DInVirtualTime, WithoutAnEchoItsAutomaticModeSearches) {
   for (std::size_t i = 0; i < 7; ++i) lengths.push_back(seen[i].length_mm);
   EXPECT_THAT(lengths, ElementsAre(5000, 10000, 20000, 40000, 80000, 100000, 5000));
   EXPECT_EQ(seen.back().gain, 6u);
+  EXPECT_THAT(altimeter.sonar().asked_by(), ::testing::StartsWith("host")) << "not the sonar itself";
   altimeter.send<std::uint8_t>(ping::Id::ping1d_set_mode_auto, 0);
   altimeter.profiles(milliseconds(300));
   const auto manual = altimeter.profiles(seconds(2));
