@@ -173,7 +173,7 @@ Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const K
                      (lines.empty() ? std::to_string(number) : "");
     const bool is_known = known.scene && known.key == ping.scene_key;
     if (is_known) filled = without(std::move(filled), lines, "scene: {objects: []}\n");
-    auto input = render::parse_render_file(with_sweep(filled, sweep_of(ping.draws)), job.source, job.folder);
+    auto input = render::parse_render_file(with_sweep(filled, sweep_of(ping.draws)), job.source, job.folder, known.shapes);
     if (!input) return tl::make_unexpected(input.error());
     ping.job = std::move(input->jobs.front());
     if (is_known) ping.job.scene = known.scene;

@@ -17,6 +17,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr std::size_t cell_cache_bytes = 96u << 20;  // each thread has an engine
+
 std::vector<std::byte> bytes_of_text(const std::string& text) {
   const auto bytes = std::as_bytes(std::span(text));
   return {bytes.begin(), bytes.end()};
@@ -60,17 +62,22 @@ Result<DrawnPing> PingMaker::compute(std::uint64_t number, Ping& ping) {
   if (!drawn) return drawn;
   const std::string key = drawn->scene_key + "\n" + visible_of(*drawn->job.scene);
   if (!engine_ || key != engine_key_) {
-    engine_.reset();
     const SimdLevel simd = simd_.value_or(drawn->job.config.engine.simd);
+    // The engine that start_engine() returns is the one that is kept.
     const auto make = [&](std::shared_ptr<const Scene> s) -> std::unique_ptr<PingEngine> {
-      return make_cpu_engine(std::move(s), one_, {.simd = simd});
+      std::unique_ptr<ChangingEngine> engine = std::move(engine_);
+      if (engine)
+        engine->change_scene(s);
+      else
+        engine = make_changing_engine(std::move(s), one_, {.simd = simd, .cell_cache_bytes = cell_cache_bytes});
+      return engine;
     };
     auto started = start_engine(make, drawn->job.scene);
     if (!started) return tl::make_unexpected(started.error());
-    engine_ = *std::move(started);
+    engine_.reset(static_cast<ChangingEngine*>(started->release()));
     engine_key_ = key;
   }
-  known_ = {drawn->scene_key, drawn->whole_scene};
+  known_ = {drawn->scene_key, drawn->whole_scene, &shapes_};
   try {
     PingRequest request = request_of(*drawn, number);
     if (const std::string why = why_unlabelled(request, *drawn->job.scene); !why.empty()) throw std::invalid_argument(why);

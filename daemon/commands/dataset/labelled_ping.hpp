@@ -12,7 +12,8 @@
 #include "core/base/parallel.hpp"
 #include "core/base/result.hpp"
 #include "core/image/raster.hpp"
-#include "core/pipeline/ping_engine.hpp"
+#include "core/pipeline/changing_engine.hpp"
+#include "core/scene/files/shape_cache.hpp"
 #include "daemon/commands/dataset/dataset_job.hpp"
 
 namespace sonar::dataset {
@@ -42,9 +43,10 @@ class PingMaker {
   std::string inputs_;
   std::optional<SimdLevel> simd_;
   Parallel one_{1};
-  KnownScene known_;
+  ShapeCache shapes_;
+  KnownScene known_{.shapes = &shapes_};
   std::string engine_key_;
-  std::unique_ptr<PingEngine> engine_;
+  std::unique_ptr<ChangingEngine> engine_;
 };
 
 }  // namespace sonar::dataset
