@@ -1,5 +1,6 @@
 #include "daemon/commands/dataset/labelled_ping.hpp"
 
+#include <algorithm>
 #include <map>
 #include <stdexcept>
 
@@ -11,6 +12,7 @@
 #include "daemon/commands/render/sidecar.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
 #include "daemon/server/engine/start_engine.hpp"
+#include "daemon/server/system/sha256.hpp"
 
 namespace sonar::dataset {
 namespace {
@@ -47,6 +49,12 @@ void number_as_instances(json& truth) {
   for (const json& object : truth["object"]) instance.push_back(object.is_null() ? 0U : object.get<std::uint32_t>() + 1);
   truth["instance"] = std::move(instance);
   truth.erase("object");
+}
+
+std::string scene_digest(const std::string& scene_key) {
+  Sha256 hash;
+  hash.add(std::as_bytes(std::span(scene_key)));
+  return hash.hex().substr(0, 16);
 }
 
 Result<Raster> draw(const Ping& ping, int width_px) {
@@ -116,6 +124,13 @@ Result<LabelledPing> PingMaker::make(std::uint64_t number) {
   const Scene& scene = *drawn->job.scene;
   made.annotations = render::annotations_of(labels, ping, scene);
   made.pixels = pixels_of(labels, scene);
+  made.scene = scene_digest(drawn->scene_key);
+  made.draws = drawn->draws.words;
+  if (std::ranges::binary_search(on_sheet_, number)) {
+    auto cell = contact_cell(ping, scene, made.annotations);
+    if (!cell) return tl::make_unexpected(cell.error());
+    made.cell = *std::move(cell);
+  }
   json words = render::sidecar(drawn->job, ping, engine_->description(), engine_->statistics(), inputs_);
   words.erase("sweep");
   words["draws"] = drawn->draws.words;
@@ -138,13 +153,12 @@ Result<LabelledPing> PingMaker::make(std::uint64_t number) {
   return made;
 }
 
-Result<std::optional<Raster>> PingMaker::picture(std::uint64_t number, int width_px) {
+Result<std::optional<Raster>> PingMaker::cell(std::uint64_t number) {
   Ping ping;
-  if (const auto drawn = compute(number, ping); !drawn) return tl::make_unexpected(drawn.error());
-  if (ping.request.settings.beam_count < 2) return std::nullopt;
-  auto drawn = draw(ping, width_px);
+  const auto drawn = compute(number, ping);
   if (!drawn) return tl::make_unexpected(drawn.error());
-  return *std::move(drawn);
+  const Scene& scene = *drawn->job.scene;
+  return contact_cell(ping, scene, render::annotations_of(*ping.labels, ping, scene));
 }
 
 }  // namespace sonar::dataset
