@@ -2,6 +2,7 @@
 // all that is made of meshes can be kept too. One thread at a time.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <map>
 #include <memory>
@@ -20,7 +21,7 @@ struct Shape {
 
 class ShapeCache {
  public:
-  static constexpr std::size_t most_triangles = 4'000'000;
+  static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;  // of shapes that were not among the last used
 
   /// The shape of that key, made with make() when it is not known. A shape without a mesh is not kept.
   template <class Make>
@@ -32,7 +33,8 @@ class ShapeCache {
     }
     kept.last_used = ++uses_;
     const Shape shape = kept.shape;
-    while (triangles_ > most_triangles && shapes_.size() > 1) forget_oldest();
+    while (triangles_ > most_triangles && forget_oldest()) {
+    }
     return shape;
   }
   /// Mesh files that were read, by path and options. They stay as they were read.
@@ -43,12 +45,12 @@ class ShapeCache {
     Shape shape;
     std::size_t last_used = 0;
   };
-  void forget_oldest() {
-    auto oldest = shapes_.begin();
-    for (auto s = shapes_.begin(); s != shapes_.end(); ++s)
-      if (s->second.last_used < oldest->second.last_used) oldest = s;
+  bool forget_oldest() {
+    const auto oldest = std::ranges::min_element(shapes_, {}, [](const auto& entry) { return entry.second.last_used; });
+    if (uses_ - oldest->second.last_used < always_kept) return false;
     triangles_ -= oldest->second.shape.mesh ? oldest->second.shape.mesh->triangles.size() : 0;
     shapes_.erase(oldest);
+    return true;
   }
 
   std::map<std::string, Kept> shapes_;
