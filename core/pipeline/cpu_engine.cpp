@@ -2,6 +2,7 @@
 #include <array>
 #include <stdexcept>
 
+#include "core/pipeline/changing_engine.hpp"
 #include "core/pipeline/check_request.hpp"
 #include "core/pipeline/interleaved_pings.hpp"
 #include "core/pipeline/labels.hpp"
@@ -13,7 +14,7 @@ namespace sonar {
 namespace {
 
 /// Lets pings in between the parts of another one: each has buffers of its own, and finds scene and cells as it needs them.
-class CpuEngine final : public PingEngine, private Interruption {
+class CpuEngine final : public ChangingEngine, private Interruption {
  public:
   CpuEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options)
       : rays_(scene, pool.threads()),
@@ -35,6 +36,13 @@ class CpuEngine final : public PingEngine, private Interruption {
       if (!is_nested) each_.push_back(statistics);
     }
     return pings;
+  }
+
+  void change_scene(const std::shared_ptr<const Scene>& scene) override {
+    rays_.change(scene);
+    scene_ = scene;
+    if (cells_) cells_->change(scene);
+    for (Workspace& work : work_) work.change_scene();
   }
 
   void set_interruption(Interruption* interruption) override { interruption_ = interruption; }
@@ -114,6 +122,11 @@ class CpuEngine final : public PingEngine, private Interruption {
 }  // namespace
 
 std::unique_ptr<PingEngine> make_cpu_engine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options) {
+  return make_changing_engine(std::move(scene), pool, options);
+}
+
+std::unique_ptr<ChangingEngine> make_changing_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
+                                                     const EngineOptions& options) {
   return std::make_unique<CpuEngine>(std::move(scene), pool, options);
 }
 

@@ -54,6 +54,10 @@ struct Workspace::Buffers {
 Workspace::Workspace(double (*now_s)()) : buffers_(std::make_unique<Buffers>()) { buffers_->now_s = now_s; }
 Workspace::~Workspace() = default;
 void Workspace::set_between(Interruption* between) { buffers_->between = between; }
+void Workspace::change_scene() {
+  buffers_->specular_echoes.forget_unused();
+  buffers_->multipath = {};
+}
 const PingStatistics& Workspace::statistics() const { return buffers_->statistics; }
 
 namespace {

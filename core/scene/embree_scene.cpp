@@ -1,25 +1,20 @@
-// The only file that knows Embree; 3.x and 4.x differ in three places, all in the shim below.
+// Tracing with Embree; 3.x and 4.x differ in three places, all in the shim below and the include of embree_trees.hpp.
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
-#include <stdexcept>
-#include <string_view>
+#include <memory>
 #include <type_traits>
 #include <vector>
 
 #include "core/base/load_step.hpp"
+#include "core/scene/embree_trees.hpp"
 #include "core/scene/ray_origin.hpp"
 #include "core/scene/ray_scene.hpp"
 
-#if SONAR_EMBREE_MAJOR >= 4
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-
 namespace sonar {
 namespace {
+
+using namespace embree;
 
 // One query of 4, 8 or 16 rays; what `coherent` becomes differs between the versions.
 #if SONAR_EMBREE_MAJOR >= 4
@@ -44,60 +39,6 @@ void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit8& rays)
 void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit16& rays) { rtcIntersect16(valid, scene, &query, &rays); }
 #endif
 
-// SONARD_EMBREE_ISA holds Embree to a lesser instruction set than the processor's: the tests run on one machine what others do.
-std::string device_settings(int threads) {
-  std::string settings = "threads=" + std::to_string(threads);
-  const char* isa = std::getenv("SONARD_EMBREE_ISA");
-  if (isa == nullptr || *isa == '\0') return settings;
-  constexpr std::string_view known[] = {"sse2", "sse4.2", "avx", "avx2", "avx512"};
-  if (std::find(std::begin(known), std::end(known), isa) == std::end(known))
-    throw std::runtime_error(std::string("SONARD_EMBREE_ISA: unknown instruction set \"") + isa +
-                             "\"; use sse2, sse4.2, avx, avx2 or avx512");
-  // The best there is. Embree's name for it differs between versions, and a name that Embree does not know means SSE2.
-  return isa == std::string_view("avx512") ? settings : settings + ",max_isa=" + isa;
-}
-
-std::string why_not(RTCError error) {
-  if (error == RTC_ERROR_UNSUPPORTED_CPU) return " on this processor";
-  if (error == RTC_ERROR_OUT_OF_MEMORY) return ": not enough memory";
-  return ": code " + std::to_string(error) + "; memory or threads may be short (ulimit -v, ulimit -u)";
-}
-
-// Owners of Embree's reference-counted handles.
-struct Device {
-  RTCDevice handle;
-  explicit Device(int threads) : handle(rtcNewDevice(device_settings(threads).c_str())) {
-    if (!handle) throw std::runtime_error("the ray tracer (Embree) cannot start" + why_not(rtcGetDeviceError(nullptr)));
-  }
-  ~Device() { rtcReleaseDevice(handle); }
-  Device(const Device&) = delete;
-  Device& operator=(const Device&) = delete;
-  void check() const {
-    const RTCError error = rtcGetDeviceError(handle);
-    if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::runtime_error("not enough memory to build the scene for ray tracing");
-    if (error != RTC_ERROR_NONE) throw std::runtime_error("the ray tracer failed with code " + std::to_string(error));
-  }
-  // The widest packet of rays that Embree has code for on this processor. It traces wider ones as a stream, which is slower, and
-  // in Embree 3.13 also reads rays that `valid` leaves out.
-  int widest_packet() const {
-    if (rtcGetDeviceProperty(handle, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) return 16;
-    return rtcGetDeviceProperty(handle, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0 ? 8 : 4;
-  }
-};
-struct SceneHandle {
-  RTCScene handle = nullptr;
-  SceneHandle() = default;
-  explicit SceneHandle(const Device& device) : handle(rtcNewScene(device.handle)) { device.check(); }
-  ~SceneHandle() {
-    if (handle) rtcReleaseScene(handle);
-  }
-  SceneHandle(SceneHandle&& o) noexcept : handle(o.handle) { o.handle = nullptr; }
-  SceneHandle& operator=(SceneHandle&& o) noexcept {
-    std::swap(handle, o.handle);
-    return *this;
-  }
-};
-
 // One acceleration structure, all static objects or one body, and which objects its geometries are.
 struct Group {
   SceneHandle scene;
@@ -121,15 +62,7 @@ void add_object(const Device& device, Group& group, const Mesh& mesh, const Pose
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                              sizeof(mesh.triangles[0]), mesh.triangles.size());
   if (vertices) {
-    const Rotation turn = rotation_from(placed.orientation);
-    for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-      const Vec3d v = to_double(mesh.vertices[i]);
-      const double p[3] = {placed.position_m.x, placed.position_m.y, placed.position_m.z};
-      for (int k = 0; k < 3; ++k) {
-        vertices[3 * i + static_cast<std::size_t>(k)] =
-            static_cast<float>(turn.m[k][0] * v.x + turn.m[k][1] * v.y + turn.m[k][2] * v.z + p[k]);
-      }
-    }
+    place_vertices(mesh, placed, vertices);
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(group.scene.handle, geometry, static_cast<unsigned>(group.objects.size()));
     group.objects.push_back(object);
@@ -146,6 +79,7 @@ constexpr int lanes_of = std::extent_v<decltype(Packet::ray.org_x)>;
 
 struct RayScene::Impl {
   std::shared_ptr<const Scene> scene;
+  int build_threads;
   Device device;
   int rays_at_once;
   Vec3d origin;
@@ -155,10 +89,12 @@ struct RayScene::Impl {
   std::vector<Pose> placed;      // the bodies, as last placed
   std::vector<Rotation> turned;  // their rotations, for normals
   RTCScene traced = nullptr;
+  std::vector<std::unique_ptr<ChangingGroup>> changing;  // of change(); the last used comes first
 
-  Impl(std::shared_ptr<const Scene> s, int build_threads)
+  Impl(std::shared_ptr<const Scene> s, int threads)
       : scene(std::move(s)),
-        device(build_threads < 1 ? 1 : build_threads),
+        build_threads(threads < 1 ? 1 : threads),
+        device(build_threads),
         rays_at_once(device.widest_packet()),
         origin(ray_origin_of(*scene)) {
     const std::size_t bodies = scene->bodies_in_world.size();
@@ -178,6 +114,43 @@ struct RayScene::Impl {
   }
   ~Impl() {
     for (RTCGeometry instance : instances) rtcReleaseGeometry(instance);
+  }
+
+  /// Without bodies, before and after.
+  void change(std::shared_ptr<const Scene> to) {
+    constexpr std::size_t most_kept = 16, most_kept_triangles = 1'250'000;  // kinds of scenes that take turns
+    scene = std::move(to);
+    origin = ray_origin_of(*scene);
+    std::vector<ChangingGroup::Wanted> wanted;
+    std::size_t triangles = 0;
+    for (std::size_t i = 0; i < scene->objects.size(); ++i) {
+      const Object& object = scene->objects[i];
+      if (!object.visible || object.mesh->triangles.empty()) continue;
+      Pose placed_in_group = object.in_world;
+      placed_in_group.position_m = placed_in_group.position_m - origin;
+      // Three numbers a corner, and one that Embree may read behind the last.
+      auto vertices = std::make_shared<std::vector<float>>(3 * object.mesh->vertices.size() + 1);
+      place_vertices(*object.mesh, placed_in_group, vertices->data());
+      wanted.push_back({object.mesh, std::move(vertices), static_cast<std::uint32_t>(i)});
+      triangles += object.mesh->triangles.size();
+    }
+    // The structure that has most of it, where that is worth it.
+    auto best = changing.end();
+    std::size_t there = 0;
+    for (auto group = changing.begin(); group != changing.end(); ++group)
+      if (const std::size_t n = (*group)->there(wanted); n > there) best = group, there = n;
+    if (best == changing.end() || 2 * there < triangles) {
+      std::size_t kept = triangles;
+      const auto is_too_much = [&](const auto& group) { return (kept += group->triangles()) > most_kept_triangles; };
+      changing.erase(std::ranges::find_if(changing, is_too_much), changing.end());
+      if (changing.size() == most_kept) changing.pop_back();
+      changing.insert(changing.begin(), std::make_unique<ChangingGroup>(device));
+    } else {
+      std::rotate(changing.begin(), best, best + 1);
+    }
+    groups[0].scene = {};
+    groups[0].objects = changing.front()->become(device, wanted);
+    traced = changing.front()->tree();
   }
 
   void build_trees() {
@@ -306,6 +279,12 @@ struct RayScene::Impl {
 RayScene::RayScene(std::shared_ptr<const Scene> scene, int build_threads)
     : impl_(std::make_unique<Impl>(std::move(scene), build_threads)) {}
 RayScene::~RayScene() = default;
+void RayScene::change(std::shared_ptr<const Scene> scene) {
+  if (impl_->scene->bodies_in_world.empty() && scene->bodies_in_world.empty() && scene->triangle_count() < compact_from_triangles)
+    impl_->change(std::move(scene));
+  else
+    impl_ = std::make_unique<Impl>(std::move(scene), impl_->build_threads);
+}
 const Scene& RayScene::scene() const { return *impl_->scene; }
 Vec3d RayScene::origin() const { return impl_->origin; }
 void RayScene::place(std::span<const Pose> bodies_in_world) { impl_->place(bodies_in_world); }

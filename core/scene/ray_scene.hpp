@@ -34,6 +34,9 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
+  /// Goes on with another scene. What stands still and has the same meshes at the same places keeps its trees, also while scenes
+  /// take turns; the hits are those of a new RayScene.
+  void change(std::shared_ptr<const Scene> scene);
   const Scene& scene() const;
   Vec3d origin() const;  // world position that float coordinates are relative to
   /// Moves the bodies; called by the thread that owns the scene, before tracing. Costs nothing when nothing moved.

@@ -113,10 +113,17 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
 
 void add_dataset_options(CLI::App& app, DatasetCommand& dataset) {
   app.footer(
-      "examples:\n  sonard dataset scenes/datasets/mines.yaml --out mines\n  sonard dataset job.yaml --out set --shards 3/8");
+      "examples:\n  sonard dataset scenes/datasets/mines.yaml --out mines\n  sonard dataset job.yaml --out set --shards 3/8\n"
+      "  sonard dataset job.yaml --out set --export coco --split 80,10,10");
   app.add_option("job", dataset.job, "job file (docs/datasets.md)")->required();
   app.add_option("--out", dataset.out, "folder for the shards; made when it is not there")->required();
   app.add_option("--shards", dataset.shards, "I/N: the shards whose number leaves I when divided by N, for several machines");
+  auto* form = app.add_option("--export", dataset.export_form,
+                              "coco or folder: when the set is complete, also as pictures in that form, in train, val and test")
+                   ->check(one_of({"coco", "folder"}));
+  app.add_option("--split", dataset.split, "shares of train, val and test, by scene (80,10,10)")->needs(form);
+  app.add_option("--split-by", dataset.split_by, "names of draws that say what a scene is, as bed_seed (equal scenes)")
+      ->needs(form);
   app.add_option("--threads", dataset.threads, "pings to make side by side (all processors)")->check(whole_number(1, 1024));
   app.add_flag("--quiet", dataset.quiet, "no progress");
 }

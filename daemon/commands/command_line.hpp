@@ -45,7 +45,8 @@ struct RenderCommand {
   EngineOptionsGiven engine;
 };
 struct DatasetCommand {
-  std::string job, out, shards;  // shards: "I/N", or empty for all
+  std::string job, out, shards;              // shards: "I/N", or empty for all
+  std::string export_form, split, split_by;  // "coco" or "folder", or empty; "80,10,10"; "bed_seed,coat"
   std::optional<int> threads;
   bool quiet = false;
 };

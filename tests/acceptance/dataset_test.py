@@ -85,6 +85,41 @@ class Dataset(unittest.TestCase):
         for shard in json.loads((out / "manifest.json").read_text())["shards"]:
             self.assertEqual(hashlib.sha256((out / shard["name"]).read_bytes()).hexdigest(), shard["sha256"])
 
+    def test_interrupted_it_says_so_and_goes_on_with_the_same_pings(self):
+        self.job.write_text(small_job(24, 24), encoding="utf-8")
+        out = self.path / "interrupted"
+        process = subprocess.Popen([str(SONARD), "dataset", str(self.job), "--out", str(out), "--threads", "1"],
+                                   stderr=subprocess.PIPE, text=True)
+        deadline = time.monotonic() + 120
+        while not any(p.stat().st_size for p in out.glob("shard-*.tar.tmp*")) and time.monotonic() < deadline:
+            time.sleep(0.002)  # until the first pings are written
+        process.send_signal(signal.SIGINT)
+        words = process.communicate(timeout=300)[1]
+        self.assertRegex(words, r"stopped: \d+ of 24 pings are made and kept.*run the same command again")
+        self.assertEqual(process.returncode, 130)
+        self.assertEqual([p.name for p in out.glob("shard-*.tar*")], [])
+        made = int(re.search(r"stopped: (\d+) of", words).group(1))
+        self.assertRegex(self.make("interrupted"), rf"\n{24 - made} pings in ")
+        self.make("whole")
+        self.assertEqual((out / "shard-000000.tar").read_bytes(), (self.path / "whole/shard-000000.tar").read_bytes())
+        self.assertEqual(sorted(p.name for p in out.iterdir()), sorted(p.name for p in (self.path / "whole").iterdir()))
+
+    def test_exports_stand_beside_the_shards(self):
+        self.job.write_text(small_job(6, 3), encoding="utf-8")
+        words = self.make("set", "--export", "coco", "--split", "60,20,20", "--split-by", "bed_seed")
+        self.assertRegex(words, r"set/coco: train \d, val \d, test \d pings of \d scenes")
+        ids = []
+        for split in sorted(p.name for p in (self.path / "set/coco").iterdir() if p.is_dir() and p.name != "annotations"):
+            coco = json.loads((self.path / "set/coco/annotations" / f"instances_{split}.json").read_text())
+            self.assertEqual({p.name for p in (self.path / "set/coco" / split).iterdir()}, {i["file_name"] for i in coco["images"]})
+            ids += [i["id"] for i in coco["images"]]
+        self.assertEqual(sorted(ids), [1, 2, 3, 4, 5, 6])
+        self.make("set", "--export", "folder")
+        result = run(SONARD, "dataset", self.job, "--out", self.path / "set", "--export", "coco")
+        self.assertEqual((result.returncode, "remove it" in result.stderr), (64, True), result.stderr)
+        result = run(SONARD, "dataset", self.job, "--out", self.path / "part", "--shards", "0/2", "--export", "coco")
+        self.assertEqual((result.returncode, "complete set" in result.stderr), (64, True), result.stderr)
+
     def test_two_processes_at_once_make_one_data_set(self):
         self.job.write_text(small_job(4, 2), encoding="utf-8")
         self.make("alone")

@@ -53,7 +53,7 @@ FLOORS = {
 INSTALLED = r"clients/bvtsdk/abi\d/include/"
 # Header of a dependency -> the only files that may include it (tests may include anything).
 DEPENDENCIES = {
-    r"embree[34]?/": ["core/scene/embree_scene.cpp"],
+    r"embree[34]?/": ["core/scene/embree_scene.cpp", "core/scene/embree_trees.hpp"],
     r"fftw": ["core/pipeline/pulses/spectral_transform.cpp"],
     r"yaml-cpp/": ["core/text/"],
     r"assimp/": ["core/scene/import/"],

@@ -17,6 +17,10 @@ RayScene::RayScene(std::shared_ptr<const Scene> scene, int)
   place({});
 }
 RayScene::~RayScene() = default;
+void RayScene::change(std::shared_ptr<const Scene> scene) {
+  impl_ = std::make_unique<Impl>(Impl{scene, cuda::FlatScene(*scene), {}});
+  place({});
+}
 const Scene& RayScene::scene() const { return *impl_->scene; }
 Vec3d RayScene::origin() const { return impl_->flat.origin(); }
 void RayScene::place(std::span<const Pose> bodies) { impl_->places = impl_->flat.place(bodies); }

@@ -149,7 +149,8 @@ double coherent_reflection(const Material& m, double wavelength_m) {
 }
 
 SpecularEchoes::PreparedMesh& SpecularEchoes::prepared(std::size_t object, const std::shared_ptr<const Mesh>& mesh) {
-  if (object < mesh_of_.size() && meshes_[mesh_of_[object]].mesh == mesh) return meshes_[mesh_of_[object]];
+  if (object < mesh_of_.size() && mesh_of_[object] < meshes_.size() && meshes_[mesh_of_[object]].mesh == mesh)
+    return meshes_[mesh_of_[object]];
   mesh_of_.resize(std::max(mesh_of_.size(), object + 1));
   const auto at = std::find_if(meshes_.begin(), meshes_.end(), [&](const PreparedMesh& m) { return m.mesh == mesh; });
   mesh_of_[object] = static_cast<std::size_t>(at - meshes_.begin());
@@ -169,6 +170,11 @@ SpecularEchoes::PreparedMesh& SpecularEchoes::prepared(std::size_t object, const
   made.centre_m = 0.5 * (low + high);
   made.radius_m = 0.5 * length(high - low);
   return meshes_.emplace_back(std::move(made));
+}
+
+void SpecularEchoes::forget_unused() {
+  std::erase_if(meshes_, [](const PreparedMesh& m) { return m.mesh.use_count() == 1; });
+  mesh_of_.clear();
 }
 
 void SpecularEchoes::candidates(const Object& object, PreparedMesh& mesh, const SpecularQuery& query) {

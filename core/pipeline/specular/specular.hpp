@@ -24,6 +24,8 @@ class SpecularEchoes {
  public:
   /// Appends the specular echoes of the scene's surfaces, as far as rays find them in sight.
   void find(const PingContext& context, std::vector<PointEcho>& echoes);
+  /// Forgets meshes that no scene has any more.
+  void forget_unused();
 
  private:
   struct PreparedMesh {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <tuple>
 
@@ -24,46 +25,124 @@ int coarsest_wanted(const CellView& view) {
 
 }  // namespace
 
+/// Parts of scenes before, for those that have the same again.
+struct SurfaceCells::Known {
+  struct SkinOf {
+    std::shared_ptr<const Mesh> mesh;
+    Skin skin;
+  };
+  std::map<const Mesh*, SkinOf> skins;
+  struct Patch {
+    std::unique_ptr<SurfacePatch> patch;
+    std::size_t bytes = 0;  // of mesh and roots, which cached_bytes_ leaves out
+  };
+  std::vector<Patch> patches;  // the last used come last
+  std::size_t bytes = 0;
+};
+
 SurfaceCells::SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, CellFields fields)
-    : scene_(std::move(scene)), seed_(seed), fields_(fields), cache_bytes_(cache_bytes), raised_(SurfacePatch::finest_root) {
+    : scene_(std::move(scene)), seed_(seed), fields_(fields), cache_bytes_(cache_bytes), known_(std::make_unique<Known>()) {
+  lay_out();
+}
+
+void SurfaceCells::change(std::shared_ptr<const Scene> scene) {
+  scene_ = std::move(scene);
+  for (auto& patch : patches_) {
+    const std::size_t bytes = patch->fixed_bytes();
+    known_->bytes += bytes;
+    known_->patches.push_back({std::move(patch), bytes});
+  }
+  patches_.clear(), roots_.clear(), skins_.clear(), textures_.clear(), grains_.clear();
+  in_view_.clear(), found_.clear();
+  there_ = {false, false};
+  lay_out();
+  forget_known();
+}
+
+void SurfaceCells::lay_out() {
+  raised_ = SurfacePatch::finest_root;
   for (const Material& m : scene_->materials) {
     const auto add = [&](const Texture& of, bool wanted, Domain domain, auto& to, bool& there) {
       const bool has = of.shape > 0;
       there = there || has;
-      to.push_back(has && wanted ? std::make_unique<TextureField>(of, m.texture_seed, seed, domain) : nullptr);
+      to.push_back(has && wanted ? std::make_unique<TextureField>(of, m.texture_seed, seed_, domain) : nullptr);
     };
-    add(m.texture, fields.texture, Domain::texture, textures_, there_.texture);
-    add(m.grain, fields.grain, Domain::grain, grains_, there_.grain);
+    add(m.texture, fields_.texture, Domain::texture, textures_, there_.texture);
+    add(m.grain, fields_.grain, Domain::grain, grains_, there_.grain);
   }
-  std::map<const Mesh*, Skin> skins;  // objects often share a mesh
+  std::erase_if(known_->skins, [](const auto& entry) { return entry.second.mesh.use_count() == 1; });
   for (std::size_t o = 0; o < scene_->objects.size(); ++o) {
     const Object& object = scene_->objects[o];
     if (!object.visible) {
       skins_.emplace_back();
       continue;
     }
-    const auto [skin, is_new] = skins.try_emplace(object.mesh.get());
-    if (is_new) skin->second = skin_of(*object.mesh);
-    skins_.push_back(skin->second);
-    std::map<std::tuple<int, int, bool>, std::vector<std::uint32_t>> sorted;  // material, axis, side
-    for (std::uint32_t t = 0; t < object.mesh->triangles.size(); ++t) {
-      const Vec3d n = lattice::normal_of(*object.mesh, t);
-      const int axis = lattice::dominant_axis(n);
-      const double along = axis == 0 ? n.x : axis == 1 ? n.y : n.z;
-      if (along == 0) continue;  // no area
-      sorted[{object.mesh->material[t], axis, along < 0}].push_back(t);
-    }
-    for (const auto& [key, triangles] : sorted) {
-      auto patch = std::make_unique<SurfacePatch>();
-      patch->object = static_cast<int>(o);
-      std::tie(patch->material, patch->axis, patch->negative_side) = key;
-      patch->coarsest = static_cast<int>(std::ceil(-0.5 * std::log2(skins_[o].area_m2 / fewest_cells)));
-      patch->mesh = object.mesh;
-      patch->plant(triangles);
-      for (auto& root : patch->roots) roots_.push_back({patch.get(), root.get()});
-      patches_.push_back(std::move(patch));
-    }
+    const auto [skin, is_new] = known_->skins.try_emplace(object.mesh.get());  // objects often share a mesh
+    if (is_new) skin->second = {object.mesh, skin_of(*object.mesh)};
+    skins_.push_back(skin->second.skin);
+    if (!take_known(o)) plant(o);
   }
+  for (auto& patch : patches_)
+    for (auto& root : patch->roots)
+      if (!root->alone) roots_.push_back({patch.get(), root.get()});
+}
+
+/// The patches that an object of scenes before had: their cubes, and where the material is as it was, their tiles. False: none.
+bool SurfaceCells::take_known(std::size_t o) {
+  const Object& object = scene_->objects[o];
+  const std::size_t before = patches_.size();
+  for (Known::Patch& known : known_->patches) {
+    if (known.patch->object != static_cast<int>(o) || known.patch->mesh != object.mesh) continue;
+    SurfacePatch& patch = *known.patch;
+    if (!patch.has_tiles_of(scene_->materials[static_cast<std::size_t>(patch.material)])) {
+      cached_bytes_ -= patch.forget_tiles();
+      patch.set_material(scene_->materials[static_cast<std::size_t>(patch.material)]);
+    }
+    known_->bytes -= known.bytes;
+    patches_.push_back(std::move(known.patch));
+  }
+  std::erase_if(known_->patches, [](const Known::Patch& known) { return !known.patch; });
+  return patches_.size() > before;
+}
+
+void SurfaceCells::plant(std::size_t o) {
+  const Object& object = scene_->objects[o];
+  std::map<std::tuple<int, int, bool>, std::vector<std::uint32_t>> sorted;  // material, axis, side
+  for (std::uint32_t t = 0; t < object.mesh->triangles.size(); ++t) {
+    const Vec3d n = lattice::normal_of(*object.mesh, t);
+    const int axis = lattice::dominant_axis(n);
+    const double along = axis == 0 ? n.x : axis == 1 ? n.y : n.z;
+    if (along == 0) continue;  // no area
+    sorted[{object.mesh->material[t], axis, along < 0}].push_back(t);
+  }
+  for (const auto& [key, triangles] : sorted) {
+    auto patch = std::make_unique<SurfacePatch>();
+    patch->object = static_cast<int>(o);
+    std::tie(patch->material, patch->axis, patch->negative_side) = key;
+    patch->set_material(scene_->materials[static_cast<std::size_t>(patch->material)]);
+    patch->coarsest = static_cast<int>(std::ceil(-0.5 * std::log2(skins_[o].area_m2 / fewest_cells)));
+    patch->mesh = object.mesh;
+    patch->plant(triangles);
+    patches_.push_back(std::move(patch));
+  }
+}
+
+/// Forgets scenes before, those first that are longest ago.
+void SurfaceCells::forget_known() {
+  std::size_t n = 0;
+  const auto is_of_the_last = [&] {  // an object's patches come and go together
+    const SurfacePatch &last = *known_->patches[n - 1].patch, &next = *known_->patches[n].patch;
+    return next.object == last.object && next.mesh == last.mesh;
+  };
+  for (; n < known_->patches.size(); ++n) {
+    const bool is_too_much = known_->bytes > cache_bytes_ / 4 || cached_bytes_ > cache_bytes_;
+    if (!is_too_much && (n == 0 || !is_of_the_last())) break;
+    Known::Patch& known = known_->patches[n];
+    known_->bytes -= known.bytes;
+    cached_bytes_ -= known.patch->forget_tiles();
+    for (auto& root : known.patch->roots) cached_bytes_ -= SurfacePatch::forget_below(*root, UINT64_MAX);
+  }
+  known_->patches.erase(known_->patches.begin(), known_->patches.begin() + static_cast<std::ptrdiff_t>(n));
 }
 
 SurfaceCells::~SurfaceCells() = default;
@@ -136,9 +215,9 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
 void SurfaceCells::raise_roots(const CellView& view) {
   for (; raised_ > coarsest_wanted(view); --raised_)
     for (auto& patch : patches_) {
-      const std::size_t planted = patch->roots.size();
-      patch->raise(raised_ - 1);
-      for (std::size_t r = planted; r < patch->roots.size(); ++r) roots_.push_back({patch.get(), patch->roots[r].get()});
+      patch->raise(raised_ - 1);  // of a scene before, it may have them
+      for (auto& root : patch->roots)
+        if (root->alone && root->address.level == raised_ - 1) roots_.push_back({patch.get(), root.get()});
     }
 }
 
@@ -241,6 +320,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
 
 /// Forgets what was not looked at for longest; it comes back identical when wanted again.
 void SurfaceCells::keep_within_budget() {
+  if (cached_bytes_ > cache_bytes_) forget_known();
   for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {
     if (age >= now_ || (kept_since_ > 0 && now_ - age >= kept_since_)) continue;
     for (auto& patch : patches_)

@@ -101,6 +101,9 @@ struct CellFields {
 class SurfaceCells {
  public:
   SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, CellFields fields = {});
+  /// Goes on with another scene. Cells of objects that have the same mesh and materials at the same place of the list stay, also
+  /// while scenes take turns.
+  void change(std::shared_ptr<const Scene> scene);
   ~SurfaceCells();
   SurfaceCells(const SurfaceCells&) = delete;
   SurfaceCells& operator=(const SurfaceCells&) = delete;
@@ -154,6 +157,11 @@ class SurfaceCells {
     std::vector<Pose> sonar_in_object;  // per object
     std::vector<Rotation> rotations;
   };
+  struct Known;  // cells of scenes before
+  void lay_out();
+  bool take_known(std::size_t object);
+  void plant(std::size_t object);
+  void forget_known();
   void raise_roots(const CellView& view);
   void prepare(const CellView& view, std::uint64_t number, Look& look) const;
   /// Through the roots [from, to).
@@ -170,6 +178,7 @@ class SurfaceCells {
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
   std::vector<std::unique_ptr<SurfacePatch>> patches_;
+  std::unique_ptr<Known> known_;
   std::vector<Root> roots_;  // of all patches, in order; then, level by level, those of raise_roots()
   int raised_;               // down to this level all patches have roots
   std::vector<TileInView> in_view_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <tuple>
+#include <utility>
 
 namespace sonar {
 namespace {
@@ -114,6 +115,36 @@ std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
     if (child) bytes += child->own_bytes();
   node.divided.store(true, std::memory_order_release);
   return bytes;
+}
+
+namespace {
+
+/// Adds up what `of` returns of a cube and of those inside it.
+template <class Node, class Of>
+std::size_t sum_over(Node& node, const Of& of) {
+  std::size_t sum = of(node);
+  for (auto& child : node.children)
+    if (child) sum += sum_over(*child, of);
+  return sum;
+}
+
+}  // namespace
+
+std::size_t SurfaceCells::SurfacePatch::fixed_bytes() const {
+  std::size_t bytes = mesh->vertices.size() * sizeof(Vec3) + mesh->triangles.size() * sizeof(mesh->triangles[0]);
+  for (const auto& root : roots) bytes += root->own_bytes() - root->tile.bytes();
+  return bytes;
+}
+
+std::size_t SurfaceCells::SurfacePatch::forget_tiles() {
+  std::size_t freed = 0;
+  for (auto& root : roots)
+    freed += sum_over(*root, [](Node& node) {
+      const std::size_t bytes = std::exchange(node.tile, CellTile{}).bytes();
+      node.built = false;
+      return bytes;
+    });
+  return freed;
 }
 
 std::size_t SurfaceCells::SurfacePatch::forget_below(Node& node, std::uint64_t then) {

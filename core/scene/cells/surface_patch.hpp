@@ -41,10 +41,19 @@ class SurfaceCells::SurfacePatch {
  public:
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
+  Texture texture, grain;  // of the material, with its seed: what the tiles are made with
+  std::uint32_t texture_seed = 0;
   int coarsest = 0;  // level that gives the object its fewest cells, where asked for
   std::shared_ptr<const Mesh> mesh;
   std::vector<std::unique_ptr<Node>> roots;
   std::size_t first_coarsest = 0;  // of the roots, from where on they have the coarsest level
+
+  void set_material(const Material& m) { texture = m.texture, grain = m.grain, texture_seed = m.texture_seed; }
+  bool has_tiles_of(const Material& m) const {
+    return texture == m.texture && grain == m.grain && texture_seed == m.texture_seed;
+  }
+  /// Size of the mesh, and of the roots without their tiles.
+  std::size_t fixed_bytes() const;
 
   void plant(const std::vector<std::uint32_t>& triangles);
   static constexpr int finest_root = 4;  // level
@@ -53,6 +62,8 @@ class SurfaceCells::SurfacePatch {
   void raise(int level);
   /// Returns the bytes that the new cubes take.
   std::size_t divide(Node& node) const;
+  /// Forgets the tiles and keeps the cubes; returns the bytes that frees.
+  std::size_t forget_tiles();
   /// Forgets all cubes below `node` that were last visited before `then`; returns the bytes that frees.
   static std::size_t forget_below(Node& node, std::uint64_t then);
 };

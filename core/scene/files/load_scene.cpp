@@ -23,10 +23,10 @@ void read_material_library(const text::Node& node, const std::filesystem::path& 
 }
 
 std::shared_ptr<const Scene> read_map(text::Map root, const std::filesystem::path& folder, const std::string& fallback_name,
-                                      std::span<const BuiltInFile> meshes_in_memory = {}) {
+                                      std::span<const BuiltInFile> meshes_in_memory = {}, ShapeCache* known = nullptr) {
   auto scene = std::make_shared<Scene>();
   MaterialTable materials(*scene);
-  ShapeReader shapes{.scene = *scene, .materials = materials, .folder = folder, .in_memory = meshes_in_memory};
+  ShapeReader shapes{.scene = *scene, .materials = materials, .folder = folder, .in_memory = meshes_in_memory, .cache = known};
   scene->name = root.optional("name").text_or(fallback_name, 64);
   read_material_library(root.optional("material_library"), folder, materials);
   materials.read(root.optional("materials").map());
@@ -47,8 +47,9 @@ Result<std::shared_ptr<const Scene>> read_document(const text::Document& documen
 
 }  // namespace
 
-std::shared_ptr<const Scene> read_scene(text::Map map, const std::filesystem::path& folder, const std::string& name) {
-  return read_map(map, folder, name);
+std::shared_ptr<const Scene> read_scene(text::Map map, const std::filesystem::path& folder, const std::string& name,
+                                        ShapeCache* known) {
+  return read_map(map, folder, name, {}, known);
 }
 
 Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& file) {

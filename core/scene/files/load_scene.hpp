@@ -10,6 +10,7 @@
 #include "core/scene/scene.hpp"
 
 namespace sonar {
+class ShapeCache;
 namespace text {
 class Map;
 }
@@ -23,6 +24,8 @@ Result<std::shared_ptr<const Scene>> parse_scene(std::string_view text, const st
 Result<std::shared_ptr<const Scene>> load_built_in_scene(std::string_view name);
 
 /// The scene that stands in a map of a larger document, whose finish() then tells what was wrong with it. Never null.
-std::shared_ptr<const Scene> read_scene(text::Map map, const std::filesystem::path& folder, const std::string& name);
+/// `known`: of scenes that were read before.
+std::shared_ptr<const Scene> read_scene(text::Map map, const std::filesystem::path& folder, const std::string& name,
+                                        ShapeCache* known = nullptr);
 
 }  // namespace sonar

@@ -49,11 +49,20 @@ Texture read_texture(const text::Node& node, Texture texture, double shortest_m)
 
 }  // namespace
 
-MaterialTable::MaterialTable(Scene& scene) : scene_(scene) {
-  auto library = text::parse_yaml(material_library_yaml, "materials.yaml", {.error_kind = ErrorKind::bug});
-  if (!library) throw std::logic_error(library.error().text);
-  read(library->root());
-  if (const auto error = library->finish()) throw std::logic_error(error->text);
+MaterialTable::MaterialTable(Scene& scene) : scene_(scene), definitions_(library()) {}
+
+/// Parsed once: scenes are read by the thousand.
+const std::vector<Material>& MaterialTable::library() {
+  static const std::vector<Material> materials = [] {
+    auto document = text::parse_yaml(material_library_yaml, "materials.yaml", {.error_kind = ErrorKind::bug});
+    if (!document) throw std::logic_error(document.error().text);
+    Scene none;
+    MaterialTable table(none, {});
+    table.read(document->root());
+    if (const auto error = document->finish()) throw std::logic_error(error->text);
+    return table.definitions_;
+  }();
+  return materials;
 }
 
 void MaterialTable::read(text::Map materials) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/scene/scene.hpp"
@@ -27,6 +28,8 @@ class MaterialTable {
   std::uint16_t add(Material material);
 
  private:
+  MaterialTable(Scene& scene, std::vector<Material> definitions) : scene_(scene), definitions_(std::move(definitions)) {}
+  static const std::vector<Material>& library();
   Material* definition(std::string_view name);
   void read_one(const std::string& name, text::Map keys);
   std::vector<std::string_view> names() const;

@@ -47,6 +47,22 @@ std::vector<std::uint16_t> ShapeReader::assign_materials(const std::vector<std::
   return out;
 }
 
+namespace {
+
+void note_losses(const std::string& name, const LoadedMesh& loaded, std::vector<std::string>& notes) {
+  if (loaded.centred.left_out > 0)
+    notes.push_back(name + ": " + std::to_string(loaded.centred.left_out) + " triangles without area left out");
+  if (loaded.lost > 0)
+    notes.push_back(name + ": " + std::to_string(loaded.lost) +
+                    " of the triangles that it lists cannot be read and are "
+                    "missing here; do their faces name vertices that are not there? Export it again");
+  if (loaded.hidden > 0)
+    notes.push_back(name + ": " + std::to_string(loaded.hidden) +
+                    " triangles of parts that the file's own scene does not show are left out");
+}
+
+}  // namespace
+
 Shape ShapeReader::read_mesh_file(Map& keys) {
   const Node file = keys.required("file");
   const std::string name = file.text(1024);
@@ -62,35 +78,27 @@ Shape ShapeReader::read_mesh_file(Map& keys) {
   std::array<char, 64> shaped{};
   std::snprintf(shaped.data(), shaped.size(), "|%.17g|%d", request.scale, request.up ? static_cast<int>(*request.up) : -1);
   key += shaped.data();
-  const bool first_time = !meshes.contains(key);
-  if (first_time) {
+  std::map<std::string, LoadedMesh>& read = cache != nullptr ? cache->mesh_files() : meshes;
+  if (!read.contains(key)) {
     if (name.empty()) return keys.optional("material"), keys.optional("materials"), Shape{};
     auto loaded = load_mesh(request);
     if (!loaded) return keys.optional("material"), keys.optional("materials"), file.fail(loaded.error().text), Shape{};
-    if (loaded->centred.left_out > 0) {
-      scene.notes.push_back(name + ": " + std::to_string(loaded->centred.left_out) + " triangles without area left out");
-    }
-    if (loaded->lost > 0)
-      scene.notes.push_back(name + ": " + std::to_string(loaded->lost) +
-                            " of the triangles that it lists cannot be read and are "
-                            "missing here; do their faces name vertices that are not there? Export it again");
-    if (loaded->hidden > 0)
-      scene.notes.push_back(name + ": " + std::to_string(loaded->hidden) +
-                            " triangles of parts that the file's own scene does not show are left out");
-    meshes.emplace(key, std::move(*loaded));
+    read.emplace(key, std::move(*loaded));
   }
-  const LoadedMesh& loaded = meshes.at(key);
+  const LoadedMesh& loaded = read.at(key);
+  if (noted.insert(key).second) note_losses(name, loaded, scene.notes);
   std::vector<bool> used(loaded.material_names.size(), false);
   for (const std::uint16_t m : loaded.centred.mesh.material) used[m] = true;
   const std::vector<std::uint16_t> assigned = assign_materials(loaded.material_names, used, keys);
   for (std::size_t i = 0; i < assigned.size(); ++i) key.append("|").append(used[i] ? std::to_string(assigned[i]) : "");
 
   const auto [place, is_new] = files.try_emplace(key);
-  if (is_new) {
-    Mesh mesh = loaded.centred.mesh;
-    for (std::uint16_t& m : mesh.material) m = assigned[m];
-    place->second = Shape{std::make_shared<const Mesh>(std::move(mesh)), loaded.centred.centre_m};
-  }
+  if (is_new)
+    place->second = known_or(key, [&] {
+      Mesh mesh = loaded.centred.mesh;
+      for (std::uint16_t& m : mesh.material) m = assigned[m];
+      return Shape{std::make_shared<const Mesh>(std::move(mesh)), loaded.centred.centre_m};
+    });
   return place->second;
 }
 

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 
 #include "core/base/load_step.hpp"
 #include "core/base/memory_left.hpp"
 #include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/shapes/primitives.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar {
 namespace {
@@ -21,6 +23,14 @@ const Range a_size{.min = 1e-4, .max = 1e5};
 Shape with_material(Mesh mesh, std::uint16_t material, const Primitive& primitive = {}) {
   std::fill(mesh.material.begin(), mesh.material.end(), material);
   return Shape{std::make_shared<const Mesh>(std::move(mesh)), {}, primitive};
+}
+
+/// Equal for equal shapes: all digits of the numbers.
+std::string shape_key(std::string_view type, std::uint16_t material, std::initializer_list<double> numbers) {
+  std::string key(type);
+  key += ' ' + std::to_string(material);
+  for (const double number : numbers) key += text::format(" %.17g", number);
+  return key;
 }
 
 constexpr std::uint64_t memory_of_a_height = 64;  // bytes, while a grid becomes a mesh
@@ -103,43 +113,61 @@ Shape ShapeReader::read_primitive(std::string_view type, Map& keys) {
     const auto v = keys.required(key).numbers<3>(a_size);
     return Vec3d{std::max(v[0], a_size.min), std::max(v[1], a_size.min), std::max(v[2], a_size.min)};
   };
-  const auto done = [&](Mesh mesh, const Primitive& primitive = {}) {
-    return with_material(std::move(mesh), material, primitive);
+  // `numbers`: all that `make` depends on.
+  const auto done = [&](std::initializer_list<double> numbers, const auto& make, const Primitive& primitive = {}) {
+    return known_or(shape_key(type, material, numbers), [&] { return with_material(make(), material, primitive); });
   };
   if (type == "plane") {
     const auto size = keys.required("size_m").numbers<2>(a_size);
     const Vec3d sheet{std::max(size[0], a_size.min), std::max(size[1], a_size.min), 0};
-    return done(make_plane(sheet.x, sheet.y, patch()), {.kind = Primitive::Kind::plane, .size_m = sheet});
+    const double patch_m = patch();
+    return done({sheet.x, sheet.y, patch_m}, [&] { return make_plane(sheet.x, sheet.y, patch_m); },
+                {.kind = Primitive::Kind::plane, .size_m = sheet});
   }
   if (type == "box") {
     const Vec3d edges = three("size_m");
-    return done(make_box(edges, patch()), {.kind = Primitive::Kind::box, .size_m = edges});
+    const double patch_m = patch();
+    return done({edges.x, edges.y, edges.z, patch_m}, [&] { return make_box(edges, patch_m); },
+                {.kind = Primitive::Kind::box, .size_m = edges});
   }
   if (type == "rock") {
     const Vec3d size = three("size_m");
     const double bumpiness = keys.optional("bumpiness").number_or(0.2, Range::between(0, 0.5));
     const auto seed = static_cast<std::uint32_t>(keys.optional("seed").unsigned_integer_or(1, 0xFFFFFFFFu));
     const int n = static_cast<int>(std::max<std::int64_t>(keys.optional("segments").integer_or(40, 8, 512), 8));
-    return done(make_rock(0.5 * size, bumpiness, seed, n));
+    return done({size.x, size.y, size.z, bumpiness, static_cast<double>(seed), static_cast<double>(n)},
+                [&] { return make_rock(0.5 * size, bumpiness, seed, n); });
   }
   const double radius = size_of("radius_m");
-  if (type == "sphere") return done(make_sphere(radius, segments(radius)), {.kind = Primitive::Kind::sphere, .radius_m = radius});
+  if (type == "sphere") {
+    const int n = segments(radius);
+    return done({radius, static_cast<double>(n)}, [&] { return make_sphere(radius, n); },
+                {.kind = Primitive::Kind::sphere, .radius_m = radius});
+  }
   if (type == "torus") {
     const double tube = size_of("tube_radius_m");
     if (tube >= radius) keys.required("tube_radius_m").fail("must be smaller than radius_m");
-    return done(make_torus(std::max(radius, 1.001 * tube), tube, segments(radius + tube)));
+    const double ring = std::max(radius, 1.001 * tube);
+    const int n = segments(radius + tube);
+    return done({ring, tube, static_cast<double>(n)}, [&] { return make_torus(ring, tube, n); });
   }
   const double length = size_of("length_m");
   if (type == "cylinder") {
     const Caps caps =
         keys.optional("caps").choice_or(Caps::both, {{"both", Caps::both}, {"bottom", Caps::bottom}, {"none", Caps::none}});
+    const int n = segments(radius);
     return done(
-        make_cylinder(radius, length, segments(radius), caps),
+        {radius, length, static_cast<double>(n), static_cast<double>(caps)},
+        [&] { return make_cylinder(radius, length, n, caps); },
         {.kind = Primitive::Kind::cylinder, .radius_m = radius, .size_m = {0, 0, length}, .inside = caps == Caps::bottom});
   }
-  if (type == "capsule") return done(make_capsule(radius, length, segments(radius)));
+  if (type == "capsule") {
+    const int n = segments(radius);
+    return done({radius, length, static_cast<double>(n)}, [&] { return make_capsule(radius, length, n); });
+  }
   const double top = keys.optional("top_radius_m").number_or(0, Range::between(0, 1e5));
-  return done(make_cone(radius, top, length, segments(std::max(radius, top))));
+  const int n = segments(std::max(radius, top));
+  return done({radius, top, length, static_cast<double>(n)}, [&] { return make_cone(radius, top, length, n); });
 }
 
 Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
@@ -153,7 +181,13 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
       return size.fail("makes more than 20 million triangles; raise spacing_m or set fine_size_m"), Shape{};
     }
     begin_load_step("making the seabed", seabed_triangles(shape));
-    return from_grid(make_seabed(shape), material, size, false);
+    return known_or(
+        shape_key(type, material,
+                  {shape.size_x_m, shape.size_y_m, shape.fine_x_m, shape.fine_y_m, shape.spacing_x_m, shape.spacing_y_m,
+                   static_cast<double>(shape.seed), shape.relief_m, shape.wavelength_m, static_cast<double>(shape.octaves),
+                   shape.persistence, shape.slope[0], shape.slope[1], shape.ripples.wavelength_m, shape.ripples.height_m,
+                   shape.ripples.direction_rad, shape.ripples.bend}),
+        [&] { return from_grid(make_seabed(shape), material, size, false); });
   }
   const Node file = keys.required("file");
   const std::filesystem::path path = folder / file.text(1024);

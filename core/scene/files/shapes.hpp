@@ -4,30 +4,28 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 
 #include "core/scene/files/built_in_scenes.hpp"
 #include "core/scene/files/load_mesh.hpp"
 #include "core/scene/files/materials.hpp"
+#include "core/scene/files/shape_cache.hpp"
 #include "core/scene/scene.hpp"
 #include "core/scene/shapes/terrain.hpp"
 #include "core/text/strict_yaml.hpp"
 
 namespace sonar {
 
-struct Shape {
-  std::shared_ptr<const Mesh> mesh;  // null after an error
-  Vec3d centre_m;                    // where the mesh's own zero lies in the object's frame
-  Primitive primitive = {};          // the true surface, of shapes that have one
-};
-
 struct ShapeReader {
   Scene& scene;
   MaterialTable& materials;
   std::filesystem::path folder;                   // paths in the scene are relative to it
   std::span<const BuiltInFile> in_memory = {};    // of a built-in scene: its mesh files, which are then not looked for on disk
+  ShapeCache* cache = nullptr;                    // of scenes before
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
+  std::set<std::string> noted = {};               // whose losses the scene's notes have
   std::map<std::string, Shape> files = {};        // the same with their materials: objects that agree share one
 
   /// Names that `type` may have here, without "point".
@@ -36,6 +34,11 @@ struct ShapeReader {
   Shape read(std::string_view type, text::Map& keys);
 
  private:
+  /// One of scenes before, or a new one.
+  template <class Make>
+  Shape known_or(const std::string& key, const Make& make) const {
+    return cache != nullptr ? cache->shape(key, make) : make();
+  }
   Shape read_primitive(std::string_view type, text::Map& keys);
   Shape read_ground(std::string_view type, text::Map& keys);
   Shape read_mesh_file(text::Map& keys);

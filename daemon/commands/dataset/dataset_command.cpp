@@ -1,11 +1,14 @@
 #include "daemon/commands/dataset/dataset_command.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <thread>
 
 #include "core/text/decimal.hpp"
+#include "daemon/commands/dataset/export_dataset.hpp"
 #include "daemon/commands/dataset/make_dataset.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 
@@ -27,6 +30,32 @@ bool read_part(const std::string& text, DatasetOptions& o) {
   return true;
 }
 
+std::atomic<bool> stopping{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+/// The second signal ends the program at once.
+extern "C" void on_stop(int signal) {
+  stopping = true;
+  std::signal(signal, SIG_DFL);
+}
+
+int say_stopped(const DatasetProgress& p) {
+  std::fprintf(stderr,
+               "stopped: %llu of %llu pings are made and kept, in %llu finished shards%s; run the same command again to go on\n",
+               static_cast<unsigned long long>(p.pings), static_cast<unsigned long long>(p.all_pings),
+               static_cast<unsigned long long>(p.shards), p.set_aside > 0 ? " and one begun" : "");
+  constexpr int by_signal = 128 + SIGINT;  // as shells say it
+  return by_signal;
+}
+
+void say_exported(const Exported& e, const DatasetCommand& command) {
+  std::fprintf(stderr, "%s: train %llu, val %llu, test %llu pings of %zu scenes\n", e.folder.c_str(),
+               static_cast<unsigned long long>(e.pings[0]), static_cast<unsigned long long>(e.pings[1]),
+               static_cast<unsigned long long>(e.pings[2]), e.scenes);
+  if (e.scenes < split_names.size() && command.split_by.empty())
+    std::fprintf(stderr, "so few scenes fill no three splits; --split-by takes draws that tell pings apart\n");
+}
+
 }  // namespace
 
 Result<int> run_dataset(const DatasetCommand& command) {
@@ -35,8 +64,12 @@ Result<int> run_dataset(const DatasetCommand& command) {
   options.threads = command.threads.value_or(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
   if (!read_part(command.shards, options))
     return failure(ErrorKind::usage, "--shards " + command.shards + " is not I/N with I from 0 to below N, as 3/8");
+  const auto split = parse_split(command.split, command.split_by);
+  if (!split) return tl::make_unexpected(split.error());
   const auto job = load_job(command.job);
   if (!job) return tl::make_unexpected(job.error());
+  options.stop = &stopping;
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, on_stop);
   const auto begin = Clock::now();
   auto shown = begin;
   const auto done = make_dataset(*job, options, [&](const DatasetProgress& p) {
@@ -50,6 +83,7 @@ Result<int> run_dataset(const DatasetCommand& command) {
                  static_cast<double>(p.all_pings - p.pings) / std::max(rate, 1e-9));
   });
   if (!done) return tl::make_unexpected(done.error());
+  if (done->stopped) return say_stopped(*done);
   if (!command.quiet) {
     const std::uint64_t missing = done->missing.value_or(0);
     const std::string what = done->whole ? "the set is complete: manifest.json"
@@ -60,6 +94,13 @@ Result<int> run_dataset(const DatasetCommand& command) {
                  static_cast<unsigned long long>(done->pings), seconds_since(begin),
                  static_cast<unsigned long long>(done->kept_shards), what.c_str());
   }
+  if (command.export_form.empty()) return 0;
+  if (!done->whole)
+    return failure(ErrorKind::usage, "--export needs a complete set: " + shard_name(done->missing.value_or(0)) + " is missing");
+  const ExportForm form = command.export_form == "coco" ? ExportForm::coco : ExportForm::folder;
+  const auto exported = export_dataset(*job, command.out, form, *split);
+  if (!exported) return tl::make_unexpected(exported.error());
+  if (!command.quiet) say_exported(*exported, command);
   return 0;
 }
 

@@ -55,6 +55,16 @@ std::string sweep_of(const Draws& draws) {
   return sweep.empty() ? "" : "sweep: {" + sweep + "}";
 }
 
+/// The text of a ping's scene with all its numbers: equal for equal scenes. Where they cannot be worked out, which the reader of
+/// the file says, and where the scene's lines are not known, no two pings have the same.
+std::string scene_key_of(const DatasetJob& job, const Draws& draws, const std::string& lines, std::uint64_t number) {
+  render::Values values = draws.numbers;
+  for (const auto& [name, formula] : job.formulas)
+    if (const auto value = render::evaluate(put_words(formula, draws.words), values)) values[name] = *value;
+  const auto filled = render::substitute(lines, values, job.source);
+  return filled && !lines.empty() ? *filled : lines + std::to_string(number);
+}
+
 std::string with_sweep(std::string text, const std::string& sweep) {
   if (sweep.empty()) return text;
   if (const auto at = flow_root(text)) return text.insert(*at, sweep + ", ");
@@ -138,9 +148,11 @@ Result<DatasetJob> parse_job(std::string text, const std::string& name, const st
   if (job.negatives > 0 && job.targets.empty())
     set.optional("negatives").fail("needs targets: the names or labels that such pings lack");
   job.variations = read_variations(root.optional("vary"));
+  for (const auto& [name_of, formula] : root.optional("let").map().entries())
+    job.formulas.emplace_back(name_of, formula.text(1000));
   read_constraints(root.optional("constraints"), job.constraints);
   // The render file's own keys are read when a ping is drawn.
-  for (const char* key : {"name", "scene", "water", "sonar", "poses", "engine", "seed", "let", "counts"}) root.optional(key);
+  for (const char* key : {"name", "scene", "water", "sonar", "poses", "engine", "seed", "counts"}) root.optional(key);
   if (root.has("sweep")) root.optional("sweep").fail("is for render files; a data set has vary:");
   if (root.has("expect")) root.optional("expect").fail("is for render files");
   if (const auto error = document->finish()) return tl::make_unexpected(*error);
@@ -169,11 +181,10 @@ Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const K
     ping.draws = draw(job.variations, job.seed, number, ping.attempt);
     std::string filled = put_words(job.text, ping.draws.words);
     const std::string lines(scene_lines(filled));
-    ping.scene_key = lines + (lines.empty() || lines.find('$') != std::string::npos ? sweep_of(ping.draws) : "") +
-                     (lines.empty() ? std::to_string(number) : "");
+    ping.scene_key = scene_key_of(job, ping.draws, lines, number);
     const bool is_known = known.scene && known.key == ping.scene_key;
     if (is_known) filled = without(std::move(filled), lines, "scene: {objects: []}\n");
-    auto input = render::parse_render_file(with_sweep(filled, sweep_of(ping.draws)), job.source, job.folder);
+    auto input = render::parse_render_file(with_sweep(filled, sweep_of(ping.draws)), job.source, job.folder, known.shapes);
     if (!input) return tl::make_unexpected(input.error());
     ping.job = std::move(input->jobs.front());
     if (is_known) ping.job.scene = known.scene;

@@ -7,12 +7,16 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/result.hpp"
 #include "daemon/commands/dataset/vary.hpp"
 #include "daemon/commands/render/render_job.hpp"
 
+namespace sonar {
+class ShapeCache;
+}
 namespace sonar::dataset {
 
 inline constexpr std::uint64_t most_pings = 100'000'000, most_shard_pings = 100'000;
@@ -34,6 +38,7 @@ struct DatasetJob {
   std::vector<std::string> targets;  // names or labels
   bool fan = false;                  // also a picture of each ping
   std::vector<Variation> variations;
+  std::vector<std::pair<std::string, std::string>> formulas;  // of let, as written
   Constraints constraints;
 
   std::uint64_t shards() const { return (pings + shard_pings - 1) / shard_pings; }
@@ -63,10 +68,11 @@ struct DrawnPing {
 };
 
 /// Draws until the constraints are met. config: they never are, with what they were; what the filled file has wrong. `known`: a
-/// scene that has been read, for the pings that have the same.
+/// scene that has been read, for the pings that have the same, and the shapes of all.
 struct KnownScene {
-  std::string key;
-  std::shared_ptr<const Scene> scene;
+  std::string key = {};
+  std::shared_ptr<const Scene> scene = {};
+  ShapeCache* shapes = nullptr;
 };
 Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const KnownScene& known = {});
 

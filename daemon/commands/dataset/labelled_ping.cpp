@@ -1,5 +1,6 @@
 #include "daemon/commands/dataset/labelled_ping.hpp"
 
+#include <algorithm>
 #include <map>
 #include <stdexcept>
 
@@ -11,11 +12,14 @@
 #include "daemon/commands/render/sidecar.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
 #include "daemon/server/engine/start_engine.hpp"
+#include "daemon/server/system/sha256.hpp"
 
 namespace sonar::dataset {
 namespace {
 
 using nlohmann::json;
+
+constexpr std::size_t cell_cache_bytes = 96u << 20;  // each thread has an engine
 
 std::vector<std::byte> bytes_of_text(const std::string& text) {
   const auto bytes = std::as_bytes(std::span(text));
@@ -47,6 +51,12 @@ void number_as_instances(json& truth) {
   truth.erase("object");
 }
 
+std::string scene_digest(const std::string& scene_key) {
+  Sha256 hash;
+  hash.add(std::as_bytes(std::span(scene_key)));
+  return hash.hex().substr(0, 16);
+}
+
 Result<Raster> draw(const Ping& ping, int width_px) {
   const auto colours = find_colour_map("viridis");
   if (!colours) return tl::make_unexpected(colours.error());
@@ -60,17 +70,22 @@ Result<DrawnPing> PingMaker::compute(std::uint64_t number, Ping& ping) {
   if (!drawn) return drawn;
   const std::string key = drawn->scene_key + "\n" + visible_of(*drawn->job.scene);
   if (!engine_ || key != engine_key_) {
-    engine_.reset();
     const SimdLevel simd = simd_.value_or(drawn->job.config.engine.simd);
+    // The engine that start_engine() returns is the one that is kept.
     const auto make = [&](std::shared_ptr<const Scene> s) -> std::unique_ptr<PingEngine> {
-      return make_cpu_engine(std::move(s), one_, {.simd = simd});
+      std::unique_ptr<ChangingEngine> engine = std::move(engine_);
+      if (engine)
+        engine->change_scene(s);
+      else
+        engine = make_changing_engine(std::move(s), one_, {.simd = simd, .cell_cache_bytes = cell_cache_bytes});
+      return engine;
     };
     auto started = start_engine(make, drawn->job.scene);
     if (!started) return tl::make_unexpected(started.error());
-    engine_ = *std::move(started);
+    engine_.reset(static_cast<ChangingEngine*>(started->release()));
     engine_key_ = key;
   }
-  known_ = {drawn->scene_key, drawn->whole_scene};
+  known_ = {drawn->scene_key, drawn->whole_scene, &shapes_};
   try {
     PingRequest request = request_of(*drawn, number);
     if (const std::string why = why_unlabelled(request, *drawn->job.scene); !why.empty()) throw std::invalid_argument(why);
@@ -109,6 +124,13 @@ Result<LabelledPing> PingMaker::make(std::uint64_t number) {
   const Scene& scene = *drawn->job.scene;
   made.annotations = render::annotations_of(labels, ping, scene);
   made.pixels = pixels_of(labels, scene);
+  made.scene = scene_digest(drawn->scene_key);
+  made.draws = drawn->draws.words;
+  if (std::ranges::binary_search(on_sheet_, number)) {
+    auto cell = contact_cell(ping, scene, made.annotations);
+    if (!cell) return tl::make_unexpected(cell.error());
+    made.cell = *std::move(cell);
+  }
   json words = render::sidecar(drawn->job, ping, engine_->description(), engine_->statistics(), inputs_);
   words.erase("sweep");
   words["draws"] = drawn->draws.words;
@@ -131,13 +153,12 @@ Result<LabelledPing> PingMaker::make(std::uint64_t number) {
   return made;
 }
 
-Result<std::optional<Raster>> PingMaker::picture(std::uint64_t number, int width_px) {
+Result<std::optional<Raster>> PingMaker::cell(std::uint64_t number) {
   Ping ping;
-  if (const auto drawn = compute(number, ping); !drawn) return tl::make_unexpected(drawn.error());
-  if (ping.request.settings.beam_count < 2) return std::nullopt;
-  auto drawn = draw(ping, width_px);
+  const auto drawn = compute(number, ping);
   if (!drawn) return tl::make_unexpected(drawn.error());
-  return *std::move(drawn);
+  const Scene& scene = *drawn->job.scene;
+  return contact_cell(ping, scene, render::annotations_of(*ping.labels, ping, scene));
 }
 
 }  // namespace sonar::dataset

@@ -12,7 +12,9 @@
 #include "core/base/parallel.hpp"
 #include "core/base/result.hpp"
 #include "core/image/raster.hpp"
-#include "core/pipeline/ping_engine.hpp"
+#include "core/pipeline/changing_engine.hpp"
+#include "core/scene/files/shape_cache.hpp"
+#include "daemon/commands/dataset/contact_sheet.hpp"
 #include "daemon/commands/dataset/dataset_job.hpp"
 
 namespace sonar::dataset {
@@ -23,6 +25,9 @@ struct LabelledPing {
   nlohmann::json pixels;                                              // samples by class
   int width = 0, height = 0;                                          // beams, rows
   bool negative = false;
+  std::string scene;           // digest of scene_key
+  nlohmann::json draws;        // words
+  std::optional<Raster> cell;  // of a ping on the contact sheet
 };
 
 /// Makes pings one after the other on one thread; keeps the engine while the scene stays the same.
@@ -32,8 +37,8 @@ class PingMaker {
   PingMaker(const DatasetJob& job, std::string inputs, std::optional<SimdLevel> simd)
       : job_(job), inputs_(std::move(inputs)), simd_(simd) {}
   Result<LabelledPing> make(std::uint64_t number);
-  /// The fan alone, without rings; nothing of a ping of one beam.
-  Result<std::optional<Raster>> picture(std::uint64_t number, int width_px);
+  /// As contact_cell().
+  Result<std::optional<Raster>> cell(std::uint64_t number);
 
  private:
   Result<DrawnPing> compute(std::uint64_t number, Ping& ping);
@@ -41,10 +46,12 @@ class PingMaker {
   const DatasetJob& job_;
   std::string inputs_;
   std::optional<SimdLevel> simd_;
+  std::vector<std::uint64_t> on_sheet_ = pings_on_sheet(job_.pings);
   Parallel one_{1};
-  KnownScene known_;
+  ShapeCache shapes_;
+  KnownScene known_{.shapes = &shapes_};
   std::string engine_key_;
-  std::unique_ptr<PingEngine> engine_;
+  std::unique_ptr<ChangingEngine> engine_;
 };
 
 }  // namespace sonar::dataset

@@ -11,8 +11,11 @@
 
 #include "core/base/parallel.hpp"
 #include "core/pipeline/simd/kernels.hpp"
-#include "core/text/format.hpp"
+#include "daemon/commands/dataset/coco.hpp"
+#include "daemon/commands/dataset/contact_sheet.hpp"
+#include "daemon/commands/dataset/dataset_card.hpp"
 #include "daemon/commands/dataset/labelled_ping.hpp"
+#include "daemon/commands/dataset/parts.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 #include "daemon/commands/render/sidecar.hpp"
 #include "daemon/commands/render/sonar_version.hpp"
@@ -27,13 +30,9 @@ constexpr std::uint64_t pings_a_thread = 4;  // of a batch: they wait in memory 
 
 constexpr std::array<std::string_view, 5> own_names{"job.json", "README.md", "manifest.json", "coco.json", "contact.png"};
 
-std::string ping_key(std::uint64_t number) { return text::format("%010llu", static_cast<unsigned long long>(number)); }
-path part_file(const path& out, std::uint64_t shard) { return out / path(shard_name(shard)).replace_extension(".json"); }
-
-json read_json(const path& file) {
-  std::ifstream in(file);
-  return json::parse(in, nullptr, false);
-}
+/// Pings of a shard that is not complete, and what is noted of them.
+path aside_file(const path& out, std::uint64_t shard) { return out / path(shard_name(shard)).replace_extension(".aside"); }
+path aside_note(const path& out, std::uint64_t shard) { return aside_file(out, shard).string() + ".json"; }
 
 class Folder final : public DatasetFolder {
  public:
@@ -52,7 +51,10 @@ class Folder final : public DatasetFolder {
         missing.push_back(shard), progress_.all_pings += end_of(shard) - first_of(shard);
     }
     for (const std::uint64_t shard : missing)
-      if (const auto r = make(shard); !r) return tl::make_unexpected(r.error());
+      if (const auto r = make(shard); progress_.stopped)
+        return progress_;
+      else if (!r)
+        return tl::make_unexpected(r.error());
     return conclude();
   }
 
@@ -124,28 +126,21 @@ class Folder final : public DatasetFolder {
 
   Result<void> make(std::uint64_t shard) override {
     differs_ = false;
-    auto tar = ShardWriter::open(o_.out / shard_name(shard));
-    if (!tar) return tl::make_unexpected(tar.error());
     json part{{"images", json::array()}, {"pixels", json::object()}};
+    auto tar = begin(shard, part);
+    if (!tar) return tl::make_unexpected(tar.error());
     const std::uint64_t at_once = pings_a_thread * static_cast<std::uint64_t>(pool_.threads());
-    for (std::uint64_t from = first_of(shard); from < end_of(shard); from += at_once) {
+    for (std::uint64_t from = first_of(shard) + part["images"].size(); from < end_of(shard); from += at_once) {
       const auto count = static_cast<std::size_t>(std::min(at_once, end_of(shard) - from));
-      std::vector<Result<LabelledPing>> made(count, failure(ErrorKind::bug, "not made"));
-      pool_.for_each(count,
-                     [&](std::size_t i, int worker) { made[i] = makers_[static_cast<std::size_t>(worker)]->make(from + i); });
+      std::vector<std::optional<Result<LabelledPing>>> made(count);
+      pool_.for_each(count, [&](std::size_t i, int worker) {
+        if (!is_stopped()) made[i] = makers_[static_cast<std::size_t>(worker)]->make(from + i);
+      });
       for (std::size_t i = 0; i < count; ++i) {
-        if (!made[i]) return tl::make_unexpected(made[i].error());
-        for (const auto& [ending, contents] : made[i]->files)
-          if (const auto done = tar->add(ping_key(from + i) + "." + ending, contents); !done) return done;
-        for (const auto& [name, n] : made[i]->pixels.items())
-          part["pixels"][name] = part["pixels"].value(name, std::uint64_t{0}) + n.get<std::uint64_t>();
-        part["images"].push_back({{"id", from + i},
-                                  {"width", made[i]->width},
-                                  {"height", made[i]->height},
-                                  {"negative", made[i]->negative},
-                                  {"annotations", std::move(made[i]->annotations)}});
+        if (!made[i]) return set_aside(shard, *tar, part);
+        if (!*made[i]) return tl::make_unexpected(made[i]->error());
+        if (const auto done = add(from + i, **made[i], *tar, part); !done) return done;
       }
-      progress_.pings += count;
       on_progress_(progress_);
     }
     // The part first: where the archive has its name, all of the shard is there.
@@ -155,6 +150,9 @@ class Folder final : public DatasetFolder {
       differs_ = done.error().kind == ErrorKind::bad_data;
       return tl::make_unexpected(done.error());
     }
+    std::error_code ec;
+    std::filesystem::remove(aside_note(o_.out, shard), ec);
+    std::filesystem::remove(aside_file(o_.out, shard), ec);
     ++progress_.shards;
     on_progress_(progress_);
     return {};
@@ -162,9 +160,9 @@ class Folder final : public DatasetFolder {
 
   /// When no shard is missing, of this part or another. One shard's labels at a time are in memory.
   Result<DatasetProgress> conclude() override {
-    json shards = json::array(), pixels = json::object(), categories = json::array();
+    json shards = json::array(), pixels = json::object();
     std::uint64_t negatives = 0;
-    std::map<std::string, std::uint64_t> instances;
+    Instances instances;
     std::error_code ec;
     for (std::uint64_t shard = 0; shard < job_.shards(); ++shard) {
       std::ifstream in(o_.out / (shard_name(shard) + ".sha256"));
@@ -175,26 +173,23 @@ class Folder final : public DatasetFolder {
         return progress_;
       }
       shards.push_back({{"name", shard_name(shard)}, {"sha256", digest}, {"pings", end_of(shard) - first_of(shard)}});
-      const auto part = read_part(shard);
+      const auto part = read_part(o_.out, shard);
       if (!part) return tl::make_unexpected(part.error());
       for (const auto& [name, n] : (*part)["pixels"].items())
         pixels[name] = pixels.value(name, std::uint64_t{0}) + n.get<std::uint64_t>();
-      for (const json& image : (*part)["images"]) {
-        negatives += image["negative"].get<bool>() ? 1 : 0;
-        for (const json& a : image["annotations"]) ++instances[a["class"].get<std::string>()];
-      }
+      for (const json& image : (*part)["images"]) negatives += image["negative"].get<bool>() ? 1 : 0;
+      count_instances(*part, instances);
     }
-    std::map<std::string, std::size_t> id_of;
-    for (const auto& [name, n] : instances) {
-      const std::size_t id = id_of.size() + 1;
-      id_of[name] = id;
-      categories.push_back({{"id", id}, {"name", name}});
-    }
-    if (const auto done = write_coco(categories, id_of); !done) return tl::make_unexpected(done.error());
+    const auto name_of = [&](std::uint64_t id) {
+      return shard_name((id - 1) / job_.shard_pings) + "/" + ping_key(id) + ".samples.png";
+    };
+    if (const auto done = write_coco(job_, o_.out, {o_.out / "coco.json", instances, name_of, [](const json&) { return true; }});
+        !done)
+      return tl::make_unexpected(done.error());
     const auto has_contact_sheet = write_contact_sheet();
     if (!has_contact_sheet) return tl::make_unexpected(has_contact_sheet.error());
-    if (const auto done = write_durably(o_.out / "README.md", card(pixels, instances, negatives, *has_contact_sheet)); !done)
-      return tl::make_unexpected(done.error());
+    const std::string card = dataset_card(job_, {pixels, instances, negatives, *has_contact_sheet}, instruction_set_);
+    if (const auto done = write_durably(o_.out / "README.md", card); !done) return tl::make_unexpected(done.error());
     const json manifest{{"name", job_.name},
                         {"about", job_.about},
                         {"license", job_.license},
@@ -235,100 +230,68 @@ class Folder final : public DatasetFolder {
     return o_.parts == 1 && std::find(own_names.begin(), own_names.end(), name) != own_names.end();
   }
 
-  /// Reads the file beside a shard that describes its pings.
-  Result<json> read_part(std::uint64_t shard) const {
-    json part = read_json(part_file(o_.out, shard));
-    if (part.is_object() && part.contains("images") && part.contains("pixels")) return part;
-    return failure(ErrorKind::bad_data,
-                   part_file(o_.out, shard).string() + " cannot be read; remove it, and run the same command again");
+  bool is_stopped() const { return o_.stop != nullptr && *o_.stop; }
+
+  /// The shard's archive; what an interrupted run set aside of it is in it, and in `part`.
+  Result<ShardWriter> begin(std::uint64_t shard, json& part) {
+    auto tar = ShardWriter::open(o_.out / shard_name(shard));
+    if (!tar) return tar;
+    json there = read_json(aside_note(o_.out, shard));
+    if (!there.is_object() || !there.contains("part") || there["part"]["images"].size() > end_of(shard) - first_of(shard))
+      return tar;
+    const auto goes_on = tar->go_on(aside_file(o_.out, shard), there.value("sha256", ""));
+    if (!goes_on) return tl::make_unexpected(goes_on.error());
+    if (!*goes_on) return tar;
+    part = std::move(there["part"]);
+    progress_.all_pings -= std::min<std::uint64_t>(progress_.all_pings, part["images"].size());
+    return tar;
   }
 
-  Result<void> write_coco(const json& categories, const std::map<std::string, std::size_t>& id_of) const {
-    auto coco = DurableFile::open(o_.out / "coco.json");
-    if (!coco) return tl::make_unexpected(coco.error());
-    std::uint64_t annotation = 0;
-    // An array with what `add` makes of each ping's part.
-    const auto write_array = [&](const std::string& begin, const auto& add) -> Result<void> {
-      std::string text = begin;
-      bool is_first = true;
-      for (std::uint64_t shard = 0; shard < job_.shards(); ++shard) {
-        auto part = read_part(shard);
-        if (!part) return tl::make_unexpected(part.error());
-        for (json& image : (*part)["images"])
-          add(image, [&](const json& item) { text += (std::exchange(is_first, false) ? "" : ",") + item.dump(); });
-        if (const auto done = coco->write(std::exchange(text, {})); !done) return done;
-      }
-      return {};
-    };
-    const auto images = write_array("{\"images\":[", [&](const json& image, const auto& put) {
-      const auto id = image["id"].get<std::uint64_t>();
-      const std::uint64_t shard = (id - 1) / job_.shard_pings;
-      put({{"id", id},
-           {"width", image["width"]},
-           {"height", image["height"]},
-           {"file_name", shard_name(shard) + "/" + ping_key(id) + ".samples.png"}});
-    });
-    if (!images) return images;
-    const auto annotations = write_array("],\"annotations\":[", [&](json& image, const auto& put) {
-      for (json& a : image["annotations"]) {
-        const auto category = id_of.find(a["class"].get<std::string>());
-        a["id"] = ++annotation, a["image_id"] = image["id"], a["iscrowd"] = 0;
-        a["category_id"] = category == id_of.end() ? 0 : category->second;
-        a.erase("class");
-        put(a);
-      }
-    });
-    if (!annotations) return annotations;
-    if (const auto done = coco->write("],\"categories\":" + categories.dump() + "}\n"); !done) return done;
-    return coco->commit();
+  Result<void> add(std::uint64_t number, LabelledPing& ping, ShardWriter& tar, json& part) {
+    for (const auto& [ending, contents] : ping.files)
+      if (const auto done = tar.add(ping_key(number) + "." + ending, contents); !done) return done;
+    for (const auto& [name, n] : ping.pixels.items())
+      part["pixels"][name] = part["pixels"].value(name, std::uint64_t{0}) + n.get<std::uint64_t>();
+    part["images"].push_back({{"id", number},
+                              {"width", ping.width},
+                              {"height", ping.height},
+                              {"negative", ping.negative},
+                              {"scene", std::move(ping.scene)},
+                              {"draws", std::move(ping.draws)},
+                              {"annotations", std::move(ping.annotations)}});
+    if (ping.cell) cells_.insert_or_assign(number, *std::move(ping.cell));
+    ++progress_.pings;
+    return {};
+  }
+
+  /// Keeps the pings of a shard that is not complete, when the run is stopped.
+  Result<void> set_aside(std::uint64_t shard, ShardWriter& tar, const json& part) {
+    progress_.stopped = true;
+    progress_.set_aside = part["images"].size();
+    if (progress_.set_aside == 0) return {};
+    const auto digest = tar.set_aside(aside_file(o_.out, shard));
+    if (!digest) return tl::make_unexpected(digest.error());
+    return write_durably(aside_note(o_.out, shard), json{{"sha256", *digest}, {"part", part}}.dump() + "\n");
   }
 
   /// Writes a sheet of the pings that have more than one beam; false if there are none.
   Result<bool> write_contact_sheet() {
-    constexpr int across = 4, width_px = 240, gap_px = 4;
-    const std::uint64_t count = std::min<std::uint64_t>(job_.pings, 12);
-    std::vector<Raster> pictures;
-    for (std::uint64_t i = 0; i < count; ++i) {
-      auto picture = makers_.front()->picture(1 + i * job_.pings / count, width_px);
-      if (!picture) return tl::make_unexpected(picture.error());
-      if (*picture) pictures.push_back(**std::move(picture));
+    std::vector<Raster> cells;
+    for (const std::uint64_t number : pings_on_sheet(job_.pings)) {
+      if (const auto kept = cells_.find(number); kept != cells_.end()) {
+        cells.push_back(kept->second);
+        continue;
+      }
+      auto cell = makers_.front()->cell(number);  // of another run
+      if (!cell) return tl::make_unexpected(cell.error());
+      if (*cell) cells.push_back(**std::move(cell));
     }
-    if (pictures.empty()) return false;
-    int height_px = 1;
-    for (const Raster& p : pictures) height_px = std::max(height_px, p.height);
-    Raster sheet(across * (width_px + gap_px), (static_cast<int>(pictures.size()) + across - 1) / across * (height_px + gap_px));
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
-      const int left = static_cast<int>(i) % across * (width_px + gap_px),
-                top = static_cast<int>(i) / across * (height_px + gap_px);
-      for (int y = 0; y < pictures[i].height; ++y)
-        for (int x = 0; x < pictures[i].width; ++x) sheet.at(left + x, top + y) = pictures[i].at(x, y);
-    }
-    const auto png = encode_png(sheet);
+    if (cells.empty()) return false;
+    const auto png = encode_png(contact_sheet(cells));
     if (!png) return tl::make_unexpected(png.error());
     const std::string_view bytes(reinterpret_cast<const char*>(png->data()), png->size());
     if (const auto done = write_durably(o_.out / "contact.png", bytes); !done) return tl::make_unexpected(done.error());
     return true;
-  }
-
-  std::string card(const json& pixels, const std::map<std::string, std::uint64_t>& instances, std::uint64_t negatives,
-                   bool has_contact_sheet) const {
-    std::string text = "# " + job_.name + "\n\n" + (job_.about.empty() ? "" : job_.about + "\n\n") + "License: " + job_.license +
-                       "\n\n" + std::to_string(job_.pings) + " synthetic pings in " + std::to_string(job_.shards()) +
-                       " shards, " + std::to_string(negatives) + " of them without targets; made by sonard " + render::version +
-                       " (" + instruction_set_ + ") from the job in `manifest.json`, which makes them again, byte for byte.\n\n" +
-                       (has_contact_sheet ? "![some of the pings](contact.png)\n\n" : "") +
-                       "| class | instances seen |\n|---|---|\n";
-    for (const auto& [name, n] : instances) text += "| " + name + " | " + std::to_string(n) + " |\n";
-    text += "\n| samples of | share |\n|---|---|\n";
-    double all = 0;
-    for (const auto& [name, n] : pixels.items()) all += n.get<double>();
-    for (const auto& [name, n] : pixels.items())
-      text += "| " + name + " | " + text::format("%.2f %%", 100 * n.get<double>() / all) + " |\n";
-    return text +
-           "\nEach ping has `samples.png`, `labels.png` (instance of each sample, 16 bits), `share.png` (of the sample's energy, "
-           "255 = all), `caster.png` (instance that casts a shadow there) and `json` (pose, settings, water, truth, instances, "
-           "boxes, draws). Rows by range, beam 0 most to port. The echoes are modelled, not recorded: tests on real data "
-           "decide.\n";
   }
 
   const DatasetJob& job_;
@@ -337,6 +300,7 @@ class Folder final : public DatasetFolder {
   Parallel pool_;
   std::string inputs_, instruction_set_;
   std::vector<std::unique_ptr<PingMaker>> makers_;  // one a thread
+  std::map<std::uint64_t, Raster> cells_;           // of the contact sheet, as far as this run has made them
   DatasetProgress progress_;
   bool differs_ = false;
 };

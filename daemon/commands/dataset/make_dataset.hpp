@@ -1,6 +1,7 @@
 // Makes a data set: its shards, as far as they are missing, and when all are there the manifest, the COCO file and the card.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -19,12 +20,16 @@ struct DatasetOptions {
   std::uint64_t part = 0, parts = 1;   // of the shards: those whose number leaves `part` when divided by `parts`
   int threads = 1;                     // pings side by side
   std::optional<SimdLevel> simd = {};  // instead of the job's
+  // When it becomes true, the pings under way are finished, and the shard's are set aside for the next run.
+  const std::atomic<bool>* stop = nullptr;
 };
 
 struct DatasetProgress {
   std::uint64_t shards = 0, all_shards = 0, kept_shards = 0;  // of this part
   std::uint64_t pings = 0, all_pings = 0;                     // made by this run, to be made by it
   std::uint64_t bytes = 0;                                    // of finished shards
+  std::uint64_t set_aside = 0;                                // of a shard that is not complete, when stopped
+  bool stopped = false;                                       // before all were made
   bool whole = false;                                         // the manifest has been written
   std::optional<std::uint64_t> missing = {};                  // the first shard that another part has not made yet
 };

@@ -5,10 +5,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -54,6 +57,22 @@ std::array<char, tar_block> tar_header(std::string_view name, std::size_t size) 
   put(148, text::format("%06o", sum));
   h[154] = '\0';
   return h;
+}
+
+/// The size that a header has in octal; nothing where it is none.
+std::optional<std::uint64_t> size_in(std::string_view header) {
+  std::uint64_t size = 0;
+  for (const char c : header.substr(124, 11)) {
+    if (c < '0' || c > '7') return std::nullopt;
+    size = 8 * size + static_cast<std::uint64_t>(c - '0');
+  }
+  return size;
+}
+
+/// "0000000001.labels.png", and nothing that leads out of a folder.
+bool is_plain_name(std::string_view name) {
+  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-'; };
+  return !name.empty() && name.front() != '.' && std::ranges::all_of(name, is_plain);
 }
 
 /// Makes a rename last: the folder's own entry.
@@ -159,6 +178,23 @@ Result<void> ShardWriter::add(std::string_view name, std::span<const std::byte> 
   return write(member);
 }
 
+Result<bool> ShardWriter::go_on(const path& aside, const std::string& digest) {
+  const auto there = digest_of_file(aside);
+  if (!there || *there != digest) return false;
+  const auto in = open_regular(aside);
+  if (!in) return false;
+  std::vector<std::byte> piece(1 << 20);
+  while (const std::size_t n = std::fread(piece.data(), 1, piece.size(), in->get()))
+    if (const auto done = write(std::span(piece).first(n)); !done) return tl::make_unexpected(done.error());
+  if (hash_.hex() == digest) return true;
+  return failure(ErrorKind::io, aside.string() + " changed while it was read; run the same command again");
+}
+
+Result<std::string> ShardWriter::set_aside(const path& aside) {
+  if (const auto done = file_.commit_as(aside); !done) return tl::make_unexpected(done.error());
+  return hash_.hex();
+}
+
 Result<std::string> ShardWriter::commit() {
   const std::vector<std::byte> end(2 * tar_block);
   if (auto done = write(end); !done) return tl::make_unexpected(done.error());
@@ -177,6 +213,34 @@ Result<std::string> ShardWriter::commit() {
   const auto noted = write_durably(file.string() + ".sha256", digest + "  " + file.filename().string() + "\n");
   if (!noted) return tl::make_unexpected(noted.error());
   return digest;
+}
+
+Result<void> read_archive(const path& file, const ArchiveSink& take) {
+  const auto in = open_regular(file);
+  if (!in) return tl::make_unexpected(in.error());
+  std::error_code ec;
+  std::uint64_t left = std::filesystem::file_size(file, ec);
+  const auto damaged = [&] {
+    return failure(ErrorKind::bad_data, file.string() + " is damaged; remove it, and make the set again");
+  };
+  std::array<char, tar_block> block{};
+  const std::string_view header(block.data(), block.size());
+  std::vector<std::byte> contents;
+  while (left >= tar_block) {
+    if (std::fread(block.data(), 1, tar_block, in->get()) != tar_block) return damaged();
+    left -= tar_block;
+    if (header.front() == '\0') return {};  // the archive's end
+    const std::string name(header.substr(0, std::min<std::size_t>(header.find('\0'), 99)));
+    const auto size = size_in(header);
+    if (!size || !is_plain_name(name) || block != tar_header(name, *size)) return damaged();
+    const std::uint64_t padded = (*size + tar_block - 1) / tar_block * tar_block;
+    if (padded > left) return damaged();
+    contents.resize(padded);
+    if (std::fread(contents.data(), 1, contents.size(), in->get()) != contents.size()) return damaged();
+    left -= padded;
+    if (const auto taken = take(name, std::span(contents).first(*size)); !taken) return taken;
+  }
+  return damaged();
 }
 
 Result<void> write_durably(const path& file, std::string_view text) {

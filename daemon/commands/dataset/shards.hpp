@@ -35,6 +35,8 @@ class DurableFile {
   Result<void> commit();
   /// The same, but a file of that name stays as it is: then false.
   Result<bool> commit_new();
+  /// The same under another name.
+  Result<void> commit_as(std::filesystem::path file) { return file_ = std::move(file), commit(); }
   const std::filesystem::path& file() const { return file_; }
 
  private:
@@ -55,6 +57,11 @@ class ShardWriter {
 
   /// `name` of at most 99 bytes. io: a full disk.
   Result<void> add(std::string_view name, std::span<const std::byte> contents);
+  /// Goes on with an archive that was set aside: its bytes, which have that digest. False, with nothing written, where they have
+  /// another, or are not there.
+  Result<bool> go_on(const std::filesystem::path& aside, const std::string& digest);
+  /// Keeps what has been added under another name. Returns the digest.
+  Result<std::string> set_aside(const std::filesystem::path& aside);
   /// The archive's end and name, then `file`.sha256 as sha256sum reads it. Returns the digest. An archive of that name that has
   /// come meanwhile stays; bad_data: its bytes differ.
   Result<std::string> commit();
@@ -67,6 +74,11 @@ class ShardWriter {
   DurableFile file_;
   Sha256 hash_;
 };
+
+/// Takes the name and the contents of a file of an archive.
+using ArchiveSink = std::function<Result<void>(const std::string&, std::span<const std::byte>)>;
+/// The files of an archive that ShardWriter wrote, in order. bad_data: it is damaged; what the sink returns.
+Result<void> read_archive(const std::filesystem::path& file, const ArchiveSink& take);
 
 /// A small file in one step.
 Result<void> write_durably(const std::filesystem::path& file, std::string_view text);

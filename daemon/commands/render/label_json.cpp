@@ -14,8 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int cartesian_width_px = 1000;  // as render's pictures
-constexpr int beams_a_side = 4;           // of a polygon: along arcs its corners lie no farther apart
+constexpr int beams_a_side = 4;  // of a polygon: along arcs its corners lie no farther apart
 
 bool is_thing(const Scene& scene, std::size_t i) {
   const std::size_t objects = scene.objects.size();

@@ -81,9 +81,11 @@ void read_sonar(const Node& node, RenderJob& job) {
   }
   const int first_mode = profile.vendor ? device_settings(job).mode : 0;
   const int mode = read_mode(ping.map().optional("mode"), *profile.model, first_mode);
-  SonarModel model = *profile.model;
-  read_model(model_node.map(), model.modes[static_cast<std::size_t>(mode)]);
-  profile.model = std::make_shared<const SonarModel>(std::move(model));
+  if (model_node.present()) {  // else it stays the one that tables are kept for
+    SonarModel model = *profile.model;
+    read_model(model_node.map(), model.modes[static_cast<std::size_t>(mode)]);
+    profile.model = std::make_shared<const SonarModel>(std::move(model));
+  }
   job.settings =
       profile.vendor ? device_settings(job) : plain_settings(job.config.water, first_depth_m(job), profile.model->modes.front());
   job.settings.mode = mode;
@@ -98,9 +100,9 @@ void read_sonar(const Node& node, RenderJob& job) {
 /// The scene's keys inline, or the name of a file. What is wrong with the scene is bad data, as where a file of its own holds it.
 /// All else must have been read: errors of the document are taken for the scene's.
 Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::filesystem::path& folder, const std::string& name,
-                                                   const text::Document& document) {
+                                                   const text::Document& document, ShapeCache* known) {
   if (node.is_map()) {
-    std::shared_ptr<const Scene> scene = read_scene(node.map(), folder, name);
+    std::shared_ptr<const Scene> scene = read_scene(node.map(), folder, name, known);
     if (auto error = document.finish()) return failure(ErrorKind::bad_data, std::move(error->text));
     return scene;
   }
@@ -112,7 +114,7 @@ Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::
 }
 
 Result<RenderJob> read_job(const std::string& text, const std::string& name, const std::filesystem::path& folder,
-                           const Values& values) {
+                           const Values& values, ShapeCache* known) {
   const auto document = text::parse_yaml(text, name, {.error_kind = ErrorKind::config});
   if (!document) return tl::make_unexpected(document.error());
   Map root = document->root();
@@ -131,7 +133,7 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   for (const char* key : {"dataset", "vary", "constraints", "counts"}) root.optional(key);  // of a data set's job
   job.expectations = read_expectations(root.optional("expect"));
   if (auto error = document->finish()) return tl::make_unexpected(*error);
-  auto scene = read_scene_of(scene_node, folder, job.name, *document);
+  auto scene = read_scene_of(scene_node, folder, job.name, *document, known);
   if (!scene) return tl::make_unexpected(scene.error());
   job.scene = *std::move(scene);
   return job;
@@ -207,7 +209,8 @@ std::string what_to_do_with_a_scene(const std::filesystem::path& file) {
 
 }  // namespace
 
-Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
+Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder,
+                                      ShapeCache* known) {
   const auto outline = text::parse_yaml(text, name, {.error_kind = ErrorKind::config});
   if (!outline) return tl::make_unexpected(outline.error());
   const auto steps = read_steps(*outline);
@@ -216,7 +219,7 @@ Result<RenderInput> parse_render_file(std::string_view text, const std::string& 
   for (const Values& values : *steps) {
     const auto filled = substitute(text, values, name);
     if (!filled) return tl::make_unexpected(filled.error());
-    auto job = read_job(*filled, name, folder, values);
+    auto job = read_job(*filled, name, folder, values, known);
     if (!job) return tl::make_unexpected(job.error());
     input.jobs.push_back(*std::move(job));
   }

@@ -16,6 +16,9 @@
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/world/world.hpp"
 
+namespace sonar {
+class ShapeCache;
+}
 namespace sonar::render {
 
 struct RenderJob {
@@ -53,8 +56,9 @@ struct RenderInput {
 
 /// A configuration (it has `world:`) or a render file. `sonar`: which of a configuration's several sonars.
 Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar = {});
-/// A render file from text; paths in it are relative to `folder`.
-Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder);
+/// A render file from text; paths in it are relative to `folder`. `known`: shapes of files that were read before.
+Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder,
+                                      ShapeCache* known = nullptr);
 
 /// A sentence when the product cannot be set to the range, which is rendered all the same; else empty.
 std::string note_of_range(const RenderJob& job);

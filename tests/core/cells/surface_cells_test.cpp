@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstring>
 #include <map>
+#include <memory>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "core/base/random.hpp"
 #include "core/scene/cells/cell_lattice.hpp"
@@ -381,6 +384,84 @@ TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
   sides.main_elevation_rad = 0.1f, sides.side_from_rad = 0.1f, sides.side_coarser = 2;
   SurfaceCells beside(scene, Seed{9}, 1u << 30);
   EXPECT_EQ(counted(beside, sides), counted(from_fine, whole_scene(2)));
+}
+
+// Scenes in turns: what is kept of those before is what a new one makes, in the same order, at coarse and fine levels.
+TEST(SurfaceCells, AnotherSceneHasTheCellsOfANewOne) {
+  const auto one = terrain(20, 4.0, gentle), other = terrain(16, 4.0, gentle), ball = sphere(0.5, 12);
+  const auto with = [&](std::vector<std::shared_ptr<const Mesh>> meshes, std::uint32_t texture_seed, float shape) {
+    auto scene = std::make_shared<Scene>();
+    Material material;
+    material.texture = {shape, 0.5f}, material.texture_seed = texture_seed;
+    scene->materials.push_back(material);
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+      Object object;
+      object.mesh = std::move(meshes[i]);
+      object.visible = object.mesh != nullptr;
+      object.in_world.position_m = {0.3 * static_cast<double>(i), 0, 0};
+      if (!object.mesh) object.mesh = std::make_shared<const Mesh>();
+      scene->objects.push_back(object);
+    }
+    return std::shared_ptr<const Scene>(scene);
+  };
+  const std::shared_ptr<const Scene> scenes[] = {with({one, ball}, 1, 0),
+                                                 with({other, ball}, 1, 0),
+                                                 with({one, ball}, 2, 0),
+                                                 with({one, nullptr}, 2, 3),
+                                                 with({ball, one}, 2, 3),
+                                                 with({one, ball, ball}, 1, 3),
+                                                 with({other, nullptr, ball}, 1, 3),
+                                                 with({one, ball}, 1, 0)};
+  for (const std::size_t budget : {std::size_t{1} << 30, std::size_t{1} << 18}) {
+    Parallel pool(2);
+    SurfaceCells changing(scenes[0], Seed{4}, budget);
+    for (int round = 0; round < 2; ++round)
+      for (std::size_t s = 0; s < std::size(scenes); ++s) {
+        changing.change(scenes[s]);
+        SurfaceCells fresh(scenes[s], Seed{4}, budget);
+        for (const int level : {4, 0, 3}) {
+          const CellView view = whole_scene(level);
+          const auto &a = changing.in_view(view, pool), &b = fresh.in_view(view, pool);
+          ASSERT_EQ(a.size(), b.size()) << "scene " << s << " level " << level;
+          for (std::size_t t = 0; t < a.size(); ++t) {
+            ASSERT_EQ(a[t].object, b[t].object);
+            ASSERT_EQ(a[t].tile->bytes(), b[t].tile->bytes());
+            ASSERT_EQ(std::memcmp(a[t].tile->data.get(), b[t].tile->data.get(), a[t].tile->bytes()), 0) << "scene " << s;
+          }
+        }
+      }
+  }
+}
+
+TEST(SurfaceCells, AnotherSceneWithTheSameSurfacesBuildsNoCells) {
+  const auto mesh = terrain(20, 4.0, gentle);
+  SurfaceCells cells(scene_of(mesh), Seed{4}, 1u << 30);
+  Parallel pool(1);
+  const CellView view = whole_scene(4);
+  cells.in_view(view, pool);
+  EXPECT_GT(cells.built_last_time(), 0u);
+  cells.change(scene_of(terrain(16, 4.0, gentle)));
+  cells.in_view(view, pool);
+  EXPECT_GT(cells.built_last_time(), 0u);
+  cells.change(scene_of(mesh));
+  cells.in_view(view, pool);
+  EXPECT_EQ(cells.built_last_time(), 0u);
+}
+
+// Every scene has a surface of its own: none of the many is kept for ever.
+TEST(SurfaceCells, ScenesThatDoNotComeBackAreForgotten) {
+  constexpr std::size_t budget = 1u << 20;
+  SurfaceCells cells(scene_of(terrain(20, 4.0, gentle)), Seed{4}, budget);
+  Parallel pool(1);
+  std::vector<std::weak_ptr<const Mesh>> meshes;
+  for (int i = 0; i < 40; ++i) {
+    const std::shared_ptr<const Mesh> mesh = terrain(20, 4.0 + 0.01 * i, gentle);
+    meshes.push_back(mesh);
+    cells.change(scene_of(mesh));
+    cells.in_view(whole_scene(4), pool);
+    EXPECT_LT(cells.cached_bytes(), 2 * budget);
+  }
+  EXPECT_LT(std::count_if(meshes.begin(), meshes.end(), [](const auto& mesh) { return !mesh.expired(); }), 20);
 }
 
 }  // namespace

@@ -142,6 +142,7 @@ struct RayScene::Impl {
 
 RayScene::RayScene(std::shared_ptr<const Scene> scene, int) : impl_(std::make_unique<Impl>(std::move(scene))) {}
 RayScene::~RayScene() = default;
+void RayScene::change(std::shared_ptr<const Scene> scene) { impl_ = std::make_unique<Impl>(std::move(scene)); }
 const Scene& RayScene::scene() const { return *impl_->scene; }
 Vec3d RayScene::origin() const { return {}; }
 void RayScene::place(std::span<const Pose> bodies_in_world) { impl_->place(bodies_in_world); }

@@ -104,6 +104,26 @@ TEST(RayScene, InvisibleObjectsAreNotThere) {
   compare(*scene, rays, {}, draw, 60, 30, true, 1e-4);
 }
 
+TEST(RayScene, AnotherSceneIsTracedAsANewOne) {
+  Draw draw(14);
+  std::vector<std::shared_ptr<const Scene>> scenes;
+  const auto ground = soup(draw, 900, 5, 1), stone = soup(draw, 60, 3, 1);
+  for (int i = 0; i < 9; ++i) {  // more than take turns at once, with a part in common
+    auto scene = three_soups(draw, {});
+    if (i % 3 != 0) scene->objects[1] = Object{.name = "ground", .mesh = ground, .in_world = {{2, 0, 0}, {}}};
+    scene->objects.push_back(Object{.name = "stone", .mesh = stone, .in_world = {{0, 0.1 * i, 0}, {}}});
+    scene->objects.push_back(Object{.name = "also", .mesh = stone, .in_world = {{4, 1, 0}, {}}, .visible = i % 2 == 0});
+    scene->ray_origin = Vec3d{0.5 * (i % 2), 0, 0};
+    scenes.push_back(scene);
+  }
+  RayScene rays(scenes[0], 1);
+  for (const std::size_t s : {1u, 2u, 1u, 0u, 3u, 4u, 5u, 6u, 7u, 8u, 1u, 0u, 0u}) {
+    rays.change(scenes[s]);
+    EXPECT_EQ(&rays.scene(), scenes[s].get());
+    compare(*scenes[s], rays, {}, draw, 20, 30, true, 1e-4);
+  }
+}
+
 // Two bodies, one of two objects, beside a static one, all of it far from the world's zero.
 class MovingScene : public ::testing::Test {
  protected:
@@ -121,6 +141,15 @@ class MovingScene : public ::testing::Test {
   Vec3d far_{1500, 1200, -30};
   std::shared_ptr<Scene> scene_;
 };
+
+TEST_F(MovingScene, ComesAndGoesWithScenesThatStandStill) {
+  const auto still = three_soups(draw_, far_);
+  RayScene rays(still, 1);
+  rays.change(scene_);
+  compare(*scene_, rays, scene_->bodies_in_world, draw_, 30, 30, true, 2e-4);
+  rays.change(still);
+  compare(*still, rays, {}, draw_, 30, 30, true, 2e-4);
+}
 
 TEST_F(MovingScene, StartsWhereTheSceneFilePutIt) {
   const RayScene rays(scene_, 2);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include "core/scene/files/shape_cache.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/scene_testing.hpp"
 #include "tests/core/scene/temporary_files.hpp"
@@ -93,6 +94,29 @@ TEST(LoadScene, InstancesShareOneMesh) {
   EXPECT_EQ(scene->objects[0].mesh, scene->objects[1].mesh);
   EXPECT_EQ(scene->objects[1].name, "pile[1]");
   EXPECT_NEAR(rpy_from_quat(scene->objects[1].in_world.orientation).yaw_rad, pi / 2, 1e-12);
+}
+
+TEST(ShapeCache, EqualShapesShareAMeshUntilThereAreTooMany) {
+  ShapeCache cache;
+  int made = 0;
+  const auto shape = [&](const std::string& key, std::size_t triangles) {
+    return cache.shape(key, [&] {
+      ++made;
+      auto mesh = std::make_shared<Mesh>();
+      mesh->triangles.resize(triangles);
+      return Shape{std::move(mesh), {}};
+    });
+  };
+  const auto bed = shape("bed", 2 * ShapeCache::most_triangles).mesh;
+  const std::weak_ptr<const Mesh> first = shape("stone 0", 1000).mesh;
+  for (int i = 1; i < 200; ++i) {
+    shape("stone " + std::to_string(i), 1000);
+    EXPECT_EQ(shape("bed", 0).mesh, bed) << "in use all the time";
+  }
+  EXPECT_EQ(made, 201);
+  EXPECT_TRUE(first.expired());
+  EXPECT_FALSE(cache.shape("none", [] { return Shape{}; }).mesh);
+  EXPECT_EQ(shape("none", 3).mesh->triangles.size(), 3u) << "one without a mesh is tried again";
 }
 
 TEST(LoadScene, MovingBodiesKeepTheirOrderAndCarryOthers) {

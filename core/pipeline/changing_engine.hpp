@@ -1,0 +1,21 @@
+// The CPU's engine for those who make pings of many scenes that are alike, such as data sets.
+#pragma once
+
+#include <memory>
+
+#include "core/pipeline/ping_engine.hpp"
+
+namespace sonar {
+
+class ChangingEngine : public PingEngine {
+ public:
+  /// Goes on with another scene, and keeps what does not depend on it, or is as it was: tables of the settings; trees and cells
+  /// of meshes that both scenes have, as the same object, not an equal one. Pings are those of a new engine.
+  virtual void change_scene(const std::shared_ptr<const Scene>& scene) = 0;
+};
+
+/// As make_cpu_engine().
+std::unique_ptr<ChangingEngine> make_changing_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
+                                                     const EngineOptions& options = {});
+
+}  // namespace sonar

@@ -1,0 +1,30 @@
+// Annotations in COCO's form (cocodataset.org, "Data format": object detection), written as they come.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "core/base/result.hpp"
+#include "daemon/commands/dataset/dataset_job.hpp"
+
+namespace sonar::dataset {
+
+/// Things that were seen, by class.
+using Instances = std::map<std::string, std::uint64_t>;
+/// Adds those of a shard's notes (parts.hpp).
+void count_instances(const nlohmann::json& part, Instances& instances);
+
+struct CocoFile {
+  std::filesystem::path file;
+  const Instances& instances;  // of the whole set: its categories have the same numbers in every split
+  std::function<std::string(std::uint64_t ping)> name_of;
+  std::function<bool(const nlohmann::json& image)> is_in;  // images of the parts
+};
+/// From the notes of the set's shards, one in memory at a time; twice through them.
+Result<void> write_coco(const DatasetJob& job, const std::filesystem::path& set, const CocoFile& coco);
+
+}  // namespace sonar::dataset

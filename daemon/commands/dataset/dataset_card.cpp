@@ -1,0 +1,78 @@
+#include "daemon/commands/dataset/dataset_card.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "core/text/format.hpp"
+#include "daemon/commands/render/sonar_version.hpp"
+
+namespace sonar::dataset {
+namespace {
+
+using nlohmann::json;
+
+/// A JSON string is a YAML string in double quotes.
+std::string quoted(const std::string& text) { return json(text).dump(-1, ' ', false, json::error_handler_t::replace); }
+
+/// Identifiers that the hub knows; others are named beside `other`.
+std::string license_lines(const std::string& license) {
+  constexpr std::array<std::string_view, 14> known{
+      "cc0-1.0",    "cc-by-4.0",    "cc-by-sa-4.0", "cc-by-nc-4.0", "cc-by-nd-4.0", "cc-by-nc-sa-4.0", "cc-by-nc-nd-4.0", "mit",
+      "apache-2.0", "bsd-3-clause", "gpl-3.0",      "odbl",         "pddl",         "unlicense"};
+  if (license == "not stated") return "license: unknown\n";
+  std::string small = license;
+  std::ranges::transform(small, small.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (std::ranges::find(known, small) != known.end()) return "license: " + small + "\n";
+  return "license: other\nlicense_name: " + quoted(license) + "\n";
+}
+
+std::string_view size_category(std::uint64_t pings) {
+  if (pings < 1'000) return "n<1K";
+  if (pings < 10'000) return "1K<n<10K";
+  if (pings < 100'000) return "10K<n<100K";
+  if (pings < 1'000'000) return "100K<n<1M";
+  return pings < 10'000'000 ? "1M<n<10M" : "10M<n<100M";
+}
+
+}  // namespace
+
+std::string card_head(const DatasetJob& job, const std::vector<FilesOfSplit>& files, bool is_webdataset) {
+  std::string head = "---\npretty_name: " + quoted(job.name) + "\n" + license_lines(job.license) +
+                     "task_categories:\n- object-detection\n- image-segmentation\nsize_categories:\n- " +
+                     std::string(size_category(job.pings)) + "\ntags:\n- sonar\n- underwater\n- synthetic\n" +
+                     (is_webdataset ? "- webdataset\n" : "");
+  if (!files.empty()) head += "configs:\n- config_name: default\n  data_files:\n";
+  for (const auto& [split, paths] : files) {
+    head += "  - split: " + split + "\n    path:\n";
+    for (const std::string& path : paths) head += "    - " + quoted(path) + "\n";
+  }
+  return head + "---\n";
+}
+
+std::string dataset_card(const DatasetJob& job, const Statistics& s, const std::string& instruction_set) {
+  std::string text = card_head(job, {{"train", {"shard-*.tar"}}}, true) + "# " + job.name + "\n\n" +
+                     (job.about.empty() ? "" : job.about + "\n\n") + "License: " + job.license + "\n\n" +
+                     std::to_string(job.pings) + " synthetic pings in " + std::to_string(job.shards()) + " shards, " +
+                     std::to_string(s.negatives) + " of them without targets; made by sonard " + render::version + " (" +
+                     instruction_set + ") from the job in `manifest.json`, which makes them again, byte for byte.\n\n" +
+                     (s.has_contact_sheet ? "![pings beside their labels: things in a colour of their class, shadows in "
+                                            "blue](contact.png)\n\n"
+                                          : "") +
+                     "| class | instances seen |\n|---|---|\n";
+  for (const auto& [name, n] : s.instances) text += "| " + name + " | " + std::to_string(n) + " |\n";
+  text += "\n| samples of | share |\n|---|---|\n";
+  double all = 0;
+  for (const auto& [name, n] : s.pixels.items()) all += n.get<double>();
+  for (const auto& [name, n] : s.pixels.items())
+    text += "| " + name + " | " + text::format("%.2f %%", 100 * n.get<double>() / all) + " |\n";
+  return text +
+         "\nEach ping has `samples.png`, `labels.png` (instance of each sample, 16 bits), `share.png` (of the sample's energy, "
+         "255 = all), `caster.png` (instance that casts a shadow there) and `json` (pose, settings, water, truth, instances, "
+         "boxes, draws). Rows by range, beam 0 most to port. The echoes are modelled, not recorded: tests on real data "
+         "decide.\n";
+}
+
+}  // namespace sonar::dataset
