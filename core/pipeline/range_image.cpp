@@ -19,28 +19,38 @@ double pattern(double angle_rad, double width_rad) {
   return std::abs(x) > reach ? 0 : std::exp(-4 * std::log(2.0) * x * x);
 }
 
-/// Power by range cell of one beam; sums of even spreads are kept as steps until finish().
+/// Power by range cell of one beam; sums of even spreads are kept as steps until finish(). As heard it has its speckle.
 class Profile {
  public:
-  explicit Profile(double cell_m, std::size_t cells) : cell_(cell_m), steps_(cells + 2, 0.0) {}
+  Profile(double cell_m, std::size_t cells, bool as_heard)
+      : cell_(cell_m), steps_(cells + 2, 0.0), re_(as_heard ? steps_.size() : 0), im_(re_.size()) {}
   void clear() {
-    std::fill(steps_.begin() + first_, steps_.begin() + std::max(first_, std::min(last_ + 2, size())), 0.0);
+    for (std::vector<double>* steps : {&steps_, &re_, &im_})
+      if (!steps->empty())
+        std::fill(steps->begin() + first_, steps->begin() + std::max(first_, std::min(last_ + 2, size())), 0.0);
     first_ = size();
     last_ = 0;
   }
-  void add(const RangeReturn& r, double weight) {
+  void add(const RangeReturns& returns, const RangeReturn& r, double weight) {
     if (r.last + 2 > size()) return;  // beyond the picture
     first_ = std::min<std::ptrdiff_t>(first_, r.first);
     last_ = std::max<std::ptrdiff_t>(last_, r.last);
-    at(r.first) += weight * r.of_first;
-    at(r.first + 1) += weight * (r.of_each - r.of_first);
-    at(r.last) += weight * (r.of_last - r.of_each);
-    at(r.last + 1) -= weight * r.of_last;
+    if (re_.empty()) return add_steps(steps_, r, weight * r.of_first, weight * r.of_each, weight * r.of_last);
+    const double amplitude = std::sqrt(weight), each = amplitude * std::sqrt(r.of_each);
+    for (std::ptrdiff_t k = r.first; k <= r.last; ++k) {
+      const ComplexNormal speckle = returns.speckle_in(r, k);
+      const double a = k > r.first && k < r.last ? each : amplitude * std::sqrt(r.power_in(k));
+      re_[static_cast<std::size_t>(k)] += a * static_cast<double>(speckle.re);
+      im_[static_cast<std::size_t>(k)] += a * static_cast<double>(speckle.im);
+    }
   }
   /// Turns steps into powers.
   void finish() {
     double sum = 0;
-    for (std::ptrdiff_t k = first_; k <= last_; ++k) sum = at(k) = std::max(0.0, sum + at(k));
+    for (std::ptrdiff_t k = first_; k <= last_; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      at(k) = re_.empty() ? sum = std::max(0.0, sum + at(k)) : re_[i] * re_[i] + im_[i] * im_[i];
+    }
   }
   bool empty() const { return first_ > last_; }
   std::ptrdiff_t first() const { return first_; }
@@ -68,10 +78,17 @@ class Profile {
   }
 
  private:
+  static void add_steps(std::vector<double>& steps, const RangeReturn& r, double first, double each, double last) {
+    const auto from = static_cast<std::size_t>(r.first), to = static_cast<std::size_t>(r.last);
+    steps[from] += first;
+    steps[from + 1] += each - first;
+    steps[to] += last - each;
+    steps[to + 1] -= last;
+  }
   std::ptrdiff_t size() const { return static_cast<std::ptrdiff_t>(steps_.size()); }
   double& at(std::ptrdiff_t k) { return steps_[static_cast<std::size_t>(k)]; }
   double cell_;
-  std::vector<double> steps_;
+  std::vector<double> steps_, re_, im_;  // re_, im_: as heard, of the amplitude
   std::ptrdiff_t first_ = 0, last_ = 0;
 };
 
@@ -114,17 +131,23 @@ class RangeImager {
       returns_.trace(pool);
       points_ = returns_.of_points();
     }
-    std::vector<Profile> profiles(static_cast<std::size_t>(pool.threads()), Profile(cell_m_, cells_));
+    std::vector<Reported> reported(pixels);
+    std::vector<Profile> profiles(static_cast<std::size_t>(pool.threads()),
+                                  Profile(cell_m_, cells_, wanted_.chosen_as_heard && !request_.switches.expected_power));
     pool.for_each(rows, [&](std::size_t row, int worker) {
       Profile& profile = profiles[static_cast<std::size_t>(worker)];
       for (int column = 0; column < grid_.columns; ++column) {
         const std::size_t index = row * static_cast<std::size_t>(grid_.columns) + static_cast<std::size_t>(column);
-        const Reported reported = pixel(column, static_cast<int>(row), static_cast<std::uint32_t>(index), profile);
-        const std::uint32_t code = code_of(reported).code();
-        if (!ping.pressure_upa.empty()) ping.pressure_upa[index] = static_cast<float>(std::sqrt(reported.power));
-        for (std::size_t b = 0; b < 4; ++b) ping.samples[4 * index + b] = static_cast<std::byte>(code >> (8 * b) & 0xFF);
+        reported[index] = pixel(column, static_cast<int>(row), static_cast<std::uint32_t>(index), profile);
       }
     });
+    if (wanted_.least_confirming > 0) drop_unconfirmed(reported, pool);
+    for (int pass = 0; pass < wanted_.median_passes; ++pass) take_medians(reported, pool);
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const std::uint32_t code = code_of(reported[i]).code();
+      if (!ping.pressure_upa.empty()) ping.pressure_upa[i] = static_cast<float>(std::sqrt(reported[i].power));
+      for (std::size_t b = 0; b < 4; ++b) ping.samples[4 * i + b] = static_cast<std::byte>(code >> (8 * b) & 0xFF);
+    }
     if (request_.switches.keep_truth) ping.truth = truth();
     return ping;
   }
@@ -133,7 +156,47 @@ class RangeImager {
   /// Value of a pixel before it is quantised; power 0 = no return.
   struct Reported {
     double power = 0, range_m = 0;  // [uPa^2], the device's metres
+    double shown_m = 0;             // the range after the filters
   };
+  /// Calls f(pixel) for those round a pixel that have a return.
+  template <class F>
+  void for_each_round(const std::vector<Reported>& all, int column, int row, F f) const {
+    const int block = wanted_.block_rows > 0 ? wanted_.block_rows : grid_.rows, first = row / block * block;
+    for (int r = std::max(row - 1, first); r <= std::min({row + 1, first + block - 1, grid_.rows - 1}); ++r)
+      for (int c = std::max(column - 1, 0); c <= std::min(column + 1, grid_.columns - 1); ++c) {
+        const Reported& other = all[static_cast<std::size_t>(r * grid_.columns + c)];
+        if ((r != row || c != column) && other.power > 0) f(other);
+      }
+  }
+  /// Renews every pixel that has a return, of what all were before: change(before, column, row, its own).
+  template <class Change>
+  void filter(std::vector<Reported>& all, Parallel& pool, Change change) const {
+    const std::vector<Reported> before = all;
+    pool.for_each(static_cast<std::size_t>(grid_.rows), [&](std::size_t row, int) {
+      for (int c = 0; c < grid_.columns; ++c) {
+        Reported& own = all[row * static_cast<std::size_t>(grid_.columns) + static_cast<std::size_t>(c)];
+        if (own.power > 0) change(before, c, static_cast<int>(row), own);
+      }
+    });
+  }
+  void drop_unconfirmed(std::vector<Reported>& all, Parallel& pool) const {
+    filter(all, pool, [this](const std::vector<Reported>& before, int column, int row, Reported& own) {
+      int confirming = 0;
+      for_each_round(before, column, row,
+                     [&](const Reported& other) { confirming += std::abs(other.shown_m - own.shown_m) <= wanted_.confirming_m; });
+      if (confirming < wanted_.least_confirming) own = {};
+    });
+  }
+  /// Medians; where the number is even, the lower of the two in the middle: what is reported is a range that was measured.
+  void take_medians(std::vector<Reported>& all, Parallel& pool) const {
+    filter(all, pool, [this](const std::vector<Reported>& before, int column, int row, Reported& own) {
+      double ranges[9] = {own.shown_m};
+      std::ptrdiff_t count = 1;
+      for_each_round(before, column, row, [&](const Reported& other) { ranges[count++] = other.shown_m; });
+      std::nth_element(ranges, ranges + (count - 1) / 2, ranges + count);
+      own.shown_m = ranges[(count - 1) / 2];
+    });
+  }
   /// Calls f(return, power weight) for all that a beam receives from ranges of which `wanted` of the return says so.
   template <class Wanted, class F>
   void for_each_return(int column, int row, Wanted wanted, F f) {
@@ -184,7 +247,7 @@ class RangeImager {
     profile.clear();
     for_each_return(
         column, row, [](const RangeReturn&) { return true; },
-        [&](const RangeReturn& r, double weight) { profile.add(r, weight); });
+        [&](const RangeReturn& r, double weight) { profile.add(returns_, r, weight); });
     profile.finish();
     double power = 0, range_m = 0;
     if (!profile.empty()) {
@@ -197,8 +260,9 @@ class RangeImager {
         const auto is_in_cell = [k](const RangeReturn& r) { return r.first <= k && r.last >= k; };
         for_each_return(column, row, is_in_cell, [&](const RangeReturn& r, double weight) {
           const double amplitude = std::sqrt(r.power_in(k) * weight);
-          re += amplitude * static_cast<double>(r.speckle.re);
-          im += amplitude * static_cast<double>(r.speckle.im);
+          const ComplexNormal speckle = wanted_.chosen_as_heard ? returns_.speckle_in(r, k) : r.speckle;
+          re += amplitude * static_cast<double>(speckle.re);
+          im += amplitude * static_cast<double>(speckle.im);
         });
         if (request_.switches.noise) {
           const ComplexNormal noise = complex_normal(bits.v[0], bits.v[1]);
@@ -217,7 +281,8 @@ class RangeImager {
       range_m = settings_.range_m * static_cast<double>(uniform_open(bits.v[3]));
     }
     if (!is_detected(power, range_m) || range_m < settings_.range_start_m || range_m > settings_.range_m) return {};
-    return {power, range_m};
+    if (const double sample_m = wanted_.range_sample_m; sample_m > 0) range_m = sample_m * std::round(range_m / sample_m);
+    return {power, range_m, range_m};
   }
 
   RangePixel code_of(const Reported& r) const {
@@ -226,7 +291,7 @@ class RangeImager {
       return static_cast<std::uint32_t>(std::clamp(value + 0.5, 1.0, static_cast<double>(most)));
     };
     return {held(strength(std::sqrt(r.power), r.range_m), RangePixel::most_strength),
-            held(r.range_m / wanted_.range_unit_m, RangePixel::most_range)};
+            held(r.shown_m / wanted_.range_unit_m, RangePixel::most_range)};
   }
 
   /// The nearest hit of each column's rays.

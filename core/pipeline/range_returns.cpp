@@ -12,6 +12,7 @@ namespace sonar {
 namespace {
 
 constexpr double speckle_cell_m = 0.02;  // surfaces keep their speckle as long as a beam's centre stays within such a cell
+constexpr std::uint32_t draws = 4096;    // that the range cells of all returns share
 constexpr double least_blur = 0.5;       // of a range cell: half the length of the shortest echo
 
 // Rays round the middle of a cell: what the middle ray passes by is heard by the share of the cell that it fills.
@@ -65,6 +66,10 @@ RangeReturns::RangeReturns(const RayScene& scene, const PingRequest& request, do
   device_per_true_ = static_cast<double>(request.settings.device_sound_speed_mps) / true_mps;
   absorption_np_ = nepers_from_db(absorption_db_per_m(request.water, depth_m, hz));
   source_ = power_from_db(static_cast<double>(mode.source_level_db));
+  for (std::uint32_t i = 0; i < draws; ++i) {
+    const Random4 bits = philox(i, 0, 0, key_of(request.seed, Domain::range_speckle));
+    draws_.push_back(complex_normal(bits.v[0], bits.v[1]));
+  }
   for (const Material& material : scene.scene().materials) laws_.push_back(make_law(material, hz, true_mps, false));
   const auto angle = [](double rad) { return Angle{std::cos(rad), std::sin(rad)}; };
   const double scale = bearing_scale_of(request);
@@ -125,7 +130,7 @@ void RangeReturns::trace_middles(int row, std::vector<RangeReturn>& middles) con
       if (p.object[i] != RayPacket::miss) {
         RangeReturn& middle = middles[static_cast<std::size_t>(from + i)];
         middle = met(p, i, {1, 1});
-        middle.speckle = speckle_of(p, i);
+        draw_speckle(p, i, middle);
         middle.rays = 0;  // counted are those round it
       }
   }
@@ -206,7 +211,7 @@ RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) con
 }
 
 /// The speckle of the place that a ray met.
-ComplexNormal RangeReturns::speckle_of(const RayPacket& p, int lane) const {
+void RangeReturns::draw_speckle(const RayPacket& p, int lane, RangeReturn& r) const {
   const auto i = static_cast<std::size_t>(lane);
   const auto cell = [](float origin, float direction, float far) {
     return static_cast<std::uint32_t>(
@@ -215,7 +220,8 @@ ComplexNormal RangeReturns::speckle_of(const RayPacket& p, int lane) const {
   const Random4 bits =
       philox(cell(p.origin_x[i], p.direction_x[i], p.far[i]), cell(p.origin_y[i], p.direction_y[i], p.far[i]),
              cell(p.origin_z[i], p.direction_z[i], p.far[i]) ^ p.object[i] << 16, key_of(request_.seed, Domain::range_speckle));
-  return complex_normal(bits.v[0], bits.v[1]);
+  r.speckle = complex_normal(bits.v[0], bits.v[1]);
+  r.draw = bits.v[2];
 }
 
 /// To the returns of one cell, those from `first` on: rays that met the same object at about the same range are one.
@@ -233,7 +239,7 @@ void RangeReturns::add(const RangeReturn& r, const RayPacket& p, int lane, std::
     return;
   }
   to.push_back(r);
-  to.back().speckle = speckle_of(p, lane);
+  draw_speckle(p, lane, to.back());
 }
 
 template <class F>

@@ -20,6 +20,7 @@ namespace sonar {
 struct RangeReturn {
   double range_m = 0, half_m = 0, power = 0;  // power [uPa^2] in a beam that looks there; 0 = nothing
   ComplexNormal speckle{1, 0};
+  std::uint32_t draw = 0;  // of the speckle of each of its range cells, see RangeReturns::speckle_in()
   std::uint32_t object = BeamTruth::nothing;
   // The same by range cells: from `first` to `last`, the power in the first, in each between, and in the last when it is another.
   std::int32_t first = 0, last = 0;
@@ -55,6 +56,10 @@ class RangeReturns {
   }
   /// Returns of the point targets that are not hidden.
   std::vector<PointReturn> of_points() const;
+  /// Speckle of a return in one of its range cells, where it is to have one of its own in each of them.
+  ComplexNormal speckle_in(const RangeReturn& r, std::ptrdiff_t cell) const {
+    return draws_[(r.draw + static_cast<std::uint32_t>(cell) * 389u) % static_cast<std::uint32_t>(draws_.size())];
+  }
   double device_per_true() const { return device_per_true_; }  // ranges
 
  private:
@@ -81,7 +86,7 @@ class RangeReturns {
   void compare_around(RangeReturn& middle, const RayPacket& p, int first_lane, std::vector<RangeReturn>& to) const;
   void aim(RayPacket& p, int lane, Vec3 direction) const;
   RangeReturn met(const RayPacket& p, int lane, Lattice lattice) const;  // without speckle
-  ComplexNormal speckle_of(const RayPacket& p, int lane) const;
+  void draw_speckle(const RayPacket& p, int lane, RangeReturn& r) const;
   void add(const RangeReturn& r, const RayPacket& p, int lane, std::vector<RangeReturn>& to, std::size_t first) const;
   void look_closer(Parallel& pool);
   std::vector<Cell> thin_cells(std::vector<std::uint8_t>& is_thin) const;  // by object
@@ -106,6 +111,7 @@ class RangeReturns {
   std::vector<LawTable> laws_;
   std::vector<Angle> azimuth_, elevation_;  // of the columns and rows
   std::vector<Row> rows_;
+  std::vector<ComplexNormal> draws_;  // of speckle_in()
 };
 
 }  // namespace sonar

@@ -21,6 +21,13 @@ struct RangeImageSettings : VendorSettings {
   std::uint32_t least_strength = 1;  // weaker returns are none
   double detection = 16;             // returns below so many times the noise power are none
   bool nearest = false;              // of a direction's returns the nearest, not the strongest
+  bool chosen_as_heard = false;      // the strongest by its speckle, which each range cell has of its own
+  double range_sample_m = 0;         // ranges are whole multiples of it, 0 = any
+  // The device's filters, in this order; the pixels round one are the eight beside it, as far as they are of its block of rows.
+  int block_rows = 0;        // rows that are measured together; 0 = all
+  int least_confirming = 0;  // a return that fewer of the pixels round it confirm is none
+  double confirming_m = 0;   // by a range that is no farther from its own
+  int median_passes = 0;     // each range becomes the median of its own and of those round it, so many times over
 };
 
 inline const RangeImageSettings* range_image_of(const PingRequest& request) {

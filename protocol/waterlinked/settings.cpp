@@ -17,6 +17,12 @@ HeldSettings::HeldSettings(const Settings& s) : settings(s) {
   beam_height_rad = rad_from_deg(mode_rows()[s.mode].beam_deg);
   range_unit_m = pixel_scale_m;
   RangeImageSettings::least_strength = waterlinked::least_strength;
+  chosen_as_heard = true;
+  RangeImageSettings::range_sample_m = waterlinked::range_sample_m;
+  RangeImageSettings::block_rows = waterlinked::block_rows;
+  RangeImageSettings::least_confirming = waterlinked::least_confirming;
+  RangeImageSettings::confirming_m = waterlinked::confirming_m;
+  RangeImageSettings::median_passes = waterlinked::median_passes;
 }
 
 bool HeldSettings::equals(const VendorSettings& other) const {

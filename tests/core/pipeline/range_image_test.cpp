@@ -278,9 +278,73 @@ TEST(RangeImage, NoiseAloneHasFewFalseAlarms) {
   EXPECT_NEAR(alarms / 16384.0, 1 - std::pow(1 - std::exp(-8), 777), 0.02);
 }
 
+/// A picture of noise: a quarter of the pixels report ranges that mean nothing.
+RangeImageSounding of_noise() {
+  RangeImageSounding s(SceneMaker().make());
+  s.request().switches.noise = true;
+  s.request().settings.gain_db = 150;
+  s.wanted->detection = 8;
+  return s;
+}
+
+TEST(RangeImage, ReturnsThatNothingConfirmsAreDropped) {
+  RangeImageSounding s = of_noise();
+  const auto count = [&s] {
+    s.ping();
+    int n = 0;
+    for (int i = 0; i < 16384; ++i) n += range_pixel(s.last(), static_cast<std::size_t>(i)).range != 0;
+    return n;
+  };
+  const int all = count();
+  s.wanted->least_confirming = 2, s.wanted->confirming_m = 0.01;
+  EXPECT_GT(all, 2000);
+  EXPECT_LT(count(), all / 100);
+  s.wanted->confirming_m = 15;
+  EXPECT_GT(count(), all / 2);
+}
+
+TEST(RangeImage, MediansEndAtTheEdgesOfBlocks) {
+  RangeImageSounding s = of_noise();
+  s.wanted->detection = 4;
+  s.wanted->median_passes = 2;
+  const auto equal = [&s](int row) {  // to the row above
+    int n = 0;
+    for (int column = 0; column < 256; ++column)
+      n += s.at(column, row).range != 0 && s.at(column, row).range == s.at(column, row + 1).range;
+    return n;
+  };
+  s.ping();
+  EXPECT_GT(equal(15), 40);
+  s.wanted->block_rows = 16;
+  s.ping();
+  for (const int row : {15, 31, 47}) EXPECT_LT(equal(row), 5) << row;
+  for (const int row : {0, 14, 16, 40, 62}) EXPECT_GT(equal(row), 40) << row;
+}
+
+TEST(RangeImage, FiltersAndSpeckleLeaveAPlaneWhereItIs) {
+  RangeImageSounding s(plane_ahead(5));
+  s.request().switches.noise = true;
+  s.wanted->chosen_as_heard = true;
+  s.wanted->range_sample_m = 0.005;
+  s.wanted->block_rows = 16, s.wanted->least_confirming = 2, s.wanted->confirming_m = 0.1, s.wanted->median_passes = 2;
+  s.ping();
+  double squares = 0, n = 0;
+  for (int row = 20; row < 44; ++row)  // farther off the middle a beam hears ranges as far apart as it is wide
+    for (int column = 112; column < 144; ++column)
+      if (s.at(column, row).range != 0) squares += std::pow(s.place(column, row).x - 5, 2), ++n;
+  EXPECT_GT(n, 0.95 * 24 * 32);
+  EXPECT_LT(std::sqrt(squares / n), 0.015);
+  for (int column = 0; column < 256; column += 5)
+    EXPECT_NEAR(std::remainder(s.range_m(column, 31), 0.005), 0, s.wanted->range_unit_m) << column;
+}
+
 TEST(RangeImage, SameBytesOnAnyNumberOfThreadsAndAnotherPingHasOtherNoise) {
   const auto scene = SceneMaker().add(wall(3, 3), -20, {5, 0, 0}).add(sphere(0.5, 4), -15, {3, 1, 0}).make();
   RangeImageSounding one(scene, 1), three(scene, 3);
+  for (RangeImageSounding* s : {&one, &three}) {
+    s->wanted->chosen_as_heard = true;
+    s->wanted->block_rows = 16, s->wanted->least_confirming = 1, s->wanted->confirming_m = 0.1, s->wanted->median_passes = 2;
+  }
   one.request().switches.noise = three.request().switches.noise = true;
   const Ping first = one.ping();
   EXPECT_EQ(first.samples, three.ping().samples);

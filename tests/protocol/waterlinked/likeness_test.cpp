@@ -1,0 +1,162 @@
+// Range images of an emulated Sonar 3D-15 beside those of a real one: traces of the device's filters, which any rough scene
+// shows. The filters were fitted to shots 1 to 3 of the recording; these are judged by shots 4 to 6.
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "core/sonar/range_image.hpp"
+#include "protocol/waterlinked/messages.hpp"
+#include "protocol/waterlinked/rip.hpp"
+#include "tests/core/pipeline/scenes.hpp"
+#include "tests/core/pipeline/sounding.hpp"
+#include "tests/protocol/waterlinked/waterlinked_testing.hpp"
+
+namespace sonar::waterlinked::likeness_test {
+namespace {
+
+/// Ranges of a shot, row by row; 0 = no return.
+struct Image {
+  std::vector<std::uint32_t> range;
+
+  std::uint32_t at(int row, int column) const { return range[static_cast<std::size_t>(row * columns + column)]; }
+  /// Share of equal ranges among neighbours in the same row; in the same column, of rows of one block or of two.
+  double equal_across() const {
+    return share_of_equal(0, 1, [](int) { return true; });
+  }
+  double equal_in_blocks() const {
+    return share_of_equal(1, 0, [](int row) { return row % block_rows != block_rows - 1; });
+  }
+  double equal_between_blocks() const {
+    return share_of_equal(1, 0, [](int row) { return row % block_rows == block_rows - 1; });
+  }
+  /// Share of the ranges with eight others round them that are the median of those nine; for independent ranges once filtered so
+  /// 0.45, twice 0.70.
+  double medians() const {
+    double same = 0, all = 0;
+    for_each_inside([&](int row, int column, const std::vector<std::uint32_t>& round) {
+      if (at(row, column) == 0 || round.size() < 8) return;
+      std::vector<std::uint32_t> nine = round;
+      nine.push_back(at(row, column));
+      std::nth_element(nine.begin(), nine.begin() + 4, nine.end());
+      ++all, same += nine[4] == at(row, column);
+    });
+    return same / all;
+  }
+  /// Share of pixels without a return of those with at least six of eight round them, whose ranges span at least so much and
+  /// less than so much [m].
+  double holes(double least_m, double most_m) const {
+    double none = 0, all = 0;
+    for_each_inside([&](int row, int column, const std::vector<std::uint32_t>& round) {
+      if (round.size() < 6) return;
+      const auto [low, high] = std::minmax_element(round.begin(), round.end());
+      const double span_m = (*high - *low) * pixel_scale_m;
+      if (span_m < least_m || span_m >= most_m) return;
+      ++all, none += at(row, column) == 0;
+    });
+    return none / std::max(all, 1.0);
+  }
+
+ private:
+  template <class Wanted>
+  double share_of_equal(int up, int across, Wanted wanted) const {
+    double same = 0, all = 0;
+    for (int row = 0; row + up < rows; ++row)
+      for (int column = 0; column + across < columns && wanted(row); ++column) {
+        const std::uint32_t a = at(row, column), b = at(row + up, column + across);
+        if (a == 0 || b == 0) continue;
+        ++all, same += a == b;
+      }
+    return same / all;
+  }
+  template <class F>
+  void for_each_inside(F f) const {  // not at the edges of blocks; with the ranges round it
+    for (int row = 0; row < rows; ++row)
+      for (int column = 1; column + 1 < columns && row % block_rows != 0 && row % block_rows != block_rows - 1; ++column) {
+        std::vector<std::uint32_t> round;
+        for (int r = row - 1; r <= row + 1; ++r)
+          for (int c = column - 1; c <= column + 1; ++c)
+            if ((r != row || c != column) && at(r, c) != 0) round.push_back(at(r, c));
+        f(row, column, round);
+      }
+  }
+};
+
+void expect_like_recording(const Image& image) {
+  EXPECT_GT(image.equal_across(), 0.28);  // 0.49 to 0.51; of the slopes 0.33 to 0.36
+  EXPECT_LT(image.equal_across(), 0.55);
+  EXPECT_GT(image.equal_in_blocks(), 0.22);  // 0.49 to 0.50; 0.27 to 0.32
+  EXPECT_LT(image.equal_between_blocks(), 0.1);
+  EXPECT_GT(image.equal_in_blocks() / image.equal_between_blocks(), 4);
+  EXPECT_GT(image.medians(), 0.65);  // 0.69 to 0.70; 0.84 to 0.91, whose ranges are smoother before the filters
+  EXPECT_LT(image.holes(0, 0.004), 0.015);
+  EXPECT_NEAR(image.holes(0.016, 0.064), 0.04, 0.025);
+  EXPECT_NEAR(image.holes(0.064, 15), 0.08, 0.04);
+}
+
+/// A rough slope, 2 to 8 m away.
+Image emulated(double relief_m, bool filtered = true) {
+  const tests::Unit unit;
+  const auto settings = std::make_shared<HeldSettings>(settings_from(unit.device.settings.get(), unit.device));
+  if (!filtered) settings->block_rows = settings->least_confirming = settings->median_passes = 0;
+  PingSettings ping = ping_settings(settings->settings, unit.device);
+  ping.mode = 0;
+  const Mesh slope = test::height_field(-2, 14, -12, 12, 0.05, test::rough_relief(relief_m, 60));
+  test::Sounding sounding(test::SceneMaker().add(slope, -20).make(), unit.device.model->modes[0], ping);
+  sounding.request.vendor_settings = settings;
+  sounding.request.switches.keep_pressure = false;
+  sounding.request.switches.noise = true;
+  Image image;
+  const Ping& shot = sounding.ping_from({0, 0, 3}, {0, 0.7, 0});
+  for (std::size_t i = 0; i < static_cast<std::size_t>(rows * columns); ++i) image.range.push_back(range_pixel(shot, i).range);
+  return image;
+}
+
+std::vector<Image> recorded() {
+  std::vector<Image> images;
+  const char* const folder = std::getenv("SONARD_CAPTURES");
+  if (folder == nullptr) return images;
+  std::ifstream file(std::filesystem::path(folder) / "sonar3d15/ship_short.sonar", std::ios::binary);
+  Bytes bytes;
+  for (std::istreambuf_iterator<char> at(file), end; at != end; ++at) bytes.push_back(static_cast<std::byte>(*at));
+  for (std::size_t at = 0; at + 8 <= bytes.size();) {  // packets back to back
+    std::size_t size = 0;
+    for (std::size_t b = 4; b-- > 0;) size = size << 8 | std::to_integer<std::size_t>(bytes[at + 4 + b]);
+    if (size == 0 || at + size > bytes.size()) return {};
+    const auto content = rip_content(BytesView(bytes).subspan(at, size));
+    at += size;
+    if (!content) return {};
+    if (const Decoded message = decode(*content); message.ranges) images.push_back({message.ranges->pixels});
+  }
+  return images;
+}
+
+TEST(WaterLinkedLikeness, RangesHaveTheTracesOfTheFilters) {
+  for (const double relief_m : {0.1, 0.3}) {
+    SCOPED_TRACE(relief_m);
+    expect_like_recording(emulated(relief_m));
+  }
+}
+
+TEST(WaterLinkedLikeness, UnfilteredTheyHaveNone) {
+  const Image image = emulated(0.1, false);
+  EXPECT_LT(image.equal_across(), 0.26);
+  EXPECT_LT(image.equal_in_blocks() / image.equal_between_blocks(), 2);
+  EXPECT_LT(image.medians(), 0.6);
+  EXPECT_LT(image.holes(0.064, 15), 0.02);
+}
+
+TEST(WaterLinkedLikeness, TheRecordingHasThoseTraces) {
+  const std::vector<Image> images = recorded();
+  if (images.empty()) GTEST_SKIP() << "SONARD_CAPTURES names no folder with sonar3d15/ship_short.sonar";
+  ASSERT_EQ(images.size(), 6u);
+  for (std::size_t shot = 3; shot < 6; ++shot) {
+    SCOPED_TRACE(shot);
+    expect_like_recording(images[shot]);
+  }
+}
+
+}  // namespace
+}  // namespace sonar::waterlinked::likeness_test
