@@ -109,7 +109,7 @@ TEST(Ping1D, AStreamGoesOnUntilItIsStopped) {
   EXPECT_THAT(ids_in(talk.take()), testing::ElementsAre(Id::ack));
   EXPECT_EQ(talk.dialogue->next_ping_request(), std::optional(at_s(0)));
   for (int i = 1; i <= 5; ++i) {
-    talk.obey(talk.dialogue->on_tick(talk.dialogue->next_tick(), false));
+    talk.apply(talk.dialogue->on_tick(talk.dialogue->next_tick(), false));
     EXPECT_EQ(talk.pings, i);
     EXPECT_FALSE(talk.dialogue->next_ping_request()) << "one at a time";
     talk.deliver(0.1 * i);
@@ -125,12 +125,12 @@ TEST(Ping1D, AStreamGoesOnUntilItIsStopped) {
 TEST(Ping1D, APingThatIsLostIsRequestedAgain) {
   Talk talk("ping1d");
   talk.say(setting(Id::ping1d_continuous_start, Id::ping1d_distance));
-  talk.obey(talk.dialogue->on_tick(at_s(0), false));
+  talk.apply(talk.dialogue->on_tick(at_s(0), false));
   const auto late = talk.aim.with;
   EXPECT_EQ(talk.dialogue->next_tick(), at_s(2));
-  talk.obey(talk.dialogue->on_tick(at_s(2), true));
+  talk.apply(talk.dialogue->on_tick(at_s(2), true));
   EXPECT_EQ(talk.pings, 1) << "it waits for its turn";
-  talk.obey(talk.dialogue->on_tick(at_s(4), false));
+  talk.apply(talk.dialogue->on_tick(at_s(4), false));
   EXPECT_EQ(talk.pings, 2);
   EXPECT_FALSE(talk.dialogue->on_ping(late.get(), 0, at_s(4)).prefixes.empty()) << "it is sent when it comes";
 }
