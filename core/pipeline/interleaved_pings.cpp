@@ -22,7 +22,8 @@ void take_beams(const Values& from, std::size_t beams, std::size_t first, std::s
 }  // namespace
 
 int pings_in(const PingRequest& picture) {
-  return picture.model->modes[static_cast<std::size_t>(picture.settings.mode)].interleaved_pings;
+  return picture.switches.interleave ? picture.model->modes[static_cast<std::size_t>(picture.settings.mode)].interleaved_pings
+                                     : 1;
 }
 
 std::vector<PingRequest> pings_of(const PingRequest& picture) {

@@ -58,6 +58,7 @@ struct Switches {
   bool defocus = true;
   bool shared_noise = true;
   bool truncation = true;
+  bool interleave = false;  // costs as many pings as a picture is made of
 
   bool operator==(const Switches&) const = default;
 };
@@ -68,7 +69,7 @@ struct NamedSwitch {
   bool Switches::*is_on;
   const char* meaning;
 };
-inline constexpr std::array<NamedSwitch, 18> named_switches{{
+inline constexpr std::array<NamedSwitch, 19> named_switches{{
     {"noise", &Switches::noise, "receiver noise"},
     {"specular", &Switches::specular, "specular echoes of smooth surfaces"},
     {"texture", &Switches::texture, "patchiness of materials that have a texture"},
@@ -87,6 +88,7 @@ inline constexpr std::array<NamedSwitch, 18> named_switches{{
     {"defocus", &Switches::defocus, "blur of near echoes off broadside"},
     {"shared_noise", &Switches::shared_noise, "noise and leak that receive channels share, near the sonar"},
     {"truncation", &Switches::truncation, "samples cut off to whole codes; off: rounded"},
+    {"interleave", &Switches::interleave, "beams of one picture from successive pings (ARIS); off: from one"},
 }};
 
 /// How the sonar moves while a ping is under way.

@@ -68,7 +68,7 @@ inline PingRequest request_of(std::shared_ptr<const SonarModel> model, std::uint
   r.sonar_moves = {{1.5, 0.3, 0}, {0, 0.02, 0.5}};
   r.settings = default_rows(4.5, 90);
   r.settings.beam_count = 48;
-  r.switches.multipath = r.switches.side_lobes = true;
+  r.switches.multipath = r.switches.side_lobes = r.switches.interleave = true;
   r.switches.keep_pressure = r.switches.keep_beams = r.switches.keep_truth = true;
   return r;
 }

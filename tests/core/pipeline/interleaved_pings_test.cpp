@@ -28,6 +28,7 @@ Sounding over_bed(int interleaved, std::vector<float> channel_gain_db = {}) {
   Sounding s(SceneMaker().add(bed, -27).make(), mode, settings);
   s.request.sonar_in_world = {{0, 0, 2}, quat_from_rpy({0, 0.4, 0})};
   s.request.number = PingNumber{5};
+  s.request.switches.interleave = true;
   s.request.fired_at = Time(std::chrono::seconds(100));
   s.request.switches.keep_beams = s.request.switches.keep_truth = s.request.switches.keep_labels = true;
   return s;

@@ -96,12 +96,12 @@ Levels emulated(bool interleaved = true) {
   settings.acoustics = {1, 6.5f, rows, 4593, 32953, 14, 12, 1, true, Frequency::high, true, 24};
   settings.telephoto = true;
   PingSettings ping = ping_settings(settings, state);
-  FrequencyMode mode = state.model->modes[static_cast<std::size_t>(ping.mode)];
-  if (!interleaved) mode.interleaved_pings = 1;
+  const FrequencyMode mode = state.model->modes[static_cast<std::size_t>(ping.mode)];
   ping.mode = 0;
   const Mesh bed = test::height_field(-1, 30, -8, 8, 1, [](double, double) { return 0.0; });
   test::Sounding sounding(test::SceneMaker().add(bed, -27).make(), mode, ping);
   sounding.request.sonar_moves.velocity_mps = {0.5, 0, 0};
+  sounding.request.switches.interleave = interleaved;
   const Ping& frame = sounding.ping_from({0, 0, 2}, {0, rad_from_deg(9), 0});
   Levels levels;
   for (std::size_t r = 750; r < 1350; ++r) {
