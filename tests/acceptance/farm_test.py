@@ -209,7 +209,7 @@ class Farm(unittest.TestCase):
         outside = self.path / "outside.obj"
         outside.write_text(TETRAHEDRON)
         job.write_text(SMALL.replace("meshes/ball.obj", "../outside.obj"))
-        self.assertIn("../outside.obj is not below the job's folder",
+        self.assertIn("../outside.obj is outside the job's folder",
                       self.farm("submit", job, "--nats", URL, "--out", self.out, code=78))
         self.assertIn("the farm has no jobs", self.status())
         self.server.kill()
