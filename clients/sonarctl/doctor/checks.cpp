@@ -122,8 +122,9 @@ void check_ports(const Facts& facts, std::vector<Finding>& findings) {
                                ""});
   const std::string reserved = ports.reserved.empty() ? exposed : ports.reserved + "," + exposed;
   findings.push_back({Level::warn, "ports",
-                      "ports " + exposed + " lie in the ephemeral range " + range + ": an outgoing connection may take one first",
-                      "reserve: sysctl net.ipv4.ip_local_reserved_ports=" + reserved});
+                      "ports " + exposed + " lie in the ephemeral range " + range +
+                          ": an outgoing connection may occupy one before sonard starts",
+                      "to reserve them: sysctl net.ipv4.ip_local_reserved_ports=" + reserved});
 }
 
 std::string text_from(const std::vector<Finding>& findings, bool colours) {
