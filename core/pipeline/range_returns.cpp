@@ -154,7 +154,8 @@ void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ra
   }
 }
 
-/// Appends what the rays of a cell met: where it is what the middle ray met, as one return with that one's range.
+/// Appends the returns of the rays of a cell. Rays that met the same as the middle ray give one return, with the range of the
+/// middle ray.
 void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int first_lane, std::vector<RangeReturn>& to) const {
   const std::size_t first = to.size();
   const double about_m = 1.25 * middle.spread_m + 2 * cell_m_;  // a patch is not quite even

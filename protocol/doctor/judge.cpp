@@ -282,7 +282,7 @@ void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, st
                         ""});
 }
 
-/// Programs of this computer that connect to a port of sonars at an address that is none of them.
+/// Programs of this computer that connect to a port of sonars at an address where no sonar is.
 void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere, std::vector<Finding>& findings) {
   std::set<std::string> ports, ours;
   std::string where;

@@ -13,7 +13,7 @@ using protocol::Reaction;
 
 constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping is taken as lost
 constexpr std::uint16_t firmware_major = 3, firmware_minor = 29, supply_mv = 5000;
-constexpr double housing_above_water_c = 8;  // chosen
+constexpr double housing_above_water_c = 8;  // assumed
 
 class Ping1DDialogue final : public StreamingConversation<Settings, settings_from> {
  public:

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double sample_unit_s = 25e-9;
 constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn in 2.4 s
-constexpr double db_per_gain = 6;                              // unknown: chosen
+constexpr double db_per_gain = 6;                              // unknown: assumed
 constexpr double fastest_hz = 1000;                            // hosts set the rhythm
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
@@ -34,7 +34,7 @@ SonarModel make_model() {
   mode.centre_hz = 750e3f;
   mode.min_range_m = 0.15f;
   mode.max_range_m = 50;
-  mode.source_level_db = 200;  // unknown: level and gains; chosen so that a wall near by is bright at gain 0
+  mode.source_level_db = 200;  // unknown: level and gains; set so that a wall near by is bright at gain 0
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(2));     // recalled from the data sheet
@@ -171,7 +171,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 }
 
 double head_rad(std::uint16_t angle, const protocol::OptionValues& options) {
-  return -(angle + number_option(options, option_name::mount_grad)) * 2 * pi / grads;  // unknown: to starboard, chosen
+  return -(angle + number_option(options, option_name::mount_grad)) * 2 * pi / grads;  // unknown: assumed to starboard
 }
 
 std::chrono::nanoseconds listening(const Transducer& t) { return nanoseconds_from(t.samples * t.period * sample_unit_s); }

@@ -19,7 +19,7 @@ using protocol::ResourceReply;
 
 constexpr std::string_view base = "/api/v1/integration";
 constexpr std::size_t longest_body = 1024;
-constexpr double slowest_mps = 1000, fastest_mps = 2000;  // unknown: chosen
+constexpr double slowest_mps = 1000, fastest_mps = 2000;  // unknown: assumed
 constexpr double electronics_warmer_c = 9.5;              // unknown: than the water
 
 struct Call {

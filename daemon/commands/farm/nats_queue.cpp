@@ -214,7 +214,7 @@ class NatsQueue final : public Queue {
                                                "; it needs JetStream: nats-server -js -sd FOLDER");
   }
 
-  /// A notice for listeners; the table is what workers and commands read.
+  /// A notice for listeners. Workers and commands read the table.
   void announce(const std::string& subject, const std::string& words) {
     natsConnection_PublishString(connection_.get(), subject.c_str(), words.c_str());
   }

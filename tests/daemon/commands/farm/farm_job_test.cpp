@@ -192,7 +192,7 @@ TEST_F(FarmJobTest, AWorkerRemovesWhatIsNoShardOfTheJob) {
       "sonar: {ping: {range_m: 7, beams: 32, rows: 64}}\n"
       "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10.5], rpy_deg: [0, 10, 0]}}\n");
   EXPECT_EXIT(std::_Exit(work_on_foreign_shards(folder_)), testing::ExitedWithCode(0),
-              "shard 999999999 is none of the 3 of set-");
+              "shard 999999999 is not one of the 3 of set-");
 }
 
 TEST_F(FarmJobTest, TheStatusShowsNoRawBytesOfTheQueue) {
