@@ -251,7 +251,7 @@ void PingStream::read_port(std::size_t port) {
   if (record_.is_open() && port == 0) {
     for (const std::byte b : received) record_.put(static_cast<char>(b));
     if (!record_) {
-      ended_ = Error{ErrorKind::io, "the recording cannot be written any further: is the disk full?"};
+      ended_ = Error{ErrorKind::io, "the recording can no longer be written: check that the disk is not full"};
       return;
     }
   }
@@ -342,7 +342,7 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
     return failure(ErrorKind::usage, "only sonars that send pings unasked are recorded as raw bytes; this is " + about() +
                                          ": sonarctl record keeps the messages of both ends");
   record_.open(file, std::ios::binary | std::ios::trunc);
-  if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
+  if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": check that its folder exists and is writable");
   return {};
 }
 

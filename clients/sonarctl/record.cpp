@@ -114,7 +114,7 @@ class Recorder {
     return {};
   }
 
-  /// By its sender, or by the address in it: a sonar that listens at every address may send from another one.
+  /// Compares the sender, and the address in the status message: a sonar that listens at every address may send from another one.
   bool is_of_device(const Datagram& datagram, std::span<const std::byte> status) const {
     if (ntohl(datagram.ip) == device_ip_) return true;
     const auto announced = stream_.make().announced != nullptr ? stream_.make().announced(status) : std::nullopt;

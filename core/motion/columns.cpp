@@ -15,7 +15,7 @@ constexpr double norm_allowed = 0.01;  // of a quaternion, or of a row of a matr
 constexpr double farthest = 1e8;       // m, m/s, rad/s
 constexpr std::size_t longest_quoted = 40, longest_name = 64;
 
-/// The fault of a line; empty for a valid one.
+/// The error in a line; empty for a valid line.
 using Complaint = std::optional<std::string>;
 
 Complaint not_a_number(std::string_view word, const char* what = "a number") {

@@ -303,7 +303,7 @@ void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere,
     if (line.state == syn_sent)
       texts["A program of this computer tries to connect to " + to + ", and nothing answers there"] = Level::fail;
     if (line.state == established)
-      texts["A program of this computer is connected to " + to + ", which is no sonar of this sonard"] = Level::warn;
+      texts["A program of this computer is connected to " + to + ", which is not a sonar of this sonard"] = Level::warn;
   }
   for (const auto& [text, level] : texts) findings.push_back({level, "address", text, cure});
   if (texts.empty() && elsewhere.refused > 0)

@@ -120,7 +120,7 @@ Settings settings_of(const AutoTransmit& t) {
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
   const Transducer& t = settings.ping;
-  // The device counts time and knows no sound speed: rows are samples in time, placed with the true one.
+  // The device counts time and has no setting for the sound speed. Rows are samples in time, placed with the true sound speed.
   const double speed = true_sound_speed_mps(device.water, device.depth_m);
   PingSettings s;
   s.beam_count = 1;
@@ -193,7 +193,7 @@ std::uint16_t Head::angle_at(Time at) const {
 
 void Head::turn_to(std::uint16_t angle, Time at) {
   from = angle_at(at);
-  // The shorter way. `to` may lie outside of a turn; angle_at() folds it.
+  // Turns the shorter way. `to` may lie outside of one turn; angle_at() folds it.
   const int ahead = ((angle - from) % grads + grads) % grads;
   to = from + (ahead <= grads / 2 ? ahead : ahead - grads);
   since = at;

@@ -27,7 +27,7 @@ std::string beginning(ping::Id first) {
          (first == ping::Id::os_mono_profile ? "os450" : "mbes24016") + R"("}],"is_recording":true})";
 }
 
-/// Milliseconds since power-up, of the messages that tell them.
+/// Milliseconds since power-up, of the messages that have them.
 std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
   const auto of = [&](auto message) -> std::optional<std::uint32_t> {
     wire::Reader reader(frame.payload);

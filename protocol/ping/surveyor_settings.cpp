@@ -106,7 +106,7 @@ PingSettings ping_settings(const Settings& settings) {
   const double shortest_s = 2 * s.range_m / speed + seconds(processing);
   s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
   s.gain_db = static_cast<float>(p.gain < 0 ? 0 : db_per_gain * p.gain);
-  s.tvg = false;  // detection wants noise that is the same at all ranges
+  s.tvg = false;  // detection needs noise that is the same at all ranges
   s.device_sound_speed_mps = p.speed_mps;
   s.format = {.bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -80, .ceiling_db = 80};
   return s;

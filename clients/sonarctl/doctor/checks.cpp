@@ -21,7 +21,7 @@ std::string counted(std::ptrdiff_t count, const std::string& what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
-/// Two sonars that drivers cannot tell apart.
+/// Finds pairs of sonars that drivers cannot distinguish.
 void check_identities(const StatusFacts& status, std::vector<Finding>& findings) {
   for (std::size_t i = 0; i < status.received.size(); ++i) {
     for (std::size_t k = i + 1; k < status.received.size(); ++k) {

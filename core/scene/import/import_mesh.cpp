@@ -91,7 +91,7 @@ std::string better_reason(const MeshFile& request, const std::string& extension,
   return fault ? *fault : reason;
 }
 
-/// Triangles that the file lists, where that is not a matter of what the importer makes of it.
+/// Number of triangles that an STL, PLY or OBJ file lists; for other files the number that was imported.
 std::uint64_t triangles_listed(const MeshFile& request, const std::string& extension, const ImportFiles& files,
                                const aiScene& scene, std::uint64_t imported) {
   if (files.obj_triangles()) return *files.obj_triangles();

@@ -55,8 +55,8 @@ void Faults::add(Fault fault, bool manual, Time now) {
   if (manual) entry.expires = now + longest_manual_fault;
   const FaultRecord::At& at = entry.fault.at;
   const bool waits = at.ping || at.every || at.time_s || at.probability || entry.fault.on;
-  // Faults that last begin now, those of single pings with the next ping (begin_ping). Three kinds act at once even if they are
-  // counted in pings.
+  // Faults with a duration begin now; faults of single pings begin with the next ping (begin_ping). Three kinds act at once even
+  // if they are counted in pings.
   if (!waits && !entry.fault.kind->per_ping()) begin(entry, now);
   if (!waits && (entry.fault.kind->effect == Effect::power_cycle || entry.fault.kind->effect == Effect::forget_settings ||
                  entry.fault.kind->effect == Effect::clock_restart))
@@ -169,7 +169,7 @@ void Faults::begin_effect(Entry& e, Time now) {
       orders_.emplace_back(SetListening{false});
       orders_.emplace_back(EndClients{e.fault.word("how") == "reset"});
       orders_.emplace_back(RestartDevice{});
-      // A gap below 0: the ports open before the first status message. step() does that.
+      // With a gap below 0 the ports open before the first status message; step() opens them.
       if (const double gap = e.fault.number("gap-s"); gap < 0)
         e.step = now + std::max(nanoseconds(0), nanoseconds_from(e.fault.number("boot-s") + gap));
       return;
@@ -224,7 +224,7 @@ void Faults::end_effect(Entry& e) {
       orders_.emplace_back(ServeWaiting{});
       return;
     case Effect::delay_requests:
-      // Requests that were held back take effect now: the last settings that clients asked for hold.
+      // Requests that were held back take effect now. The settings that clients requested last are in force.
       for (auto& [at, request] : e.late) orders_.emplace_back(std::move(request));
       e.late.clear();
       return;

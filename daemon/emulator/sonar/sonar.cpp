@@ -283,7 +283,7 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
 }
 
 void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
-  // Faults note that they meet this ping before it is altered, framed or offered; the calls below ask for these notes.
+  // Faults decide whether they act on this ping before it is altered, framed or offered. The calls below use these decisions.
   faults_.begin_ping(static_cast<std::uint32_t>(outcome.ping->request.number), now);
   const auto reported = faults_.altered(outcome.ping, state_, now);
   const auto bytes = vendor_.frame(*reported, state_);

@@ -1,4 +1,5 @@
-// Time that goes by the stamps of the vehicles' poses (clock: follow): how their clocks become ours, and how far it may pass.
+// Time that follows the time stamps of the vehicles' poses (clock: follow): how their clocks are converted to ours, and how far
+// time may advance.
 #include <algorithm>
 
 #include "daemon/emulator/world/world.hpp"

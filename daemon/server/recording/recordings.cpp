@@ -124,7 +124,7 @@ void Recordings::find_earlier() {
 Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& asked, const RecordedSonar& sonar) {
   if (config_.recording.folder.empty())
     return failure(ErrorKind::usage,
-                   "sonard may not write recordings: the configuration says where, recording: {folder: DIR} (docs/recording.md)");
+                   "sonard may not write recordings: set recording: {folder: DIR} in its configuration (docs/recording.md)");
   const auto kind = RecordingFile::kind_of(asked.file, sonar.vendor);
   if (!kind) return tl::make_unexpected(kind.error());
   if (const std::string why = asked.labels ? why_without_labels(*kind, sonar, config_.engine.switches) : ""; !why.empty())

@@ -22,7 +22,7 @@ bool bind_shared(udp::socket& socket, const udp::endpoint& at) {
   return !ec;
 }
 
-/// On the loopback, which is 127.0.0.0/8 whatever the netmask says, hosts of this machine ask 127.255.255.255.
+/// The loopback network is 127.0.0.0/8 whatever the netmask is. There hosts of this machine broadcast to 127.255.255.255.
 Ipv4 broadcast_of(const SonarConfig& sonar) {
   if (sonar.bind_ip[0] == 127) return {127, 255, 255, 255};
   Ipv4 address{};

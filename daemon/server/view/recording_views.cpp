@@ -155,7 +155,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   bool busy_ = false, behind_ = false, wanted_ = false;
 };
 
-/// A slice: measures, or looks for the ping at this moment and draws it.
+/// One slice of the work: measures the recording, or finds the ping at this moment and draws it.
 void RecordingViews::Seen::go_on(Work& work, RecordingPlayer::Ns at) {
   if (!work.player) return;
   RecordingPlayer& player = *work.player;
