@@ -90,8 +90,9 @@ void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
   for (int k = first; k < last; ++k) {
     std::vector<Gap>& gaps = gaps_[static_cast<std::size_t>(k)];
     const std::int32_t lowest = (k - first) * elevations;
-    // Upwards. An object hides what is beyond it: from where that is last seen, below the lower edge, to where it is seen again,
-    // above the upper edge. Of an object that stands on something, from the object itself.
+    // Goes upwards. An object hides surfaces beyond it. The hidden part is from where such a surface is last seen, below the
+    // lower edge, to where it is seen again, above the upper edge. If the object stands on something, it is from the object
+    // itself.
     behind.clear();
     up.clear();
     for (std::int32_t i = lowest; i >= 0; i = at(i).next)

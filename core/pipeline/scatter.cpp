@@ -139,7 +139,7 @@ void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles) {
   const BubbleLayer bubbles(context.scene().sea_surface);
   tiles.resize(in_view.size());
-  // Tiles a task. Each writes its own place, so the order of the tiles, and of every sum, is that of one thread.
+  // Tiles per task. Each task writes its own places, so the order of the tiles, and of each sum, is the same as with one thread.
   constexpr std::size_t batch = 256;
   context.pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);

@@ -116,7 +116,7 @@ struct RayScene::Impl {
     for (RTCGeometry instance : instances) rtcReleaseGeometry(instance);
   }
 
-  /// Without bodies, before and after.
+  /// Changes the scene; neither the previous nor the new scene has bodies.
   void change(std::shared_ptr<const Scene> to) {
     constexpr std::size_t most_kept = 16, most_kept_triangles = 1'250'000;  // kinds of scenes that take turns
     scene = std::move(to);

@@ -90,7 +90,7 @@ struct Peak {
   double azimuth_rad;
 };
 
-/// Where the echo lies that is loudest in a beam of its row; none beyond the sector.
+/// The azimuth of an echo that is loudest in this beam of its row; nothing if it is beyond the sector.
 std::optional<double> azimuth_of_peak(const Fan& fan, const Levels& level, int row, int beam) {
   const double here = level(row, beam);
   if (beam > 0 && beam + 1 < level.beams) {

@@ -19,7 +19,7 @@ constexpr double nominal_sound_speed_mps = 1490;
 constexpr std::uint32_t most_pulse_us = 80;
 constexpr std::size_t commands = 0, frames = 1;  // ports
 
-/// The settings for a product, or none: it has no such range or mode.
+/// The settings for a product; nothing if it has no such range or mode.
 std::optional<Acoustics> acoustics_for(const SonarModel& model, const protocol::SettingsOverride& wanted) {
   const Product& product = product_of(model);
   Acoustics a = product.initial;
@@ -141,7 +141,7 @@ class ArisHost final : public protocol::Host {
     actions.emplace_back(protocol::HostSend{commands, framed(command)});
   }
 
-  /// Once each: settings that the sonar does not use, frames of which datagrams were lost.
+  /// Notes that are given once each: settings that the sonar does not use, and frames that lost datagrams.
   void warn_of(const DecodedFrame& frame, HostActions& actions) {
     constexpr int settled = 3;  // the first frames may still have the settings of before
     const FrameHeader& h = frame.header;

@@ -347,7 +347,7 @@ Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
 }
 
 void MavlinkPoses::note_boot_time(std::int64_t ms) {
-  // A clock that goes back further than late packets do is that of a restarted autopilot.
+  // If the clock goes back further than late packets do, the autopilot has restarted.
   if (ms < newest_boot_ms_ - late_ms) clear_histories();
   newest_boot_ms_ = std::max(newest_boot_ms_, ms);
 }

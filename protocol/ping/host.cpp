@@ -56,7 +56,7 @@ Bytes ping360_request(const protocol::SettingsOverride& wanted) {
 
 using Points = std::vector<std::pair<double, double>>;  // azimuth, range
 
-/// As far as they are there; none from the first bad one on.
+/// The points up to the first bad one, or to the end of the message.
 Points points_in(const YzPointData& data, BytesView rest) {
   Points polar;
   wire::Reader reader(rest);

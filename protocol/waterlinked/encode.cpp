@@ -62,7 +62,7 @@ StrengthMessage strength_message(const Ping& ping, const Settings& settings, con
   return m;
 }
 
-/// At whole periods of the device's clock.
+/// Samples of the IMU at whole periods of the device's clock.
 ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
   ImuMessage m;
   m.sequence = static_cast<std::uint32_t>(ping.request.number);

@@ -45,8 +45,8 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
   return view;
 }
 
-/// In rounds: batches of tiles become echoes, sorted by column group; then groups sum them, batch by batch. So the order of
-/// every sum is that of the tiles, whichever thread does the work.
+/// Works in rounds. Batches of tiles become echoes, sorted by column group; then groups sum them, batch by batch. So the order of
+/// each sum is the order of the tiles, whichever thread does the work.
 class Rounds {
  public:
   Rounds(MultipathWork& work, const PingPlan& plan, const simd::Kernels& kernels, Parallel& pool)

@@ -17,7 +17,7 @@ void store(Vec3d v, float (&to)[3]) {
   to[0] = static_cast<float>(v.x), to[1] = static_cast<float>(v.y), to[2] = static_cast<float>(v.z);
 }
 
-/// Without the care that the library's product takes of infinities.
+/// The product without the checks for infinities that the library's product makes.
 std::complex<float> times(std::complex<float> a, std::complex<float> b) {
   return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }

@@ -23,7 +23,7 @@ std::string first_line(std::string s) {
   return s.substr(0, std::min<std::size_t>(s.find('\n'), 200));
 }
 
-/// At most, of every mesh of the file.
+/// The largest possible number of triangles of each mesh of the file.
 std::vector<std::uint64_t> triangles_of_meshes(const aiScene& scene) {
   std::vector<std::uint64_t> triangles(scene.mNumMeshes);
   for (unsigned m = 0; m < scene.mNumMeshes; ++m)

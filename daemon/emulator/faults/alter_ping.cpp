@@ -59,7 +59,7 @@ class Levels {
   std::uint32_t full() const { return full_; }
   bool are_of_ranges() const { return of_ranges_ != nullptr; }
 
-  /// Code of a range image's return at a multiple of its range; none beyond `most_m`.
+  /// The code of a return in a range image at a multiple of its range; 0, no return, beyond `most_m`.
   std::uint32_t at_range(std::uint32_t code, double factor, double most_m) const {
     const double range = static_cast<double>(code & most_range) * factor;
     if (range < 1 || range > std::min<double>(most_range, most_m / of_ranges_->range_unit_m)) return 0;

@@ -159,7 +159,7 @@ void Sonar::deliver(Connection& to, Outbox::Message ping, Time now, Actions& act
   }
   if (held.size() >= most_held || held_bytes(to) + ping.size() > most_held_bytes)
     return to.outbox.drop_offered(DropReason::fault);
-  // Pings keep their order: none leaves before the one ahead of it.
+  // Pings keep their order: no ping leaves before the previous one.
   const Time earliest = held.empty() ? now : held.back().until;
   const Time until = hold.kind == Kind::until ? std::max(hold.until, earliest) : hold.kind == Kind::pass ? earliest : Time::max();
   held.push_back({std::move(ping), until, hold.kind == Kind::after_next});

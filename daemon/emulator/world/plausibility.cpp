@@ -47,7 +47,7 @@ struct Doubt {
   const char* cure;
 };
 
-/// The lowest point of all ground above or below that place; none when there is no ground.
+/// The lowest point of all ground above or below that place; nothing when there is no ground.
 std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around) {
   std::optional<double> lowest;
   for (const Extent& ground : around.ground)

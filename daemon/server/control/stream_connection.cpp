@@ -121,7 +121,7 @@ asio::awaitable<void> StreamConnection::read() {
   wake_writer_.cancel();  // it writes the remaining answers, then closes
 }
 
-/// Poses beyond the client's share are skipped, but for the newest: none acts long after it was sent.
+/// Poses beyond the client's share are skipped, except the newest. So no pose acts long after it was sent.
 bool StreamConnection::is_beyond_pose_rate() {
   if (!pose_rate_) pose_rate_ = targets_.pose_rate.join(services_.limits.pose_bytes_per_s);
   return targets_.pose_rate.left(*pose_rate_, Steady::now()) == 0;

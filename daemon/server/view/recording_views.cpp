@@ -271,7 +271,7 @@ std::string RecordingViews::Seen::server_info() const {
   return foxglove::text_of(info);
 }
 
-/// The page's time line is that of a vehicle on a trajectory: here, of the recording.
+/// The page has a time line for a vehicle on a trajectory. Here the trajectory is the recording.
 ViewPayloadPointer RecordingViews::Seen::status() const {
   v1::DaemonStatus status;
   status.set_version(SONARD_VERSION);
