@@ -1,4 +1,4 @@
-// Its messages and files, for recordings.
+// The messages and files of ARIS, for recordings.
 #include <array>
 
 #include "protocol/aris/aris_file.hpp"

@@ -79,8 +79,9 @@ class ArisHost final : public protocol::Host {
  public:
   explicit ArisHost(const protocol::Wanted& wanted) : wanted_(wanted) {}
 
-  /// The device does not say what it is, except in beacons that may not come here. It refuses the settings of other products; the
-  /// order matters to an ARIS 1800, which also takes those of a 1200. Frames begin with the receiver.
+  /// Only beacons name the product, and they may not arrive here. So settings for each product are sent, and the device refuses
+  /// those of other products. The order matters to an ARIS 1800, which also accepts those of a 1200. Frames begin when the
+  /// receiver is set.
   HostActions on_open(std::span<const std::uint16_t> own, Time now) override {
     HostActions actions;
     std::uint32_t cookie = 0;

@@ -46,7 +46,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
   Reaction on_tick(Time now, bool ping_pending) override {
     Reaction reaction;
     settings_ = settings_from(device_.settings.get(), device_);
-    while (!waiting_.empty() && waiting_.front().until <= now) {  // every wait is as long: the oldest ends first
+    while (!waiting_.empty() && waiting_.front().until <= now) {  // all waits have the same length, so the oldest ends first
       reaction.replies.push_back(make_error(waiting_.front().request_id, Code::timeout, "no ping in the time given"));
       waiting_.pop_front();
     }

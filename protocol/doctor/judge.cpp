@@ -245,7 +245,7 @@ class SonarJudge {
   std::vector<Finding>& findings_;
 };
 
-/// In stepped time: finds what the time waits for.
+/// In stepped time: finds the client or request for which time waits.
 void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, std::vector<Finding>& findings) {
   if (now.clock() == "realtime") return findings.push_back({Level::ok, "clock", "Time runs: clock: realtime", ""});
   const v1::ClientStatus* slowest = nullptr;

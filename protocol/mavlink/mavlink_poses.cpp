@@ -72,7 +72,7 @@ void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
   clear_histories();
 }
 
-/// Later messages must not be paired with earlier ones.
+/// Later messages must not be paired with earlier messages.
 void MavlinkPoses::clear_histories() {
   attitudes_.clear();
   local_.clear();
@@ -290,7 +290,7 @@ void MavlinkPoses::join_pairs(Moment at) {
              boot_stamp(pair->place.at_ms), pair->place.enu_in_world, at);
 }
 
-/// A pose of each attitude, with the newest depth: attitudes come more often, and depth changes slowly.
+/// Each attitude gives a pose, with the newest depth, because attitudes come more often and depth changes slowly.
 void MavlinkPoses::add_pose_of_depth(const AttitudeReading& reading, Moment at) {
   if (!depth_ || at.now - depth_->received > system_silence || received_within(LocalPositionNed::id, at.now, source_silence))
     return;
@@ -336,7 +336,9 @@ void MavlinkPoses::add_pose(Source source, const RawPose& raw, Stamp stamp, cons
   at.out.poses.push_back({*std::move(pose), "system " + std::to_string(*system_) + " " + std::string(name_of(source))});
 }
 
-/// UNIX time or time since boot: the sender's own clock either way. None, or one beyond reason: the moment of arrival.
+/// The stamp is UNIX time or time since boot, both of the sender's own clock. Without a stamp, or with an absurd one, it is the
+/// moment
+// of arrival.
 Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
   if (time_us == 0 || time_us > control::largest_stamp_ns / 1000) return {};
   const auto ns = static_cast<std::int64_t>(time_us * 1000);

@@ -1,4 +1,4 @@
-// Its messages and files, for recordings.
+// The messages and files of Oculus, for recordings.
 #include <array>
 
 #include "protocol/oculus/decode.hpp"

@@ -37,7 +37,7 @@ constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;
 constexpr float noise_figure_db = 10, m1200d_high_noise_figure_db = 14.6f;
 
 /// unknown: fitted to the first two captured M1200d pings; of several fits the one that a comparison with all three judged best
-/// was kept (docs/acoustics.md, section 9). Of their mode only.
+/// was kept (docs/acoustics.md, section 9). They are used for the mode of these pings only.
 void fit_to_recording(ReceiverModel& receiver) {
   // Neighbouring rows of the far noise are uncorrelated (0.02).
   receiver.noise_width = 0.71f / 0.9f;
@@ -54,7 +54,7 @@ void fit_to_recording(ReceiverModel& receiver) {
   // mode would be 0.57), with opposite signs in neighbours.
   receiver.shared_noise = {.level_db = 3.4f, .full_m = 0.2f, .steady = 0.6f, .focus_rows = 0.5f, .nearest_focus_m = 0.0085f};
   receiver.leak_is_shared = true;
-  // 255 never occurs; codes 0 to 5 of the noise are as frequent as of floor(255 v^gamma), v below 1.
+  // 255 never occurs. Codes 0 to 5 of the noise are as frequent as those of floor(255 v^gamma), with v below 1.
   receiver.truncates = true;
   receiver.profile.blend = {-0.1f, 0.07f, 0.1f, 0.13f, 0.13f, 0.13f, 0.13f, 0.06f, -0.1f};
   // The medians of rows 0 to 8: it rings, with a null in row 2. By half a row.

@@ -194,7 +194,7 @@ std::vector<Bytes> frames_of(const Ping& ping) {
   profile.distance_mm = static_cast<std::uint32_t>(std::lround(1000 * echo.range_m));
   profile.confidence = static_cast<std::uint16_t>(echo.confidence);
   profile.ping = static_cast<std::uint32_t>(ping.request.number);
-  // How the ping was made, which settings of the same moment may not say.
+  // The settings with which the ping was made, because the present settings may differ.
   profile.start_mm = static_cast<std::uint32_t>(std::lround(1000 * made.range_start_m));
   profile.length_mm = static_cast<std::uint32_t>(std::lround(1000 * (made.range_m - made.range_start_m)));
   profile.transmit_us = static_cast<std::uint16_t>(

@@ -77,7 +77,7 @@ bool HeldSettings::equals(const VendorSettings& other) const {
   const auto* of = dynamic_cast<const HeldSettings*>(&other);
   if (of == nullptr) return false;
   Transducer theirs = of->settings.ping;
-  // The angle does not count: it changes with every ping.
+  // The angle is not compared, because it changes with every ping.
   theirs.angle = settings.ping.angle;
   const auto scan = [](const Settings& s) { return std::tuple(s.scans, s.start, s.stop, s.steps, s.delay_ms); };
   return settings.ping == theirs && scan(settings) == scan(of->settings);
@@ -133,7 +133,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.triggered = true;
   s.gain_db = static_cast<float>(db_per_gain * t.gain);
   s.device_sound_speed_mps = static_cast<float>(speed);
-  // unknown: the law. Chosen: linear in dB over 60 dB.
+  // unknown: the law. Assumed: linear in dB over 60 dB.
   s.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = 0, .ceiling_db = 60};
   return s;
 }

@@ -1,4 +1,4 @@
-// Its messages and files, for recordings.
+// The messages and files of Water Linked sonars, for recordings.
 #include <array>
 
 #include "protocol/recording/raw_dump.hpp"

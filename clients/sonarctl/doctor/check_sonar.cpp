@@ -96,7 +96,7 @@ class SonarChecks {
     }
     if (received == nullptr) {
       if (answers()) check_silence(port);
-      return;  // otherwise the finding of the connection names the fault
+      return;  // otherwise the finding on the connection names the error
     }
     if (!received->complaints.empty())
       return add(Level::fail, "status",

@@ -118,7 +118,7 @@ void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, s
   Image image(ping);
   const Levels levels(ping, image.full());
   const double share = fault.number("share");
-  // The same beams in every ping: draws of the fault, not of the ping.
+  // The beams are the same in every ping, because they are drawn for the fault and not for the ping.
   FaultDraws of_fault = draws;
   of_fault.ping = 0;
   const auto chosen_beam = [&](std::size_t beam) {

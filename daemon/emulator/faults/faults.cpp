@@ -78,7 +78,8 @@ void Faults::forget_old() {
 bool Faults::remove(const std::string& name, Time now) {
   bool found = false;
   for (Entry& e : entries_) {
-    // The parts of a trouble are NAME.1, NAME.2, ...; a fault without a name of its own has its code, and ends by its word, too.
+    // The parts of a trouble are NAME.1, NAME.2, ...; a fault without a name of its own has its code as name, and its word ends
+    // it too.
     const bool by_word = e.fault.name == e.fault.kind->code && e.fault.what == name;
     if (e.over || (e.fault.name != name && !by_word && !e.fault.name.starts_with(name + "."))) continue;
     found = true;
@@ -91,7 +92,7 @@ void Faults::clear(Time now) {
   for (Entry& e : entries_) finish(e, now);
 }
 
-/// The fault acts on no ping any more, not even on one that waits in an outbox.
+/// The fault no longer acts on any ping, not even on one that waits in an outbox.
 void Faults::finish(Entry& e, Time now) {
   end(e, now);
   e.over = true;
@@ -313,14 +314,14 @@ void Faults::begin_ping(std::uint32_t number, Time now) {
   }
 }
 
-/// Faults of status messages count those instead (alter_beacons).
+/// Faults of status messages count status messages instead (alter_beacons).
 void Faults::count_ping(Entry& e, Time now) {
   if (e.fault.span.pings == 0 || e.fault.kind->stage == FaultStage::status || --e.pings_left > 0) return;
   // A power cycle ends by its time.
   if (e.fault.kind->effect != Effect::power_cycle) end(e, now);
 }
 
-/// Pings are remembered by number, because clients are sent a ping long after it was made.
+/// Pings are remembered by number, because a ping may be sent to clients long after it was made.
 bool Faults::met(const Entry& e, std::uint32_t ping) const {
   return std::find(e.hits.begin(), e.hits.end(), ping) != e.hits.end();
 }

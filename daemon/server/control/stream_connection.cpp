@@ -88,7 +88,7 @@ asio::awaitable<void> StreamConnection::read() {
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || over()) break;
     received += n;
-    // Any web page can make a browser send an HTTP request here: it must have no effect, even if it parses as protobuf.
+    // Any web page can make a browser send an HTTP request here. The request must have no effect, even if it parses as protobuf.
     if (http_.speaks_http(std::span(buffer).first(n))) {
       log_refusal(services_, "HTTP request on the control stream, which is protobuf; use control.http for HTTP", sender_.id);
       break;
