@@ -73,8 +73,8 @@ std::vector<DriverAddress> driver_addresses(const Vendor& vendor, Ipv4 ip, std::
 }
 
 std::string line_of(std::string_view protocol, std::string_view at, bool sonar_speaks_first) {
-  return text::format("%-10.*s %-26.*s %s speaks first", static_cast<int>(protocol.size()), protocol.data(),
-                      static_cast<int>(at.size()), at.data(), sonar_speaks_first ? "the sonar" : "the driver");
+  return text::format("%-10.*s %-26.*s %s", static_cast<int>(protocol.size()), protocol.data(), static_cast<int>(at.size()),
+                      at.data(), sonar_speaks_first ? "sends without a request" : "waits for the driver");
 }
 
 Result<SonarPicture> drawing_of(const HostPing& ping) {

@@ -1,4 +1,5 @@
-// A file of its own: a program that adds a make defines makes() in its place (tests/example_make/makes.cpp).
+// This function has a file of its own, because a program that adds a make defines makes() in its place
+// (tests/example_make/makes.cpp).
 #include "protocol/host.hpp"
 
 namespace sonar::protocol {

@@ -155,7 +155,7 @@ Result<Profile> find_profile(std::string_view profile);
 
 /// The addresses of a sonar at `ip`, port by port; `status_to`: where its status messages go.
 std::vector<DriverAddress> driver_addresses(const Vendor& vendor, Ipv4 ip, std::span<const Endpoint> status_to);
-/// "tcp        127.0.0.2:52100            the driver speaks first"
+/// "tcp        127.0.0.2:52100            waits for the driver"
 std::string line_of(std::string_view protocol, std::string_view at, bool sonar_speaks_first);
 
 }  // namespace sonar::protocol

@@ -1,5 +1,5 @@
 // gazebo_bridge: follows models of a Gazebo world and sends their poses to sonard, JSON by UDP.
-// Built where Ignition Transport 11 is (SONAR_GAZEBO); everything but the subscription is in model_poses.hpp.
+// Built with SONAR_GAZEBO where Ignition Transport 11 is installed. model_poses.hpp converts the messages.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>
@@ -28,9 +28,10 @@ struct Following {
   void on_poses(const ignition::msgs::Pose_V& message) {
     const std::vector<std::string> lines = lines_from(message, models);
     for (const std::string& line : lines) {
-      // The error concerns the previous datagram. A restart of sonard must not end the bridge.
+      // An error here says that the previous datagram was refused. A restart of sonard must not end the bridge.
       const bool refused = !write_all(socket, std::as_bytes(std::span(line)));
-      if (refused && !was_refused) std::fprintf(stderr, "gazebo_bridge: no sonard listens there yet\n");
+      if (refused && !was_refused)
+        std::fprintf(stderr, "gazebo_bridge: sonard does not listen at the address of --to; start it, or correct --to\n");
       was_refused = refused;
     }
     sent += lines.size();
@@ -78,12 +79,13 @@ int follow(const Options& options) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("gazebo_bridge: poses of Gazebo's models to sonard");
+  CLI::App app("gazebo_bridge: sends the poses of Gazebo's models to sonard");
   Options options;
-  app.add_option("model", options.models, "MODEL or MODEL=VEHICLE; several for several vehicles")->required();
+  app.add_option("model", options.models, "model to follow, MODEL or MODEL=VEHICLE of sonard; one for each vehicle")->required();
   app.add_option("--world", options.world, "name of the world")->capture_default_str();
-  app.add_option("--topic", options.topic, "of poses; default /world/WORLD/pose/info");
-  app.add_option("--to", options.to, "sonard's poses.json: host or host:port; default 127.0.0.1:14771");
+  app.add_option("--topic", options.topic, "topic of the poses; default /world/WORLD/pose/info");
+  app.add_option("--to", options.to,
+                 "HOST or HOST:PORT where sonard takes poses as JSON (poses.json in its configuration); default 127.0.0.1:14771");
   CLI11_PARSE(app, argc, argv);
   return follow(options);
 }

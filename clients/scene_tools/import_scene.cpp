@@ -99,7 +99,7 @@ Result<void> write_file(const fs::path& path, const std::string& text) {
   std::ofstream out(path, std::ios::binary);
   out << text;
   if (out.flush()) return {};
-  return failure(ErrorKind::io, path.string() + ": cannot be written; is its folder there and writable?");
+  return failure(ErrorKind::io, path.string() + ": cannot be written; check that its folder exists and is writable");
 }
 
 }  // namespace

@@ -140,7 +140,8 @@ Result<void> FileResolver::write_converted() {
     std::ofstream out(path, std::ios::binary);
     out << text;
     if (!out.flush())
-      return failure(ErrorKind::io, path.string() + ": cannot be written; is the folder writable, the disk full?");
+      return failure(ErrorKind::io,
+                     path.string() + ": cannot be written; check that the folder is writable and the disk is not full");
   }
   return {};
 }

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double least_m = 1e-4, most_m = 1e5;  // of a length in a scene
 
-/// One element of geometry: `size` is <size>..</size> in SDF, size=".." in URDF.
+/// Reads one element of geometry. A value is a child element in SDF (<size>..</size>), and an attribute in URDF (size="..").
 class GeometryReader {
  public:
   GeometryReader(const Element& element, Findings& findings) : element_(element), findings_(findings) {}
@@ -31,11 +31,11 @@ class GeometryReader {
   }
   double checked(double v, const char* key) {
     if (v > 0 && v <= most_m) return std::max(v, least_m);
-    if (why_not_.empty()) why_not_ = std::string(key) + " is not above 0 and at most 100 km";
+    if (why_not_.empty()) why_not_ = std::string(key) + " must be greater than 0 and at most 100 km";
     return 1;
   }
   void refuse(std::string why) { why_not_ = std::move(why); }
-  /// The shape; an invalid length is listed instead.
+  /// Returns the shape. If a value was invalid, returns nothing and lists the element as left out.
   std::optional<Shape> finish(const Shape& shape) {
     if (findings_.failed()) return std::nullopt;
     if (why_not_.empty()) return shape;
@@ -66,7 +66,7 @@ Shape read_plane(GeometryReader& in, Pose& offset) {
     else
       in.refuse("its normal has no length");
   }
-  shape.size_m = {100, 100, 0};  // collision planes are infinite
+  shape.size_m = {100, 100, 0};  // the default, because collision planes of SDF are infinite
   if (in.has("size")) {
     const auto size = in.numbers("size", 2);
     shape.size_m = {in.checked(size[0], "size"), in.checked(size[1], "size"), 0};
@@ -135,7 +135,7 @@ std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, 
     if (kind == "mesh") return in.finish(read_mesh(element, in));
     if (kind == "heightmap") return in.finish(read_heightmap(in, offset));
     if (kind != "empty")
-      findings.leave_out(element.place(), std::string("geometry ") + plain(kind) + ": not a shape that a scene has");
+      findings.leave_out(element.place(), std::string("geometry ") + plain(kind) + ": scenes have no such shape");
     return std::nullopt;
   }
   return std::nullopt;
@@ -161,7 +161,7 @@ Result<ImportedWorld> read_world(std::string_view text, const std::filesystem::p
   } else if (root.name() == "robot") {
     world = read_urdf(**file, options, findings);
   } else {
-    std::string what = "the file's element is neither <sdf> nor <robot> (URDF), but ";
+    std::string what = "the root element of the file is neither <sdf> nor <robot> (URDF), but ";
     what += plain(root.name());
     if (root.name() == "gazebo") what += "; convert this old world with: gz sdf -p";
     findings.fail(root.place(), what);

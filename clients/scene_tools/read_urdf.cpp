@@ -72,7 +72,7 @@ class UrdfReader {
     joints_.push_back(joint);
   }
 
-  /// From the root links outwards.
+  /// Places the links, from the root links outwards.
   void hang_links() {
     for (const Joint& joint : joints_)
       for (const std::string& end : {joint.parent, joint.child})

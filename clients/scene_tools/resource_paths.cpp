@@ -21,7 +21,7 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-/// -1: no number, so no version.
+/// The version that names a folder; -1 if its name is not a number.
 int version_of(const fs::path& folder) {
   const std::string name = folder.filename().string();
   const bool digits =
@@ -31,7 +31,7 @@ int version_of(const fs::path& folder) {
 
 constexpr int most_looked_at = 20'000;  // entries of a folder
 
-/// Folders of a model that Gazebo downloaded are called by its versions; the newest first.
+/// Gazebo names the folders of a downloaded model by its versions. Returns them, the newest first.
 std::vector<fs::path> versions_in(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code error;
@@ -51,7 +51,7 @@ std::string lower(std::string_view text) {
   return out;
 }
 
-/// As it is called, or else in other capitals: Gazebo stores what it downloads in small letters.
+/// Looks for the exact name, then ignores case, because Gazebo stores downloads in small letters.
 fs::path child_of(const fs::path& folder, const std::string& name) {
   std::error_code error;
   if (name.empty() || name == "." || name == "..") return {};
@@ -81,7 +81,7 @@ fs::path model_in(const fs::path& folder) {
   return best;
 }
 
-/// The file itself, or the model that a folder holds, or the newest version in it, or only the version that is named (not -1).
+/// The file itself, or the model in a folder, or the newest version in the folder; if a version is given (not -1), only that one.
 fs::path file_at(const fs::path& place, int named = -1) {
   if (!is_folder(place)) return is_file(place) ? place : fs::path();
   if (fs::path model = model_in(place); !model.empty()) return model;
@@ -146,7 +146,7 @@ std::optional<FuelAddress> fuel_address(const fs::path& address) {
   return out;
 }
 
-/// Where Gazebo keeps what it downloaded, both generations.
+/// The folders in which both generations of Gazebo keep downloads.
 std::vector<fs::path> fuel_caches() {
   std::vector<fs::path> caches;
   for (const char* variable : {"GZ_FUEL_CACHE_PATH", "IGN_FUEL_CACHE_PATH"})

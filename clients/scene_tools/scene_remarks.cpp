@@ -9,7 +9,7 @@ namespace sonar::scene_tools {
 namespace {
 
 constexpr double far_m = 1000, tiny_m = 0.005, wide_m = 5;
-constexpr double tiny_ground_m = 1, steepest_ground = 10;  // its width; its height over that
+constexpr double tiny_ground_m = 1, steepest_ground = 10;  // width of the ground; its height over its width
 constexpr std::size_t many_triangles = 2'000'000;
 
 std::string list_of(const std::vector<std::string>& names) {

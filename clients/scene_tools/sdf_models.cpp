@@ -84,7 +84,7 @@ std::unique_ptr<SdfModel> SdfTree::build(const Element& world) {
   return root;
 }
 
-/// Each once, with the command that fetches it.
+/// Reports each missing model once, with the command that fetches it.
 void SdfTree::report_missing() {
   if (missing_.empty()) return;
   std::string list;
@@ -184,8 +184,8 @@ void SdfTree::add_include(SdfModel& parent, const Element& include, int include_
   const std::string shown = plain(uri, 200);
   if (uri.empty()) return findings_.fail(include.place(), "include: has no <uri>");
   if (include_depth >= most_includes_deep)
-    return findings_.fail(include.place(),
-                          std::string("include: ") + shown + " is more than 16 includes deep; does it include itself?");
+    return findings_.fail(include.place(), std::string("include: ") + shown +
+                                               " is more than 16 includes deep; check that it does not include itself");
   const std::string name = model_name(uri);
   const auto leave_out_kind = [&](const std::string& kind) {
     findings_.leave_out_of_no_echo(kind, kind == "light" ? "" : uri.substr(uri.find_last_of('/') + 1));
@@ -270,7 +270,7 @@ Pose model_in_parent(SdfModel& nested, const Place& asked_by, Findings& findings
   return once(frame, asked_by, findings, depth, [&] {
     const SdfPose given = read_sdf_pose(frame.pose, findings);
     const Place at = frame.pose ? frame.pose.place() : frame.element.place();
-    // The pose that an included file gives itself cannot know the frames of who includes it.
+    // A pose that an included file gives to itself cannot refer to frames of the including file.
     const bool foreign = frame.pose.file() != frame.element.file();
     const Pose base = frame_in_model(*nested.parent, foreign ? std::string() : given.relative_to, at, findings, depth + 1);
     const Pose placed = compose(base, given.pose);

@@ -10,7 +10,7 @@
 namespace sonar::scene_tools {
 namespace {
 
-/// At most six decimals, none that say nothing.
+/// Writes at most six decimals, without trailing zeros.
 std::string number(double v) {
   const double rounded = std::round(v * 1e6) / 1e6;
   std::array<char, 64> text{};
@@ -24,7 +24,7 @@ std::string precise(double v) {
 }
 std::string triple(Vec3d v) { return std::string("[") + number(v.x) + ", " + number(v.y) + ", " + number(v.z) + "]"; }
 
-/// As YAML reads it back: bare when that is safe, else in double quotes.
+/// A YAML scalar that parses to this text: without quotes where that is safe, else in double quotes.
 std::string yaml_text(std::string_view text) {
   const auto is_letter = [](char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; };
   const auto is_plain = [&](char c) {
@@ -52,7 +52,7 @@ class SceneWriter {
       links_of_model_.push_back(0);
     }
     for (const auto& [key, count] : shapes_of_link_) ++links_of_model_[key.first];
-    // Names of moving models are what poses are sent to: taken before anything else could take them.
+    // Poses are sent to the names of moving models, so these names are reserved before those of other objects.
     for (auto& [m, carrier] : carriers_) carrier.name = unique(world.models[m].path);
   }
 
@@ -79,13 +79,14 @@ class SceneWriter {
   void head(const std::vector<std::string>& left_out) {
     comment(std::string("From ") + world_.format +
             (options_.command.empty() ? "" : std::string(": ") + plain(options_.command, 400)));
-    comment("z = 0 is the water's surface. Materials are guesses where nothing named them: docs/scenes.md, \"Materials\".");
+    comment("z = 0 is the water's surface. Where the source names no known material, the material is a guess:");
+    comment("docs/scenes.md, \"Materials\".");
     std::string loose;
     for (std::size_t m = 0; m < world_.models.size(); ++m)
       if (!world_.models[m].is_static && !is_part_of_moving(m) && shapes_of_model_[m] > 0 && loose.size() < 300)
         loose += (loose.empty() ? "" : ", ") + plain(world_.models[m].path);
     if (!loose.empty())
-      comment(std::string("Not static where they came from, standing still here (--moving MODEL changes that): ") + loose);
+      comment(std::string("Not static in the source, but fixed in this scene (--moving MODEL makes one move): ") + loose);
     if (left_out.empty()) return;
     comment("Left out:");
     constexpr std::size_t most = 60;
@@ -93,7 +94,7 @@ class SceneWriter {
     if (left_out.size() > most) comment(std::string("  and ") + std::to_string(left_out.size() - most) + " more");
   }
 
-  /// The moving model that model m is, or is inside of; the number of models when none.
+  /// Index of the innermost moving model that is m or contains m; the number of models if there is none.
   std::size_t carrier_of(std::size_t m) const {
     std::size_t best = world_.models.size(), length = 0;
     for (const auto& [c, unused] : carriers_) {
@@ -126,12 +127,12 @@ class SceneWriter {
     return length(in_model.position_m) < 1e-9 && std::abs(std::abs(in_model.orientation.w) - 1) < 1e-12;
   }
 
-  /// A body needs an object to be known by; an invisible one has no echo.
+  /// Poses address a body by the name of an object. This object is invisible, so it has no echo.
   void write_carrier(std::size_t m) {
     out_ += std::string("  - {name: ") + yaml_text(carriers_[m].name) +
             ", type: sphere, radius_m: 0.01, segments: 8, material: plastic, visible: false, "
             "moving: true" +
-            pose_text(moved(world_.models[m].in_world)) + "}  # carries the rest of the model\n";
+            pose_text(moved(world_.models[m].in_world)) + "}  # invisible; the shapes of the model are attached to it\n";
   }
 
   Pose moved(Pose pose) const {
@@ -223,7 +224,7 @@ class SceneWriter {
   const WriteOptions& options_;
   std::string out_;
   std::set<std::string> names_;
-  std::map<std::string, int> last_number_;  // given to a name that was taken
+  std::map<std::string, int> last_number_;  // highest number appended so far to a name that was taken
   std::map<std::size_t, std::size_t> shapes_of_model_;
   std::map<Key, std::size_t> shapes_of_link_;
   std::vector<std::size_t> links_of_model_;
@@ -234,7 +235,7 @@ class SceneWriter {
 
 Vec3d rpy_deg_from(const Quatd& q) {
   RollPitchYaw a = rpy_from_quat(q);
-  if (std::abs(2 * (q.w * q.y - q.z * q.x)) > 1 - 1e-12) {  // roll and yaw turn about the same axis: all of it is called yaw
+  if (std::abs(2 * (q.w * q.y - q.z * q.x)) > 1 - 1e-12) {  // roll and yaw turn about the same axis: roll is 0
     const Vec3d port = rotate(q, Vec3d{0, 1, 0});
     a.roll_rad = 0;
     a.yaw_rad = std::atan2(-port.x, port.y);

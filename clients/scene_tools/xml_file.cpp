@@ -20,7 +20,7 @@ std::string_view trimmed(const char* text) {
   return view.substr(begin, view.find_last_not_of(blanks) - begin + 1);
 }
 
-constexpr int deepest = 100;  // as tinyxml2 before version 10 had it; later ones go to 500
+constexpr int deepest = 100;  // the limit of tinyxml2 before version 10; later versions allow 500
 
 /// The first element that lies deeper than `deepest`; null when none does. `count` elements were seen.
 const tinyxml2::XMLElement* count_elements(const tinyxml2::XMLElement* first, int depth, std::size_t& count) {
@@ -32,7 +32,7 @@ const tinyxml2::XMLElement* count_elements(const tinyxml2::XMLElement* first, in
   return nullptr;
 }
 
-/// Bytes of the UTF-8 character that `text` begins with; 0 when it is none.
+/// Bytes of the UTF-8 character that `text` begins with; 0 if it is not valid.
 std::size_t character_length(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char lead = byte(0);

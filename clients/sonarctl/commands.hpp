@@ -1,5 +1,5 @@
 // The commands of sonarctl, one function each; main.cpp fills the options from the command line. Results go to standard output,
-// errors are returned as one sentence with the class of the exit code.
+// errors are returned as one sentence with the ErrorKind that determines the exit code.
 #pragma once
 
 #include <cstdint>
@@ -27,11 +27,11 @@ struct SourceOptions {
   Wanted wanted;
   double connect_patience_s = 2;
   double silence_limit_s = 10;  // longest time without a byte
-  double return_limit_s = 60;   // longest time without a connection in a run without an end
-  double picture_limit_s = 30;  // longest time for a picture of many pings, from the first on: a Ping360 scans 180 degrees in it
+  double return_limit_s = 60;   // longest wait for a new connection, in a run without a limit of time or pings
+  double picture_limit_s = 30;  // longest wait for a picture of many pings, from the first ping on; a Ping360 scans 180 degrees
   bool observe = false;         // occupy no client slot, request nothing
-  bool keeps_messages = false;  // PingStream::Item::messages
-  std::string control;  // HOST:PORT of sonard's control stream, which reports the address for observers; empty = its default
+  bool keeps_messages = false;  // fill PingStream::Item::messages
+  std::string control;  // HOST:PORT of sonard's control stream, which gives the address for observers; empty = the usual one
   std::filesystem::path token_file;
 };
 
@@ -49,12 +49,12 @@ Result<void> listen(const ListenOptions& options);
 
 struct ViewOptions {
   SourceOptions source;
-  std::filesystem::path png;               // file to write, or
-  bool terminal = false;                   // the picture as text
-  bool live = false;                       // every ping until interrupted, or so many
+  std::filesystem::path png;               // write the picture to this file
+  bool terminal = false;                   // print the picture as text
+  bool live = false;                       // show each ping until interrupted, or until `pings` are shown
   std::uint64_t pings = 0;                 // 0 = no limit
   std::optional<TerminalColours> colours;  // nullopt = what the terminal supports
-  std::optional<std::size_t> ping;         // which of a recording's, from 0; nullopt: the first that is whole
+  std::optional<std::size_t> ping;         // index of the ping in the recording, from 0; nullopt: the first whole picture
   FanStyle style;
 };
 Result<void> view(ViewOptions options);
@@ -87,7 +87,7 @@ struct PoseOptions {
 };
 Result<void> send_poses(const PoseOptions& options);
 
-/// Set by Ctrl-C: commands end as at their time limit.
+/// Set by Ctrl-C. Commands then end as they do when their time limit is reached.
 extern volatile int interrupted;
 
 }  // namespace sonar::clients

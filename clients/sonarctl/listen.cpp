@@ -25,8 +25,8 @@ class Listener {
     use(std::move(opened.stream));
   }
 
-  /// Until the requested time or number of pings; an error when the device stops earlier, and in a run without an end does not
-  /// come back.
+  /// Runs until the requested time or number of pings. An error when the device stops earlier and, in a run without a limit, does
+  /// not come back.
   Result<void> run() {
     for (;;) {
       const Result<void> ran = run_once();

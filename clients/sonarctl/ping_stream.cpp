@@ -82,7 +82,7 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
     if (Result<void> opened = stream.start(std::move(connected), within); !opened) return tl::unexpected(opened.error());
     return stream;
   };
-  // A sonar that does not have the settings is asked without them: its refusal counts only where such a sonar is.
+  // A sonar that does not have the settings is asked without them. Its refusal counts only if such a sonar answers.
   const auto searched = [&](const Candidate& at, milliseconds within) -> Result<PingStream> {
     auto host = at.first->host(wanted);
     if (host) return started(at, std::move(host), std::nullopt, within);
@@ -251,7 +251,7 @@ void PingStream::read_port(std::size_t port) {
   if (record_.is_open() && port == 0) {
     for (const std::byte b : received) record_.put(static_cast<char>(b));
     if (!record_) {
-      ended_ = Error{ErrorKind::io, "the recording cannot be written any further: is the disk full?"};
+      ended_ = Error{ErrorKind::io, "the recording can no longer be written: check that the disk is not full"};
       return;
     }
   }
@@ -263,7 +263,7 @@ void PingStream::read_port(std::size_t port) {
   if (has_more && items_.size() == items) items_.push_back({Wait::data, {}, {}, std::exchange(kept_, {}), {}});
 }
 
-/// Where messages are kept, the host has them one by one: each stands before the ping that it completes.
+/// If messages are kept, the host gets them one by one, so that each comes before the ping that it completes.
 void PingStream::take(std::size_t port, std::span<const std::byte> bytes) {
   const auto give = [&](std::span<const std::byte> message) {
     keep(port, recording::Origin::device, message);
@@ -342,7 +342,7 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
     return failure(ErrorKind::usage, "only sonars that send pings unasked are recorded as raw bytes; this is " + about() +
                                          ": sonarctl record keeps the messages of both ends");
   record_.open(file, std::ios::binary | std::ios::trunc);
-  if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": is the folder there and writable?");
+  if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": check that its folder exists and is writable");
   return {};
 }
 

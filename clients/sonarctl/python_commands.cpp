@@ -1,4 +1,5 @@
-// `sonarctl judge` and `sonarctl lab`, programs of the Python package, and `sonarctl farm`, of sonard: found beside sonarctl.
+// Runs `sonarctl judge` and `sonarctl lab`, programs of the Python package, and `sonarctl farm`, a command of sonard. They are
+// found beside sonarctl.
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <cstdlib>
@@ -12,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The folder of the package: installed share/sonard/python, or clients/python of the source tree around the build folder.
+/// The folder of the package: share/sonard/python if installed, or clients/python of the source tree around the build folder.
 fs::path package_near(const fs::path& program) {
   for (fs::path folder = program.parent_path(); folder.has_relative_path(); folder = folder.parent_path())
     for (const char* place : {"share/sonard/python", "clients/python"})
@@ -59,7 +60,7 @@ Run add(CLI::App& app, const char* name, const char* purpose, const std::string&
 
 }  // namespace
 
-/// The farm makes data sets, as sonard does: it is a command of sonard's.
+/// The farm makes data sets, which sonard does, so it is a command of sonard.
 Run add_farm(CLI::App& app, const std::vector<std::string>& words) {
   app.add_subcommand("farm", "labelled data sets by many machines: submit jobs, see how they stand, collect");
   return [words]() -> Result<void> {

@@ -114,7 +114,7 @@ class Recorder {
     return {};
   }
 
-  /// By its sender, or by the address in it: a sonar that listens at every address may send from another one.
+  /// Compares the sender, and the address in the status message: a sonar that listens at every address may send from another one.
   bool is_of_device(const Datagram& datagram, std::span<const std::byte> status) const {
     if (ntohl(datagram.ip) == device_ip_) return true;
     const auto announced = stream_.make().announced != nullptr ? stream_.make().announced(status) : std::nullopt;
@@ -158,7 +158,7 @@ void report(const RecordFiles& files, double seconds) {
               files.sizes().c_str());
 }
 
-/// The status datagrams of a make that has them; none when that fails, with a note.
+/// Receives the status datagrams of a make that has them. Nothing when that fails, with a note.
 std::optional<Socket> listen_to_status(const RecordOptions& options, const Make& make) {
   const protocol::Port* const beacon = make.device->port(protocol::Port::Kind::udp_beacon);
   if (!options.status || beacon == nullptr || (options.pcap.empty() && options.mcap.empty())) return std::nullopt;
@@ -243,7 +243,7 @@ Result<void> convert(const RecordOptions& options) {
   return {};
 }
 
-/// Also of files that are not there yet.
+/// Whether two names mean the same file, also if the file does not exist yet.
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code ec;
   if (a == b || std::filesystem::equivalent(a, b, ec)) return true;

@@ -74,7 +74,7 @@ Result<void> RecordFiles::write(const recording::RecordedMessage& message) {
 
 Result<void> RecordFiles::write_ping(Time at, const HostPing& ping) {
   ++pings_;
-  // The session makes images of messages that hold samples; a scan would be written whole with each of its lines.
+  // The session makes images of messages with samples. For a scan, each of its lines would write the whole picture.
   if (mcap_ == nullptr || make_->codec.samples != nullptr || make_->scans) return {};
   const Result<PolarImage> image = ping.picture();
   return image ? mcap_->write_image(at, samples_of(*image, ping.facts.bits)) : Result<void>{};  // some pings are no picture

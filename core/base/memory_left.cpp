@@ -11,7 +11,7 @@ namespace {
 
 using std::filesystem::path;
 
-/// The number of a file that holds nothing else; "max" is none.
+/// The number of a file that holds nothing else. The word "max" is no number.
 std::optional<std::uint64_t> number_in(const path& file) {
   std::ifstream in(file);
   std::uint64_t number = 0;

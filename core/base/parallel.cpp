@@ -17,7 +17,7 @@ struct Parallel::Pool {
   std::mutex mutex;
   std::condition_variable start, finished;
   std::vector<std::thread> workers;
-  int free_places = 0, busy = 0;  // of the round: workers that it still has work for, that are at it
+  int free_places = 0, busy = 0;  // in this round: workers that may still join, workers that compute
   bool stop = false;
 
   std::atomic<std::size_t> next{0};

@@ -12,7 +12,7 @@ namespace {
 constexpr Rgb head_colour{79, 184, 255};
 constexpr double waterfall_shape = 0.75;  // height over width
 
-/// Cells [first, last) of `cells` that lie under pixel `at` of `pixels`: at least one.
+/// The cells [first, last) of `cells` under pixel `at` of `pixels`; at least one cell.
 std::pair<std::size_t, std::size_t> cells_under(int at, int pixels, std::size_t cells) {
   const auto first = static_cast<std::size_t>(at) * cells / static_cast<std::size_t>(pixels);
   return {first, std::max(first + 1, static_cast<std::size_t>(at + 1) * cells / static_cast<std::size_t>(pixels))};

@@ -83,7 +83,7 @@ Result<std::vector<std::byte>> encode_png(const Raster& raster) {
   image.width = static_cast<png_uint_32>(raster.width);
   image.height = static_cast<png_uint_32>(raster.height);
   image.format = PNG_FORMAT_RGB;
-  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);  // what it comes to at most
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);  // the largest possible size
   std::vector<std::byte> bytes(size);
   if (png_image_write_to_memory(&image, bytes.data(), &size, 0, rgb.data(), 0, nullptr) == 0)
     return failure(ErrorKind::bug, std::string("the picture could not be encoded: ") + image.message);

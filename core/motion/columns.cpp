@@ -15,7 +15,7 @@ constexpr double norm_allowed = 0.01;  // of a quaternion, or of a row of a matr
 constexpr double farthest = 1e8;       // m, m/s, rad/s
 constexpr std::size_t longest_quoted = 40, longest_name = 64;
 
-/// The fault of a line; empty for a valid one.
+/// The error in a line; empty for a valid line.
 using Complaint = std::optional<std::string>;
 
 Complaint not_a_number(std::string_view word, const char* what = "a number") {
@@ -59,7 +59,7 @@ bool is_rotation(const Rotation& r) {
 
 }  // namespace
 
-// In the order of enum Column. The long names carry the unit, which is the same for the short ones.
+// The names in the order of enum Column. The long names carry the unit, which is the same for the short ones.
 const std::array<std::string_view, Columns::columns> Columns::long_names{
     "t_s",       "t_ns",    "x_m",    "y_m",    "z_m",    "qw",       "qx",       "qy",       "qz",  "roll_deg",
     "pitch_deg", "yaw_deg", "vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps", "body"};
@@ -144,7 +144,7 @@ Complaint Columns::refuse_vector(const Words& words, Column first, const char* w
     if (!value) return not_a_number(text);
     *parts[i] = *value;
   }
-  // Beyond every scene [m]; at 1e8 m a double still resolves 1e-8 m.
+  // The limit is beyond every scene [m]. At 1e8 m a double still resolves 1e-8 m.
   if (largest(out) > farthest) return std::string(what) + " is beyond 1e8";
   return std::nullopt;
 }

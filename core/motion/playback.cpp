@@ -48,7 +48,7 @@ Playback::Place Playback::place(Time clock) const {
 void Playback::begin_anew(Time clock) {
   // Later speeds and pauses count from this place, so that the place itself does not jump.
   const Ns reached = line(clock);
-  place_at_ = reached < Ns{0} ? reached : place(clock).at;  // what it still waits, it waits
+  place_at_ = reached < Ns{0} ? reached : place(clock).at;  // a remaining wait stays as it is
   clock_at_ = clock;
 }
 

@@ -36,14 +36,14 @@ Moment Trajectory::at(Ns time) const {
   if (time < times.front()) return {points_.poses.front(), {}};
   if (time > times.back() || times.size() == 1) return {points_.poses.back(), {}};
   if (time == times.back()) return {points_.poses.back(), between(times.size() - 1, 1)};
-  // The first point later than `time`: the interval is that before it.
+  // The first point later than `time`. The interval ends at this point.
   const auto after = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), time) - times.begin());
   const Pose &a = points_.poses[after - 1], &b = points_.poses[after];
   // Share of the interval, in [0, 1); differences of whole nanoseconds are exact.
   const double u =
       static_cast<double>((time - times[after - 1]).count()) / static_cast<double>((times[after] - times[after - 1]).count());
   const Motion moves = between(after, u);
-  // At a point its own pose to the last bit.
+  // At a point the pose is exactly that of the point.
   if (u == 0) return {a, moves};
   return {{a.position_m + u * (b.position_m - a.position_m), slerp(a.orientation, b.orientation, u)}, moves};
 }

@@ -12,7 +12,7 @@ namespace {
 
 /// Delay over the record's length; the record begins where the picture does.
 double turns_of(double range_m, const Prepared& p, const PingScalars& s) {
-  // In periods of the record: P25's sum over frequencies (its eq. 4) repeats after T.
+  // The delay in periods of the record, because the sum over frequencies of P25 (its eq. 4) repeats after T.
   return (range_m * s.samples_per_m - p.plan.start_samples) / p.plan.samples;
 }
 

@@ -106,8 +106,8 @@ class ModeRouter final : public PingEngine {
 
   std::unique_ptr<PingEngine> canonical_;
   std::function<std::unique_ptr<ComparisonEngine>()> make_comparison_;
-  std::unique_ptr<ComparisonEngine> comparison_;  // made for its first ping: it needs a scene of rays of its own
-  std::deque<bool> passed_on_;                    // of what was submitted: to the canonical engine
+  std::unique_ptr<ComparisonEngine> comparison_;  // made for its first ping, because it needs a ray scene of its own
+  std::deque<bool> passed_on_;                    // for each submitted ping: whether the canonical engine has it
   std::vector<PingStatistics> each_;              // of the last run
   bool last_was_canonical_ = true;
 };

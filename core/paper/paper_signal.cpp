@@ -66,7 +66,7 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
   double energy = 0;
   for (const double to : azimuth_rad)
     for (const double from : azimuth_rad) {
-      // As coded by the authors: |sin y / y| of the angle between two beams, normalised by the energy of all weights.
+      // The weights as in the authors' code: |sin y / y| of the angle between two beams, normalised by the energy of all weights.
       const double y = pi * 0.884 / spacing_rad * std::sin(to - from);
       v.push_back(std::abs(y) < 1e-12 ? 1.0 : std::abs(std::sin(y) / y));
       energy += v.back() * v.back();

@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-constexpr int weightings = 3;  // of a half: rising, as the later one of its group's; falling; all alike
+constexpr int weightings = 3;  // of a half: rising, as in the later half of a group; falling; constant
 constexpr double most_radians = 3.5, interpolation_error = 4e-6;
 constexpr std::size_t most_beams = 128;  // of a segment
 

@@ -50,8 +50,8 @@ struct HiddenLine {
   }
 };
 
-/// Calls f(from_m, to_m, object) for the parts of a range behind sample `of`: each is in the shadow of the object that is seen in
-/// its direction, the nearest of those that hide it.
+/// Calls f(from_m, to_m, object) for the parts of a range behind sample `of`. Each part is in the shadow of the nearest object
+/// that hides it, which is the one seen in its direction.
 template <class F>
 void for_each_caster(const Upwards& up, std::size_t of, float from_m, float to_m, F f) {
   const HiddenLine line(up, of);
@@ -82,7 +82,7 @@ void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
   const auto end = static_cast<float>(plan.samples);
   struct Behind {
     std::uint32_t object;
-    float from_m;  // where what is beyond it is hidden from; 0: from the object on
+    float from_m;  // range from which it hides what is beyond it; 0: from the object on
     bool goes_on;  // whether there is something beyond it
   };
   std::vector<Behind> behind;
@@ -90,8 +90,9 @@ void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
   for (int k = first; k < last; ++k) {
     std::vector<Gap>& gaps = gaps_[static_cast<std::size_t>(k)];
     const std::int32_t lowest = (k - first) * elevations;
-    // Upwards. An object hides what is beyond it: from where that is last seen, below the lower edge, to where it is seen again,
-    // above the upper edge. Of an object that stands on something, from the object itself.
+    // Goes upwards. An object hides surfaces beyond it. The hidden part is from where such a surface is last seen, below the
+    // lower edge, to where it is seen again, above the upper edge. If the object stands on something, it is from the object
+    // itself.
     behind.clear();
     up.clear();
     for (std::int32_t i = lowest; i >= 0; i = at(i).next)
@@ -131,7 +132,8 @@ void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
   }
 }
 
-/// In the column's gaps, as far as it has no echo above the noise: from another elevation, or the pulse's own length.
+/// Marks dark rows in the column's gaps, where the column has no echo above the noise. An echo may come from another elevation,
+/// or from the length of the pulse.
 void LabelWork::find_dark(int column) {
   const PingPlan& plan = context_->plan;
   const int rows = plan.settings.range_bin_count, per_row = plan.settings.samples_per_row;

@@ -303,7 +303,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.fan = make_fan(mode, settings, p.pulse_width_m, switches.side_lobes);
   lay_out_fixed_fan(p);
   p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
-  // The mean over speckle hides no chance in where cells lie: smaller cells leave a tenth of a decibel of it.
+  // The mean over speckle does not hide the random places of the cells. With smaller cells they cause only a tenth of a decibel.
   const double cell_scale = p.expected_power ? 0.4 : 1.0;
   const double narrowest_rad =
       mode.has_own_widths() ? beam_width_sines(mode).narrowest : static_cast<double>(mode.pattern.azimuth_width_rad);

@@ -58,7 +58,7 @@ PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d
   s.sound_speed_mps = true_sound_speed_mps(request.water, depth);
   s.absorption_np_per_m = nepers_from_db(absorption_db_per_m(request.water, depth, hz));
   s.source_upa = amplitude_from_db(static_cast<double>(plan.mode.source_level_db));
-  // The device turns time into range with the sound speed it believes in.
+  // The device converts time to range with the sound speed of its settings.
   s.samples_per_m = static_cast<double>(plan.settings.device_sound_speed_mps) / s.sound_speed_mps / plan.sample_spacing_m;
   s.sample_offset = plan.sample_offset;
   s.max_range_m = (plan.samples + plan.sample_offset + plan.taps) / s.samples_per_m;

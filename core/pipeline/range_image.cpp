@@ -197,7 +197,7 @@ class RangeImager {
       own.shown_m = ranges[(count - 1) / 2];
     });
   }
-  /// Calls f(return, power weight) for all that a beam receives from ranges of which `wanted` of the return says so.
+  /// Calls f(return, power weight) for each return that a beam receives and for which `wanted` holds.
   template <class Wanted, class F>
   void for_each_return(int column, int row, Wanted wanted, F f) {
     const int first = std::max(column - column_reach_, 0), last = std::min(column + column_reach_, grid_.columns - 1);

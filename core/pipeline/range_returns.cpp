@@ -23,7 +23,7 @@ constexpr int cells_a_packet = RayPacket::size / rays_around;
 // fills is as exact as its rays are close.
 constexpr double thin_share = 0.4;
 constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15;
-constexpr std::size_t most_thin_cells = 512, most_probed_cells = 2048;  // a net over the view: what the few rays meet will do
+constexpr std::size_t most_thin_cells = 512, most_probed_cells = 2048;  // when a net covers the view, the few usual rays must do
 
 /// Where in a cell a ray is, -0.5 to 0.5, along an axis in one of `of` strata: multiples of the golden ratio shift it from line
 /// to line through the grid, so that level and upright edges meet every part of a cell; where the lines begin is random, so that
@@ -131,7 +131,7 @@ void RangeReturns::trace_middles(int row, std::vector<RangeReturn>& middles) con
         RangeReturn& middle = middles[static_cast<std::size_t>(from + i)];
         middle = met(p, i, {1, 1});
         draw_speckle(p, i, middle);
-        middle.rays = 0;  // counted are those round it
+        middle.rays = 0;  // the rays around it are counted
       }
   }
 }
@@ -154,7 +154,8 @@ void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ra
   }
 }
 
-/// Appends what the rays of a cell met: where it is what the middle ray met, as one return with that one's range.
+/// Appends the returns of the rays of a cell. Rays that met the same as the middle ray give one return, with the range of the
+/// middle ray.
 void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int first_lane, std::vector<RangeReturn>& to) const {
   const std::size_t first = to.size();
   const double about_m = 1.25 * middle.spread_m + 2 * cell_m_;  // a patch is not quite even
@@ -224,7 +225,8 @@ void RangeReturns::draw_speckle(const RayPacket& p, int lane, RangeReturn& r) co
   r.draw = bits.v[2];
 }
 
-/// To the returns of one cell, those from `first` on: rays that met the same object at about the same range are one.
+/// Adds a return to those of one cell, which begin at `first`. Rays that met the same object at about the same range give one
+/// return.
 void RangeReturns::add(const RangeReturn& r, const RayPacket& p, int lane, std::vector<RangeReturn>& to,
                        std::size_t first) const {
   if (!(r.power > 0)) return;

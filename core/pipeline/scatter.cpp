@@ -17,7 +17,7 @@ float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 
 /// Which columns the box round a tile's cells can reach: u = y / r (y / h for flat beams) over it, to second order.
 void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotation& sonar_from_object, const PingPlan& plan,
                   PreparedTile& out) {
-  // All columns unless the box is small beside its distance, where u is nearly linear over it.
+  // All columns, unless the box is small compared with its distance; then u is nearly linear over the box.
   out.first_column = 0, out.last_column = plan.columns.count;
   const Vec3d half = to_double(tile.box_half_m), c = centre_from_sonar_m + sonar_from_object * to_double(tile.box_middle_m);
   const double from_axis = plan.switches.conical ? length(c) : std::sqrt(c.x * c.x + c.y * c.y);
@@ -139,7 +139,7 @@ void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles) {
   const BubbleLayer bubbles(context.scene().sea_surface);
   tiles.resize(in_view.size());
-  // Tiles a task. Each writes its own place, so the order of the tiles, and of every sum, is that of one thread.
+  // Tiles per task. Each task writes its own places, so the order of the tiles, and of each sum, is the same as with one thread.
   constexpr std::size_t batch = 256;
   context.pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);

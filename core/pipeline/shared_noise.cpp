@@ -16,8 +16,9 @@ namespace sonar {
 namespace {
 
 constexpr double none_db = -150;
-/// How far beyond the range where the whole array's part leaves the sector the noise is followed, and where it begins to fade:
-/// what groups hear in the outer beams would go on, and is not in the recording at 1.75 m, 3.7 times that range.
+/// The part of the whole array leaves the sector at some range. The noise is followed up to `margin` times that range, and fades
+/// from `fades_from` times on. Without the fade, noise of groups would stay in the outer beams; the recording has none at 1.75 m,
+/// 3.7 times that range.
 constexpr double margin = 3, fades_from = 2;
 
 /// A beam's blocks of samples of a part are left out if nowhere louder than this share of the channels' own noise (30),
@@ -40,7 +41,7 @@ double focus_m(const SharedNoise& law, const PingSettings& settings) {
   return static_cast<double>(law.focus_rows) * settings.range_bin_m;
 }
 
-/// As far as the noise is followed: to `end_m`, over the last `fade_m` of which its power falls to nothing.
+/// The noise is followed to `end_m`. Over the last `fade_m` its power falls to 0.
 struct Reach {
   double end_m = 0, fade_m = 1;
   double share(double range_m) const { return std::clamp((end_m - range_m) / fade_m, 0.0, 1.0); }  // of its power

@@ -338,8 +338,8 @@ void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWork
   // A window is 64 samples of whole rows: its beams stay in cache until they are codes.
   mine.beams.shape(plan_.settings.beam_count, first * per_row, (last - first) * per_row);
   form_beams(w_.columns, plan_.beam_weights, kernels_, mine.beam_scratch, mine.beams);
-  // On top of the beams at exact directions: points and other sonars; then what beams take of each other. Another sonar's
-  // pulse does not come from the range of its rows: the blur is not its.
+  // Points and pulses of other sonars are added to the beams at their exact directions; then the beams are mixed. The pulse of
+  // another sonar does not come from the range of its rows, so it is not blurred.
   add_points(points_, plan_, mine.beams);
   plan_.beam_mix.blur(kernels_, mine.beams, mine.mixed);
   add_pulses(other_sonars_, plan_, mine.beams);

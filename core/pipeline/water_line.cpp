@@ -5,9 +5,9 @@
 namespace sonar {
 namespace {
 
-/// Until the moment the scene is looked at, PingScalars::seen_at_s.
+/// How far the sonar rises [m] until the moment at which the scene is computed, PingScalars::seen_at_s.
 double rise_m(const PingRequest& r) {
-  // Upwards [m]: vertical speed times range / c, the time until half of the ping.
+  // Vertical speed times range / c, the time until half of the ping.
   return std::max(0.0, r.sonar_moves.velocity_mps.z) * r.settings.range_m /
          static_cast<double>(r.settings.device_sound_speed_mps);
 }
@@ -25,9 +25,9 @@ void change(PingRequest& r) {
   }
   double& z = r.sonar_in_world.position_m.z;
   double& climbs_mps = r.sonar_moves.velocity_mps.z;
-  // At the surface: computed 1 mm below it (section 3).
+  // A sonar at the surface is computed 1 mm below it (section 3).
   z = std::min(z, -least_depth_m);
-  // Slowed so that it is just below the surface when the scene is looked at; one that does not rise keeps its speed.
+  // A rising sonar is slowed, so that it is just below the surface at that moment. Others keep their speed.
   if (const double rise = rise_m(r); rise > 0) climbs_mps *= std::clamp((-least_depth_m - z) / rise, 0.0, 1.0);
 }
 

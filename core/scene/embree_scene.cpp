@@ -116,7 +116,7 @@ struct RayScene::Impl {
     for (RTCGeometry instance : instances) rtcReleaseGeometry(instance);
   }
 
-  /// Without bodies, before and after.
+  /// Changes the scene; neither the previous nor the new scene has bodies.
   void change(std::shared_ptr<const Scene> to) {
     constexpr std::size_t most_kept = 16, most_kept_triangles = 1'250'000;  // kinds of scenes that take turns
     scene = std::move(to);
@@ -128,13 +128,13 @@ struct RayScene::Impl {
       if (!object.visible || object.mesh->triangles.empty()) continue;
       Pose placed_in_group = object.in_world;
       placed_in_group.position_m = placed_in_group.position_m - origin;
-      // Three numbers a corner, and one that Embree may read behind the last.
+      // Three numbers per corner, and one more, because Embree may read behind the last.
       auto vertices = std::make_shared<std::vector<float>>(3 * object.mesh->vertices.size() + 1);
       place_vertices(*object.mesh, placed_in_group, vertices->data());
       wanted.push_back({object.mesh, std::move(vertices), static_cast<std::uint32_t>(i)});
       triangles += object.mesh->triangles.size();
     }
-    // The structure that has most of it, where that is worth it.
+    // Finds the structure that has most of these objects, if reuse is worth it.
     auto best = changing.end();
     std::size_t there = 0;
     for (auto group = changing.begin(); group != changing.end(); ++group)

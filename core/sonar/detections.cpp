@@ -9,9 +9,11 @@
 namespace sonar {
 namespace {
 
-/// Less than a row's loudest, what a beam hears may be a side lobe's: those of Hamming's weights lie 42 dB below.
+/// A sample that is weaker than the loudest of its row by more than this may come from a side lobe: with Hamming weights side
+/// lobes are 42 dB below.
 constexpr double side_lobes_db = 30;
-/// Less than the loudest sample of a direction, a peak may be the tail of a pulse or of another direction's echo.
+/// A peak that is weaker than the loudest sample of its direction by more than this may be the tail of a pulse, or of an echo
+/// from another direction.
 constexpr double tail_db = 12;
 /// As much speckle may lie between neighbours on a floor.
 constexpr double fill_db = 20;
@@ -88,7 +90,7 @@ struct Peak {
   double azimuth_rad;
 };
 
-/// Where the echo lies that is loudest in a beam of its row; none beyond the sector.
+/// The azimuth of an echo that is loudest in this beam of its row; nothing if it is beyond the sector.
 std::optional<double> azimuth_of_peak(const Fan& fan, const Levels& level, int row, int beam) {
   const double here = level(row, beam);
   if (beam > 0 && beam + 1 < level.beams) {
@@ -126,8 +128,8 @@ struct Found {
   double level_db;
 };
 
-/// The loudest peak of each direction. Not what a louder one may have left beside it, within half a beam and two pulses, nor what
-/// is far weaker than what the direction's beams hear.
+/// The loudest peak of each direction. Left out are peaks within half a beam and two pulses of a louder peak, which may have
+/// caused them, and peaks far weaker than the loudest sample of their direction.
 std::vector<std::optional<Found>> loudest_peaks(const Fan& fan, const Levels& level, const std::vector<double>& least_db,
                                                 double reach_m) {
   const PingSettings& settings = fan.ping.request.settings;

@@ -117,7 +117,8 @@ void add_dataset_options(CLI::App& app, DatasetCommand& dataset) {
       "  sonard dataset job.yaml --out set --export coco --split 80,10,10");
   app.add_option("job", dataset.job, "job file (docs/datasets.md)")->required();
   app.add_option("--out", dataset.out, "folder for the shards; made when it is not there")->required();
-  app.add_option("--shards", dataset.shards, "I/N: the shards whose number leaves I when divided by N, for several machines");
+  app.add_option("--shards", dataset.shards,
+                 "I/N: only shards whose number has remainder I when divided by N, to share a job among machines");
   auto* form = app.add_option("--export", dataset.export_form,
                               "coco or folder: when the set is complete, also as pictures in that form, in train, val and test")
                    ->check(one_of({"coco", "folder"}));
@@ -151,7 +152,8 @@ void add_farm_options(CLI::App& app, FarmCommand& farm) {
   CLI::App& submit = *app.add_subcommand("submit", "put the shards of a job that are missing into the queue");
   submit.add_option("job", farm.job, "job file (docs/datasets.md)")->required();
   submit.add_option("--out", farm.out, "the farm's folder; the job's folder is made below it")->required();
-  submit.add_option("--simd", farm.simd, "instruction set that all workers have (as the job says, else this processor's)")
+  submit
+      .add_option("--simd", farm.simd, "instruction set that all workers have (default: that of the job, else this processor's)")
       ->check(one_of({simd_level_names.begin(), simd_level_names.end()}));
   submit.add_option("--ack-wait", farm.ack_wait_s, "seconds until a silent worker's shard is another's (60)")
       ->check(number(0.5, 86400));
@@ -197,7 +199,7 @@ std::string complaint(const RunCommand& run) {
   if (!known)
     return "there is no demo \"" + run.demo_of + "\"; there are " + demo_names(", ") + ", and --profile NAME for any product";
   if (!run.profile.empty() && !file.empty())
-    return "--profile chooses the demo's sonar, and " + file + " says itself what its sonars are: leave out one of the two";
+    return "--profile chooses the demo's sonar, and " + file + " lists its own sonars: leave out one of the two";
   if (!run.profile.empty() && !run.demo_of.empty())
     return "--demo " + run.demo_of + " and --profile " + run.profile + " both choose the demo's sonar: leave out one of the two";
   return {};

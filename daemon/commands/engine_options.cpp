@@ -13,18 +13,18 @@ using text::one_of;
 using text::whole_number;
 
 void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
-  constexpr const char* parts = "Parts of the model (a configuration may say otherwise than these defaults)";
+  constexpr const char* parts = "Parts of the model (a configuration may override these defaults)";
   const Switches defaults;
   app.add_option("--seed", given.seed, "seed of speckle and noise (default 1)")->check(whole_number())->envname("SONARD_SEED");
   app.add_option("--simd", given.simd, "instruction set of the hot loops (default auto)")
       ->check(one_of({simd_level_names.begin(), simd_level_names.end()}))
       ->envname("SONARD_SIMD");
   app.add_option("--mode", given.mode,
-                 "the model of sonard, or for comparison Choi 2025 as printed (paper, raster); default canonical")
+                 "acoustic model: canonical is sonard's own (default); for comparison, paper and raster are Choi 2025 as printed")
       ->check(one_of({mode_names.begin(), mode_names.end()}))
       ->group(parts);
   app.add_option("--fixed-fan", given.fixed_fan,
-                 "rays a column with one scatterer each, no surface cells; default 0: as the mode has it")
+                 "number of rays per column, each with one scatterer, without surface cells; default 0: what --mode does")
       ->check(whole_number(0, most_fixed_rays))
       ->group(parts);
   app.add_flag("--expected-power", given.expected_power, "mean echo power instead of speckle")->group(parts);
@@ -62,7 +62,8 @@ Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const En
   if (given.seed) seed = *given.seed;
   engine.device = enum_from<EngineDevice>(given.device, engine_device_names).value_or(engine.device);
   engine.simd = enum_from<SimdLevel>(given.simd, simd_level_names).value_or(engine.simd);
-  // The command line wins over SONARD_SIMD, which `automatic` reads: the best level instead; processors fall back from it.
+  // --simd auto must win over SONARD_SIMD, which SimdLevel::automatic would read. So the best level is requested; kernels_for()
+  // falls back to the levels that the processor has.
   if (given.simd == "auto") engine.simd = SimdLevel::avx512;
   if (given.expected_power) engine.switches.expected_power = true;
   engine.switches.mode = enum_from<Mode>(given.mode, mode_names).value_or(engine.switches.mode);
@@ -73,7 +74,8 @@ Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const En
     engine.switches.*part.is_on = given.switches[i] == "on";
     const std::string why = why_without_effect(engine.switches, part);
     if (engine.switches.*part.is_on && !why.empty())
-      return failure(ErrorKind::usage, option_of(part) + " on has no effect: " + why + "; leave out one of them");
+      return failure(ErrorKind::usage,
+                     option_of(part) + " on has no effect: " + why + "; leave it out, or change --mode or --fixed-fan");
   }
   return {};
 }

@@ -20,7 +20,7 @@
 namespace sonar {
 namespace {
 
-/// On the log stream, and in its format.
+/// Writes the error to standard error: as a JSON line of the log if `json`, else as plain text. Returns the exit code.
 int report_error(const Error& error, bool json) {
   LogOptions options;
   options.json = true;
@@ -31,7 +31,7 @@ int report_error(const Error& error, bool json) {
   return exit_code(error.kind);
 }
 
-/// Whether an exception of the standard library's threads, or of Boost's, means a lack of threads.
+/// Whether an exception that std::thread or Boost threw means that no more threads can be started.
 bool is_short_of_threads(const std::exception& e) {
   if (const auto* error = dynamic_cast<const std::system_error*>(&e))
     return error->code() == std::errc::resource_unavailable_try_again;
@@ -44,7 +44,7 @@ Result<int> code_of(const Result<void>& done) {
   return 0;
 }
 
-/// Returns the exit code. `json` = how the caller writes errors, also those that are thrown.
+/// Returns the exit code. Sets `json` if the caller must write errors as JSON, thrown exceptions included.
 Result<int> run_command(const Command& command, std::chrono::steady_clock::time_point begin, bool& json) {
   if (const auto* leave = std::get_if<Leave>(&command)) return leave->exit_code;
   if (const auto* check = std::get_if<CheckCommand>(&command)) return code_of(run_check(*check));

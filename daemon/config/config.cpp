@@ -44,7 +44,7 @@ void read_world(Map map, Config& config, const std::filesystem::path& directory)
   config.water = read_water(map.optional("water"), &config.allow_hot);
 }
 
-/// The name of the next of several; `taken` has those before it.
+/// Reads the name of one of several entries; `taken` has the names of those before it.
 Node read_name(Map& map, std::size_t longest, std::set<std::string>& taken, std::string& name) {
   const Node node = map.required("name");
   name = node.text(longest);

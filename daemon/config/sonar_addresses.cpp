@@ -19,7 +19,7 @@ Result<void> rebind(Config& config, std::string_view address) {
   if (*ip == Ipv4{})
     return failure(
         ErrorKind::usage,
-        "0.0.0.0 is no address that drivers can connect to; give one of this computer's, or write bind_ip: 0.0.0.0 and "
+        "0.0.0.0 is not an address that drivers can connect to; give one of this computer's, or write bind_ip: 0.0.0.0 and "
         "advertise_ip in a configuration file");
   SonarConfig& first = config.sonars.front();
   for (const SonarConfig& other : config.sonars)
@@ -79,7 +79,7 @@ std::vector<Listening> listening_of(const Config& c) {
   return all;
 }
 
-/// TCP ports of a sonar; those of UDP are shared where the protocol wants it.
+/// Adds the TCP ports of a sonar. Sonars share UDP ports where the protocol requires it.
 void add_tcp_ports(std::vector<Listening>& all, const SonarConfig& sonar) {
   using Kind = protocol::Port::Kind;
   for (const protocol::Port& port : sonar.profile.vendor->ports())

@@ -5,7 +5,7 @@
 namespace sonar {
 namespace {
 
-/// Those of the vendor: a file may also have options of others, which are without effect.
+/// The options of the vendor. A file may also have options of other vendors, which have no effect.
 bool same_options(const SonarConfig& a, const SonarConfig& b) {
   const auto own = a.profile.vendor->options();
   return std::all_of(own.begin(), own.end(), [&](const protocol::Option& option) {
@@ -15,7 +15,7 @@ bool same_options(const SonarConfig& a, const SonarConfig& b) {
   });
 }
 
-/// Only its place differs.
+/// Whether the sonars differ only in their mount and vehicle.
 bool is_same_device(const SonarConfig& a, const SonarConfig& b) {
   return a.name == b.name && a.profile.vendor == b.profile.vendor && a.profile.model->profile == b.profile.model->profile &&
          a.bind_ip == b.bind_ip && a.advertise_ip == b.advertise_ip && a.netmask == b.netmask && a.status_to == b.status_to &&

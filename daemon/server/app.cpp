@@ -13,7 +13,7 @@
 namespace sonar {
 namespace {
 
-/// As stop_limit, while files are written. Less than the unit's TimeoutStopSec.
+/// Like stop_limit, while files are written. It is less than TimeoutStopSec of the systemd unit.
 constexpr std::chrono::milliseconds files_limit{8000};
 
 }  // namespace

@@ -109,7 +109,7 @@ SceneChanges::Built SceneChanges::build(const std::vector<Make>& makes, const Sc
     built.engine = std::make_shared<std::unique_ptr<PingEngine>>(*std::move(engine));
     return built;
   }
-  // The others must not fail with the one that asks for too much: each is tried alone then.
+  // One change may need too much, and the others must not fail with it. So each is then tried alone.
   if (makes.size() > 1) return build({makes.front()}, now);
   return {now, nullptr, {tl::make_unexpected(engine.error())}};
 }

@@ -65,10 +65,11 @@ class ArisFileReader final : public RecordingReader {
       if (left >= record)
         damages_.add("cannot be read from byte " + std::to_string(at) + " on");
       else if (left > 0)
-        damages_.add("the file ends at byte " + std::to_string(source_->size()) + " within " + frame + ", of which " +
-                     std::to_string(left) + " bytes are there");
+        damages_.add("the file ends at byte " + std::to_string(source_->size()) + " within " + frame + ": only " +
+                     std::to_string(left) + " of its " + std::to_string(record) + " bytes are there");
       else if (places_ < header_.frames)
-        damages_.add("the file states " + std::to_string(header_.frames) + " frames and holds " + std::to_string(places_));
+        damages_.add("the file's header announces " + std::to_string(header_.frames) + " frames, and the file holds " +
+                     std::to_string(places_));
       return false;
     }
     ++places_;
@@ -76,7 +77,8 @@ class ArisFileReader final : public RecordingReader {
     wire::Reader reader(bytes);
     fields(reader, header);
     if (header.version != aris::file_version || header.samples_per_beam != header_.samples) {
-      damages_.add("frame " + std::to_string(places_) + " at byte " + std::to_string(at) + " does not begin with its header");
+      damages_.add("frame " + std::to_string(places_) + " at byte " + std::to_string(at) +
+                   " is damaged: its version or number of samples is not the file's");
       return true;
     }
     at_ = Time(std::chrono::microseconds(header.frame_time_us % longest_time_us));
@@ -85,7 +87,7 @@ class ArisFileReader final : public RecordingReader {
     return true;
   }
 
-  static constexpr std::uint64_t longest_time_us = std::uint64_t{1} << 52;  // of years: no overflow of nanoseconds
+  static constexpr std::uint64_t longest_time_us = std::uint64_t{1} << 52;  // about 142 years, which fit into nanoseconds
   std::unique_ptr<Source> source_;
   Scan scan_;
   FileHeader header_;
@@ -116,7 +118,7 @@ class ArisFileWriter final : public RecordingWriter {
     }
     if (frame->beams != header_.beams || frame->samples != header_.samples)
       return failure(ErrorKind::bad_data,
-                     "frames of another shape follow, which an .aris file cannot hold: the settings have changed");
+                     "the settings were changed, and frames now have another size; an .aris file holds frames of one size");
     frame->header.frame_index = header_.frames;
     frame->header.reordered = 1;
     const std::size_t at = record.size();
@@ -125,7 +127,7 @@ class ArisFileWriter final : public RecordingWriter {
     record.insert(record.end(), frame->picture.begin(), frame->picture.end());
     if (auto written = sink_->append(record); !written) return written;
     ++header_.frames;
-    return sink_->overwrite(0, wire::bytes_of(header_));  // a file that is cut off says what it holds
+    return sink_->overwrite(0, wire::bytes_of(header_));  // so that the count is right even if the program is killed
   }
 
   Result<void> close() override { return sink_->close(); }
@@ -147,7 +149,7 @@ Result<std::unique_ptr<RecordingReader>> read_aris_file(std::unique_ptr<Source> 
   wire::Reader reader(front);
   fields(reader, header);
   if (header.beams == 0 || header.beams > most_beams || header.samples == 0 || header.samples > aris::most_samples)
-    return failure(ErrorKind::bad_data, source->name() + " states frames of " + std::to_string(header.beams) + " beams and " +
+    return failure(ErrorKind::bad_data, source->name() + " announces frames of " + std::to_string(header.beams) + " beams and " +
                                             std::to_string(header.samples) + " samples, which no ARIS sends");
   return std::make_unique<ArisFileReader>(std::move(source), header);
 }

@@ -1,4 +1,4 @@
-// Its messages and files, for recordings.
+// The messages and files of ARIS, for recordings.
 #include <array>
 
 #include "protocol/aris/aris_file.hpp"
@@ -9,7 +9,7 @@
 namespace sonar::aris {
 namespace {
 
-/// By the first datagram of a frame.
+/// The sender, from the first datagram of a frame.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   FramePart part;
   if (message.by != recording::Carrier::datagram || !protobuf::read(message.bytes, part)) return std::nullopt;

@@ -32,7 +32,7 @@ class ArisDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
-    // All commands of a call become one change of settings, as the last of them leaves it.
+    // All commands of one call become one change of settings, with the result of the last command.
     settings_ = base();
     settings_.streaming |= streaming_;
     settings_.first_ping = std::min(settings_.first_ping, first_ping_);  // of the controller that connected first
@@ -51,7 +51,8 @@ class ArisDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  private:
-  /// The settings that the next command changes: those commanded last, which a fault may hold back, or others that replaced them.
+  /// The settings that the next command changes. These are the settings commanded last (a fault may hold them back), or others
+  /// that replaced them.
   Settings base() {
     if (device_.settings != seen_) {
       const auto applied = std::find(waiting_.begin(), waiting_.end(), device_.settings);

@@ -141,7 +141,7 @@ Bytes make_beacon(const protocol::DeviceState& device) {
   a.busy = device.connected_client != protocol::Ipv4{};
   a.capabilities.enabled = {"KA"};  // keep-alives
   a.cpu_c = 30;
-  a.hot_limit_c = 70;  // unknown: chosen
+  a.hot_limit_c = 70;  // unknown: assumed
   a.hot_limit_s = 60;
   return protobuf::bytes_of(a);
 }

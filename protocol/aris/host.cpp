@@ -19,7 +19,7 @@ constexpr double nominal_sound_speed_mps = 1490;
 constexpr std::uint32_t most_pulse_us = 80;
 constexpr std::size_t commands = 0, frames = 1;  // ports
 
-/// The settings for a product, or none: it has no such range or mode.
+/// The settings for a product; nothing if it has no such range or mode.
 std::optional<Acoustics> acoustics_for(const SonarModel& model, const protocol::SettingsOverride& wanted) {
   const Product& product = product_of(model);
   Acoustics a = product.initial;
@@ -79,8 +79,9 @@ class ArisHost final : public protocol::Host {
  public:
   explicit ArisHost(const protocol::Wanted& wanted) : wanted_(wanted) {}
 
-  /// The device does not say what it is, except in beacons that may not come here. It refuses the settings of other products; the
-  /// order matters to an ARIS 1800, which also takes those of a 1200. Frames begin with the receiver.
+  /// Only beacons name the product, and they may not arrive here. So settings for each product are sent, and the device refuses
+  /// those of other products. The order matters to an ARIS 1800, which also accepts those of a 1200. Frames begin when the
+  /// receiver is set.
   HostActions on_open(std::span<const std::uint16_t> own, Time now) override {
     HostActions actions;
     std::uint32_t cookie = 0;
@@ -141,7 +142,7 @@ class ArisHost final : public protocol::Host {
     actions.emplace_back(protocol::HostSend{commands, framed(command)});
   }
 
-  /// Once each: settings that the sonar does not use, frames of which datagrams were lost.
+  /// Notes that are given once each: settings that the sonar does not use, and frames that lost datagrams.
   void warn_of(const DecodedFrame& frame, HostActions& actions) {
     constexpr int settled = 3;  // the first frames may still have the settings of before
     const FrameHeader& h = frame.header;

@@ -24,7 +24,7 @@ constexpr LensRow telephoto_lens[] = {{48, 7.522, -0.179}, {96, 7.603, -0.180}};
 constexpr double elevation_1800_deg = 14, elevation_3000_deg = 15, telephoto_elevation_deg = 3;  // recalled from data sheets
 constexpr double frequencies_hz[3][2] = {{1.108e6, 1.8e6}, {1.8e6, 3.0e6}, {0.692e6, 1.2e6}};    // DOC, by SystemType
 
-// unknown: levels. Chosen: no TVG beyond 20 log r, and no absorption, since the level of SMP falls with range all the way; full
+// unknown: levels. Assumed: no TVG beyond 20 log r, and no absorption, since the level of SMP falls with range all the way; full
 // scale so that the demo scene under SMP's settings has SMP's level at an ARIS 1200, and a like one at the others.
 constexpr float source_level_db = 210, tvg_slope_db = 20, tvg_ceiling_db = 60;
 constexpr float full_scale_upa[3] = {2.5e4f, 1e4f, 4e4f};  // by SystemType

@@ -10,7 +10,7 @@ namespace sonar::aris {
 namespace {
 
 constexpr std::uint32_t rest_us = 360;                  // of a cycle, after its last sample
-constexpr double lenient_share = 0.05;                  // chosen: option cycle
+constexpr double lenient_share = 0.05;                  // assumed, for the option cycle
 constexpr auto focus_travel = std::chrono::seconds(1);  // whole way; the device's log has about a second
 
 struct Limits {
@@ -161,7 +161,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.gain_db = a.gain_db;
   s.transmit = a.transmit;
   s.device_sound_speed_mps = static_cast<float>(speed);
-  s.device_absorption_db_per_m = 0;  // unknown: chosen, since the level of a real recording falls with range all the way
+  s.device_absorption_db_per_m = 0;  // unknown: assumed, since the level of a real recording falls with range all the way
   s.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = 0, .ceiling_db = 80};
   return s;
 }

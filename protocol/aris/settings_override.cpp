@@ -1,4 +1,4 @@
-// A SettingsOverride as the SET_ACOUSTICS that a controller would have sent for it.
+// Converts a SettingsOverride to the SET_ACOUSTICS that a controller would send for it.
 #include <algorithm>
 #include <cmath>
 

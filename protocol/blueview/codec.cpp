@@ -1,4 +1,4 @@
-// Its messages and files, for recordings.
+// The messages and files of BlueView, for recordings.
 #include <algorithm>
 
 #include "protocol/blueview/frames.hpp"

@@ -46,7 +46,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
   Reaction on_tick(Time now, bool ping_pending) override {
     Reaction reaction;
     settings_ = settings_from(device_.settings.get(), device_);
-    while (!waiting_.empty() && waiting_.front().until <= now) {  // every wait is as long: the oldest ends first
+    while (!waiting_.empty() && waiting_.front().until <= now) {  // all waits have the same length, so the oldest ends first
       reaction.replies.push_back(make_error(waiting_.front().request_id, Code::timeout, "no ping in the time given"));
       waiting_.pop_front();
     }
@@ -54,7 +54,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
       subscription_->wanted = true;
       // A single ping that a host requested of another head comes first; else a quick subscription would always be served.
       if (!ping_pending || settings_.active_head == subscription_->head) ask_for_ping(subscription_->head, reaction);
-      // Intervals that have passed are skipped: a late tick asks for one ping, not for a burst.
+      // Intervals that have passed are skipped, so that a late tick requests one ping and not a burst.
       subscription_->next += ((now - subscription_->next) / subscription_->interval + 1) * subscription_->interval;
     }
     if (now >= spoke_at_ + keep_alive_after) reaction.replies.push_back(make_frame(FrameType::keep_alive, 0, {}));
@@ -122,7 +122,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
 
   int base() const { return text_option(device_.options, option_name::heads_base) == "1" ? 1 : 0; }
 
-  /// Index of a head that the host calls `id`. Hosts number heads from 0 or from 1: with one head, both are it.
+  /// Index of the head that the host calls `id`. Hosts number heads from 0 or from 1; with one head, both numbers mean that head.
   std::optional<int> head_of(std::int32_t id) const {
     const int count = static_cast<int>(settings_.heads.size());
     const int index = id - base();

@@ -27,7 +27,7 @@ std::optional<double> number_in(const Value& value) {
 
 Applied refused(Code code, std::string text) { return {std::nullopt, {code, std::move(text)}}; }
 
-/// Start and stop together: the start must lie before the stop.
+/// Sets start and stop together, because the start must lie before the stop.
 Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, float stop, bool strict, Key key) {
   if (!std::isfinite(start) || !std::isfinite(stop)) return refused(Code::bad_parameter, "a range must be a finite number");
   const bool fine = start >= mode.min_range_m && stop <= mode.max_range_m && start < stop;
@@ -36,7 +36,7 @@ Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, 
                 static_cast<double>(stop), static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m));
   if (!fine && strict) return refused(Code::bad_range, text);
   const float shortest = std::max(0.1f, 0.01f * mode.max_range_m);
-  // The stop first: the start then has room below it.
+  // The stop is set first, so that the start has room below it.
   head.stop_m = std::clamp(stop, mode.min_range_m + shortest, mode.max_range_m);
   head.start_m = std::clamp(start, 0.0f, head.stop_m - shortest);
   if (key == Key::range) return {Value(FloatPair{head.start_m, head.stop_m}), {}};

@@ -201,7 +201,7 @@ class BlueViewHost final : public protocol::Host {
     actions.emplace_back(protocol::HostSend{0, make_frame(type, id, payload)});
   }
 
-  /// This host has requested nothing: the answers are those to another one.
+  /// This host has requested nothing, so the answers are for another host.
   void on_recorded(const Frame& frame, HostActions& actions) {
     if (frame.header.type == FrameType::hello_ok) greeting_ = read_greeting(frame.payload).value_or(greeting_);
     if (frame.header.type == FrameType::ping_data) on_ping(frame, actions);
@@ -234,7 +234,7 @@ class BlueViewHost final : public protocol::Host {
     send(FrameType::set, ++last_id_, payload, now, actions);
   }
 
-  /// Why the sonar cannot have them; empty when it can.
+  /// Why the sonar cannot use these settings; empty when it can.
   std::string plan_settings() {
     if (head_ >= greeting_.heads.size())
       return greeting_.model + " has " + std::to_string(greeting_.heads.size()) + " head(s), no mode " +

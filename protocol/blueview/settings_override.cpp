@@ -10,7 +10,7 @@
 namespace sonar::blueview {
 namespace {
 
-constexpr double half_gain_db = 48;  // chosen: 0 to 100 % turn the gain adjustment from -48 to 48 dB, as an Oculus' 96 dB
+constexpr double half_gain_db = 48;  // assumed: 0 to 100 % turn the gain adjustment from -48 to 48 dB, as an Oculus' 96 dB
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 

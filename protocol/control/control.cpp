@@ -46,7 +46,8 @@ bool is_unasked_pose(BytesView rest) {
       continue;
     }
     if ((*key & 7) != with_length || *value > rest.size()) return false;
-    is_pose = field == v1::Request::kPoseFieldNumber || field == v1::Request::kObjectFieldNumber;  // the last one counts
+    // A request may repeat its operation; the last one on the wire holds.
+    is_pose = field == v1::Request::kPoseFieldNumber || field == v1::Request::kObjectFieldNumber;
     rest = rest.subspan(static_cast<std::size_t>(*value));
   }
   return is_pose && !has_id;

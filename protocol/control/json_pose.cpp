@@ -160,7 +160,7 @@ std::optional<LineParser::Line> LineParser::next() {
   while (true) {
     const std::size_t end = buffer_.find('\n', start_);
     if (end == std::string::npos) {
-      // A line that is too long is reported once, as soon as that is known; what follows of it is swallowed.
+      // A line that is too long is reported once, as soon as that is known; the rest of it is skipped.
       const bool too_long = !swallowing_ && buffer_.size() - start_ > longest_line;
       if (!swallowing_ && !too_long) return std::nullopt;
       const bool object = begins_object(std::string_view(buffer_).substr(start_));

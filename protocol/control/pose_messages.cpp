@@ -1,4 +1,4 @@
-// Poses, placements and mounts between protobuf and our frames.
+// Converts poses, placements and mounts between protobuf and our frames.
 #include <cmath>
 
 #include "core/base/units.hpp"

@@ -1,4 +1,4 @@
-// Requests between protobuf and plain structs: what a name, a number, a choice may be.
+// Converts requests between protobuf and plain structs, with the rules for names, numbers and choices.
 #include <google/protobuf/struct.pb.h>
 
 #include <algorithm>

@@ -245,7 +245,7 @@ class SonarJudge {
   std::vector<Finding>& findings_;
 };
 
-/// In stepped time: finds what the time waits for.
+/// In stepped time: finds the client or request for which time waits.
 void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, std::vector<Finding>& findings) {
   if (now.clock() == "realtime") return findings.push_back({Level::ok, "clock", "Time runs: clock: realtime", ""});
   const v1::ClientStatus* slowest = nullptr;
@@ -282,7 +282,7 @@ void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, st
                         ""});
 }
 
-/// Programs of this computer that connect to a port of sonars at an address that is none of them.
+/// Programs of this computer that connect to a port of sonars at an address where no sonar is.
 void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere, std::vector<Finding>& findings) {
   std::set<std::string> ports, ours;
   std::string where;
@@ -303,7 +303,7 @@ void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere,
     if (line.state == syn_sent)
       texts["A program of this computer tries to connect to " + to + ", and nothing answers there"] = Level::fail;
     if (line.state == established)
-      texts["A program of this computer is connected to " + to + ", which is no sonar of this sonard"] = Level::warn;
+      texts["A program of this computer is connected to " + to + ", which is not a sonar of this sonard"] = Level::warn;
   }
   for (const auto& [text, level] : texts) findings.push_back({level, "address", text, cure});
   if (texts.empty() && elsewhere.refused > 0)

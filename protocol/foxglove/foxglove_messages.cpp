@@ -103,7 +103,7 @@ Bytes with_stamps(const Channel& of, BytesView message, const Stamp& stamp) {
 }
 
 Bytes descriptor_set(const std::string& name) {
-  // Names what is looked up by name only, so that the linker keeps it.
+  // Names the messages that are looked up only by name, so that the linker keeps them.
   fg::RawImage::descriptor();
   v1::PingGeometry::descriptor();
   v1::Picture::descriptor();

@@ -11,8 +11,8 @@
 namespace sonar::foxglove {
 namespace {
 
-using Json = nlohmann::ordered_json;  // what is written; looks through all keys for each
-using Read = nlohmann::json;          // of viewers, who may send thousands
+using Json = nlohmann::ordered_json;  // for writing; a look-up searches all keys
+using Read = nlohmann::json;          // for reading from viewers, which may send thousands of keys
 constexpr int deepest = 16;
 
 /// Invalid UTF-8 in names is replaced, not refused.

@@ -25,7 +25,7 @@ bool contains_pose(std::uint32_t id) { return id != Heartbeat::id && id != Syste
 
 Stamp boot_stamp(std::int64_t at_ms) { return {ClockDomain::sim, at_ms * 1'000'000}; }
 
-/// A parameter of a command that counts something. Nothing: it is no whole number, or a large one.
+/// A parameter of a command that is a count. Nothing: it is not a whole number, or it is too large.
 std::optional<std::uint32_t> whole_number(float value) {
   if (!(value >= 0 && value <= 65535) || value != std::floor(value)) return std::nullopt;
   return static_cast<std::uint32_t>(value);
@@ -72,7 +72,7 @@ void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
   clear_histories();
 }
 
-/// Later messages must not be paired with earlier ones.
+/// Later messages must not be paired with earlier messages.
 void MavlinkPoses::clear_histories() {
   attitudes_.clear();
   local_.clear();
@@ -290,7 +290,7 @@ void MavlinkPoses::join_pairs(Moment at) {
              boot_stamp(pair->place.at_ms), pair->place.enu_in_world, at);
 }
 
-/// A pose of each attitude, with the newest depth: attitudes come more often, and depth changes slowly.
+/// Each attitude gives a pose, with the newest depth, because attitudes come more often and depth changes slowly.
 void MavlinkPoses::add_pose_of_depth(const AttitudeReading& reading, Moment at) {
   if (!depth_ || at.now - depth_->received > system_silence || received_within(LocalPositionNed::id, at.now, source_silence))
     return;
@@ -336,7 +336,9 @@ void MavlinkPoses::add_pose(Source source, const RawPose& raw, Stamp stamp, cons
   at.out.poses.push_back({*std::move(pose), "system " + std::to_string(*system_) + " " + std::string(name_of(source))});
 }
 
-/// UNIX time or time since boot: the sender's own clock either way. None, or one beyond reason: the moment of arrival.
+/// The stamp is UNIX time or time since boot, both of the sender's own clock. Without a stamp, or with an absurd one, it is the
+/// moment
+// of arrival.
 Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
   if (time_us == 0 || time_us > control::largest_stamp_ns / 1000) return {};
   const auto ns = static_cast<std::int64_t>(time_us * 1000);
@@ -347,7 +349,7 @@ Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
 }
 
 void MavlinkPoses::note_boot_time(std::int64_t ms) {
-  // A clock that goes back further than late packets do is that of a restarted autopilot.
+  // If the clock goes back further than late packets do, the autopilot has restarted.
   if (ms < newest_boot_ms_ - late_ms) clear_histories();
   newest_boot_ms_ = std::max(newest_boot_ms_, ms);
 }

@@ -85,7 +85,7 @@ void MavlinkPoses::request_messages(Reaction& out) {
   ask(GpsGlobalOrigin::id, 1);
 }
 
-/// Why x and y do not change, and what would make them.
+/// Why x and y do not change, and which messages would change them.
 std::string MavlinkPoses::held_text() const {
   std::string why = " has no fix, and there is no LOCAL_POSITION_NED: no DVL or the like";
   if (depth_ && depth_->message == VfrHud::id)

@@ -5,7 +5,7 @@
 namespace sonar::mavlink {
 namespace {
 
-/// Straight between the two, shorter way: attitudes of one vehicle are close to each other.
+/// Interpolates linearly along the shorter way, because attitudes of one vehicle are close to each other.
 Quatd between(Quatd a, Quatd b, double u) {
   const double sign = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -u : u;
   const double rest = 1 - u;

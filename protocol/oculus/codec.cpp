@@ -1,4 +1,4 @@
-// Its messages and files, for recordings.
+// The messages and files of Oculus, for recordings.
 #include <array>
 
 #include "protocol/oculus/decode.hpp"
@@ -33,7 +33,7 @@ std::optional<std::size_t> length_of(wire::BytesView header, Origin from, bool s
   return message_length(read, from == Origin::device ? Sender::device : Sender::client);
 }
 
-/// Which model it is, only its status tells.
+/// The sender of a message. Only a status message has the model.
 std::optional<recording::Sender> sender_of(const RecordedMessage& message) {
   if (!framing.begins_message(message.bytes, Origin::device)) return std::nullopt;
   return recording::Sender{models().front(), header_of(message.bytes).source};

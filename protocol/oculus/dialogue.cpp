@@ -149,7 +149,7 @@ class OculusDialogue final : public protocol::Dialogue {
       stored_ = {config.ip_address, config.ip_mask, config.dhcp_enable != 0};
       reaction.events.emplace_back(StoreAddress{stored_});
     }
-    // A write is not answered by default: the vendor's viewer reads the values back itself.
+    // By default a write is not answered, because the vendor's viewer reads the values back itself.
     if (write && text_option(device_.options, option_name::user_config_write) != "reply") return;
     reaction.replies.push_back(make_user_config(device_.id, stored_, device_));
     postpone_dummy(now);  // the only client that reads it accepts the first 28 bytes as its answer

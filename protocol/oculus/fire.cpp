@@ -37,7 +37,7 @@ wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination, bool p
 }
 
 FireRequest stored_fire() {
-  FireRequest fire;  // unknown: settings stored in the real device; chosen: range 10 m
+  FireRequest fire;  // unknown: settings stored in the real device; assumed: range 10 m
   fire.settings.mode = 2;
   fire.settings.flags = flag::range_in_metres | flag::simple_result | flag::beams_512;
   fire.settings.range = 10;

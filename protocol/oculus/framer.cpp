@@ -54,7 +54,7 @@ std::optional<wire::BytesView> Framer::next() {
       begin_ += *length;
       return waiting.first(*length);
     }
-    // One byte at a time: a false start hides no message.
+    // Skips one byte at a time, so that a false start hides no message.
     ++begin_;
     ++skipped_;
   }

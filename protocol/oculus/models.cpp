@@ -14,7 +14,7 @@ namespace {
 // oculus_driver. BAS: bastianschildknecht sonar_driver. TID: tidewise drivers-sonar_oculus_m750d. CAT: the payload catalogue of
 // the open simulator OceanSim, which quotes the vendor's data sheet DA-148-P01443-10 (2026) for the M series and integrators'
 // pages for the C550d; the data sheet itself was not read. CAP: the captured M1200d pings. unknown: no public source; the value
-// is chosen.
+// is assumed, or fitted as the comment says.
 
 /// unknown: fitted. The pressure that reaches full scale at TVG 0 dB and gain 0 dB, so that the demo scene at gain 50, gamma 127
 /// has an 8-bit median of 30 to 60; of the others by the same brightness at half their range. Not by the captured M1200d pings:
@@ -24,8 +24,8 @@ constexpr float m370s = 2.2e10f, c550d_low = 1.9e10f, c550d_high = 1.4e10f, m750
 constexpr float m1200d_low = 1.5e10f, m1200d_high = 3.5e10f, m3000d_low = 1.4e10f, m3000d_high = 3.3e10f;
 }  // namespace fitted_full_scale_upa
 
-constexpr float source_level_db = 200;  // unknown: chosen; Choi et al. 2025 fitted 170 dB to an M1200d, with gains of their own
-constexpr float tvg_ceiling_db = 80;    // unknown: chosen
+constexpr float source_level_db = 200;  // unknown: assumed; Choi et al. 2025 fitted 170 dB to an M1200d, with gains of their own
+constexpr float tvg_ceiling_db = 80;    // unknown: assumed
 
 // unknown: fitted to the captured M1200d ping (docs/acoustics.md, section 9), and taken for all products, which share their
 // electronics, as far as is known. The law: from the part of the picture that changes from ping to ping, noise, which rises
@@ -33,11 +33,11 @@ constexpr float tvg_ceiling_db = 80;    // unknown: chosen
 constexpr float tvg_slope_db = 35, tvg_minimum_range_m = 0.25f;
 constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;
 // unknown: fitted to the captured M1200d ping on the assumption that its bed is soft mud (-40 dB): the echo of the bed at 1
-// m is 30 dB above the noise. Other modes: chosen.
+// m is 30 dB above the noise. Other modes: assumed.
 constexpr float noise_figure_db = 10, m1200d_high_noise_figure_db = 14.6f;
 
 /// unknown: fitted to the first two captured M1200d pings; of several fits the one that a comparison with all three judged best
-/// was kept (docs/acoustics.md, section 9). Of their mode only.
+/// was kept (docs/acoustics.md, section 9). They are used for the mode of these pings only.
 void fit_to_recording(ReceiverModel& receiver) {
   // Neighbouring rows of the far noise are uncorrelated (0.02).
   receiver.noise_width = 0.71f / 0.9f;
@@ -54,7 +54,7 @@ void fit_to_recording(ReceiverModel& receiver) {
   // mode would be 0.57), with opposite signs in neighbours.
   receiver.shared_noise = {.level_db = 3.4f, .full_m = 0.2f, .steady = 0.6f, .focus_rows = 0.5f, .nearest_focus_m = 0.0085f};
   receiver.leak_is_shared = true;
-  // 255 never occurs; codes 0 to 5 of the noise are as frequent as of floor(255 v^gamma), v below 1.
+  // 255 never occurs. Codes 0 to 5 of the noise are as frequent as those of floor(255 v^gamma), with v below 1.
   receiver.truncates = true;
   receiver.profile.blend = {-0.1f, 0.07f, 0.1f, 0.13f, 0.13f, 0.13f, 0.13f, 0.06f, -0.1f};
   // The medians of rows 0 to 8: it rings, with a null in row 2. By half a row.

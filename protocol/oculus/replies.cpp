@@ -10,9 +10,9 @@ namespace sonar::oculus {
 namespace {
 
 constexpr std::uint32_t main_firmware_runs = 3, main_connection = 1u << 7;
-// unknown: versions of the real firmware; major 8 bits, minor 8, build 16. Chosen: 1.0 build 0.
+// unknown: versions of the real firmware; major 8 bits, minor 8, build 16. Assumed: 1.0 build 0.
 constexpr std::uint32_t firmware_version = 0x01000000, firmware_date = 0;
-// unknown: dstDeviceId of the status, 0xFFFF in the notes of ALD on a real M750d; chosen: 0, as in CAP's pings. No driver reads
+// unknown: dstDeviceId of the status, 0xFFFF in the notes of ALD on a real M750d; assumed: 0, as in CAP's pings. No driver reads
 // it.
 
 MessageHeader header_for(MessageType type, std::uint16_t device_id, std::size_t message_size) {

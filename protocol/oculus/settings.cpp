@@ -11,7 +11,7 @@
 namespace sonar::oculus {
 namespace {
 
-constexpr double rest_per_ping_s = 0.002;  // chosen: between the last echo and the next transmission
+constexpr double rest_per_ping_s = 0.002;  // assumed: between the last echo and the next transmission
 constexpr double surface_pressure_bar = 1.013;
 
 constexpr int most_samples_per_row = 32;

@@ -74,7 +74,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
           bits == 32 ? fire.extension.flags | flag::extended_32_bit : fire.extension.flags & ~flag::extended_32_bit;
   }
   if (wanted.row_gains) set(asked, flag::row_gains, *wanted.row_gains);
-  // As a driver's would be: written, sent and read.
+  // The request is written, sent and read like that of a driver.
   const FireRequest received = parse_fire(make_fire(fire)).value_or(fire);
   return protocol::ChangeSettings{resolve(received, device).settings, std::make_shared<HeldFire>(received), describe(received)};
 }

@@ -1,4 +1,4 @@
-// Its messages and files, for recordings.
+// The messages and files of the Ping Protocol, for recordings.
 #include <algorithm>
 #include <array>
 #include <initializer_list>

@@ -25,7 +25,7 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
   protocol::Reaction reaction;
   framer_.append(received);
   while (const auto frame = framer_.next()) {
-    // One answer a datagram, because the address of its sender may be forged.
+    // Sends one answer per datagram, because the address of its sender may be forged.
     const bool is_all = header_size + frame->header.length + sum_size == received.size();
     if (!by_datagrams_ || frame->sum_is_right || is_all) on_frame(*frame, now, reaction);
     if (by_datagrams_ && frame->sum_is_right) break;

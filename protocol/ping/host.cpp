@@ -56,7 +56,7 @@ Bytes ping360_request(const protocol::SettingsOverride& wanted) {
 
 using Points = std::vector<std::pair<double, double>>;  // azimuth, range
 
-/// As far as they are there; none from the first bad one on.
+/// The points up to the first bad one, or to the end of the message.
 Points points_in(const YzPointData& data, BytesView rest) {
   Points polar;
   wire::Reader reader(rest);
@@ -85,7 +85,7 @@ Points points_in(const AtofPointData& data, BytesView rest) {
 }
 
 double end_m(const YzPointData& data, const Points&) { return static_cast<double>(data.end_m); }
-/// The message has no far end, but how long the sonar listened, from the near end on.
+/// The message does not have the far end. It has the time for which the sonar listened, from the near end on.
 double end_m(const AtofPointData& data, const Points& polar) {
   double far_m = static_cast<double>(data.listening_s) * static_cast<double>(data.speed_mps) / 2;
   for (const auto& point : polar) far_m = std::max(far_m, point.second);
@@ -167,7 +167,7 @@ class SurveyorHost final : public PingHost {
     if (frame.header.id == Id::atof_point_data) return read(frame, AtofPointData{});
     return frame.header.id == Id::yz_point_data ? read(frame, YzPointData{}) : std::nullopt;
   }
-  /// A ping may have its points in both messages: the first one counts.
+  /// A ping may have its points in both messages; the first message counts.
   template <class Data>
   std::optional<HostPing> read(const Frame& frame, Data data) {
     const auto rest = read_front(frame, data);
@@ -210,7 +210,7 @@ struct Turn {
     return std::any_of(lines.begin() + static_cast<std::ptrdiff_t>(from), lines.begin() + static_cast<std::ptrdiff_t>(to),
                        [](const auto& line) { return line == nullptr; });
   }
-  /// The half ahead as long as nothing else was scanned.
+  /// The half ahead, as long as only that half was scanned.
   PolarImage shown() const {
     bool only_ahead = true;
     for (std::size_t beam = 0; beam < grads; ++beam)
@@ -238,7 +238,7 @@ class Ping360Host final : public PingHost {
     constexpr std::array<std::byte, 2> wanted{std::byte{static_cast<std::uint8_t>(Id::protocol_version)}};
     return {protocol::HostSend{0, framed(Id::general_request, 0, wanted)}};
   }
-  /// It does not scan on, unless another driver requested the scan.
+  /// The sonar does not continue to scan, unless another driver requested the scan.
   HostActions on_leave() override {
     if (!is_open_ || !asks()) return {};
     return {protocol::HostSend{0, framed(Id::motor_off, 0, {})}};

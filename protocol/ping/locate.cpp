@@ -90,7 +90,7 @@ std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields
 
 constexpr std::size_t attitude_size = header_size + wire::wire_size<AttitudeReport>() + sum_size;
 
-/// Offset of the frame of points (3012) in a ping's frames together, or in the datagram that has it.
+/// Offset of the frame of points (3012) in all frames of a ping, or in the datagram that has this frame.
 std::optional<std::size_t> atof_frame(BytesView frames) {
   const std::size_t at = frames.empty() || is_of(Id::attitude_report, frames) ? attitude_size : 0;
   const bool there = frames.empty() || (frames.size() > at && is_of(Id::atof_point_data, frames.subspan(at)));

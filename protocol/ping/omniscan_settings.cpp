@@ -10,7 +10,7 @@
 namespace sonar::ping::omniscan {
 namespace {
 
-constexpr double db_per_gain = 6;  // unknown: chosen, like full scale and the source level
+constexpr double db_per_gain = 6;  // unknown: assumed, like full scale and the source level
 constexpr int most_gain = 7;
 constexpr double longest_m = 150;
 constexpr double processing_s = 0.01;

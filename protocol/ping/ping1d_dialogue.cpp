@@ -13,7 +13,7 @@ using protocol::Reaction;
 
 constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping is taken as lost
 constexpr std::uint16_t firmware_major = 3, firmware_minor = 29, supply_mv = 5000;
-constexpr double housing_above_water_c = 8;  // chosen
+constexpr double housing_above_water_c = 8;  // assumed
 
 class Ping1DDialogue final : public StreamingConversation<Settings, settings_from> {
  public:
@@ -111,14 +111,14 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
 
  private:
   Results wanted() const { return once_ | streamed_; }
-  /// Range and gain are the device's own in automatic mode: refused.
+  /// In automatic mode the device sets range and gain itself, so these requests are refused.
   bool is_manual(const Frame& frame, Reaction& reaction) const {
     const bool manual = settings_after(reaction).parameters.mode_auto == 0;
     if (!manual) refuse(frame, "the mode is automatic", reaction);
     return manual;
   }
   bool is_enabled() const { return settings().parameters.enable != 0; }
-  /// The ping under way, if any, is not made for the new result: the next one follows it.
+  /// A ping under way does not serve the new request; the next ping does.
   void want(Results& results, Results result, Time now, Reaction& reaction) {
     if (!std::exchange(has_asked_, true)) change(reaction, [](Settings&) {});  // pings are enabled as it comes: now they are made
     if (wanted() == no_result) due_ = now;

@@ -20,7 +20,7 @@ void add_value(Bytes& to, Id id, T value) {
   to.insert(to.end(), frame.begin(), frame.end());
 }
 
-/// The settings one by one, then a stream of profiles. Without range and gain the sonar finds both itself.
+/// Sends the settings one by one, then requests a stream of profiles. Without range and gain the sonar finds both itself.
 Bytes request(const protocol::SettingsOverride& wanted) {
   Bytes all;
   const bool manual = wanted.range_m || wanted.gain_percent;

@@ -14,7 +14,7 @@ constexpr std::array<double, 7> gains{0.6, 1.8, 5.5, 12.9, 30.2, 66.1, 144};  //
 constexpr int most_gain = static_cast<int>(gains.size()) - 1;
 constexpr int points = 200;                                        // recalled, like the ones that follow
 constexpr std::uint32_t least_length_mm = 1000, most_mm = 100000;  // DEF and manual
-constexpr double shortest_pulse_us = 26;  // at 1 m, as a user saw (ping-python, issue 157); unknown: chosen farther away
+constexpr double shortest_pulse_us = 26;  // at 1 m, as a user saw (ping-python, issue 157); unknown farther away: assumed there
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
@@ -24,7 +24,7 @@ SonarModel make_model() {
   mode.centre_hz = 115e3f;
   mode.min_range_m = 0.3f;
   mode.max_range_m = 1e-3f * most_mm;
-  mode.source_level_db = 190;  // unknown: level and full scale; chosen so that sand takes the lowest gain at 0.5 m
+  mode.source_level_db = 190;  // unknown: level and full scale; set so that sand takes the lowest gain at 0.5 m
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(30));  // manual; a newer edition has 25
@@ -88,7 +88,7 @@ PingSettings ping_settings(const Settings& settings) {
   s.rate_hz = p.enable == 0 ? 0 : 1000.0f / static_cast<float>(std::max<int>(p.interval_ms, 1));
   s.triggered = true;
   s.gain_db = static_cast<float>(20 * std::log10(gains[p.gain]));
-  s.tvg = false;  // unknown: chosen, since its gains reach from the nearest bottom to the farthest
+  s.tvg = false;  // unknown: assumed, since its gains reach from the nearest bottom to the farthest
   s.device_sound_speed_mps = static_cast<float>(speed_mps);
   s.format = {.bits = 8, .max_code = 255};
   return s;
@@ -129,7 +129,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 }
 
 Echo find_echo(const Ping& ping) {
-  constexpr double least_snr_db = 10;  // unknown: chosen, above what noise alone reaches in 200 points
+  constexpr double least_snr_db = 10;  // unknown: assumed, above what noise alone reaches in 200 points
   constexpr double certain_snr_db = 30;
   constexpr int longest_gap = 2;  // points of speckle inside an echo
   const PingSettings& s = ping.request.settings;
@@ -194,7 +194,7 @@ std::vector<Bytes> frames_of(const Ping& ping) {
   profile.distance_mm = static_cast<std::uint32_t>(std::lround(1000 * echo.range_m));
   profile.confidence = static_cast<std::uint16_t>(echo.confidence);
   profile.ping = static_cast<std::uint32_t>(ping.request.number);
-  // How the ping was made, which settings of the same moment may not say.
+  // The settings with which the ping was made, because the present settings may differ.
   profile.start_mm = static_cast<std::uint32_t>(std::lround(1000 * made.range_start_m));
   profile.length_mm = static_cast<std::uint32_t>(std::lround(1000 * (made.range_m - made.range_start_m)));
   profile.transmit_us = static_cast<std::uint16_t>(

@@ -35,7 +35,7 @@ class Ping360Dialogue final : public Conversation {
     // Here fired_ means that longest_wait is over. A request that has not been started, because an earlier ping is still being
     // computed, gets the whole time again.
     if (fired_ && ping_pending) return fired_at_ = now, reaction;
-    // A request that was started has brought no ping yet: the task goes on, and the ping is still sent if it comes.
+    // A request that was started has brought no ping yet. The task continues, and the ping is still sent if it comes.
     if (fired_) return late_ = fired_, advance(now), reaction;
     Settings s = settings();
     s.id = id_;
@@ -115,7 +115,7 @@ class Ping360Dialogue final : public Conversation {
                           DeviceData{t.mode, t.gain, head_.angle_at(now), t.transmit_us, t.period, t.khz, t.samples, 0});
   }
 
-  /// A valid request replaces the one in progress; a refused one leaves it alone.
+  /// A valid request replaces the one in progress. A refused request has no effect on it.
   template <class Request>
   void begin(const Frame& frame, const Request& request, Time now, Reaction& reaction) {
     if (const std::string why = complaint(request); !why.empty()) return refuse(frame, why, reaction);

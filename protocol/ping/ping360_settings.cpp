@@ -13,7 +13,7 @@ namespace {
 
 constexpr double sample_unit_s = 25e-9;
 constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn in 2.4 s
-constexpr double db_per_gain = 6;                              // unknown: chosen
+constexpr double db_per_gain = 6;                              // unknown: assumed
 constexpr double fastest_hz = 1000;                            // hosts set the rhythm
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
@@ -34,7 +34,7 @@ SonarModel make_model() {
   mode.centre_hz = 750e3f;
   mode.min_range_m = 0.15f;
   mode.max_range_m = 50;
-  mode.source_level_db = 200;  // unknown: level and gains; chosen so that a wall near by is bright at gain 0
+  mode.source_level_db = 200;  // unknown: level and gains; set so that a wall near by is bright at gain 0
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(2));     // recalled from the data sheet
@@ -77,7 +77,7 @@ bool HeldSettings::equals(const VendorSettings& other) const {
   const auto* of = dynamic_cast<const HeldSettings*>(&other);
   if (of == nullptr) return false;
   Transducer theirs = of->settings.ping;
-  // The angle does not count: it changes with every ping.
+  // The angle is not compared, because it changes with every ping.
   theirs.angle = settings.ping.angle;
   const auto scan = [](const Settings& s) { return std::tuple(s.scans, s.start, s.stop, s.steps, s.delay_ms); };
   return settings.ping == theirs && scan(settings) == scan(of->settings);
@@ -120,7 +120,7 @@ Settings settings_of(const AutoTransmit& t) {
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
   const Transducer& t = settings.ping;
-  // The device counts time and knows no sound speed: rows are samples in time, placed with the true one.
+  // The device counts time and has no setting for the sound speed. Rows are samples in time, placed with the true sound speed.
   const double speed = true_sound_speed_mps(device.water, device.depth_m);
   PingSettings s;
   s.beam_count = 1;
@@ -133,7 +133,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.triggered = true;
   s.gain_db = static_cast<float>(db_per_gain * t.gain);
   s.device_sound_speed_mps = static_cast<float>(speed);
-  // unknown: the law. Chosen: linear in dB over 60 dB.
+  // unknown: the law. Assumed: linear in dB over 60 dB.
   s.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = 0, .ceiling_db = 60};
   return s;
 }
@@ -171,7 +171,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 }
 
 double head_rad(std::uint16_t angle, const protocol::OptionValues& options) {
-  return -(angle + number_option(options, option_name::mount_grad)) * 2 * pi / grads;  // unknown: to starboard, chosen
+  return -(angle + number_option(options, option_name::mount_grad)) * 2 * pi / grads;  // unknown: assumed to starboard
 }
 
 std::chrono::nanoseconds listening(const Transducer& t) { return nanoseconds_from(t.samples * t.period * sample_unit_s); }
@@ -193,7 +193,7 @@ std::uint16_t Head::angle_at(Time at) const {
 
 void Head::turn_to(std::uint16_t angle, Time at) {
   from = angle_at(at);
-  // The shorter way. `to` may lie outside of a turn; angle_at() folds it.
+  // Turns the shorter way. `to` may lie outside of one turn; angle_at() folds it.
   const int ahead = ((angle - from) % grads + grads) % grads;
   to = from + (ahead <= grads / 2 ? ahead : ahead - grads);
   since = at;

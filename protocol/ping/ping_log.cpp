@@ -21,13 +21,13 @@ bool is_answer(ping::Id id) {
   return ping::is_of_device(id) || id == device_information || id == protocol_version;
 }
 
-/// As the makers' own programs begin a log, without what they say of their computer.
+/// The start of a log as the makers' own programs write it, without the description of their computer.
 std::string beginning(ping::Id first) {
   return std::string(R"({"session_id":1,"session_uptime":0.0,"session_devices":[{"product_id":")") +
          (first == ping::Id::os_mono_profile ? "os450" : "mbes24016") + R"("}],"is_recording":true})";
 }
 
-/// Milliseconds since power-up, of the messages that tell them.
+/// Milliseconds since power-up, of the messages that have them.
 std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
   const auto of = [&](auto message) -> std::optional<std::uint32_t> {
     wire::Reader reader(frame.payload);
@@ -77,7 +77,7 @@ class PingLogReader final : public RecordingReader {
   }
 
  private:
-  /// With the right sum.
+  /// The frame with the right checksum.
   std::optional<ping::Frame> next_frame() {
     for (bool ended = false;;) {
       while (auto frame = framer_.next())

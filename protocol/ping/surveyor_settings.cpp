@@ -15,9 +15,9 @@ namespace {
 constexpr int beams = 64, directions = 16;  // directions: as many as receive elements
 constexpr double swath_deg = 80;            // recalled, like the width along the track and the number of elements
 constexpr double beam_width_deg = 7;        // of 16 elements half a wavelength apart
-constexpr double above_db = 15;             // unknown: chosen
-constexpr double usual_end_m = 20;          // chosen: of end 0, which the device sets by the bottom itself
-constexpr double db_per_gain = 0.4;         // unknown: chosen
+constexpr double above_db = 15;             // unknown: assumed
+constexpr double usual_end_m = 20;          // assumed for end 0, which the device sets by the bottom itself
+constexpr double db_per_gain = 0.4;         // unknown: assumed
 constexpr auto processing = std::chrono::milliseconds(10);
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
@@ -106,7 +106,7 @@ PingSettings ping_settings(const Settings& settings) {
   const double shortest_s = 2 * s.range_m / speed + seconds(processing);
   s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
   s.gain_db = static_cast<float>(p.gain < 0 ? 0 : db_per_gain * p.gain);
-  s.tvg = false;  // detection wants noise that is the same at all ranges
+  s.tvg = false;  // detection needs noise that is the same at all ranges
   s.device_sound_speed_mps = p.speed_mps;
   s.format = {.bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -80, .ceiling_db = 80};
   return s;

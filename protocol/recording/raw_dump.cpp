@@ -35,8 +35,8 @@ class RawReader final : public RecordingReader {
     splitter_.finish();
     auto last = splitter_.next();
     if (splitter_.losses() > 0)
-      damages_.add("the file ends at byte " + std::to_string(source_->size()) + " within a message, of which " +
-                   std::to_string(unfinished) + " bytes are there");
+      damages_.add("the file ends at byte " + std::to_string(source_->size()) + " within a message: only " +
+                   std::to_string(unfinished) + " bytes of it are there");
     return last;
   }
   std::optional<RecordedMessage> unreadable() {

@@ -1,4 +1,4 @@
-// Its messages and files, for recordings.
+// The messages and files of Water Linked sonars, for recordings.
 #include <array>
 
 #include "protocol/recording/raw_dump.hpp"
@@ -10,7 +10,7 @@
 namespace sonar::waterlinked {
 namespace {
 
-/// Packets do not tell which of them it is.
+/// The sender of a datagram. Packets do not have the model, so the first model is taken.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   if (message.by != recording::Carrier::datagram || rip_length(message.bytes) != message.bytes.size()) return std::nullopt;
   return recording::Sender{models().front()};

@@ -62,7 +62,7 @@ StrengthMessage strength_message(const Ping& ping, const Settings& settings, con
   return m;
 }
 
-/// At whole periods of the device's clock.
+/// Samples of the IMU at whole periods of the device's clock.
 ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
   ImuMessage m;
   m.sequence = static_cast<std::uint32_t>(ping.request.number);
@@ -73,7 +73,7 @@ ImuMessage imu_message(const Ping& ping, const Settings& settings, const protoco
   const Time shot = device_time(r.fired_at, settings, device);
   const Time from = shot - (goes_on ? since_last : period);
   for (Time at = from - from.time_since_epoch() % imu_period + imu_period; at <= shot; at += imu_period) {
-    // Turned back by the rate of turn; acceleration is not known and taken as none.
+    // The orientation is turned back by the rate of turn. The acceleration is not known and is taken as 0.
     const double before_s = -seconds(shot - at);
     const Quatd then = normalized(r.sonar_in_world.orientation * turned_by(before_s * r.sonar_moves.angular_rate_radps));
     m.samples.push_back({at, frd(rotate(conjugate(then), Vec3d{0, 0, gravity_mps2})), frd(r.sonar_moves.angular_rate_radps)});

@@ -95,13 +95,14 @@ class WaterlinkedHost final : public protocol::Host {
 
   HostActions on_open(std::span<const std::uint16_t>, Time) override { return {ask("GET", "/udp", "")}; }
 
-  /// Sets the receiver of the images first: multicast is switched on when the output is disabled. Then the settings, one by one.
+  /// First sets the receiver of the images; if the output is disabled, it switches multicast on. Then sends the settings, one by
+  /// one.
   HostActions on_reply(const protocol::ResourceReply& reply, Time) override {
     const auto fail = [](ErrorKind kind, std::string text) { return HostActions{Error{kind, std::move(text)}}; };
     if (!std::exchange(knows_output_, true)) {
       const Json udp = Json::parse(reply.body, nullptr, false);
       if (reply.status != 200 || !udp.is_object())
-        return fail(ErrorKind::bad_data, "is no Sonar 3D-15: " + asked_ + " returned " + std::to_string(reply.status));
+        return fail(ErrorKind::bad_data, "is not a Sonar 3D-15: " + asked_ + " returned " + std::to_string(reply.status));
       const Json mode = udp.value("mode", Json());
       if (mode == Json(unicast))
         return fail(ErrorKind::usage,

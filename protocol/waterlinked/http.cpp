@@ -19,7 +19,7 @@ using protocol::ResourceReply;
 
 constexpr std::string_view base = "/api/v1/integration";
 constexpr std::size_t longest_body = 1024;
-constexpr double slowest_mps = 1000, fastest_mps = 2000;  // unknown: chosen
+constexpr double slowest_mps = 1000, fastest_mps = 2000;  // unknown: assumed
 constexpr double electronics_warmer_c = 9.5;              // unknown: than the water
 
 struct Call {
@@ -257,7 +257,7 @@ ResourceReply answer(const protocol::ResourceRequest& request, const DeviceState
     return refused;
   }
   if (request.body.size() > longest_body) return reply_of(413, {{"error", "the body is longer than 1024 bytes"}});
-  // Without a body nothing is set: force-sync needs none, every other resource says what it needs.
+  // Without a body nothing is set. force-sync needs no body; every other resource replies what it needs.
   const Json posted = request.body.empty() ? Json::object() : Json::parse(request.body, nullptr, false);
   if (posted.is_discarded()) return reply_of(400, {{"error", "not JSON"}});
   return changed(call, path->post(call, posted));

@@ -50,8 +50,8 @@ class SonarFileReader final : public RecordingReader {
     const std::string place = "byte " + std::to_string(at);
     if (length == 0) return "no packet begins at " + place;
     if (there == length) return "the packet at " + place + " is damaged: wrong CRC or compression";
-    return "the file ends at byte " + std::to_string(source_->size()) + " within the packet at " + place + ", of which " +
-           std::to_string(there) + " of " + std::to_string(length) + " bytes are there";
+    return "the file ends at byte " + std::to_string(source_->size()) + " within the packet at " + place + ": only " +
+           std::to_string(there) + " of its " + std::to_string(length) + " bytes are there";
   }
 
   std::unique_ptr<Source> source_;

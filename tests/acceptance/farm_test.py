@@ -200,7 +200,7 @@ class Farm(unittest.TestCase):
                 pass
         self.wait_for(self.worker(None, "--until-empty"))
         for number in ("6", "999999999", "18446744073709551615"):
-            self.assertIn(f"shard {number} is none of the 6 of", self.logs())
+            self.assertIn(f"shard {number} is not one of the 6 of", self.logs())
         self.assertEqual(sorted(f.name for f in made.glob("shard-*.tar")), [f"shard-{n:06}.tar" for n in range(6)])
         self.assertIn("6 done, 0 running, 0 queued, 0 dead", self.status())
 
@@ -209,7 +209,7 @@ class Farm(unittest.TestCase):
         outside = self.path / "outside.obj"
         outside.write_text(TETRAHEDRON)
         job.write_text(SMALL.replace("meshes/ball.obj", "../outside.obj"))
-        self.assertIn("../outside.obj is not below the job's folder",
+        self.assertIn("../outside.obj is outside the job's folder",
                       self.farm("submit", job, "--nats", URL, "--out", self.out, code=78))
         self.assertIn("the farm has no jobs", self.status())
         self.server.kill()

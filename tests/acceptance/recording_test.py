@@ -200,7 +200,7 @@ class Inside(Files):
         with Sonard(scene="tank-rod.yaml", more="recording: {folder: .}\n") as self.daemon:
             kept = pathlib.Path(self.daemon.folder.name) / "run.mcap"
             done = self.steer("recording", "start", "run.mcap")
-            self.assertEqual((done.returncode, done.stdout), (0, "run.mcap is being recorded; sonarctl status shows how it goes\n"))
+            self.assertEqual((done.returncode, done.stdout), (0, "recording to run.mcap; sonarctl status shows its progress\n"))
             for name, code in (("run.mcap", 65), ("../run.mcap", 65), ("run.txt", 65)):
                 self.assertEqual(self.steer("recording", "start", name).returncode, code, name)
             resource.prlimit(self.daemon.process.pid, resource.RLIMIT_FSIZE, (2_500_000, 2_500_000))
@@ -304,13 +304,13 @@ class OneIntoAnother(Files):
         self.path("raw").write_bytes(self.made()[:-100])
         done = self.convert(self.path("raw"), "--oculus", self.path("oculus"))
         self.assertEqual(done.returncode, 65)
-        self.assertIn("within a message, of which", done.stderr)
+        self.assertIn("within a message: only", done.stderr)
         self.assertEqual(done.stderr.count("\n"), 1)
         self.assertEqual(oculus_log_messages(self.read("oculus")), split(self.made(3)))
         with Replay(self.path("raw"), "--stepped") as replay:
             self.assertEqual(replay.everything(), self.made(3))
             self.assertEqual(replay.process.wait(60), 0)
-            self.assertIn("within a message, of which", replay.text())
+            self.assertIn("within a message: only", replay.text())
 
     def test_replay_ends_by_signals(self):
         self.path("raw").write_bytes(self.made())

@@ -117,7 +117,7 @@ TEST(Doctor, WarnsOfPortsThatOthersMayTake) {
   facts.kernel_ports.reserved = "";
   EXPECT_THAT(text_from(run_checks(facts)),
               HasSubstr("warn  ports 52100,52102 lie in the ephemeral range 32768-60999: an outgoing "
-                        "connection may take one first; reserve: sysctl "
+                        "connection may occupy one before sonard starts; to reserve them: sysctl "
                         "net.ipv4.ip_local_reserved_ports=52100,52102\n8 checks, 0 errors, 1 warning\n"));
   facts.kernel_ports.reserved = "8080,52101-52110";
   expect(line(facts, "ports"), Level::warn, "ports 52100 lie", "ip_local_reserved_ports=8080,52101-52110,52100");

@@ -174,7 +174,7 @@ TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
   EXPECT_THAT(nothing.error().text, HasSubstr("cannot connect to tcp " + address + ":52100"));
   const auto named = PingStream::open({address, 0}, find_make("waterlinked"), {}, 100ms);
   ASSERT_FALSE(named);
-  EXPECT_THAT(named.error().text, HasSubstr("is no Sonar 3D-15"));
+  EXPECT_THAT(named.error().text, HasSubstr("is not a Sonar 3D-15"));
 }
 
 TEST(WatchPings, KeepsWhatTheSonarRefuses) {

@@ -19,13 +19,14 @@ struct Colour {
 };
 using ColourMap = std::vector<Colour>;  // 4096 entries, the weakest first; empty = none loaded
 
-/// One of colour_map_names from its formula; empty for other names.
+/// Computes the map of that name, one of colour_map_names; returns an empty map for other names.
 ColourMap make_colour_map(std::string_view name);
-/// Raw file, no header: 4096 x B, G, R (verified on public files). file_open, or load_color_map for any other size.
+/// Reads a raw file without a header: 4096 x B, G, R (verified on public files). Returns file_open if it cannot be opened, and
+/// the code load_color_map if it has another size.
 Code load_colour_map(const std::string& path, ColourMap& map);
 Code save_colour_map(const std::string& path, const ColourMap& map);
 
-/// Order of the bytes of a colour pixel in memory. Clients hand them to OpenCV as BGRA (inferred).
+/// Order of the bytes of a colour pixel in memory. Clients hand the pixels to OpenCV as BGRA (inferred).
 enum class PixelOrder { bgra, rgba };
 /// BVE_PIXEL=bgra or rgba; default bgra.
 PixelOrder pixel_order_from_environment();
@@ -35,27 +36,28 @@ struct ColourImage : ImageGeometry {
   std::vector<std::uint32_t> pixels;  // four bytes in memory in that order, alpha 255
 };
 
-/// Entry = 4095 clamp((v - bottom) / (top - bottom), 0, 1)^(1 / gamma), rounded (chosen).
+/// The map entry for magnitude v is 4095 * clamp((v - bottom) / (top - bottom), 0, 1)^(1 / gamma), rounded. The formula is our
+/// assumption.
 class ColourMapper {
  public:
   explicit ColourMapper(PixelOrder order = pixel_order_from_environment()) : order_(order) {}
 
-  /// Codes of load_colour_map; the map in use stays when it fails.
+  /// Returns the codes of load_colour_map. If loading fails, the map in use is kept.
   Code load(const std::string& path);
   void use(ColourMap map);
 
-  /// bad_parameter unless 0 <= bottom < top <= 65535, and in auto mode (verified: refused).
+  /// Returns bad_parameter if 0 <= bottom < top <= 65535 does not hold, and always in auto mode (verified: the SDK refuses it).
   Code set_thresholds(int top, int bottom);
   /// bad_parameter unless 0 < gamma <= 100.
   Code set_gamma(float gamma);
-  /// Automatic top: the 99.5th percentile of the pixels that are not 0, at least lowest_auto_top (chosen).
+  /// Automatic top: the 99.5th percentile of the pixels that are not 0, at least lowest_auto_top (our assumption).
   void set_auto_mode(bool on);
-  int top() const { return top_; }  // in auto mode that of the last image
+  int top() const { return top_; }  // in auto mode the top that the last image had
   int bottom() const { return bottom_; }
   float gamma() const { return gamma_; }
   bool auto_mode() const { return auto_mode_; }
 
-  /// bad_color_map when none is loaded; memory_alloc.
+  /// Returns bad_color_map if no map is loaded, and memory_alloc if memory runs out.
   Code map(const MagImage& magnitudes, ColourImage& colours);
 
   static constexpr int lowest_auto_top = 4096;
@@ -71,9 +73,9 @@ class ColourMapper {
   std::vector<std::uint32_t> table_;  // a pixel for each magnitude; empty = to be built
 };
 
-/// P5, 16 bits, big-endian. file_create, or file_write.
+/// Writes a P5 file of 16 bits, big-endian. Returns file_create if it cannot be created, and file_write if writing fails.
 Code save_pgm(const std::string& path, const MagImage& image);
-/// P6, 8 bits a colour.
+/// Writes a P6 file with 8 bits per channel.
 Code save_ppm(const std::string& path, const ColourImage& image);
 
 }  // namespace sonar::bvt

@@ -17,7 +17,7 @@ constexpr Entry entries[] = {
     {memory_alloc, "BVT_MEMORY_ALLOC", "Out of memory."},
     {file_open, "BVT_FILE_OPEN", "The file cannot be opened; check its name and rights."},
     {file_read, "BVT_FILE_READ", "The file cannot be read."},
-    {file_write, "BVT_FILE_WRITE", "The file cannot be written; is the disk full?"},
+    {file_write, "BVT_FILE_WRITE", "The file cannot be written; check that the disk is not full."},
     {bad_parameter, "BVT_BAD_PARAMETER", "An argument is outside what the function takes."},
     {invalid_ptr, "BVT_INVALID_PTR", "A handle or pointer is null, was destroyed, or is of another kind."},
     {file_create, "BVT_FILE_CREATE", "The file cannot be created; check its folder and rights."},

@@ -32,7 +32,7 @@ Extent extent_of(const PolarPing& ping, int sound_speed_override_mps) {
           scale * static_cast<double>(ping.bin_m)};
 }
 
-/// Rows where no size was asked for; `shown_m` of range lie in them, `columns_per_row` tells the width.
+/// Number of rows when no size was requested. The rows show `shown_m` of range; `columns_per_row` gives the width.
 int rows_by_resolution(const Extent& extent, const ImageSettings& settings, double shown_m, double columns_per_row,
                        double fixed_columns) {
   double rows = 0;
@@ -91,8 +91,8 @@ void plan_r_theta(const Extent& extent, const ImageSettings& settings, int beams
   g.origin_col = to_int(std::round(-static_cast<double>(g.fov_min_deg) / g.bearing_resolution_deg));
 }
 
-/// Row 0 is the far end (inferred from one client that turns the image over). A pixel shows the strongest of the samples it
-/// covers, or the one its centre lies in where it covers none whole (chosen): no echo falls between the rows.
+/// Row 0 is the far end (inferred from one client that turns the image over). A pixel shows the strongest of the samples that
+/// it covers. If it covers no whole sample, it shows the one at its centre (chosen). So no echo falls between the rows.
 void fill_r_theta(const PolarGrid& grid, const Extent& extent, MagImage& image) {
   struct Bins {
     int from, to;
@@ -194,7 +194,7 @@ Code Imager::make(const PolarPing& ping, ImageType type, const ImageSettings& se
     static_cast<ImageGeometry&>(image) = geometry;
     image.pixels.assign(geometry.pixel_count(), 0);
     Extent extent = extent_of(ping, settings.sound_speed_override_mps);
-    // XY rows coarser than two bins: the strongest of the bins in a row is shown (chosen), or echoes would be missed.
+    // If XY rows are coarser than two bins, a row shows the strongest of its bins (chosen). Otherwise echoes would be missed.
     const int pooled =
         type == ImageType::xy ? std::max(1, to_int(std::floor(image.range_resolution_m / extent.bin_m + 1e-9))) : 1;
     const SampleGrid grid(ping, settings.noise_threshold, settings.clipping_threshold, pooled);

@@ -22,7 +22,7 @@ std::string default_port() {
   return port && *port ? port : std::to_string(blueview::tcp_port);
 }
 
-/// A refusal's code; the sonar's sentence goes to the log.
+/// The code of an error reply. The text of the reply is logged.
 int refusal(const Bytes& payload) {
   Reader reader(payload);
   const auto code = reader.read<std::int32_t>();
@@ -32,7 +32,7 @@ int refusal(const Bytes& payload) {
   return code;
 }
 
-/// Signals of the host are for the host's threads.
+/// Blocks all signals while a thread is started, so that signals go to the threads of the program that loaded this library.
 class SignalsBlocked {
  public:
   SignalsBlocked() {
@@ -56,7 +56,7 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
     return static_cast<Code>(code);
   };
   if (!split_endpoint(endpoint, host, port))
-    return refuse(bad_parameter, "write HOST or HOST:PORT, and a port from 1 to 65535 there or in BVE_PORT");
+    return refuse(bad_parameter, "write HOST or HOST:PORT; the port, given there or in BVE_PORT, must be from 1 to 65535");
   Descriptor socket;
   const Code code = connect_to(host, port, Clock::now() + patience.connect, socket, why);
   if (code == lookup_host) return refuse(code, why + "; check the host's name, or give its IPv4 address");
@@ -64,28 +64,31 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
   if (code != success)
     return refuse(
         code, there + ": " + why +
-                  "; check that sonard runs a BlueView sonar at that address; another port goes behind the host (HOST:PORT) or "
-                  "into BVE_PORT");
+                  "; check that sonard runs a BlueView sonar at that address; if it uses another port, give it as HOST:PORT or "
+                  "in BVE_PORT");
   std::unique_ptr<Link> fresh(new Link(std::move(socket), patience));
   Bytes hello, answer;
   put(hello, blueview::protocol_version);
   put(hello, static_cast<std::uint16_t>(abi));
   put_text(hello, "libbvtsdk");
   const int greeted = fresh->ask(FrameType::hello, hello, answer, patience.connect);
-  // Hosts retry on connection_timed_out and give up on all else, so a sonar that is just starting or ending counts as that.
+  // Programs retry after connection_timed_out and give up after any other code. So that code is returned for a sonar that is just
+  // starting or shutting down.
   if (greeted == bad_packet_type)
     return refuse(greeted, "what answers at " + there + " is not sonard's BlueView link; check the port");
   if (greeted == bad_packet_version)
-    return refuse(greeted, "sonard at " + there + " speaks another version of the link; use library and sonard of one release");
+    return refuse(greeted,
+                  "sonard at " + there + " uses another version of the link; use the library and sonard of the same release");
   if (greeted != success)
-    return refuse(connection_timed_out, there +
-                                            (greeted == socket_read_timeout ? " accepts the connection but sends no greeting"
-                                                                            : " accepts the connection and closes it at once") +
-                                            "; sonard is starting, ending or stopped: see its log, and open again");
+    return refuse(connection_timed_out,
+                  there +
+                      (greeted == socket_read_timeout ? " accepts the connection but sends no greeting"
+                                                      : " accepts the connection and closes it at once") +
+                      "; sonard is starting, shutting down or suspended: check its log, then open the sonar again");
   std::optional<SonarDescription> description = decode_description(answer);
   if (!description)
     return refuse(bad_packet_type,
-                  "what answers at " + there + " does not describe a sonar; use library and sonard of one release");
+                  "what answers at " + there + " does not describe a sonar; use the library and sonard of the same release");
   fresh->may_be_silent_ = description->may_be_silent();
   sonar = std::move(*description);
   link = std::move(fresh);

@@ -1,4 +1,4 @@
-// Objects behind the small handles: pings, images, range lists, navigation, generators, mappers, discovery agents.
+// The simpler objects that handles refer to: pings, images, range lists, navigation, generators, mappers, discovery agents.
 // Sonars and heads have files of their own. The facades lock an object's mutex around each call on it.
 #pragma once
 
@@ -35,7 +35,8 @@ struct DiscoveryObject : Object {
   DiscoveryAgent agent;
 };
 
-/// Image settings of a head at the time of its ping; used by BVTPing_GetImage and related functions.
+/// Image settings of a head. Each ping keeps a copy of those that the head had at its time, for BVTPing_GetImage and related
+/// functions.
 struct HeadImaging {
   ImageType type = ImageType::xy;
   ImageSettings image;
@@ -44,16 +45,16 @@ struct HeadImaging {
 
 struct PingObject : Object {
   PolarPing polar;
-  HeadDescription settings;  // the head's when it pinged
+  HeadDescription settings;  // of the head, when this ping was made
   HeadImaging imaging;
-  std::shared_ptr<Imager> imager;  // the head's: it remembers its tables
+  std::shared_ptr<Imager> imager;  // shared with the head, so that its tables are used again
   void* range_data = nullptr;      // 3.x: belongs to the ping and dies with it
   ~PingObject() override {
     if (range_data) handles().remove<RangeListObject>(range_data);
   }
 };
 
-/// 4.x.
+/// Only in the 4.x interface.
 struct ImageGeneratorObject : Object {
   bool has_head = false;
   ImageSettings image;

@@ -15,7 +15,7 @@ struct Place {
   std::uint16_t weight;
 };
 
-/// Between which two of n samples, counted from their centres; beyond the outermost centres the outermost counts.
+/// The two of n samples between whose centres `index` lies; beyond the outermost centres, the outermost sample counts.
 Place place_of(double index, int n) {
   const double inside = std::clamp(index, 0.0, static_cast<double>(n - 1));
   const int low = std::min(static_cast<int>(inside), n - 2);

@@ -10,9 +10,9 @@ namespace sonar::bvt {
 namespace {
 
 constexpr std::uint8_t format_u16 = 1;
-constexpr std::size_t deflate_at_best = 1032;  // zlib's own bound: no stream grows by more than this
+constexpr std::size_t deflate_at_best = 1032;  // zlib's bound: no stream inflates to more than 1032 times its size
 
-/// Calls visit(bit, value) for each number in the order of the link.
+/// Calls visit(bit, value) for each numeric field of the navigation data, in the order in which the link sends them.
 template <class Nav, class Visit>
 void numbers_of(Nav& nav, const Visit& visit) {
   visit(nav_time, nav.time_s);
@@ -28,17 +28,18 @@ void numbers_of(Nav& nav, const Visit& visit) {
 }
 constexpr std::uint16_t known_fields = 2 * nav_text - 1;
 
-/// The fault of the fixed fields; empty when there is none.
+/// The error in the fields of fixed size; empty when they are valid.
 std::string complaint(const PolarPing& p) {
   if (!std::isfinite(p.time_s)) return "its time is not a number";
-  if (!(p.start_m >= 0 && p.stop_m > p.start_m && p.stop_m <= 1e6f)) return "its ranges are not 0 <= start < stop";
-  if (!(p.bin_m > 0 && p.bin_m <= 1e6f)) return "its range bin is not a length";
-  if (p.sound_speed_mps <= 0 || p.sound_speed_mps > 100000) return "its sound speed is not one";
-  if (!(p.fov_min_deg >= -180 && p.fov_max_deg > p.fov_min_deg && p.fov_max_deg <= 180)) return "its sector is not one";
+  if (!(p.start_m >= 0 && p.stop_m > p.start_m && p.stop_m <= 1e6f)) return "its ranges are not 0 <= start < stop <= 1000 km";
+  if (!(p.bin_m > 0 && p.bin_m <= 1e6f)) return "its range bin is not between 0 and 1000 km";
+  if (p.sound_speed_mps <= 0 || p.sound_speed_mps > 100000) return "its sound speed is not from 1 to 100000 m/s";
+  if (!(p.fov_min_deg >= -180 && p.fov_max_deg > p.fov_min_deg && p.fov_max_deg <= 180))
+    return "its sector is not -180 <= minimum < maximum <= 180 degrees";
   return {};
 }
 
-/// Little-endian pairs of bytes; gcc makes a copy of it on little-endian machines.
+/// Reads 16-bit samples, little-endian. On little-endian machines gcc turns the loop into a memcpy.
 void samples_from(BytesView bytes, std::vector<std::uint16_t>& samples) {
   samples.resize(bytes.size / 2);
   for (std::size_t i = 0; i < samples.size(); ++i)
@@ -79,7 +80,7 @@ Bytes inflated(BytesView body, std::size_t size) {
   return out;
 }
 
-/// Runs only: searching noise for other repetitions gains too little. Empty on failure.
+/// Compresses runs of equal bytes only (Z_RLE): in noise, a search for other repetitions gains too little. Empty on failure.
 Bytes deflated(BytesView body) {
   z_stream stream{};
   if (deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) return {};
@@ -151,7 +152,9 @@ std::optional<PolarPing> decode_ping(BytesView payload, std::string* why) {
   if (format != format_u16) return refuse("its samples have format " + std::to_string(format) + ", only 1 is known");
   const std::size_t expected = 2 * static_cast<std::size_t>(p.beams) * static_cast<std::size_t>(p.bins);
   if (size != expected || size > longest_payload)
-    return refuse(std::to_string(size) + " bytes of samples for " + std::to_string(p.beams) + " x " + std::to_string(p.bins));
+    return refuse("it announces " + std::to_string(size) + " bytes of samples; " + std::to_string(p.beams) + " beams x " +
+                  std::to_string(p.bins) + " bins need " + std::to_string(expected) + ", and the limit is " +
+                  std::to_string(longest_payload));
   if (packing == Packing::plain) {
     if (body.size != size) return refuse(std::to_string(body.size) + " bytes follow, " + std::to_string(size) + " are announced");
     samples_from(body, p.samples);

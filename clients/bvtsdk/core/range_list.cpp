@@ -10,12 +10,13 @@
 namespace sonar::bvt {
 namespace {
 
-/// Index of the selected sample, or n for none. At equal strength the nearer one.
+/// Index of the selected sample, or n for none. Of equally strong samples the nearest is selected.
 std::size_t chosen_bin(const std::uint16_t* samples, std::size_t first, std::size_t n, std::uint16_t lowest,
                        RangeListSettings::Policy policy) {
   if (first >= n) return n;
+  // The compiler vectorises this loop. Most beams have no sample as strong as `lowest` and need no other.
   std::uint16_t strongest = 0;
-  for (std::size_t k = first; k < n; ++k) strongest = std::max(strongest, samples[k]);  // vectorised: most beams end here
+  for (std::size_t k = first; k < n; ++k) strongest = std::max(strongest, samples[k]);
   if (strongest < lowest) return n;
   const std::uint16_t* const from = samples + first;
   const std::uint16_t* const found = policy == RangeListSettings::Policy::nearest
@@ -24,7 +25,7 @@ std::size_t chosen_bin(const std::uint16_t* samples, std::size_t first, std::siz
   return static_cast<std::size_t>(found - samples);
 }
 
-/// The list's bearing is a beam's left edge; echoes lie in its middle.
+/// A bearing in the list is the left edge of a beam; the echoes of the beam are at its centre.
 double centre_rad(const RangeList& list, int i) {
   return (static_cast<double>(list.bearing_deg[static_cast<std::size_t>(i)]) + 0.5 * list.bearing_resolution_deg) / degrees;
 }
@@ -50,11 +51,11 @@ Code make_range_list(const PolarPing& ping, const RangeListSettings& settings, R
   if (!ping.has_signal()) return no_ping_signal;
   const double scale = range_scale(ping, settings.sound_speed_override_mps);
   const auto beams = static_cast<std::size_t>(ping.beams), bins = static_cast<std::size_t>(ping.bins);
-  // Above the threshold, and not silenced by the noise threshold.
+  // The smallest sample that counts: it is above `threshold`, and the noise threshold does not set it to 0.
   const int lowest = std::max(settings.threshold + 1, static_cast<int>(lowest_significant(settings.noise_threshold)));
   const double skipped = (static_cast<double>(settings.start_range_m) / scale - static_cast<double>(ping.start_m)) /
                              static_cast<double>(ping.bin_m) -
-                         0.5;  // a bin counts when its centre does
+                         0.5;  // a bin counts if its centre is not nearer than start_range_m
   const auto first = skipped > 0 ? static_cast<std::size_t>(std::ceil(std::min(skipped, static_cast<double>(bins)))) : 0;
   RangeList made;
   try {

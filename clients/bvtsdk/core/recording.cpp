@@ -14,7 +14,7 @@ constexpr std::uint16_t newest_version = 2;
 constexpr std::size_t file_header_size = 8;
 constexpr std::size_t crc_size = 4;
 constexpr std::size_t index_entry_size = 2 + 4 + 8 + 8;
-constexpr std::size_t most_lanes = 256;                // bounds the search in a damaged index
+constexpr std::size_t most_lanes = 256;                // a damaged index may name any number of heads; add() searches all lanes
 constexpr std::size_t index_tail_size = 8 + crc_size;  // the index frame's own offset, and its checksum
 
 std::uint32_t checksum(BytesView header, BytesView payload) {
@@ -29,7 +29,7 @@ bool read_all(std::FILE* file, std::uint8_t* to, std::size_t size) { return std:
 
 bool write_all(std::FILE* file, const Bytes& bytes) { return std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size(); }
 
-/// Where a frame belongs in the index; nothing for one that is not counted.
+/// Fills in the index entry of a frame. False: frames of that type are not in the index, or the payload is too short.
 bool place_of(FrameType type, BytesView payload, FramePlace& place) {
   Reader reader(payload);
   place.type = type;
@@ -75,7 +75,7 @@ Code RecordingWriter::put_frame(FrameType type, BytesView payload, std::int32_t 
                        std::fwrite(payload.data, 1, payload.size, file_.get()) == payload.size && write_all(file_.get(), crc) &&
                        std::fflush(file_.get()) == 0;
   if (!written) {
-    file_.reset();  // bytes after a partial frame would never be read; the frames before it will
+    file_.reset();  // readers stop at a partial frame; the frames before it can be read
     return file_write;
   }
   if (size_ > file_header_size && type != FrameType::index) places_.push_back({type, head, time_s, size_});
@@ -123,7 +123,7 @@ Code RecordingWriter::close() {
   }
   put(index, size_);
   Code code = put_frame(FrameType::index, index, 0, 0);
-  if (code == bad_parameter) code = success;  // three million frames: read by scanning
+  if (code == bad_parameter) code = success;  // more than some three million frames: readers scan the file
   if (file_ && std::fclose(file_.release()) != 0) code = file_write;
   return code;
 }
@@ -148,7 +148,7 @@ Code RecordingReader::open(const std::string& path, std::string* why) {
   File file(std::fopen(path.c_str(), "rb"));
   std::string reason;
   const Code code = file ? open(std::move(file), &reason) : file_open;
-  if (code == file_open) reason = "cannot be opened; does it exist, and may it be read?";
+  if (code == file_open) reason = "cannot be opened; check that it exists and that you may read it";
   if (why && code != success) *why = path + " " + reason;
   return code;
 }
@@ -162,7 +162,7 @@ Code RecordingReader::open(File file, std::string* why) {
   };
   file_ = std::move(file);
   std::uint8_t start[file_header_size];
-  if (!file_ || fseeko(file_.get(), 0, SEEK_END) != 0) return refuse(file_open, "cannot be read from any place");
+  if (!file_ || fseeko(file_.get(), 0, SEEK_END) != 0) return refuse(file_open, "cannot be read: it is not a regular file");
   const off_t end = ftello(file_.get());
   size_ = end > 0 ? static_cast<std::uint64_t>(end) : 0;
   if (!seek(file_.get(), 0) || !read_all(file_.get(), start, sizeof start) || std::memcmp(start, "BVER", 4) != 0)
@@ -173,12 +173,13 @@ Code RecordingReader::open(File file, std::string* why) {
     return refuse(file_too_new, "is a recording of version " + std::to_string(version) + "; this library reads versions 1 and 2");
   FrameHeader header;
   if (version < 1 || !read_frame(file_header_size, header, hello_) || header.type != FrameType::hello_ok)
-    return refuse(file_header_bad, "does not name its sonar; was it cut off at the start?");
+    return refuse(file_header_bad, "has no valid description of its sonar at its start; it is probably damaged");
   const std::uint64_t first = file_header_size + frame_header_size + hello_.size() + crc_size;
   has_index_ = read_index();
   if (!has_index_) scan(first);
   for (Lane& lane : lanes_)
-    if (lane.type == FrameType::hello_ok) std::sort(lane.offsets.begin(), lane.offsets.end());  // searched; an index may lie
+    // hello_of_ping() searches these by bisection, and a damaged index may have them in any order.
+    if (lane.type == FrameType::hello_ok) std::sort(lane.offsets.begin(), lane.offsets.end());
   return success;
 }
 
@@ -186,7 +187,8 @@ bool RecordingReader::read_frame(std::uint64_t offset, FrameHeader& header, Byte
   Bytes head(frame_header_size);
   if (!file_ || offset > size_ || size_ - offset < frame_header_size + crc_size) return false;
   if (!seek(file_.get(), offset) || !read_all(file_.get(), head.data(), head.size()) || !read_header(head, header)) return false;
-  if (size_ - offset - frame_header_size - crc_size < header.payload_size) return false;  // checked before anything is allocated
+  // Checked first, so that a damaged size does not cause a huge allocation.
+  if (size_ - offset - frame_header_size - crc_size < header.payload_size) return false;
   payload.resize(header.payload_size);
   std::uint8_t crc[crc_size];
   if (!read_all(file_.get(), payload.data(), payload.size()) || !read_all(file_.get(), crc, sizeof crc)) return false;
@@ -270,7 +272,7 @@ Code RecordingReader::read_ping(std::int32_t head, int n, PolarPing& ping, std::
   };
   if (!read_frame(offsets[static_cast<std::size_t>(n)], header, payload))
     return refuse(file_read, "its frame is cut off, or does not match its checksum");
-  std::string reason = "another frame lies at its place";
+  std::string reason = "the index points to a frame that is not this ping";
   auto decoded = header.type == FrameType::ping_data ? decode_ping(payload, &reason) : std::nullopt;
   if (!decoded || decoded->head != head) return refuse(bad_ping, reason);
   ping = std::move(*decoded);

@@ -39,7 +39,7 @@ std::uint16_t lowest_significant(float noise_threshold) {
 SampleGrid::SampleGrid(const PolarPing& ping, float noise_threshold, float clipping_threshold, int pool) {
   auto beams = static_cast<std::size_t>(ping.beams), bins = static_cast<std::size_t>(ping.bins);
   const std::uint16_t* samples = ping.samples.data();
-  // Pooling, then thresholds: the strongest of some, cut, is the strongest of the cut ones, and there are fewer to cut.
+  // Samples are pooled before the thresholds apply. The result is the same, and the thresholds apply to fewer samples.
   const std::size_t together = std::min(bins, static_cast<std::size_t>(std::max(pool, 1)));
   if (together > 1) {
     made_ = pooled_bins(samples, beams, bins, together);

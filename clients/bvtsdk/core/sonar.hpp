@@ -1,4 +1,4 @@
-// A sonar of the SDK and its heads: implements BVTSonar_* and BVTHead_* of both interfaces.
+// The SDK's objects for a sonar and its heads. They implement BVTSonar_* and BVTHead_* of the interfaces 3.x and 4.x.
 #pragma once
 
 #include <string>
@@ -9,21 +9,23 @@
 
 namespace sonar::bvt {
 
-/// The facades hold `mutex` during a call, also while a ping is waited for.
+/// The facades hold Object::mutex during a call, also while the call waits for a ping.
 class Head : public Object {
  public:
   Head(std::shared_ptr<Source> source, const HeadDescription& description);
 
-  /// Settings last applied, or held when the ping of a recording was made. Other hosts of the same sonar are not asked.
+  /// The settings that were last applied here; after a ping was read from a recording, those that it was made with. Changes that
+  /// other programs make at the same sonar are not seen.
   HeadDescription now;
   HeadImaging imaging;
-  int transmit = 1, ping_interval_ms = 0, dynamic_power = 0, mount = 0;  // mount is kept and read back only
+  int transmit = 1, ping_interval_ms = 0, dynamic_power = 0, mount = 0;  // mount has no effect: it is stored and returned
 
-  /// bad_parameter for a non-finite number; else the code of the sonar (bad_range). `now` receives the applied value.
+  /// Returns bad_parameter if a number is not finite, else the code that the sonar returns, such as bad_range. `now` receives the
+  /// applied value.
   int set_range(float start_m, float stop_m);
   int set_start(float start_m);
   int set_stop(float stop_m);
-  /// One integer setting of the sonar and where it is kept here.
+  /// Sets one setting of the sonar; `kept` receives the applied value.
   int set(Key key, int value, std::int32_t& kept);
   int set(Key key, float value, float& kept);
 
@@ -31,7 +33,7 @@ class Head : public Object {
   int put_ping(const PingObject& ping) { return source_->put_ping(now.id, ping.polar, ping.settings); }
   int ping_count() const { return source_->ping_count(now.id); }
 
-  void* borrowed = nullptr;  // 3.x: the one handle, which belongs to the sonar
+  void* borrowed = nullptr;  // 3.x: the head's one handle, which the sonar owns
 
  private:
   const std::shared_ptr<Source> source_;
@@ -42,18 +44,20 @@ class Sonar : public Object {
  public:
   ~Sonar() override { reset(); }
 
-  /// "NET" and an address, or "FILE" and a path. What was open is closed: for NET first, also when it fails; for FILE once the
-  /// file is open, because hosts look for the next part of a recording in this way and go on with what they have (verified).
+  /// `type` is "NET" with an address, or "FILE" with a path. NET closes the previous source first, even if opening then fails.
+  /// FILE closes it only once the new file is open: programs try to open the next part of a recording in this way, and continue
+  /// with the current part if there is none (verified).
   int open(const std::string& type, const std::string& parameter, int abi);
-  /// Becomes a new recording of that sonar.
+  /// Creates a recording of the sonar that `of` describes; this object then writes to it.
   int create_file(const std::string& path, const SonarDescription& of);
-  /// Closes link or file; remaining heads then return errors, and 3.x handles of heads are invalid.
+  /// Closes the link or file. Heads that the program still has then return errors, and 3.x handles of heads are invalid.
   void reset();
-  /// no_head for a number it does not have, net_not_connected before it is open.
+  /// Returns no_head if the sonar has no head of that number, and net_not_connected if the sonar is not open.
   int head(int number, std::shared_ptr<Head>& head) const;
 
   const Source* source() const { return source_.get(); }  // null: not open
-  /// Its description, with the current settings. Waits for calls on its heads. Only while it is open.
+  /// The sonar's description, with the current settings. Blocks until running calls on its heads have ended. Call it only while
+  /// the sonar is open.
   SonarDescription description() const;
   int put_event(const std::string& key, const std::string& text);
   int set_local_clock(int on);

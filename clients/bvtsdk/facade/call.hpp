@@ -1,5 +1,5 @@
-// The frame of every C function of the facades around its one line of work: find the object behind the handle, lock it, write
-// every out-parameter whatever happens, and let no exception out.
+// The steps that all C functions of the facades share around their own line of work: find the object of the handle, lock it,
+// always write every out-parameter, and let no exception out.
 #pragma once
 
 #include <cstring>
@@ -22,7 +22,7 @@ int guarded(F work) noexcept {
   }
 }
 
-/// The code of `work(object)`, done under the object's lock; invalid_ptr when the handle is not of a T.
+/// Runs `work(object)` with the object locked, and returns its result code; invalid_ptr if the handle is not that of a T.
 template <class T, class F>
 int on(const void* handle, F work) noexcept {
   return guarded([&]() -> int {
@@ -33,7 +33,7 @@ int on(const void* handle, F work) noexcept {
   });
 }
 
-/// Getter of 4.x: *out = work(object); 0 when it fails.
+/// Getter of the 4.x interface: sets *out to work(object), or to 0 if it fails.
 template <class T, class V, class F>
 int get(const void* handle, V* out, F work) noexcept {
   if (!out) return invalid_ptr;
@@ -44,7 +44,7 @@ int get(const void* handle, V* out, F work) noexcept {
   });
 }
 
-/// Getter that may refuse: the code of work(object, value).
+/// Getter that can fail: returns the code of work(object, value). On failure *out is 0.
 template <class T, class V, class F>
 int try_get(const void* handle, V* out, F work) noexcept {
   if (!out) return invalid_ptr;
@@ -55,7 +55,7 @@ int try_get(const void* handle, V* out, F work) noexcept {
   return code;
 }
 
-/// Getter of 3.x, which cannot refuse: `otherwise` for a bad handle.
+/// Getter of the 3.x interface, which has no error code: returns `otherwise` for a bad handle.
 template <class T, class V, class F>
 V value(const void* handle, V otherwise, F work) noexcept {
   V result = otherwise;
@@ -66,7 +66,7 @@ V value(const void* handle, V otherwise, F work) noexcept {
   return result;
 }
 
-/// Hands a new object to the host. H is one of the interface's handle types.
+/// Registers a new object and gives its handle to the calling program. H is one of the interface's handle types.
 template <class H>
 int give(std::shared_ptr<Object> object, H* out) {
   void* handle = handles().add(std::move(object));
@@ -74,7 +74,7 @@ int give(std::shared_ptr<Object> object, H* out) {
   return handle ? success : memory_alloc;
 }
 
-/// Makes an object with work(T of the handle, new object of type N) and hands it out; *out is null when that fails.
+/// Creates an N, lets work(object, fresh) fill it, and puts a handle of it into *out; *out is null if that fails.
 template <class T, class N, class H, class F>
 int make(const void* handle, H* out, F work) noexcept {
   if (!out) return invalid_ptr;
@@ -86,7 +86,7 @@ int make(const void* handle, H* out, F work) noexcept {
   });
 }
 
-/// Null when out of memory.
+/// Creates an N and returns its handle; null if memory or handles run out.
 template <class N, class H>
 H create() noexcept {
   H handle = nullptr;
@@ -94,7 +94,7 @@ H create() noexcept {
   return handle;
 }
 
-/// Null and stale handles have no effect. Objects go with the last thread that still works on them.
+/// Makes the handle invalid; null and stale handles are ignored. The object is freed when the last thread that uses it is done.
 template <class T>
 void destroy(const void* handle) noexcept {
   guarded([&]() -> int {
@@ -103,7 +103,7 @@ void destroy(const void* handle) noexcept {
   });
 }
 
-/// NUL-terminated into the host's buffer; empty there and buffer_too_small when it does not fit.
+/// Copies a text and its NUL into the caller's buffer. If it does not fit, the buffer is "" and the result is buffer_too_small.
 inline int copy_text(const std::string& text, char* buffer, int size) {
   if (!buffer || size <= 0) return bad_parameter;
   buffer[0] = '\0';
@@ -112,14 +112,14 @@ inline int copy_text(const std::string& text, char* buffer, int size) {
   return success;
 }
 
-/// As copy_text, of work(object) -> text; the buffer is emptied first.
+/// Copies the text that work(object) returns, as copy_text does. The buffer is "" if the handle is bad.
 template <class T, class F>
 int get_text(const void* handle, char* buffer, int size, F work) noexcept {
   if (buffer && size > 0) buffer[0] = '\0';
   return on<T>(handle, [&](T& object) -> int { return copy_text(work(object), buffer, size); });
 }
 
-/// All values into the host's buffer, or none and buffer_too_small.
+/// Copies all values into the caller's buffer. If they do not fit, copies none and returns buffer_too_small.
 template <class V, class N>
 int copy_values(const std::vector<V>& values, V* buffer, N size) {
   if (!buffer) return invalid_ptr;

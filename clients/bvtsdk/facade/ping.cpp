@@ -1,4 +1,4 @@
-// BVTPing_*, BVTImageGenerator_*, range data and range profiles. See docs/bvtsdk.md for each function.
+// The functions BVTPing_*: images, navigation data and, in 3.x, range data of a ping. See docs/bvtsdk.md for each function.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"
@@ -62,7 +62,7 @@ RetVal BVTPing_GetRangeData(BVTPing self, BVTRangeData* out) {
       const auto fresh = std::make_shared<RangeListObject>();
       const int code = make_range_list(o.polar, o.imaging.ranges, fresh->list);
       if (code != success) return code;
-      // Hosts turn ranges into rows of the ping's image with it (verified), which is right only when it is that image's.
+      // Programs divide ranges by range_resolution_m to get rows of the ping's image (verified). So it must be the image's.
       ImageGeometry image;
       if (plan_image(o.polar, o.imaging.type, o.imaging.image, image) == success)
         fresh->list.range_resolution_m = image.range_resolution_m;

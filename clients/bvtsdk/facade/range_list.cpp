@@ -1,4 +1,4 @@
-// BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x): one range a bearing. See docs/bvtsdk.md for each function.
+// BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x): one range per bearing. See docs/bvtsdk.md for each function.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;
@@ -32,7 +32,7 @@ RetVal BVTRangeData_CopyRangeValues(BVTRangeData self, float* buffer, int count)
 #else
 
 namespace {
-/// Value i, by work(list).
+/// Sets *out to the value that work(list) returns; index_out_of_bounds if the list has no entry i.
 template <class V, class F>
 RetVal entry(BVTRangeProfile self, int i, V* out, F work) {
   return try_get<RangeListObject>(self, out, [&](RangeListObject& o, V& v) -> int {

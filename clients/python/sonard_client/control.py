@@ -190,7 +190,7 @@ class Control:
 
     def start_recording(self, file: str, sonar: str = "", labels: bool = False) -> None:
         """Starts a recording inside sonard, in its folder. The extension selects the kind (docs/recording.md).
-        labels: in .mcap, also which object's echo each sample holds. Returns when the file is open."""
+        labels: only .mcap: also record which object's echo each sample holds. Returns when the file is open."""
         self._post("start_recording", _given(file=file, sonar=sonar or None, labels=labels or None))
 
     def stop_recording(self, file: str = "") -> None:

@@ -31,17 +31,17 @@ class ControlClient {
   using Operation = decltype(control::Request::op);
   using Response = std::shared_ptr<const v1::Response>;
   static constexpr std::chrono::milliseconds usual_patience{10000};
-  /// sonard greets at once even when busy; a longer silence means another service.
+  /// sonard answers Hello at once even when busy. No answer within this time means that another service listens there.
   static constexpr std::chrono::milliseconds greeting_patience{2000};
 
-  /// Connects and greets. Errors: no connection, another service, the token. `token_required` is set when sonard requires a token
-  /// and no token file is given.
+  /// Connects and sends Hello. Fails when there is no connection, when another service answers, or when the token is missing or
+  /// wrong. `token_required` is set when sonard requires a token and no token file is given.
   static Result<ControlClient> open(const ControlOptions& options, bool* token_required = nullptr);
 
   /// The answer to one request; a refusal is an error with sonard's text. Events that arrive meanwhile are kept.
   Result<Response> request(Operation operation, std::chrono::milliseconds patience = usual_patience);
   Result<std::shared_ptr<const v1::DaemonStatus>> status(std::chrono::milliseconds patience = usual_patience);
-  /// The next subscribed event; null after `patience` or a signal.
+  /// The next subscribed event; null when `patience` has passed or the process has received a signal.
   Result<std::shared_ptr<const v1::Event>> next_event(std::chrono::milliseconds patience);
 
   const Endpoint& at() const { return at_; }
@@ -54,10 +54,10 @@ class ControlClient {
   Socket socket_;
   Endpoint at_;
   control::DelimitedParser parser_;
-  bool received_ = false;  // a byte
+  bool received_ = false;  // any byte has arrived
   std::deque<std::shared_ptr<const v1::Event>> events_;
   std::uint64_t last_id_ = 0;
-  bool unauthenticated_ = false;  // says the last answer
+  bool unauthenticated_ = false;  // the last answer had the status UNAUTHENTICATED
 };
 
 }  // namespace sonar::clients

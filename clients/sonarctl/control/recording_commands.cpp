@@ -1,4 +1,4 @@
-// Command line of recording: files that a running sonard writes on its own computer.
+// Command line of `sonarctl recording`, which makes a running sonard record into files on its own computer.
 #include <CLI/CLI.hpp>
 #include <memory>
 
@@ -26,14 +26,15 @@ CLI::App& add_command(CLI::App& recording, const std::string& name, const std::s
 }  // namespace
 
 Run add_recording(CLI::App& app) {
-  CLI::App& recording =
-      *app.add_subcommand("recording", "files written by a running sonard, with true poses and the first object of each beam");
+  CLI::App& recording = *app.add_subcommand(
+      "recording", "start or stop files that a running sonard records, with true poses and the first object that each beam hits");
   recording.require_subcommand(1);
   recording.footer(
       "examples:\n"
-      "  sonarctl recording start run-1.mcap          in the folder that its configuration names\n"
+      "  sonarctl recording start run-1.mcap          in the folder that sonard's configuration names\n"
       "  sonarctl recording stop\n"
-      "sonarctl status lists the recordings; sonarctl record writes files here, as a client of the sonar");
+      "sonarctl status lists the recordings; sonarctl record connects as a client of the sonar and writes files on this "
+      "computer");
   const auto arguments = std::make_shared<RecordingArguments>();
   RecordingArguments& a = *arguments;
 
@@ -41,14 +42,15 @@ Run add_recording(CLI::App& app) {
       add_command(recording, "start", "start a file; its suffix selects the format: " + recording::file_endings(), a);
   start.add_option("FILE", a.start.file, "file name, without a folder")->required();
   start.add_option("--sonar", a.start.sonar, "name of the sonar (default: the only one)");
-  start.add_flag("--labels", a.start.labels,
-                 "in .mcap, also which object's echo each sample holds; pings take about twice as long");
+  start.add_flag(
+      "--labels", a.start.labels,
+      "only .mcap: also record which object's echo each sample holds; computing a ping then takes about twice as long");
   start.footer(
       "examples:\n"
       "  sonarctl recording start run-1.mcap --labels\n"
       "  sonarctl recording start left.pcap --sonar left");
   start.callback([&a] {
-    a.what = [&a] { return steer(a.control, a.start, a.start.file + " is being recorded; sonarctl status shows how it goes"); };
+    a.what = [&a] { return steer(a.control, a.start, "recording to " + a.start.file + "; sonarctl status shows its progress"); };
   });
 
   CLI::App& stop = add_command(recording, "stop", "finish a file, or all of them", a);

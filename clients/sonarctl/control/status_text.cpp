@@ -108,7 +108,7 @@ std::string text_from(const v1::ObjectStatus& o) {
   return text;
 }
 
-/// Only for clocks other than real time.
+/// The time of the clock; empty for real time.
 std::string clock_time(const v1::DaemonStatus& s) {
   return s.clock() == "realtime" ? std::string() : format(" at %.3f s", 1e-9 * static_cast<double>(s.now_ns()));
 }

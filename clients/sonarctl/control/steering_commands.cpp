@@ -176,7 +176,7 @@ void add_set_trajectory(CLI::App& set, const std::shared_ptr<Steering>& steering
   });
 }
 
-/// `what` refers to the steering it is in: taken out, the two do not keep each other.
+/// `what` refers to the steering that contains it. It is moved out, so that the two do not keep each other alive.
 Run run_of(const std::shared_ptr<Steering>& steering) {
   return [steering] { return std::exchange(steering->what, {})(); };
 }

@@ -68,7 +68,7 @@ class SonarChecks {
 
   bool answers() const { return sonar_.stream.outcome >= Outcome::closed_without_a_byte || !sonar_.clients.empty(); }
 
-  /// Images go by UDP, for which no client connects: only the daemon knows of them.
+  /// Images go by UDP, and no client connects for them. So only the status of the daemon shows them.
   void check_images() {
     const std::string at = "http at " + sonar_.at.host;
     if (!sonar_.reported) return add(Level::warn, "ping", at + ": no daemon tells whether images are sent", "");
@@ -96,7 +96,7 @@ class SonarChecks {
     }
     if (received == nullptr) {
       if (answers()) check_silence(port);
-      return;  // otherwise the finding of the connection names the fault
+      return;  // otherwise the finding on the connection names the error
     }
     if (!received->complaints.empty())
       return add(Level::fail, "status",

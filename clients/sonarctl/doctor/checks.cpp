@@ -21,7 +21,7 @@ std::string counted(std::ptrdiff_t count, const std::string& what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
-/// Two sonars that drivers cannot tell apart.
+/// Finds pairs of sonars that drivers cannot distinguish.
 void check_identities(const StatusFacts& status, std::vector<Finding>& findings) {
   for (std::size_t i = 0; i < status.received.size(); ++i) {
     for (std::size_t k = i + 1; k < status.received.size(); ++k) {
@@ -122,8 +122,9 @@ void check_ports(const Facts& facts, std::vector<Finding>& findings) {
                                ""});
   const std::string reserved = ports.reserved.empty() ? exposed : ports.reserved + "," + exposed;
   findings.push_back({Level::warn, "ports",
-                      "ports " + exposed + " lie in the ephemeral range " + range + ": an outgoing connection may take one first",
-                      "reserve: sysctl net.ipv4.ip_local_reserved_ports=" + reserved});
+                      "ports " + exposed + " lie in the ephemeral range " + range +
+                          ": an outgoing connection may occupy one before sonard starts",
+                      "to reserve them: sysctl net.ipv4.ip_local_reserved_ports=" + reserved});
 }
 
 std::string text_from(const std::vector<Finding>& findings, bool colours) {

@@ -78,7 +78,7 @@ class Gathering {
       control_.emplace(std::move(*client));
   }
 
-  /// At the address given by the user, else that reported by the daemon, else the default.
+  /// Asks at the address that the user gave, else at the one that the daemon reported, else at the default.
   void ask_http(Endpoint at) {
     const bool given = !questions_.http.empty();
     const auto& status = facts_.control.status;
@@ -130,7 +130,7 @@ class Gathering {
     return s.advertised() == host || s.listens().starts_with(host + ":");
   }
 
-  /// Without a port: that of the sonar known at this address.
+  /// If no port is given, it is that of the sonar known at this address.
   Endpoint with_port(const Endpoint& given) const {
     if (given.port != 0) return given;
     if (facts_.control.status)
@@ -173,7 +173,7 @@ class Gathering {
       for (const v1::ClientStatus& client : sonar.reported->clients()) sonar.clients.push_back(client.address());
       return;
     }
-    // Without a daemon: the connections of this computer's kernel, else the client named by the status message.
+    // Without a daemon, clients are the connections in this computer's kernel, else the client that the status message names.
     for (const SocketLine& socket : sockets)
       if (socket.state == established && socket.local_port == sonar.at.port && socket.local_host == sonar.at.host)
         sonar.clients.push_back(socket.remote_host + ":" + std::to_string(socket.remote_port));

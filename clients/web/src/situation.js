@@ -5,7 +5,7 @@ const stands_after_s = 2;
 const preview_begins_s = 5;  // where it begins by itself
 const now_s = () => performance.now() / 1000;
 
-/// The first address at which a driver speaks first: "udp 127.0.0.2:12345"; of older daemons the host.
+/// The first address at which the sonar waits for a driver: "udp 127.0.0.2:12345"; of older daemons the host.
 function whereToConnect(sonar) {
   const found = sonar.addresses?.find((a) => !a.sonar_speaks_first);
   return found ? `${found.protocol} ${found.address}` : host(sonar.listens) || sonar.advertised;

@@ -19,7 +19,8 @@ std::vector<Path> paths_in_view(const std::vector<FlatMirror>& mirrors, const Bo
   return paths;
 }
 
-/// Cells wherever a path by mirrors may reach; their sizes follow the paths' lengths, reach[0] being the straight one.
+/// Selects cells wherever a path over mirrors may reach. Their sizes follow the lengths of the paths; reach[0] is the straight
+/// path.
 CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pose> bodies, const std::vector<PathReach>& reach) {
   CellView view;
   view.sonar_in_world = s.seen_from;
@@ -44,8 +45,8 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
   return view;
 }
 
-/// In rounds: batches of tiles become echoes, sorted by column group; then groups sum them, batch by batch. So the order of
-/// every sum is that of the tiles, whichever thread does the work.
+/// Works in rounds. Batches of tiles become echoes, sorted by column group; then groups sum them, batch by batch. So the order of
+/// each sum is the order of the tiles, whichever thread does the work.
 class Rounds {
  public:
   Rounds(MultipathWork& work, const PingPlan& plan, const simd::Kernels& kernels, Parallel& pool)

@@ -65,7 +65,7 @@ Path path_by(const std::vector<FlatMirror>& mirrors, int first, int second) {
   path.turn = a.turn, path.shift_m = a.shift_m;
   if (second < 0) return path;
   const Image b = image_in(at(mirrors, second));
-  // The last mirror's image first: a place is mirrored in b, its image in a.
+  // The last mirror comes first: a place is mirrored in b, then its image in a.
   path.turn = a.turn * b.turn;
   path.shift_m = a.turn * b.shift_m + a.shift_m;
   path.second_normal = a.turn * at(mirrors, second).normal;
@@ -90,7 +90,7 @@ bool is_lit(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d plac
 double bubble_factor(const BubbleLayer& bubbles, const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place,
                      const PingScalars& s) {
   if (!bubbles.present()) return 1;
-  // Backwards from the place: where the line from the sonar's last image to it meets each mirror.
+  // Goes backwards from the place, to each point where the line from the last image of the sonar to the place crosses a mirror.
   std::vector<Vec3d> bends{place};
   for (const int mirror : {path.second, path.first}) {
     if (mirror < 0) continue;
@@ -99,13 +99,13 @@ double bubble_factor(const BubbleLayer& bubbles, const Path& path, const std::ve
     const Vec3d source = two_left ? image_in(at(mirrors, path.second)).of(image_in(at(mirrors, path.first)).of({}))
                                   : image_in(at(mirrors, path.first)).of({});
     const double from = at(mirrors, mirror).height_of(source), to = at(mirrors, mirror).height_of(end);
-    // A place on the dark side has no such line; tiles that reach through the mirror may be represented by one.
+    // For a place on the dark side there is no such line. Tiles that reach through the mirror may have their middle there.
     const double part = from == to ? 0.5 : std::clamp(from / (from - to), 0.0, 1.0);
     bends.push_back(source + part * (end - source));
   }
   bends.push_back({});
   double factor = 1;
-  // World z [m], by which (16) knows the layer.
+  // World z [m], which decides the layer in (16).
   const auto height = [&s](Vec3d p) { return s.seen_from.position_m.z + (s.world_from_sonar * p).z; };
   // two_way() is e^{-2 b l}: its root is the loss of one way.
   for (std::size_t i = 0; i + 1 < bends.size(); ++i)

@@ -17,7 +17,7 @@ void store(Vec3d v, float (&to)[3]) {
   to[0] = static_cast<float>(v.x), to[1] = static_cast<float>(v.y), to[2] = static_cast<float>(v.z);
 }
 
-/// Without the care that the library's product takes of infinities.
+/// The product without the checks for infinities that the library's product makes.
 std::complex<float> times(std::complex<float> a, std::complex<float> b) {
   return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
@@ -288,7 +288,7 @@ void MultipathScatterer::pair_up(const Cell& cell, float fade, std::vector<Echoe
       const float sample = 0.5f * (a.range_m + b.range_m) * per_m - from + 0.5f * (a.sample_shift + b.sample_shift);
       if (sample <= first || sample >= last) continue;
       const auto add_arrival = [&](const Arrival& out, const Arrival& back, std::complex<float> amplitude) {
-        // finish_columns lights a column as the direct path out would; here the path out is another.
+        // finish_columns lights a column by the direct path to the scatterer. Here that path is another.
         if (back.transmit < least_transmit || out.transmit == 0) return;
         const float lit = out.transmit / back.transmit;
         add(sample, amplitude * (plan_.expected_power ? lit * lit : lit), back.column, by_group);

@@ -254,7 +254,7 @@ BounceFan make_bounce_fan(const PingPlan& plan) {
   fan.bins_per_tangent = plan.fan.axis.bins_per_tangent;
   fan.bins = static_cast<int>(std::ceil(2 * tangent * static_cast<double>(fan.bins_per_tangent)));
   fan.first_tangent = static_cast<float>(-tangent);
-  // As dense in elevation as the direct fan.
+  // The fan is as dense in elevation as the direct fan.
   const double step =
       2 * plan.fan.half_angle_rad / (static_cast<double>(plan.fan.elevation_rad.size()) - 2 * plan.fan.side_elevations);
   const int n = static_cast<int>(std::ceil(2 * fan.half_angle_rad / step)) + 1;

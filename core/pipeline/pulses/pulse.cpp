@@ -234,7 +234,7 @@ std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s) {
   const int order = std::min(wanted, longest);
   std::vector<double> r(static_cast<std::size_t>(order) + 1);
   for (int k = 0; k <= order; ++k) {
-    // Cut short, a correlation is one no more; under a window that is itself one it still is.
+    // A correlation that is cut short is no longer a valid correlation. With a window that is itself a correlation, it is valid.
     const double window = wanted > longest ? parzen(static_cast<double>(k) / (order + 1)) : 1.0;
     r[static_cast<std::size_t>(k)] = window * pulse.correlation(k * sample_time_s).real();
   }

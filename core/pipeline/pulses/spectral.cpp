@@ -103,9 +103,9 @@ FrequencySums::FrequencySums(int count, int width)
 template <int padded>
 void FrequencySums::spread(double turns, Complex amplitude, Complex* grid) const {
   // The delay in grid points: the grid is one turn long and periodic.
-  const double place = (turns - std::floor(turns)) * points_;  // may round up to points_: the wrap below knows
+  const double place = (turns - std::floor(turns)) * points_;  // may round up to points_; the wrap below allows that
   const double first = std::ceil(place - 0.5 * width_);
-  // From the kernel's edge to the first point, 0 to 1 spacings, as the t of the polynomials.
+  // The distance from the kernel's edge to the first point, 0 to 1 spacings, is the t of the polynomials.
   const double t = 2 * (first - place + 0.5 * width_) - 1;
   double value[padded];
   const double* c = polynomial_.data();

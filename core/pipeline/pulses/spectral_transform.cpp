@@ -14,7 +14,7 @@ namespace sonar::spectral {
 
 namespace {
 
-// FFTW's planner is one for the whole process and not to be entered twice; carrying plans out is free of that.
+// The whole process has one planner of FFTW, which only one thread may use at a time. Plans may be executed by several threads.
 std::mutex& planner() {
   static std::mutex only;
   return only;

@@ -186,7 +186,8 @@ void SpecularEchoes::candidates(const Object& object, PreparedMesh& mesh, const 
   }
   mirrors_.assign(reflection_.size(), false);
   for (const std::uint16_t m : mesh.materials) mirrors_[m] = reflection_[m] != 0;
-  // By the set of materials that mirror, which depends on the frequency: a ping must not depend on those before it.
+  // Surfaces are kept by the set of materials that mirror, which depends on the frequency. So a ping does not depend on those
+  // before it.
   auto at = std::find_if(mesh.surfaces.begin(), mesh.surfaces.end(),
                          [this](const PreparedMesh::Surface& s) { return s.mirrors == mirrors_; });
   if (at == mesh.surfaces.end()) {

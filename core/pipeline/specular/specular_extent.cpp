@@ -98,7 +98,7 @@ Complex specular_factor(const SpecularPoint& p, double wavelength_m, const Specu
     sum += up.part(from, to) * along_strip(across, x, w, row);
   };
   const auto& edge = w.edge[1];
-  // Below the window, its rows of cells in four strips each, and above it.
+  // Adds the part below the window, the rows of cells of the window in four strips each, and the part above it.
   strip(p.from[1], edge.front(), 0);
   for (std::size_t row = 0; row < SpecularWindow::cells; ++row)
     for (int s = 0; s < strips_per_cell; ++s) {

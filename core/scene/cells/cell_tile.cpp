@@ -138,7 +138,7 @@ CellList list_cells(Ownership& all) {
   auto again = all.again.cbegin();
   int n = 0;
   for (int p = 0; p < cell_lanes::points; ++p) {
-    cells.put(n, all.points, p, all.first.facet[p], all.first.w[p]);  // the next takes its place where it has no owner
+    cells.put(n, all.points, p, all.first.facet[p], all.first.w[p]);  // the next one overwrites it if it has no owner
     n += all.first.facet[p] >= 0;
     for (; again != all.again.cend() && again->point == p; ++again) cells.put(n++, all.points, p, again->facet, again->w);
   }

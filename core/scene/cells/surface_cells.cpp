@@ -87,7 +87,8 @@ void SurfaceCells::lay_out() {
       if (!root->alone) roots_.push_back({patch.get(), root.get()});
 }
 
-/// The patches that an object of scenes before had: their cubes, and where the material is as it was, their tiles. False: none.
+/// Takes over the patches that an object had in earlier scenes: their cubes and, if the material is the same, their tiles. False:
+/// there are none.
 bool SurfaceCells::take_known(std::size_t o) {
   const Object& object = scene_->objects[o];
   const std::size_t before = patches_.size();
@@ -187,7 +188,7 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
       if (!(by_side ? in_side : in_main)) continue;
       const int wanted = level_of(level) - (by_side ? view.side_coarser : 0);
       if (wanted == node.address.level) {
-        // Once, also when one level's main fan and another's side lobes both want it.
+        // Listed only once, even if the main fan of one level and the side lobes of another both need it.
         if (!node.built && (found.missing.empty() || found.missing.back() != &node)) found.missing.push_back(&node);
         if (!node.built || node.tile.count > 0) found.in_view.push_back({&node.tile, &level, q, p, patch.object, by_side});
       } else if (wanted > node.address.level) {

@@ -15,7 +15,7 @@ bool has_area(Vec3 a, Vec3 b, Vec3 c) {
   return length(cross(ab, ac)) > 1e-6 * longest && longest > 1e-12;
 }
 
-bool is_within(Vec3d p, Vec3d low, Vec3d high) {  // false of what is not a number
+bool is_within(Vec3d p, Vec3d low, Vec3d high) {  // false if a coordinate is not a number
   return p.x >= low.x && p.y >= low.y && p.z >= low.z && p.x <= high.x && p.y <= high.y && p.z <= high.z;
 }
 

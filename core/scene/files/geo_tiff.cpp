@@ -290,7 +290,7 @@ class GeoTiffReader {
     const double step = std::abs(place.step_y);
     const bool sound = place.step_x > 1e-7 && place.step_x < 1e5 && step > 1e-7 && step < 1e5 && std::abs(place.x) <= 1e8 &&
                        std::abs(place.y) <= 1e8;
-    if (!sound) return bad("has cells that are no lengths between 1e-7 and 1e5, or lies farther than 1e8 m away");
+    if (!sound) return bad("has cells whose sizes are not between 1e-7 and 1e5, or lies farther than 1e8 m away");
     return place;
   }
 

@@ -19,7 +19,7 @@ constexpr float none = std::numeric_limits<float>::quiet_NaN();
 constexpr std::array<float, 12> usual_fills{-9999,   -32768, -32767, 32767, -99999, 99999,
                                             -999999, 65535,  -999,   9999,  -10000, 999999};
 
-/// One of the last digit that the text of a number has.
+/// The value of one unit in the last digit of a number as it is written.
 double last_digit(std::string_view word, double value) {
   int digits = 0;
   for (const char c : word.substr(0, word.find_first_of("eE"))) digits += (c >= '0' && c <= '9') && (digits > 0 || c != '0');
@@ -150,8 +150,8 @@ HeightValues::HeightValues(std::optional<std::string_view> declared) {
     declared_.reset();
     return;
   }
-  // The same value in single precision, and beyond every height also what it was before it was written with few digits.
-  // Never so far that a height is it, as 0 would be with the one digit of 1e20.
+  // Accepts the same value in single precision. A value beyond every height may also have been rounded to few digits. The
+  // tolerance never reaches a height: with the one digit of 1e20, it would reach 0.
   const double size = std::abs(*declared_);
   tolerance_ = size > highest_m ? std::min(last_digit(*declared, *declared_), 0.5 * (size - highest_m)) : 1e-6 * size;
 }
@@ -180,8 +180,7 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   if (raw.system.height_unit_m != 1)
     grid.notes.push_back(text::format("its heights, in units of %.6g m, become metres", raw.system.height_unit_m));
   if (geographic && !could_be_degrees(raw))
-    return failure(ErrorKind::bad_data,
-                   "its coordinates are no longitudes and latitudes, in degrees; take geographic: true away");
+    return failure(ErrorKind::bad_data, "its coordinates are not longitudes and latitudes in degrees; remove geographic: true");
   if (options.origin && !geographic)
     return failure(ErrorKind::bad_data,
                    "origin is for a grid in degrees; write geographic: true if it is one, else take it away");

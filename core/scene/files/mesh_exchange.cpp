@@ -59,7 +59,7 @@ bool write_head(int descriptor, Head head) {
 }
 
 Result<LoadedMesh> broken() {
-  return failure(ErrorKind::bug, "the program that imports meshes gave an answer that is none (this is a bug, please report it)");
+  return failure(ErrorKind::bug, "the program that imports meshes gave an invalid answer (this is a bug, please report it)");
 }
 
 /// Every user of a mesh relies on this.

@@ -142,7 +142,7 @@ MeshFault unread_extension(const GltfWalk& walk) {
   for (const auto& [name, primitives] : walk.primitives)
     for (const GltfWalk::Primitive& p : primitives)
       if (const auto at = walk.accessors.find(p.positions); at != walk.accessors.end() && at->second.type != floating)
-        return "has vertices that are no floating numbers (KHR_mesh_quantization), which are not read; export it without";
+        return "has vertices that are not floating-point numbers (KHR_mesh_quantization), which are not read; export it without";
   return std::nullopt;
 }
 
@@ -200,13 +200,13 @@ MeshFault glb_fault(std::string_view file) {
   };
   const auto bytes = [](std::uint64_t n) { return std::to_string(n) + " bytes"; };
   if (!file.starts_with("glTF"))
-    return "not a GLB file: it does not begin with glTF; is it a .gltf, or a link to the file (Git LFS)?";
+    return "not a GLB file: it does not begin with glTF; it may be a .gltf, or a link of Git LFS in place of the file";
   if (file.size() < head + chunk_head) return "ends within its head, after " + bytes(file.size()) + "; fetch or export it again";
   const std::uint64_t version = number(4), length = number(8);
   if (version == 1) return std::nullopt;
   if (version != 2) return "is GLB of version " + std::to_string(version) + "; export it as glTF 2.0";
   if (length > file.size())
-    return "is cut short: it says that it has " + bytes(length) + " and has " + bytes(file.size()) + "; fetch or export it again";
+    return "is cut short: it announces " + bytes(length) + " and has " + bytes(file.size()) + "; fetch or export it again";
   int chunk = 0;
   for (std::size_t at = head; at + chunk_head <= file.size(); ++chunk) {
     const std::uint64_t size = number(at);

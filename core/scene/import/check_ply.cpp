@@ -25,7 +25,7 @@ MeshFault check_ply(std::string_view head, std::uint64_t file_bytes) {
   std::istringstream lines{std::string(head.substr(0, end))};
   bool ascii = false;
   std::string element;
-  std::uint64_t count = 0, least = 0, all = 0;  // bytes: of one of the element at least, of the elements before it
+  std::uint64_t count = 0, least = 0, all = 0;  // bytes: `least` of one such element, `all` of the elements before it
   const auto holds = [&] {
     all = std::min<std::uint64_t>(all + count * std::max<std::uint64_t>(least, 1), std::uint64_t{1} << 62);
     return all <= file_bytes + 1;  // the last line may lack its end

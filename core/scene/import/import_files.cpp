@@ -29,7 +29,8 @@ class ObjText {
 
   Step next(char c) {
     Step step{c};
-    const bool goes_on = in_face_ && before_ == '\\' && (c == '\n' || c == '\r');  // on the next line: made one of it
+    const bool goes_on =
+        in_face_ && before_ == '\\' && (c == '\n' || c == '\r');  // the face goes on in the next line; both become one line
     if (goes_on) {
       step.c = ' ';
       in_word_ = false;
@@ -98,7 +99,7 @@ class ObjStream final : public Assimp::IOStream {
     }
     return size == 0 ? 0 : n / size;
   }
-  /// From there on, after following the text to there. The importer also seeks the place where it is, before each block.
+  /// Reads from that place on, after following the text up to it. Before each block, the importer also seeks its present place.
   aiReturn Seek(std::size_t offset, aiOrigin origin) override {
     if (origin == aiOrigin_CUR) offset += Tell();
     if (origin == aiOrigin_END) offset = size_ - std::min(offset, size_);

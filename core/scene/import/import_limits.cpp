@@ -50,7 +50,7 @@ void begin_import_limits(const ImportRequest& request, int descriptor) {
   limits.name = request.mesh.file.filename().string();
   limits.at_start = address_space_bytes().value_or(std::uint64_t{256} << 20);
   offer_for_out_of_memory();
-  limit(RLIMIT_FSIZE, RLIM_INFINITY, RLIM_INFINITY);  // of files on disks: what is written here is in memory
+  limit(RLIMIT_FSIZE, RLIM_INFINITY, RLIM_INFINITY);  // no limit, because this program writes to memory only
   ::prctl(PR_SET_DUMPABLE, 0);                        // no core dump: the fault is the file's
   std::set_new_handler(end_for_memory);
   struct sigaction action {};

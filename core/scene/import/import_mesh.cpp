@@ -23,7 +23,7 @@ std::string first_line(std::string s) {
   return s.substr(0, std::min<std::size_t>(s.find('\n'), 200));
 }
 
-/// At most, of every mesh of the file.
+/// The largest possible number of triangles of each mesh of the file.
 std::vector<std::uint64_t> triangles_of_meshes(const aiScene& scene) {
   std::vector<std::uint64_t> triangles(scene.mNumMeshes);
   for (unsigned m = 0; m < scene.mNumMeshes; ++m)
@@ -91,7 +91,7 @@ std::string better_reason(const MeshFile& request, const std::string& extension,
   return fault ? *fault : reason;
 }
 
-/// Triangles that the file lists, where that is not a matter of what the importer makes of it.
+/// Number of triangles that an STL, PLY or OBJ file lists; for other files the number that was imported.
 std::uint64_t triangles_listed(const MeshFile& request, const std::string& extension, const ImportFiles& files,
                                const aiScene& scene, std::uint64_t imported) {
   if (files.obj_triangles()) return *files.obj_triangles();

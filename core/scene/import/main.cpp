@@ -1,4 +1,5 @@
-// sonard-import-mesh: reads one mesh file for sonard and its tools, and ends. It is what a bad file may end instead of them.
+// sonard-import-mesh: reads one mesh file for sonard and its tools, and ends. If a bad file makes a mesh library crash, only this
+// program ends, not sonard.
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>

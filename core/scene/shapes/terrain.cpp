@@ -6,8 +6,9 @@
 namespace sonar {
 namespace {
 
-/// East and north of every vertex of a grid. In degrees: of the point of the ellipsoid, in the plane that touches it at the
-/// origin, whatever the height. Seen from there, a length along the ground d away is too short by the part (d / R)^2 / 2.
+/// East and north of every vertex of a grid. Coordinates in degrees give a point of the ellipsoid, which is
+/// projected into the plane that touches the ellipsoid at the origin, whatever the height. Seen from there, a length along the
+/// ground d away is too short by the part (d / R)^2 / 2.
 class PlaneOf {
  public:
   explicit PlaneOf(const HeightGrid& grid) : grid_(grid) {

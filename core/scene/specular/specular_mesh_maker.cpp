@@ -63,7 +63,7 @@ void SpecularMesh::Maker::make() {
   if (!out_.triangles_.empty()) plant();
 }
 
-// Neighbours by the edges they share; an edge of more than two facets belongs to none.
+// Facets that share an edge are neighbours. An edge of more than two facets joins none.
 void SpecularMesh::Maker::join_edges() {
   struct Side {
     std::uint32_t a, b, facet, corner;

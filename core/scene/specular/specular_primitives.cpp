@@ -84,7 +84,7 @@ void box(const Primitive& shape, const SpecularQuery& q, std::vector<SpecularPoi
     for (const double side : {-1.0, 1.0}) {
       if (shape.inside && k == 2 && side > 0) continue;  // open at the top
       const Face face{k, side * half[k], side, half[(k + 1) % 3], half[(k + 2) % 3]};
-      // From outside the near faces, from within all of them.
+      // A sonar outside sees the near faces; a sonar inside sees all faces.
       const bool outside = side * component(q.sonar_m, k) > half[k];
       if (outside || within || shape.inside) keep(of_face(face, outside ? side : -side, q), q, out);
     }
@@ -111,7 +111,7 @@ void cylinder(const Primitive& shape, const SpecularQuery& q, std::vector<Specul
   if (d > a) {
     wall(outward, outward, d - a, 1 / a);
   } else if (within || shape.inside) {
-    // From within two feet: the near wall and the one across the axis, both hollow.
+    // From inside there are two mirror points: on the near wall and on the wall across the axis. Both walls are hollow.
     wall(outward, -1.0 * outward, a - d, -1 / a);
     wall(-1.0 * outward, outward, a + d, -1 / a);
   }

@@ -55,8 +55,8 @@ std::string sweep_of(const Draws& draws) {
   return sweep.empty() ? "" : "sweep: {" + sweep + "}";
 }
 
-/// The text of a ping's scene with all its numbers: equal for equal scenes. Where they cannot be worked out, which the reader of
-/// the file says, and where the scene's lines are not known, no two pings have the same.
+/// The text of a ping's scene with all its numbers, which is equal for equal scenes. If the numbers cannot be computed (the
+/// reader of the file reports that) or the lines of the scene are not known, no two pings have the same text.
 std::string scene_key_of(const DatasetJob& job, const Draws& draws, const std::string& lines, std::uint64_t number) {
   render::Values values = draws.numbers;
   for (const auto& [name, formula] : job.formulas)
@@ -189,7 +189,7 @@ Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const K
     ping.job = std::move(input->jobs.front());
     if (is_known) ping.job.scene = known.scene;
     ping.whole_scene = ping.job.scene;
-    // Each reader of names asks before objects are hidden.
+    // Names are looked up before objects are hidden.
     if (std::string why = why_unknown(job.constraints, job.targets, *ping.job.scene); !why.empty())
       return failure(ErrorKind::config, job.source + ": " + why);
     const auto numbers = render::substitute(filled, ping.job.values, job.source);

@@ -72,7 +72,7 @@ class Export {
   path folder_of(std::size_t split) const { return unfinished_ / std::string(split_names[split]); }
   static std::string name_of(std::uint64_t ping) { return ping_key(ping) + ".png"; }
 
-  /// Pings of equal scenes go into one split: what is learned of a scene is not tested on it.
+  /// Pings of equal scenes go into one split, so that a model is not tested on a scene that it was trained on.
   Result<void> find_splits() {
     std::vector<std::string> scenes;  // in the order of the pings
     std::vector<std::size_t> scene_of;
@@ -126,7 +126,7 @@ class Export {
         const char* const end = name.data() + std::min(dot, name.size());
         const bool is_number = std::from_chars(name.data(), end, number).ptr == end;
         if (!is_number || number < 1 || number > split_of_.size() || dot == std::string::npos)
-          return failure(ErrorKind::bad_data, archive.string() + " holds " + name + ", which is no ping of this job");
+          return failure(ErrorKind::bad_data, archive.string() + " holds " + name + ", which is not a ping of this job");
         return put(number, name.substr(dot + 1), contents);
       });
       if (!done) return done;
@@ -165,7 +165,7 @@ class Export {
     return {};
   }
 
-  /// A line a picture, as the loader of image folders of Hugging Face takes it.
+  /// Writes one line per picture, in the format that the image folder loader of Hugging Face reads.
   template <class IsIn>
   Result<void> write_metadata(std::size_t split, const IsIn& is_in) {
     auto file = DurableFile::open(folder_of(split) / "metadata.jsonl");

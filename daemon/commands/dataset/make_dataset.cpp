@@ -62,7 +62,7 @@ class Folder final : public DatasetFolder {
   const std::string& instruction_set() const override { return instruction_set_; }
   bool differs() const override { return differs_; }
 
-  /// The folder is of this job, or becomes it.
+  /// Checks that the folder belongs to this job, or makes it the folder of this job.
   Result<void> claim() {
     const auto first = draw_ping(job_, 1);  // what is wrong with the job shows before there is a folder
     if (!first) return tl::make_unexpected(first.error());

@@ -59,7 +59,7 @@ std::array<char, tar_block> tar_header(std::string_view name, std::size_t size) 
   return h;
 }
 
-/// The size that a header has in octal; nothing where it is none.
+/// The size in a header, in octal; nothing if these characters are no number.
 std::optional<std::uint64_t> size_in(std::string_view header) {
   std::uint64_t size = 0;
   for (const char c : header.substr(124, 11)) {

@@ -1,5 +1,5 @@
-// Files of a data set: pings in tar archives that WebDataset reads, each committed by its rename, and what is written beside
-// them.
+// Writes the files of a data set: pings in tar archives that WebDataset reads, and the small files beside the archives. Each file
+// gets its final name by a rename when it is complete.
 #pragma once
 
 #include <cstddef>
@@ -19,8 +19,9 @@ namespace sonar::dataset {
 /// "shard-000123.tar".
 std::string shard_name(std::uint64_t shard);
 
-/// A file that has its name when it is complete. Until then it is beside it as NAME.tmp.HOST.PID, which no other process opens,
-/// and locked, so that remove_unfinished() can tell what a killed run left. What is not committed is removed.
+/// A file that gets its final name when it is complete. Until then it is NAME.tmp.HOST.PID in the same folder, a name that no
+/// other process uses. It stays locked until then, so that remove_unfinished() can tell it from a file that a killed run left.
+/// The destructor removes a file that was not committed.
 class DurableFile {
  public:
   static Result<DurableFile> open(const std::filesystem::path& file);
@@ -28,14 +29,14 @@ class DurableFile {
   DurableFile& operator=(DurableFile&&) = delete;
   ~DurableFile();
 
-  /// io: a full disk.
+  /// Fails with ErrorKind::io, for example when the disk is full.
   Result<void> write(std::span<const std::byte> bytes);
   Result<void> write(std::string_view text) { return write(std::as_bytes(std::span(text))); }
   /// fsync and rename; a file of that name is replaced.
   Result<void> commit();
-  /// The same, but a file of that name stays as it is: then false.
+  /// Like commit(), but keeps a file of that name as it is and then returns false.
   Result<bool> commit_new();
-  /// The same under another name.
+  /// Like commit(), under another name.
   Result<void> commit_as(std::filesystem::path file) { return file_ = std::move(file), commit(); }
   const std::filesystem::path& file() const { return file_; }
 
@@ -47,7 +48,7 @@ class DurableFile {
   int descriptor_ = -1;
 };
 
-/// Removes what killed runs left of files whose names `is_own` accepts.
+/// Removes the unfinished files that killed runs left, if `is_own` accepts their final names.
 void remove_unfinished(const std::filesystem::path& folder, const std::function<bool(const std::string&)>& is_own);
 
 /// Writes a ustar archive. Owner, mode and times are fixed, so that equal contents are equal bytes.
@@ -55,15 +56,16 @@ class ShardWriter {
  public:
   static Result<ShardWriter> open(const std::filesystem::path& file);
 
-  /// `name` of at most 99 bytes. io: a full disk.
+  /// Adds a file; `name` has at most 99 bytes. Fails with ErrorKind::io, for example when the disk is full.
   Result<void> add(std::string_view name, std::span<const std::byte> contents);
-  /// Goes on with an archive that was set aside: its bytes, which have that digest. False, with nothing written, where they have
-  /// another, or are not there.
+  /// Continues an archive that was set aside. Returns false, with nothing written, if the archive is missing or has another
+  /// digest.
   Result<bool> go_on(const std::filesystem::path& aside, const std::string& digest);
   /// Keeps what has been added under another name. Returns the digest.
   Result<std::string> set_aside(const std::filesystem::path& aside);
-  /// The archive's end and name, then `file`.sha256 as sha256sum reads it. Returns the digest. An archive of that name that has
-  /// come meanwhile stays; bad_data: its bytes differ.
+  /// Writes the end of the archive and gives it its name, then writes `file`.sha256 as sha256sum reads it. Returns the digest. If
+  /// another worker has committed an archive of that name, that one is kept. If its bytes differ, the error is
+  /// ErrorKind::bad_data.
   Result<std::string> commit();
   std::uint64_t bytes() const { return hash_.size(); }
 
@@ -77,10 +79,11 @@ class ShardWriter {
 
 /// Takes the name and the contents of a file of an archive.
 using ArchiveSink = std::function<Result<void>(const std::string&, std::span<const std::byte>)>;
-/// The files of an archive that ShardWriter wrote, in order. bad_data: it is damaged; what the sink returns.
+/// Reads the files of an archive that ShardWriter wrote, in order. Fails with ErrorKind::bad_data if the archive is damaged, and
+/// with the error that the sink returns.
 Result<void> read_archive(const std::filesystem::path& file, const ArchiveSink& take);
 
-/// A small file in one step.
+/// Writes a small file in one step.
 Result<void> write_durably(const std::filesystem::path& file, std::string_view text);
 
 /// Digest of a whole file, in hexadecimal.

@@ -98,7 +98,7 @@ Result<std::map<std::string, std::string>> read_table(Queue& queue, Table table)
   return all;
 }
 
-/// Beats and descriptions are written by others: a value of another kind is as none.
+/// Beats and descriptions come from other programs: a value of another type counts as missing.
 std::string text_in(const json& is, const char* key) {
   const auto at = is.find(key);
   return at != is.end() && at->is_string() ? at->get<std::string>() : std::string();
@@ -176,7 +176,7 @@ Result<int> status(const FarmCommand& c) {
   }
 }
 
-/// The job file and the instruction set that a job's folder says.
+/// The job file and the instruction set that job.json in the folder of a job names.
 Result<FarmJob> described_in(const path& folder) {
   const auto words = read_regular(folder / "job.json", std::size_t{16} << 20);
   if (!words) return failure(words.error().kind, words.error().text + "; the folder is that of a job, as submit said");

@@ -19,20 +19,22 @@ using nlohmann::json;
 using std::filesystem::path;
 
 constexpr std::size_t most_in_bucket = std::size_t{8} << 20;
-constexpr std::size_t piece_bytes = std::size_t{512} << 10;  // a server accepts messages of 1 MiB by default
+constexpr std::size_t piece_bytes = std::size_t{512} << 10;  // less than the 1 MiB that NATS allows a message by default
 
 constexpr std::chrono::milliseconds least_patience{100}, most_patience = std::chrono::hours(24);
 
-/// A whole number of a record, within bounds; json::get() would bend what is none.
+/// Reads a whole number of a record and checks its bounds. json::get() would silently convert other values.
 Result<std::uint64_t> count_in(const json& words, const char* name, std::uint64_t least, std::uint64_t most) {
   const json& value = words.at(name);
   if (value.is_number_unsigned() && value.get<std::uint64_t>() >= least && value.get<std::uint64_t>() <= most)
     return value.get<std::uint64_t>();
-  return failure(ErrorKind::bad_data, std::string(name) + " is " + value.dump().substr(0, 64) + ", not a whole number from " +
-                                          std::to_string(least) + " to " + std::to_string(most));
+  return failure(ErrorKind::bad_data,
+                 std::string(name) + " is " + value.dump().substr(0, 64) +
+                     (least == most ? ", not " : ", not a whole number from " + std::to_string(least) + " to ") +
+                     std::to_string(most));
 }
 
-/// The counts of a record, as dataset jobs have them.
+/// Reads the counts of a record, with the limits of dataset jobs.
 Result<void> read_counts(const json& words, FarmJob& record) {
   const auto pings = count_in(words, "pings", 1, dataset::most_pings);
   if (!pings) return tl::make_unexpected(pings.error());
@@ -48,13 +50,18 @@ Result<void> read_counts(const json& words, FarmJob& record) {
   return {};
 }
 
+std::string counts_text(std::uint64_t shards, std::uint64_t pings, std::uint64_t shard_pings) {
+  return std::to_string(shards) + " shards for " + std::to_string(pings) + " pings, up to " + std::to_string(shard_pings) +
+         " in each";
+}
+
 std::string digest_of(std::string_view bytes) {
   Sha256 hash;
   hash.add(std::as_bytes(std::span(bytes)));
   return hash.hex();
 }
 
-/// A name below a folder, and the only one of its file.
+/// Whether a name is a relative path that stays inside its folder, in normal form, so that a file has only one name.
 bool is_confined(const path& name) {
   return !name.empty() && name.is_relative() && name.lexically_normal() == name && name.has_filename() && *name.begin() != "..";
 }
@@ -71,7 +78,7 @@ std::string id_of(const FarmJob& record) {
 
 std::string piece_key(const std::string& digest, std::size_t piece) { return digest + "." + std::to_string(piece); }
 
-/// Makes its folders, which no link leads out of.
+/// Writes the file and makes its folders. Refuses if a symbolic link leads out of `folder`.
 Result<void> write_below(const path& folder, const std::string& name, const std::string& bytes) {
   const path file = folder / name;
   std::error_code ec;
@@ -118,8 +125,8 @@ Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& inst
   for (const dataset::NamedFile& named : dataset::named_files(job)) {
     const path name = std::filesystem::absolute(named.file).lexically_normal().lexically_relative(folder);
     if (!is_confined(name))
-      return failure(ErrorKind::config, job.source + ": " + named.word + " is not below the job's folder " + folder.string() +
-                                            "; a farm's job has all its files there: copy it");
+      return failure(ErrorKind::config, job.source + ": " + named.word + " is outside the job's folder " + folder.string() +
+                                            "; a farm job uses only files in that folder: copy the file into it");
     names[name.string()] = named.digest;
   }
   for (const auto& [name, digest] : names) record.files.push_back({name, digest});
@@ -135,7 +142,7 @@ Result<FarmJob> parse_farm_job(const std::string& id, const std::string& text) {
     for (const json& f : words.at("files")) record.files.push_back({f.at("name"), f.at("sha256")});
     if (const auto counts = read_counts(words, record); !counts)
       return failure(ErrorKind::bad_data,
-                     "the farm's record of job " + id + " cannot be: " + counts.error().text + "; submit the job again");
+                     "the farm's record of job " + id + " is invalid: " + counts.error().text + "; submit the job again");
     record.submitted_unix_s = words.at("submitted_unix_s"), record.in_bucket = words.at("in_bucket");
   } catch (const json::exception& e) {
     return failure(ErrorKind::bad_data, "the farm's record of job " + id + " cannot be read: " + e.what());
@@ -148,7 +155,7 @@ Result<FarmJob> parse_farm_job(const std::string& id, const std::string& text) {
       std::all_of(record.files.begin(), record.files.end(), [](const FarmFile& f) { return is_confined(f.name); });
   if (record.id == id && is_named && is_inside) return record;
   return failure(ErrorKind::bad_data, "the farm's record of job " + id +
-                                          (is_inside ? " does not fit its id" : " has names that lead out of its folder") +
+                                          (is_inside ? " does not match its id" : " has names that lead out of its folder") +
                                           "; submit the job again");
 }
 
@@ -162,7 +169,8 @@ Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const p
     const auto contents = f.name == record.file ? job.text : read_regular(job.folder / f.name, std::size_t{1} << 40);
     if (!contents) return tl::make_unexpected(contents.error());
     if (digest_of(*contents) != f.digest)
-      return failure(ErrorKind::bad_data, (job.folder / f.name).string() + " has just been changed; submit again");
+      return failure(ErrorKind::bad_data,
+                     (job.folder / f.name).string() + " has changed since the job was read; submit it again");
     if (!is_there(files / f.name, f.digest))
       if (const auto done = write_below(files, f.name, *contents); !done) return done;
     if (!record.in_bucket) continue;
@@ -187,11 +195,11 @@ Result<path> receive_files(const FarmJob& record, const path& files, Queue& queu
       if ((*piece)->size() < piece_bytes || contents.size() > most_in_bucket) break;
     }
     if (digest_of(contents) != f.digest)
-      return failure(
-          ErrorKind::missing_file,
-          (files / f.name).string() + " is not there as it was submitted" +
-              (record.in_bucket ? ", nor in the queue: submit the job again"
-                                : ", and files of 8 MiB and more are not sent: give --out the folder of the submission"));
+      return failure(ErrorKind::missing_file,
+                     (files / f.name).string() + " is missing, or differs from the submitted file" +
+                         (record.in_bucket ? ", and the queue does not have it; submit the job again"
+                                           : "; the files of this job are 8 MiB or more in all, so the queue does not carry "
+                                             "them: give --out the folder of the submission"));
     if (const auto done = write_below(files, f.name, contents); !done) return tl::make_unexpected(done.error());
   }
   return files / record.file;
@@ -201,20 +209,22 @@ Result<dataset::DatasetJob> load_files(const FarmJob& record, const path& file) 
   auto job = dataset::load_job(file);
   if (!job) return job;
   if (job->shards() == record.shards && job->shard_pings == record.shard_pings && job->pings == record.pings) return job;
-  return failure(ErrorKind::bad_data, "the farm's record of job " + record.id + " has " + std::to_string(record.shards) +
-                                          " shards, and its file " + record.file + " makes " + std::to_string(job->shards()) +
+  return failure(ErrorKind::bad_data, "the farm's record of job " + record.id + " does not match its file " + record.file +
+                                          ": the record has " + counts_text(record.shards, record.pings, record.shard_pings) +
+                                          ", the file has " + counts_text(job->shards(), job->pings, job->shard_pings) +
                                           "; submit the job again");
 }
 
 std::string why_unfit(const FarmJob& record) {
   if (record.version != render::version)
-    return record.folder() + " was submitted by sonard " + record.version + ", and this is " + render::version +
-           ": other versions make other bytes; install that one here, or submit with this one";
+    return record.folder() + " was submitted with sonard " + record.version + ", and this is sonard " + render::version +
+           ", which may make other bytes: install sonard " + record.version + " here, or submit the job with sonard " +
+           render::version;
   const auto level = enum_from<SimdLevel>(record.instruction_set, simd_level_names);
   const std::string here = level ? simd::kernels_for(*level).name : "unknown";
   if (here == record.instruction_set) return {};
-  return record.folder() + " is computed with " + record.instruction_set +
-         ", which this processor lacks: submit it with --simd " + here + ", which all workers have, or work on another machine";
+  return record.folder() + " needs " + record.instruction_set + ", which this processor lacks: submit the job with --simd " +
+         here + ", which this processor has, or run the worker on another machine";
 }
 
 }  // namespace sonar::farm

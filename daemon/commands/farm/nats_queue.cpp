@@ -66,7 +66,7 @@ class NatsQueue final : public Queue {
     Owned<natsOptions, natsOptions_Destroy> options;
     natsStatus s = into(options, natsOptions_Create);
     if (s == NATS_OK) s = natsOptions_SetURL(options.get(), o.url.c_str());
-    if (s != NATS_OK) return failure(ErrorKind::usage, "--nats " + where_ + " is no address like nats://10.0.0.1:4222");
+    if (s != NATS_OK) return failure(ErrorKind::usage, "--nats " + where_ + " is not an address like nats://10.0.0.1:4222");
     natsOptions_SetMaxReconnect(options.get(), -1);
     natsOptions_SetReconnectWait(options.get(), 500);
     if (!o.token_file.empty()) {
@@ -201,7 +201,7 @@ class NatsQueue final : public Queue {
     const auto shard = text::parse_unsigned(subject.substr(subject.rfind('.') + 1));
     if (into(about, [&](auto** a) { return natsMsg_GetMetaData(a, message.get()); }) != NATS_OK || !shard) {
       natsMsg_Term(message.get(), nullptr);
-      return failure(ErrorKind::unavailable, "the queue holds " + subject + ", which is no shard; it is removed");
+      return failure(ErrorKind::unavailable, "the queue holds " + subject + ", which is not a shard; it is removed");
     }
     return std::make_unique<NatsTask>(*this, job, *shard, static_cast<int>(about->NumDelivered), std::move(message));
   }
@@ -214,7 +214,7 @@ class NatsQueue final : public Queue {
                                                "; it needs JetStream: nats-server -js -sd FOLDER");
   }
 
-  /// A notice for listeners; the table is what workers and commands read.
+  /// A notice for listeners. Workers and commands read the table.
   void announce(const std::string& subject, const std::string& words) {
     natsConnection_PublishString(connection_.get(), subject.c_str(), words.c_str());
   }

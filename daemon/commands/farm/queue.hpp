@@ -1,5 +1,6 @@
-// The farm's queue: NATS JetStream behind plain functions. A stream FARM of shards to make (work queue, file store, subjects
-// farm.work.JOB.SHARD), one durable pull consumer a job, and tables of keys and values. docs/decisions/0022-nats.md.
+// The farm's queue: NATS JetStream behind plain functions. The stream FARM (work queue, file store, subjects
+// farm.work.JOB.SHARD) holds the shards that are still to be made. Each job has one durable pull consumer. Tables hold keys and
+// values. docs/decisions/0022-nats.md.
 #pragma once
 
 #include <chrono>
@@ -17,38 +18,39 @@
 namespace sonar::farm {
 
 struct QueueOptions {
-  std::string url = "nats://127.0.0.1:4222";  // several: comma between
+  std::string url = "nats://127.0.0.1:4222";  // several URLs are separated by commas
   std::filesystem::path credentials;          // a NATS credentials file; empty = none
   std::filesystem::path token_file;
-  /// Called with the reason when no server answers: whether to try again. Empty: once.
+  /// When no server answers, connect() calls this with the reason, and tries again if it returns true. Empty: connect() tries
+  /// once.
   std::function<bool(const std::string& why)> try_again{};
 };
 
-/// Buckets of keys and values; `name` is the server's.
+/// A bucket of keys and values; `name` is its name on the server.
 struct Table {
   const char* name;
   std::chrono::seconds lifetime;  // of a value
 };
 inline constexpr std::chrono::hours a_month{30 * 24};
-inline constexpr Table job_table{"FARM_JOBS", a_month};                     // JOB: FarmJob; JOB.stopped: why
-inline constexpr Table file_table{"FARM_FILES", a_month};                   // SHA256.N: a piece of a file
-inline constexpr Table dead_table{"FARM_DEAD", a_month};                    // JOB.SHARD: why
-inline constexpr Table beat_table{"FARM_BEATS", std::chrono::seconds(30)};  // HOST.PID: what the worker is at
+inline constexpr Table job_table{"FARM_JOBS", a_month};    // key JOB: its FarmJob; JOB.stopped: why it was stopped
+inline constexpr Table file_table{"FARM_FILES", a_month};  // key SHA256.N: a piece of a file
+inline constexpr Table dead_table{"FARM_DEAD", a_month};   // key JOB.SHARD: why it failed
+inline constexpr Table beat_table{"FARM_BEATS", std::chrono::seconds(30)};  // key HOST.PID: what that worker does
 
-/// A shard that this worker has for a while.
+/// A shard that is lent to this worker. The worker must call in_progress(), or end it, within the `patience` of the job.
 class Task {
  public:
   virtual ~Task() = default;
   virtual std::uint64_t shard() const = 0;
   virtual int delivery() const = 0;  // from 1
   virtual Result<void> in_progress() = 0;
-  /// Waits for the server's word. Only then the shard is out of the queue.
+  /// Waits until the server confirms. Only then has the shard left the queue.
   virtual Result<void> done() = 0;
-  /// Another worker shall have it.
+  /// Returns the shard to the queue, which delivers it again after `later`.
   virtual Result<void> again(std::chrono::milliseconds later) = 0;
-  /// No worker shall have it.
+  /// Removes the shard from the queue for good, and writes `why` into dead_table.
   virtual Result<void> bury(const std::string& why) = 0;
-  /// It is no shard: it leaves the queue without a trace.
+  /// For a message that names no shard of the job: removes it from the queue and records nothing.
   virtual Result<void> drop() = 0;
 };
 
@@ -56,8 +58,8 @@ struct Waiting {
   std::uint64_t queued = 0, running = 0;
 };
 
-/// Calls block, for seconds at most. unavailable: the server does not answer, refuses, or has no JetStream. While the server is
-/// away the connection is tried again without end.
+/// Calls block, for seconds at most. They fail with ErrorKind::unavailable when the server does not answer, refuses, or has no
+/// JetStream. While the server cannot be reached, the client library reconnects in the background, without a limit.
 class Queue {
  public:
   virtual ~Queue() = default;
@@ -66,7 +68,7 @@ class Queue {
   virtual Result<std::vector<std::string>> keys(Table table) = 0;
   virtual Result<void> erase(Table table, const std::string& key) = 0;
 
-  /// `patience`: a shard without a sign from its worker for so long is another worker's.
+  /// If a worker reports nothing about its shard for `patience`, the shard is given to another worker.
   virtual Result<void> open_job(const std::string& job, std::chrono::milliseconds patience) = 0;
   /// False: it is in the queue already.
   virtual Result<bool> publish(const std::string& job, std::uint64_t shard) = 0;
@@ -75,7 +77,8 @@ class Queue {
   virtual Result<std::unique_ptr<Task>> take(const std::string& job, std::chrono::milliseconds wait) = 0;
 };
 
-/// Connects and makes what the farm has on the server, where it is missing. unavailable also: sonard was built without libnats.
+/// Connects, and creates the stream and the tables on the server if they are missing. Also fails with ErrorKind::unavailable when
+/// sonard was built without libnats.
 Result<std::unique_ptr<Queue>> connect(const QueueOptions& options);
 
 }  // namespace sonar::farm

@@ -155,8 +155,8 @@ class Worker {
 
   /// Any program that reaches the queue can put any number into it.
   void drop(const FarmJob& record, Task& task) {
-    say("shard " + std::to_string(task.shard()) + " is none of the " + std::to_string(record.shards) + " of " + record.folder() +
-        "; it is removed from the queue");
+    say("shard " + std::to_string(task.shard()) + " is not one of the " + std::to_string(record.shards) + " of " +
+        record.folder() + "; it is removed from the queue");
     if (const auto dropped = task.drop(); !dropped) {
       say(dropped.error().text);
       rest();

@@ -16,14 +16,14 @@ namespace sonar::render {
 namespace {
 
 constexpr double least_pattern = 0.1;     // -20 dB
-constexpr double level_tolerance = 1e-6;  // of what must be level
+constexpr double level_tolerance = 1e-6;  // of a sine or cosine, for the bed and the sonar
 
 struct Bed {
-  double height_m = 0;  // of the sonar above it
+  double height_m = 0;  // of the sonar above the bed
   const Material* material = nullptr;
 };
 
-/// The level plane next below the sonar.
+/// The nearest level plane below the sonar.
 std::optional<Bed> bed_below(const Scene& scene, Vec3d sonar_m) {
   std::optional<Bed> bed;
   for (const Object& o : scene.objects) {
@@ -35,7 +35,8 @@ std::optional<Bed> bed_below(const Scene& scene, Vec3d sonar_m) {
   return bed;
 }
 
-/// SL - 40 log r - 2 alpha r + S_b + 10 log10(theta_eff r (c / 2) tau_eff F) and the two-way pattern, as a power.
+/// The echo of the bed: SL - 40 log r - 2 alpha r + S_b + 10 log10(theta_eff r (c / 2) tau_eff F) dB, plus the two-way pattern in
+/// dB. power() returns it as a power, not in dB; there F is `oblique`.
 class ClosedForm {
  public:
   ClosedForm(const RenderJob& job, const Ping& ping, const Bed& bed)
@@ -48,7 +49,8 @@ class ClosedForm {
     area_per_m2_ = cell.beam_u * 0.5 * sound_speed_mps_ * cell.energy_s;
     has_pattern_ = mode_.pattern.elevation_taper != Taper::unit;
     aperture_ = has_pattern_ ? elevation_aperture_in_wavelengths(mode_.pattern) : 0;
-    unit_reach_rad_ = static_cast<double>(mode_.pattern.elevation_width_rad) * 1.1;  // the fan reaches 1.15 widths
+    unit_reach_rad_ =
+        static_cast<double>(mode_.pattern.elevation_width_rad) * 1.1;  // less than the 1.15 widths of the fan of rays
   }
 
   double true_range_m(double device_range_m) const { return device_range_m * true_over_device_; }
@@ -61,7 +63,7 @@ class ClosedForm {
     if (!has_pattern_) return std::abs(psi) < unit_reach_rad_ ? 1 : 0;
     return std::abs(psi) < pi / 2 ? elevation_two_way(aperture_, psi) : 0;
   }
-  /// Whether the whole footprint of a bin lies where the beams see the bed: pulse and beam to either side.
+  /// Whether the beams see the bed in the whole footprint of a bin: the bin, and one pulse and one beam to either side.
   bool holds(double range_m, double sine, double pulse_m, double beam_sine) const {
     for (const double r : {range_m - pulse_m, range_m, range_m + pulse_m})
       for (const double u : {sine - beam_sine, sine, sine + beam_sine})
@@ -104,16 +106,16 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
   if (std::abs(rotate(sonar.orientation, Vec3d{0, 1, 0}).z) > level_tolerance)
     return failure(ErrorKind::bad_data, "coverage is defined for a sonar without roll; level it");
   if (!job.config.engine.switches.conical)
-    return failure(ErrorKind::bad_data, "coverage is defined for conical beams; leave out --conical off");
+    return failure(ErrorKind::bad_data, "coverage is defined only for conical beams; remove the option --conical off");
   if (job.config.engine.switches.mode != Mode::canonical)
     return failure(ErrorKind::bad_data, "coverage is defined for the canonical model; leave out --mode paper or raster");
   if (job.mode().pattern.azimuth_taper == Taper::unit)
-    return failure(ErrorKind::bad_data, "coverage is defined for beams with a width; azimuth_taper unit has none");
+    return failure(ErrorKind::bad_data, "coverage is defined for beams with a width; beams with azimuth_taper: unit have none");
   const ClosedForm expected(job, ping, *bed);
   const PingSettings& s = job.settings;
   const double pulse_m = cell_of(job).pulse_width_m;
   const auto sine_of_width = [](float width_rad) { return 2 * std::sin(static_cast<double>(width_rad) / 2); };
-  const std::vector<float>& widths = job.mode().beam_widths_rad;  // of listed beams
+  const std::vector<float>& widths = job.mode().beam_widths_rad;  // empty unless the profile lists its beams
   const double common_sine = sine_of_width(job.mode().pattern.azimuth_width_rad);
   Coverage coverage;
   double ratios = 0;
@@ -203,7 +205,7 @@ std::vector<RenderJob> shipped_sonars_over_a_bed() {
         if (std::any_of(jobs.begin(), jobs.end(), [&](const RenderJob& other) { return acoustically_equal(job, other); }))
           continue;
         job.scene = level_bed(2.5 * job.settings.range_m);
-        // Coverage is of a fan's beams.
+        // Range images have no beams of a fan, so coverage is not defined for them.
         if (range_image_of(make_request(job, world_of(job), PingNumber{1}, Time{})) != nullptr) continue;
         jobs.push_back(std::move(job));
       }

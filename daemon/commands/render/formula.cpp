@@ -30,7 +30,7 @@ constexpr Function functions[] = {
     {"rad", [](double x) { return rad_from_deg(x); }},
 };
 
-/// Recursive descent; the first thing wrong ends it.
+/// A recursive descent parser, which stops at the first error.
 class Parser {
  public:
   Parser(std::string_view text, const Values& values) : text_(text), values_(values) {}

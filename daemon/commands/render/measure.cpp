@@ -8,7 +8,8 @@
 namespace sonar::render {
 namespace {
 
-/// A Gaussian through three equidistant samples: its place beside the middle one, and its height.
+/// The peak of a Gaussian through three equidistant samples, which is a parabola through their logarithms: the offset of the peak
+/// from the middle sample, and its height.
 struct Parabola {
   double offset = 0, height = 0;
 };
@@ -49,7 +50,8 @@ class Picture {
   /// Mean energy of one beam.
   double energy() const { return sum_of_power() * row_s() / static_cast<double>(beams_.size()); }
 
-  /// The sum of E|s|^2 over rows and beams counts every echo theta_eff tau_eff times.
+  /// Target strength. The sum of E|s|^2 over rows and beams holds the energy of each echo times theta_eff tau_eff
+  /// (ResolutionCell), so it is divided by both and by the source level.
   double strength() const {
     const ResolutionCell cell = cell_of(job_);
     const double source_upa = amplitude_from_db(static_cast<double>(job_.mode().source_level_db));
@@ -87,7 +89,7 @@ Result<double> measure_in(Measure what, const Window& window, const RenderJob& j
   }
   const Picture picture(job, ping, window);
   if (what == Measure::strength_db && job.mode().pattern.azimuth_taper == Taper::unit)
-    return failure(ErrorKind::bad_data, "strength_db needs beams with a width; azimuth_taper unit has none");
+    return failure(ErrorKind::bad_data, "strength_db needs beams with a width; beams with azimuth_taper: unit have none");
   if (picture.empty()) return failure(ErrorKind::bad_data, "no row or no beam of the picture lies in the window");
   switch (what) {
     case Measure::peak_level_db:

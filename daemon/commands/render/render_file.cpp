@@ -97,8 +97,8 @@ void read_sonar(const Node& node, RenderJob& job) {
   read_ping(ping.map(), *profile.model, rows, job.settings);
 }
 
-/// The scene's keys inline, or the name of a file. What is wrong with the scene is bad data, as where a file of its own holds it.
-/// All else must have been read: errors of the document are taken for the scene's.
+/// The scene's keys inline, or the name of a file. An error in the scene is bad data, as it is in a scene
+/// file. Everything else must have been read before, because errors of the document are then taken as errors of the scene.
 Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::filesystem::path& folder, const std::string& name,
                                                    const text::Document& document, ShapeCache* known) {
   if (node.is_map()) {

@@ -8,7 +8,7 @@
 namespace sonar::render {
 namespace {
 
-/// Without the poses that follow another in less than `shortest_step`; the last one stays where it is the only other.
+/// Removes poses that follow another in less than `shortest_step`. The last pose stays if only one other is left.
 motion::Trajectory thinned(const motion::Points& all) {
   motion::Points kept;
   for (std::size_t i = 0; i < all.times.size(); ++i) {
@@ -28,7 +28,7 @@ Steps steps_of(const motion::Trajectory& trajectory) {
   const motion::Trajectory way = thinned(trajectory.points());
   const std::vector<motion::Ns>& times = way.points().times;
   for (std::size_t i = 0; i + 1 < times.size(); ++i) {
-    const motion::Motion m = way.at(times[i]).moves;  // that of the way to the next one
+    const motion::Motion m = way.at(times[i]).moves;  // the motion on the way to the next pose
     const double mps = length(m.velocity_mps), radps = length(m.angular_velocity_radps);
     ++steps.all;
     if (!(mps <= fastest_vehicle_mps && radps <= fastest_vehicle_radps)) ++steps.too_far;

@@ -152,7 +152,7 @@ int read_mode(const Node& node, const SonarModel& model, int fallback) {
   if (!node.present()) return fallback;
   if (text::parse_integer(node.text(64))) {
     const int modes = static_cast<int>(model.modes.size());
-    return std::clamp(static_cast<int>(node.integer(1, modes)), 1, modes) - 1;  // what is outside has been said by then
+    return std::clamp(static_cast<int>(node.integer(1, modes)), 1, modes) - 1;  // a value outside has been reported by then
   }
   std::vector<std::string_view> names;
   for (const FrequencyMode& mode : model.modes) names.push_back(mode.name);

@@ -42,7 +42,7 @@ void add_replay_options(CLI::App& app, ReplayCommand& replay) {
 
 namespace {
 
-/// Port 0: none is given.
+/// Port 0 means that no port was given.
 Result<Endpoint> endpoint_from(const std::string& place, const std::string& option) {
   const std::size_t colon = place.find(':');
   const auto ip = parse_ipv4(place.substr(0, colon));

@@ -36,7 +36,7 @@ bool has_integer(const protocol::Vendor& vendor, protocol::Part part, protocol::
       part, name, [](auto n) { return n; }, none);
 }
 
-/// How many of the values first to last one model of the vendor takes, of the model that takes most.
+/// How many of the values from first to last a model of the vendor accepts; the largest number over its models.
 template <class T>
 std::size_t accepted(const protocol::Vendor& vendor, std::optional<T> protocol::SettingsOverride::*setting, std::uint32_t first,
                      std::uint32_t last) {

@@ -69,7 +69,7 @@ void add_to(Bytes& bytes, const std::optional<Field>& field, std::int64_t by) {
   if (field) write_integer(bytes, field->offset, field->size, read_integer(bytes, *field) + static_cast<std::uint64_t>(by));
 }
 
-/// `count` bytes by the word of `fill`.
+/// Makes `count` bytes of the kind that the option `fill` names.
 Bytes filling(const std::string& fill, std::size_t count, const Bytes& message, const FaultDraws& draws) {
   constexpr std::string_view text = "sonar: debug 0x00 ok\r\n";
   Bytes out(count, fill == "FF" ? std::byte{0xFF} : std::byte{0});
@@ -273,7 +273,7 @@ Touch alter_content(const Fault& fault, const MessageContext& c, MessageEdit& m)
       return {};
     case E::false_sync: {
       Bytes front = filling(fault.word("fill"), static_cast<std::size_t>(fault.number("bytes")), bytes, c.draws);
-      // The two bytes of the magic, and no message behind them.
+      // Inserts the two bytes of the magic number without a message behind them.
       std::copy_n(bytes.begin(), std::min<std::size_t>(2, bytes.size()), front.begin());
       put_before(bytes, front);
       return {};
@@ -325,7 +325,7 @@ Touch alter_content(const Fault& fault, const MessageContext& c, MessageEdit& m)
 Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m) {
   using E = FaultEffect;
   const E effect = fault.kind->effect;
-  // These effects leave a message that is right but for one field, so its checksums are corrected. The others damage it as a link
+  // These effects leave a message with one wrong field, so its checksums are corrected. The others damage it as a link
   // would.
   const bool of_fields = effect == E::set_field || effect == E::add_to_field || effect == E::renumber;
   const Bytes before = of_fields ? m.bytes : Bytes{};

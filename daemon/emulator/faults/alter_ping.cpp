@@ -59,7 +59,7 @@ class Levels {
   std::uint32_t full() const { return full_; }
   bool are_of_ranges() const { return of_ranges_ != nullptr; }
 
-  /// Code of a range image's return at a multiple of its range; none beyond `most_m`.
+  /// The code of a return in a range image at a multiple of its range; 0, no return, beyond `most_m`.
   std::uint32_t at_range(std::uint32_t code, double factor, double most_m) const {
     const double range = static_cast<double>(code & most_range) * factor;
     if (range < 1 || range > std::min<double>(most_range, most_m / of_ranges_->range_unit_m)) return 0;
@@ -118,7 +118,7 @@ void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, s
   Image image(ping);
   const Levels levels(ping, image.full());
   const double share = fault.number("share");
-  // The same beams in every ping: draws of the fault, not of the ping.
+  // The beams are the same in every ping, because they are drawn for the fault and not for the ping.
   FaultDraws of_fault = draws;
   of_fault.ping = 0;
   const auto chosen_beam = [&](std::size_t beam) {

@@ -55,8 +55,8 @@ void Faults::add(Fault fault, bool manual, Time now) {
   if (manual) entry.expires = now + longest_manual_fault;
   const FaultRecord::At& at = entry.fault.at;
   const bool waits = at.ping || at.every || at.time_s || at.probability || entry.fault.on;
-  // Faults that last begin now, those of single pings with the next ping (begin_ping). Three kinds act at once even if they are
-  // counted in pings.
+  // Faults with a duration begin now; faults of single pings begin with the next ping (begin_ping). Three kinds act at once even
+  // if they are counted in pings.
   if (!waits && !entry.fault.kind->per_ping()) begin(entry, now);
   if (!waits && (entry.fault.kind->effect == Effect::power_cycle || entry.fault.kind->effect == Effect::forget_settings ||
                  entry.fault.kind->effect == Effect::clock_restart))
@@ -78,7 +78,8 @@ void Faults::forget_old() {
 bool Faults::remove(const std::string& name, Time now) {
   bool found = false;
   for (Entry& e : entries_) {
-    // The parts of a trouble are NAME.1, NAME.2, ...; a fault without a name of its own has its code, and ends by its word, too.
+    // The parts of a trouble are NAME.1, NAME.2, ...; a fault without a name of its own has its code as name, and its word ends
+    // it too.
     const bool by_word = e.fault.name == e.fault.kind->code && e.fault.what == name;
     if (e.over || (e.fault.name != name && !by_word && !e.fault.name.starts_with(name + "."))) continue;
     found = true;
@@ -91,7 +92,7 @@ void Faults::clear(Time now) {
   for (Entry& e : entries_) finish(e, now);
 }
 
-/// The fault acts on no ping any more, not even on one that waits in an outbox.
+/// The fault no longer acts on any ping, not even on one that waits in an outbox.
 void Faults::finish(Entry& e, Time now) {
   end(e, now);
   e.over = true;
@@ -169,7 +170,7 @@ void Faults::begin_effect(Entry& e, Time now) {
       orders_.emplace_back(SetListening{false});
       orders_.emplace_back(EndClients{e.fault.word("how") == "reset"});
       orders_.emplace_back(RestartDevice{});
-      // A gap below 0: the ports open before the first status message. step() does that.
+      // With a gap below 0 the ports open before the first status message; step() opens them.
       if (const double gap = e.fault.number("gap-s"); gap < 0)
         e.step = now + std::max(nanoseconds(0), nanoseconds_from(e.fault.number("boot-s") + gap));
       return;
@@ -224,7 +225,7 @@ void Faults::end_effect(Entry& e) {
       orders_.emplace_back(ServeWaiting{});
       return;
     case Effect::delay_requests:
-      // Requests that were held back take effect now: the last settings that clients asked for hold.
+      // Requests that were held back take effect now. The settings that clients requested last are in force.
       for (auto& [at, request] : e.late) orders_.emplace_back(std::move(request));
       e.late.clear();
       return;
@@ -313,14 +314,14 @@ void Faults::begin_ping(std::uint32_t number, Time now) {
   }
 }
 
-/// Faults of status messages count those instead (alter_beacons).
+/// Faults of status messages count status messages instead (alter_beacons).
 void Faults::count_ping(Entry& e, Time now) {
   if (e.fault.span.pings == 0 || e.fault.kind->stage == FaultStage::status || --e.pings_left > 0) return;
   // A power cycle ends by its time.
   if (e.fault.kind->effect != Effect::power_cycle) end(e, now);
 }
 
-/// Pings are remembered by number, because clients are sent a ping long after it was made.
+/// Pings are remembered by number, because a ping may be sent to clients long after it was made.
 bool Faults::met(const Entry& e, std::uint32_t ping) const {
   return std::find(e.hits.begin(), e.hits.end(), ping) != e.hits.end();
 }

@@ -1,4 +1,4 @@
-// Effects of faults on pings, on messages to clients, on their requests and on status messages.
+// Effects of faults on pings, on messages and datagrams to clients, and on status messages.
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -13,7 +13,8 @@ namespace {
 
 using protocol::Bytes;
 
-/// A message as one run of bytes: each prefix with the bytes that all clients share.
+/// All bytes of a message in the order in which they are sent: each prefix, followed by the shared bytes. Without prefixes: the
+/// shared bytes once.
 Bytes whole(const Outbox::Message& message) {
   Bytes all;
   if (message.prefixes.empty()) return *message.bytes;
@@ -24,7 +25,7 @@ Bytes whole(const Outbox::Message& message) {
   return all;
 }
 
-/// The time that a device's 32-bit counter is about to wrap.
+/// The time two seconds before a device's 32-bit counter wraps.
 Time before_wrap(const std::string& unit, Time powered_up_at) {
   constexpr double counts = 4294967296.0, before_s = 2;
   const double unit_s = unit == "milliseconds" ? 1e-3 : 1e-6;
@@ -83,7 +84,7 @@ bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
     const bool joins = e.fault.kind->effect == Effect::join_late;
     const bool splices = e.fault.kind->effect == Effect::splice;
     if (!of_message || !chosen(e.fault, to)) continue;
-    // A splice needs the message before this one, also where it did not meet the ping of that message.
+    // A splice copies bytes of the previous message. So each message is kept, even if the fault did not act on its ping.
     const Bytes earlier = splices && !e.over ? std::exchange(e.before, whole(message)) : Bytes{};
     // A late join acts on the first ping of a client only.
     if (!(joins ? e.active : met(e, message.ping)) || (joins && to.outbox.pings_written() > 0)) continue;
@@ -99,7 +100,7 @@ bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
   if (!edit) return true;
   message.bytes = std::make_shared<const Bytes>(std::move(edit->bytes));
   message.prefixes.clear();
-  message.shape = nullptr;  // the port's: its places are those of the bytes as they were
+  message.shape = nullptr;  // the port's shape has positions in the unaltered bytes
   if (!edit->pauses.empty() || edit->end != Outbox::Shape::End::none) {
     std::sort(edit->pauses.begin(), edit->pauses.end(), [](const auto& a, const auto& b) { return a.before < b.before; });
     message.shape = std::make_shared<const Outbox::Shape>(Outbox::Shape{std::move(edit->pauses), edit->end});
@@ -120,8 +121,8 @@ void Faults::note_message(Entry& e, const Connection& to, std::uint32_t ping, co
   note(e, FaultEntry::What::injected, now, std::move(more));
 }
 
-/// Where a ping travels as datagrams: kinds that change bytes change the first that has what they change; a number without a
-/// fixed place is in all of them.
+/// For a ping that is sent as datagrams: a fault that changes bytes changes the first datagram that has the field or region. A
+/// field without a fixed place is changed in every datagram.
 void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
   using protocol::Part;
   for (Entry& e : entries_) {
@@ -187,7 +188,7 @@ void Faults::alter_beacons(std::vector<Bytes>& beacons, Time now) {
   for (Entry& e : entries_) {
     if (!e.active) continue;
     const Effect effect = e.fault.kind->effect;
-    // The device is off until its boot is over; a silent device may keep its status messages.
+    // The device is off until it has booted. A device that sends no pings still sends status messages if `keep-status` says so.
     const bool off = (effect == Effect::power_cycle && seconds(now - e.since) < e.fault.number("boot-s")) ||
                      (effect == Effect::withhold && e.fault.word("keep-status") == "no");
     if (off) beacons.clear();

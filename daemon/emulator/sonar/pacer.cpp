@@ -24,7 +24,7 @@ void Pacer::configure(const PingSettings& settings, Time now) {
   travel_ = nanoseconds_from(travel_s(settings));
   // An unchanged rhythm keeps its grid: some drivers repeat their settings at ping rate.
   if (running_ && period == period_ && settings.triggered == triggered_) return;
-  // A new grid begins when the last echo is home and the shorter of both periods is over.
+  // A new grid begins when the last echo has arrived and the shorter of both periods is over.
   const Time quiet_until = has_fired_ ? std::max(home_at_, last_tick_ + std::min(period_, period)) : now;
   running_ = period.count() > 0;
   if (!(running_ && triggered_ && settings.triggered)) forget_trigger();
@@ -55,7 +55,7 @@ void Pacer::forget_trigger() {
 
 void Pacer::trigger(Time now, bool joins) {
   if (!running_ || !triggered_) return;
-  // A trigger joins the one that waits, or is counted as skipped: at most one ping is due.
+  // At most one ping is due. A trigger joins the one that waits, or is counted as skipped.
   if (trigger_waits_) {
     if (joins) return;
     ++ticks_;
@@ -91,7 +91,7 @@ bool Pacer::fire(Time now, bool busy) {
     note_ping(now);
     return true;
   }
-  // Free running: ticks that have passed or meet a busy simulation are counted, never made up for.
+  // In free running, ticks that have passed, or that come while the simulation is busy, are counted and never repeated.
   const std::int64_t reached = (now - start_) / period_;  // index of the newest tick that has passed
   const auto missed = static_cast<std::uint64_t>(reached - index_);
   ticks_ += missed + 1;

@@ -39,7 +39,7 @@ std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t bu
   begin(ticks, busy, rate_hz);
   if (skipped <= tolerated_share) return std::nullopt;
   said_ = true;
-  // Pings that on the average take less than a period: those of other sonars came between, or single ones take longer.
+  // If pings take less than a period on average, pings of other sonars came between, or single pings took longer.
   const bool by_itself = alone_hz < rate_hz;
   const double possible_hz = by_itself ? alone_hz : made_hz;
   const std::string why = by_itself    ? std::string()

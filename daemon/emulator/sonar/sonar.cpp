@@ -33,7 +33,7 @@ void Sonar::report(Report::Topic topic, LogLevel level, std::string phrase, std:
 
 // ---- settings
 
-/// As if no client had ever connected: the next one finds the device as it comes.
+/// Restores the state in which no client has ever connected, so that the next client finds the device as delivered.
 void Sonar::use_initial_settings() {
   asked_ = false;
   asked_by_.clear();
@@ -60,7 +60,7 @@ void Sonar::change_settings(const protocol::ChangeSettings& change, const std::s
     report(Report::Topic::settings, who.empty() ? LogLevel::debug : LogLevel::info, "settings: " + change.summary,
            {{"client", who.empty() ? "the sonar itself" : who}}, actions);
   }
-  settings_ = change.settings;  // of a repeat too: the device's own sound speed follows its depth
+  settings_ = change.settings;  // also for a repeat, because the device's own sound speed follows its depth
   asked_ = true;
   if (change.receivers) set_receivers({}, *change.receivers, now);
   if (wants_pings()) update_pacer(now);
@@ -92,7 +92,7 @@ void Sonar::use_water(const Water& water, Time now) {
   if (wants_pings()) update_pacer(now);
 }
 
-/// The client's request stays; what the device derives from it follows the water at its depth.
+/// The client's request stays. Values that the device derives from it follow the water at its depth.
 void Sonar::follow_water() {
   const auto same = vendor_.apply_override({}, state_);
   if (same && same->settings.device_sound_speed_mps != settings_.device_sound_speed_mps) settings_ = same->settings;
@@ -199,7 +199,7 @@ std::vector<protocol::Bytes> Sonar::beacons(Time now) {
 
 void Sonar::update_depth(Time now) { state_.depth_m = depth_from_z(pose_at(now).position_m.z); }
 
-/// A device that keeps its rhythm while its host does not keep up has numbers for the pings that were not made.
+/// A device may keep its rhythm while its host cannot keep up. Then pings that were not made have numbers too.
 PingNumber Sonar::next_number() {
   const SkippedTicks& skipped = pacer_.skipped();
   const std::uint64_t lost = skipped.late + skipped.busy;
@@ -230,7 +230,7 @@ std::optional<PingRequest> Sonar::preview_request(PingNumber number, Time at) co
   PingRequest request = request_at(at, step ? step->aim : aim_);
   if (step) request.settings = step->settings;
   request.number = number;
-  // Another key of the noise than that of the sonar's pings.
+  // The key of the noise differs from that of the sonar's pings.
   request.sonar_id = ~index_;
   return request;
 }
@@ -283,7 +283,7 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
 }
 
 void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
-  // Faults note that they meet this ping before it is altered, framed or offered; the calls below ask for these notes.
+  // Faults decide whether they act on this ping before it is altered, framed or offered. The calls below use these decisions.
   faults_.begin_ping(static_cast<std::uint32_t>(outcome.ping->request.number), now);
   const auto reported = faults_.altered(outcome.ping, state_, now);
   const auto bytes = vendor_.frame(*reported, state_);
@@ -310,7 +310,7 @@ void Sonar::queue_ping(const PingOutcome& outcome, Time now, Actions& actions) {
   apply_fault_orders(now, actions);
 }
 
-/// An exception costs this ping, not the stream, which belongs to the device.
+/// An exception loses this ping, but does not end the stream, which belongs to the device.
 void Sonar::offer_datagrams(Connection& stream, const Ping& ping, Time now, PingQueued& queued, Actions& actions) {
   if (stream.finishing || receivers(stream.id).empty()) return;
   try {
@@ -377,7 +377,7 @@ std::shared_ptr<const Outbox::Shape> Sonar::parted(const Connection& to, const P
   return shape.pauses.empty() ? nullptr : std::make_shared<const Outbox::Shape>(std::move(shape));
 }
 
-/// The engine computed noise only of a ping that was requested as any other: it compares the depth with the sea surface.
+/// This ping was requested like any other, and the engine computed only noise, because the sonar is above the sea surface.
 void Sonar::note_water(const PingRequest& computed, Time now, Actions& actions) {
   const bool was_in_air = std::exchange(in_air_, computed.blank && !busy_blank_);
   if (!in_air_) return;

@@ -21,7 +21,7 @@ void drop_unreceived(Connections& connections) {
 Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port) {
   Actions actions;
   if (port == nullptr) port = vendor_.port(protocol::Port::Kind::tcp_stream);
-  // The slots give the verdict; a fault of clients may replace it; a sonar that stops refuses all.
+  // The slots decide; a fault of clients may replace their decision; a sonar that stops refuses all clients.
   Connections::Verdict verdict = stopping_ ? Connections::Verdict::refuse : connections_.verdict(role);
   const auto admission = role == Role::client && !stopping_ ? faults_.admission() : Faults::Admission::as_configured;
   if (admission == Faults::Admission::wait) verdict = Connections::Verdict::wait;
@@ -56,7 +56,7 @@ void Sonar::serve(Connection& connection, Time now, Actions& actions) {
   connection.dialogue = vendor_.converse(*connection.port, state_, unskipped(now));
   // Serve makes the session that later actions name, such as the ReadFrom of a fault.
   actions.emplace_back(Serve{connection.id});
-  // Observers are in no figures and change neither settings nor the rate of pings.
+  // Observers are not counted, and change neither settings nor the rate of pings.
   if (connection.role == Role::observer) return;
   connection.number = ++figures_.clients;
   on_membership(now, actions);
@@ -164,7 +164,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool
   if (connection == nullptr) return actions;
   const Role connection_role = connection->role;
   const bool was_client = connection_role == Role::client && connection->state == Connection::State::served;
-  // Pings that a fault holds back are offered to the outbox before it drops them, so that the accounts balance.
+  // Pings that a fault holds back are offered to the outbox before it drops them, so that the counters add up.
   for (Connection::Held& held : connection->held) connection->outbox.push_ping(std::move(held.ping));
   connection->outbox.end(connection->finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection->peer.name, connection->role, connection->state != Connection::State::waiting,
@@ -264,7 +264,7 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
   } else if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
     change_as_requested(from, *change, now, actions);
   } else if (const auto* request = std::get_if<protocol::RequestPing>(&event)) {
-    // The ping being computed will do only if it was fired with the settings that hold now.
+    // The ping being computed is used only if it was fired with the present settings.
     const bool served = request->joins && busy_ && busy_settings_ == state_.settings;
     if (served) return;
     aim_ = *request;

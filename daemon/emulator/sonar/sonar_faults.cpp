@@ -150,7 +150,7 @@ void Sonar::deliver(Connection& to, Outbox::Message ping, Time now, Actions& act
   using Kind = Faults::Hold::Kind;
   const Faults::Hold hold = faults_.hold(to, ping.ping, now);
   std::deque<Connection::Held>& held = to.held;
-  // A ping that no fault holds goes out at once, before one that was held to be swapped with it: that one follows.
+  // A ping that no fault holds is sent at once. A ping that was held to be swapped with it follows.
   if (hold.kind == Kind::pass && (held.empty() || held.front().after_next)) {
     to.outbox.push_ping(std::move(ping));
     actions.emplace_back(Wake{to.id});
@@ -159,7 +159,7 @@ void Sonar::deliver(Connection& to, Outbox::Message ping, Time now, Actions& act
   }
   if (held.size() >= most_held || held_bytes(to) + ping.size() > most_held_bytes)
     return to.outbox.drop_offered(DropReason::fault);
-  // Pings keep their order: none leaves before the one ahead of it.
+  // Pings keep their order: no ping leaves before the previous one.
   const Time earliest = held.empty() ? now : held.back().until;
   const Time until = hold.kind == Kind::until ? std::max(hold.until, earliest) : hold.kind == Kind::pass ? earliest : Time::max();
   held.push_back({std::move(ping), until, hold.kind == Kind::after_next});

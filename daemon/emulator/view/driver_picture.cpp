@@ -7,7 +7,7 @@
 namespace sonar {
 namespace {
 
-constexpr float dimmed = 0.4f;  // what the wire does not carry
+constexpr float dimmed = 0.4f;  // brightness of parts that the messages do not carry
 
 /// The messages of a ping, over TCP or as datagrams.
 std::vector<protocol::Bytes> messages_of(const Ping& ping, const protocol::Vendor& vendor, const protocol::DeviceState& state) {

@@ -145,7 +145,7 @@ ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPic
   if (!fan) return nullptr;
   auto samples = std::make_shared<wire::Bytes>();
   samples->reserve(fan->pixels.size());
-  for (const Rgb& p : fan->pixels)  // what is outside has a colour, which the map has not
+  for (const Rgb& p : fan->pixels)  // outside of the fan pixels have a colour that the map does not have
     samples->push_back(static_cast<std::byte>(p.r == p.g && p.g == p.b ? p.r : 0));
   return picture(at, sonar,
                  {static_cast<std::uint32_t>(fan->width), static_cast<std::uint32_t>(fan->height), "mono8", 1, samples});

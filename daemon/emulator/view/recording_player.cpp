@@ -5,7 +5,7 @@
 
 namespace sonar {
 
-/// Times that decrease are those of the ping before.
+/// A time that decreases is replaced by that of the previous ping.
 std::optional<RecordingPlayer::Shown> RecordingPlayer::read() {
   auto found = pings_.next();
   if (!found) return std::nullopt;

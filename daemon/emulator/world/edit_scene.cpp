@@ -29,7 +29,7 @@ bool is_printable(std::string_view name) {
   return std::all_of(name.begin(), name.end(), [](char c) { return std::isprint(static_cast<unsigned char>(c)) != 0; });
 }
 
-/// Empty when an object may be called so.
+/// Empty when an object may have this name.
 std::string complaint_about(const Scene& scene, const std::string& name) {
   if (name.empty() || name.size() > longest_name || !is_printable(name))
     return "an object needs a name of 1 to 64 printable characters";
@@ -38,7 +38,7 @@ std::string complaint_about(const Scene& scene, const std::string& name) {
   return {};
 }
 
-/// The other's shape, all of one material.
+/// The shape of the other object, all of one material.
 std::shared_ptr<const Mesh> mesh_of(const Mesh& mesh, std::size_t material) {
   auto copy = std::make_shared<Mesh>(mesh);
   std::fill(copy->material.begin(), copy->material.end(), static_cast<std::uint16_t>(material));
@@ -53,7 +53,7 @@ std::size_t free_place(Scene& scene) {
   return scene.objects.size() - 1;
 }
 
-/// Removes a body on which nothing rides any more. The indices of the bodies after it move up by one.
+/// Removes a body to which no object is attached any more. The indices of the bodies after it move up by one.
 void remove_body_if_empty(Scene& scene, int body) {
   const auto rides = [body](const auto& thing) { return thing.body == body; };
   if (std::any_of(scene.objects.begin(), scene.objects.end(), rides) ||

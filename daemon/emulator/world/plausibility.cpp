@@ -18,8 +18,8 @@ using text::format;
 
 constexpr double turned_over = -0.5;           // the z axis points down, by more than 30 deg below the horizon
 constexpr std::size_t most_looked_at = 10000;  // poses of a trajectory, triangles of a mesh
-constexpr double ground_flatness = 0.05;       // height over width: what is flatter is ground, which may be long
-constexpr double least_ground_m = 2;           // its width: a plate is no ground
+constexpr double ground_flatness = 0.05;       // height over width; flatter objects are ground, which may be long
+constexpr double least_ground_m = 2;           // width; a flat plate that is narrower is not ground
 constexpr double long_ranges = 5;              // lengths of the longest range that an object may have
 
 // Each cure is one kind of note: a kind is reported once.
@@ -47,7 +47,7 @@ struct Doubt {
   const char* cure;
 };
 
-/// The lowest point of all ground above or below that place; none when there is no ground.
+/// The lowest point of all ground above or below that place; nothing when there is no ground.
 std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around) {
   std::optional<double> lowest;
   for (const Extent& ground : around.ground)
@@ -59,7 +59,7 @@ std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around)
 enum class Location { fine, above_water, below_ground, far_away };
 Location judge_location(Vec3d sonar_m, const Surroundings& around) {
   const Extent& scene = around.scene;
-  const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // then the scene is what is wrong
+  const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // then the scene is wrong
   if (sonar_m.z > least_depth_m && !lies_above) return Location::above_water;
   if (const auto ground_m = lowest_ground_m(sonar_m, around); ground_m && sonar_m.z < *ground_m) return Location::below_ground;
   return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Location::far_away : Location::fine;
@@ -115,7 +115,7 @@ bool has_nameless_quaternions(const motion::Plan& plan) {
   return is(motion::Format::tum) || is(motion::Format::euroc);
 }
 
-/// Tilted where nothing that carries a sonar is, and upright with the numbers in another order.
+/// The pose is tilted as no carrier of a sonar is, and would be upright with the numbers in another order.
 bool is_out_of_order(const std::vector<Pose>& poses) {
   std::size_t lying = 0, explained = 0;
   for (const Pose& p : poses) {
@@ -126,7 +126,7 @@ bool is_out_of_order(const std::vector<Pose>& poses) {
   return 10 * lying >= poses.size() && 100 * explained >= 99 * lying;
 }
 
-/// All, or every second, third, ...: no more than most_looked_at.
+/// Looks at all, or at every second, third, ..., so that there are at most most_looked_at.
 std::vector<Pose> some_poses_of(const motion::Plan& plan) {
   const std::vector<Pose>& all = plan.trajectory->points().poses;
   const std::size_t step = 1 + (all.size() - 1) / most_looked_at;
@@ -135,7 +135,7 @@ std::vector<Pose> some_poses_of(const motion::Plan& plan) {
   return some;
 }
 
-/// The doubt of the first pose that is doubtful, and how many are.
+/// The note on the first doubtful pose, and the number of doubtful poses.
 std::optional<Doubt> doubt_of_all(const std::vector<Pose>& poses, const motion::Plan& plan,
                                   const std::function<bool(const Pose&)>& is_doubtful,
                                   const std::function<std::optional<Doubt>(const Pose&)>& doubt_of) {
@@ -162,7 +162,7 @@ Extent in_world(const Extent& own, const Pose& place) {
   return out;
 }
 
-/// All triangles face up, of those looked at: seen from above it hides nothing of itself.
+/// All triangles that were looked at face up. So from above no part of the object hides another.
 bool is_height_field(const Mesh& mesh) {
   const std::size_t step = 1 + mesh.triangles.size() / most_looked_at;
   for (std::size_t i = 0; i < mesh.triangles.size(); i += step) {
@@ -208,7 +208,7 @@ std::vector<Note> notes_on_plans(const Config& config, const Surroundings& aroun
   return notes;
 }
 
-/// All but those on plans. A vehicle that waits for its first pose, without an initial one, has none to check.
+/// All vehicles but those on trajectories. A vehicle without an initial pose that waits for its first pose has no pose to check.
 std::vector<Note> notes_on_start(const Config& config, const Scene& scene, const Surroundings& around) {
   const std::vector<Carrier> carriers = carriers_of(config);
   std::vector<Note> notes = notes_on_mounts(config);
@@ -269,7 +269,7 @@ std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around)
   const double allowed_m = std::max(huge_mesh_m, long_ranges * around.longest_range_m);
   std::set<const Mesh*> seen;
   for (const Object& o : scene.objects) {
-    // A primitive's size is in the scene file, in metres; only files have a unit of their own.
+    // The size of a primitive is in the scene file, in metres. Only mesh files have a unit of their own.
     if (!o.visible || o.primitive.kind != Primitive::Kind::none || !seen.insert(o.mesh.get()).second) continue;
     const MeshShape& shape = around.meshes.at(o.mesh);
     const double length_m = shape.own.longest_m();

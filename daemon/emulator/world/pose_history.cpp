@@ -5,7 +5,7 @@
 
 namespace sonar {
 namespace {
-// Two samples nearer than this say nothing about speed: their stamps are mostly jitter.
+// Two samples closer in time than this give no speed, because the difference of their stamps is mostly jitter.
 constexpr std::chrono::nanoseconds shortest_difference = std::chrono::milliseconds(1);
 }  // namespace
 

@@ -151,7 +151,7 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   // SIM stamps are of the sender's own clock, in stepped time WALL ones too.
   const bool own_clock = !has_shared_clock(sample) && sample.stamp.domain != ClockDomain::arrival;
   const Ns offset = own_clock ? offset_for(track, at, now, goes_on) : Ns(0);
-  const bool vehicle = sample.of == PoseSample::Of::vehicle;  // poses of objects may come seldom
+  const bool vehicle = sample.of == PoseSample::Of::vehicle;  // poses of objects may be rare
   if (rules_.follows && vehicle && offset != track.offset && track.sender_id == sender.id)
     out.notice = "stamps of " + track.body.name + " do not go on from where they were: taken as the next moments of our time";
   track.offset = offset;

@@ -1,4 +1,5 @@
-// Time that goes by the stamps of the vehicles' poses (clock: follow): how their clocks become ours, and how far it may pass.
+// Time that follows the time stamps of the vehicles' poses (clock: follow): how their clocks are converted to ours, and how far
+// time may advance.
 #include <algorithm>
 
 #include "daemon/emulator/world/world.hpp"
@@ -13,9 +14,9 @@ bool World::is_followed(const Track& track, Time newest) const {
   return !track.history.empty() && track.history.newest().at + track.offset >= newest - rules_.stale_after;
 }
 
-/// Offset from the stamps of a sender to sonard's time. A known offset, or none, is kept while it puts the stamp near the newest
-/// one. Otherwise the sender's clock has jumped, or this is the first pose: if it is ahead, and no other vehicle is followed, the
-/// time between is skipped; in all other cases the stamp becomes the present time.
+/// Offset from the stamps of a sender to sonard's time. The offset of this vehicle, 0, or that of another vehicle is taken if
+/// it puts the stamp near the newest one. Otherwise the sender's clock has jumped, or this is the first pose. If the stamp is
+/// ahead, and no other vehicle is followed, the time between is skipped. In all other cases the stamp becomes the present time.
 World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
   const Time newest = newest_followed_.value_or(now);
   const bool vehicle = std::any_of(vehicles_.begin(), vehicles_.end(), [&](const Track& t) { return &t == &track; });

@@ -1,4 +1,4 @@
-// Trajectories of bodies as the World plays them: where they are, and pausing, seeking and speed by request.
+// Trajectories of bodies that the World plays: their poses, and requests to pause, seek and change the speed.
 #include <cmath>
 
 #include "daemon/emulator/world/world.hpp"

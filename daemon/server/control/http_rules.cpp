@@ -34,7 +34,7 @@ std::optional<std::string> decoded(std::string_view text) {
   return out;
 }
 
-/// Up to `stop`, which goes too.
+/// Removes the text up to `stop`, and `stop` itself.
 std::string_view cut(std::string_view& rest, char stop) {
   const std::size_t end = std::min(rest.find(stop), rest.size());
   const std::string_view part = rest.substr(0, end);
@@ -107,7 +107,7 @@ bool is_json(std::string_view content_type) {
 
 namespace {
 
-/// Below /api/v1/faults, shaped like Toxiproxy's.
+/// Routes below /api/v1/faults, which resemble those of Toxiproxy.
 Route fault_route(const std::vector<std::string>& s, std::string_view method) {
   if (s.size() == 3)
     return method == "POST" ? Route{Route::Kind::operation, "POST", "add_fault"} : Route{Route::Kind::faults, "GET", "faults"};

@@ -86,7 +86,7 @@ constexpr SonarFamily sonar_families[] = {
      [](const DeviceFigures& f) { return static_cast<double>(f.pings); }},
     {"sonard_pings_refused_total", Type::counter, "Pings that the engine could not make.",
      [](const DeviceFigures& f) { return static_cast<double>(f.refused); }},
-    {"sonard_pings_unwanted_total", Type::counter, "Pings whose clients had gone or changed their settings when they were ready.",
+    {"sonard_pings_unwanted_total", Type::counter, "Pings that were ready after their client had left or changed its settings.",
      [](const DeviceFigures& f) { return static_cast<double>(f.unwanted); }},
     {"sonard_pings_out_of_water_total", Type::counter, "Pings of noise only: the sonar was above the sea surface.",
      [](const DeviceFigures& f) { return static_cast<double>(f.out_of_water); }},

@@ -88,7 +88,7 @@ asio::awaitable<void> StreamConnection::read() {
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || over()) break;
     received += n;
-    // Any web page can make a browser send an HTTP request here: it must have no effect, even if it parses as protobuf.
+    // Any web page can make a browser send an HTTP request here. The request must have no effect, even if it parses as protobuf.
     if (http_.speaks_http(std::span(buffer).first(n))) {
       log_refusal(services_, "HTTP request on the control stream, which is protobuf; use control.http for HTTP", sender_.id);
       break;
@@ -121,7 +121,7 @@ asio::awaitable<void> StreamConnection::read() {
   wake_writer_.cancel();  // it writes the remaining answers, then closes
 }
 
-/// Poses beyond the client's share are skipped, but for the newest: none acts long after it was sent.
+/// Poses beyond the client's share are skipped, except the newest. So no pose acts long after it was sent.
 bool StreamConnection::is_beyond_pose_rate() {
   if (!pose_rate_) pose_rate_ = targets_.pose_rate.join(services_.limits.pose_bytes_per_s);
   return targets_.pose_rate.left(*pose_rate_, Steady::now()) == 0;

@@ -100,7 +100,7 @@ OperationResult FaultOperations::add(const control::AddFault& asked, const Sende
   return result;
 }
 
-/// All sonars are asked first: nothing is half applied.
+/// All sonars are checked first, so that nothing is applied to some of them only.
 OperationResult FaultOperations::add(const control::FaultRecord& record, bool manual, const Device* only) {
   const auto faults = check_fault(record, manual);
   if (!faults) return result_of(faults.error());

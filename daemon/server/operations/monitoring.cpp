@@ -40,7 +40,7 @@ void add_vehicles(v1::DaemonStatus& out, const Config& config, const World& worl
 void add_objects(v1::DaemonStatus& out, const Scene& scene, const World& world, Time now) {
   const std::vector<Pose> bodies = world.objects_at(now);
   for (const Object& o : scene.objects) {
-    if (o.name.empty()) continue;  // the place of one that was removed
+    if (o.name.empty()) continue;  // the index of a removed object
     v1::ObjectStatus& object = *out.add_objects();
     object.set_name(o.name);
     object.set_moving(body_named(scene, o.name) >= 0);

@@ -71,7 +71,7 @@ OperationResult SceneOperations::without_details(const Error& error, const Scene
   return result;
 }
 
-/// Its turn comes after the changes before, also where nothing is to be built.
+/// It waits for the changes before it, even if nothing must be built.
 void SceneOperations::set(const control::SetObject& asked, const Sender& sender, Operations::Done done) {
   if (changes_.is_full()) return done(too_many_changes());
   auto finish = [this, asked, sender, done = std::move(done)](const Result<void>& outcome) {

@@ -8,8 +8,8 @@
 
 namespace sonar {
 
-/// Where time follows the poses, the answer comes when the pings are out that this one made possible: a client that waits for it
-/// runs in step with the sonars.
+/// If time follows the poses, the answer to a pose comes when the pings that this pose made possible have been sent. So a client
+/// that waits for the answer runs in step with the sonars.
 void TimeOperations::take(const control::PoseSample& sample, const Sender& sender, Operations::Done done) {
   std::string refusal = poses_.take(sample, sender);
   if (!refusal.empty()) return done(refused(std::move(refusal)));
@@ -22,7 +22,7 @@ void TimeOperations::step(const control::Step& asked, Operations::Done done) {
   if (std::string why = time_.step(asked.dt_s); !why.empty()) return done(refused(std::move(why)));
   time_.wait([this, done = std::move(done)](Time then) {
     const std::uint64_t before = std::exchange(pings_reported_, pings_made());
-    // A sonar that a reload took away took its pings along.
+    // If a reload removed a sonar, its pings are gone too.
     const std::uint64_t pings = pings_reported_ - std::min(before, pings_reported_);
     const auto stepped = std::make_shared<v1::Stepped>();
     stepped->set_now_ns(then.time_since_epoch().count());

@@ -15,7 +15,7 @@ std::vector<LogField> fields_of(const v1::RecordingStatus& status) {
 
 std::string why_without_labels(RecordingFile::Kind kind, const RecordedSonar& sonar, const Switches& switches) {
   if (kind != &RecordingFile::mcap) return "labels are recorded in MCAP only: end the name in .mcap";
-  if (sonar.has_range_images) return "range images have no labels; the file's truth is what each column sees";
+  if (sonar.has_range_images) return "range images have no labels; the file's truth holds what each column sees";
   if (switches.mode != Mode::canonical || switches.fixed_fan > 0)
     return "labels need the canonical model: sonard was started with another mode or a fixed fan";
   return {};
@@ -124,7 +124,7 @@ void Recordings::find_earlier() {
 Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& asked, const RecordedSonar& sonar) {
   if (config_.recording.folder.empty())
     return failure(ErrorKind::usage,
-                   "sonard may not write recordings: the configuration says where, recording: {folder: DIR} (docs/recording.md)");
+                   "sonard may not write recordings: set recording: {folder: DIR} in its configuration (docs/recording.md)");
   const auto kind = RecordingFile::kind_of(asked.file, sonar.vendor);
   if (!kind) return tl::make_unexpected(kind.error());
   if (const std::string why = asked.labels ? why_without_labels(*kind, sonar, config_.engine.switches) : ""; !why.empty())

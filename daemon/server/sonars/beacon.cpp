@@ -9,7 +9,7 @@ namespace sonar {
 Result<void> Beacon::open(const SonarConfig& sonar, const protocol::Port& port) {
   period_ = port.period;
   for (const Endpoint& to : sonar.status_to) to_.emplace_back(address_of(to.ip), to.port == 0 ? port.number : to.port);
-  // An ephemeral port, but never by chance the one that drivers listen on.
+  // Takes an ephemeral port, but never the one on which drivers listen.
   for (int attempt = 0; attempt < 8; ++attempt) {
     if (socket_.is_open()) socket_.close();
     if (auto r = bind_udp(socket_, {sonar.bind_ip, 0}, true); !r) return r;

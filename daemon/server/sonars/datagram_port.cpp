@@ -22,7 +22,7 @@ bool bind_shared(udp::socket& socket, const udp::endpoint& at) {
   return !ec;
 }
 
-/// On the loopback, which is 127.0.0.0/8 whatever the netmask says, hosts of this machine ask 127.255.255.255.
+/// The loopback network is 127.0.0.0/8 whatever the netmask is. There hosts of this machine broadcast to 127.255.255.255.
 Ipv4 broadcast_of(const SonarConfig& sonar) {
   if (sonar.bind_ip[0] == 127) return {127, 255, 255, 255};
   Ipv4 address{};
@@ -47,7 +47,7 @@ bool is_closed_port(msghdr& message) {
 Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port, bool shared) {
   number_ = port;
   Socket& own = sockets_.emplace_back(io_);
-  // With `groups` broadcasts are enabled: only the system knows all broadcast addresses.
+  // With `groups` broadcasts are enabled, because only the system has the list of all broadcast addresses.
   if (auto r = bind_udp(own.socket, {sonar.bind_ip, port}, !sonar.groups.empty(), shared); !r) return r;
   send_multicast_from(own.socket, sonar.bind_ip);
   return {};
@@ -101,7 +101,8 @@ void DatagramPort::receive(Socket& at) {
     take_errors();
     if (!ec && answer_ && at.from.address().is_v4()) {
       const Endpoint from{at.from.address().to_v4().to_bytes(), at.from.port()};
-      // From the sonar's own address: that is how a host learns it. A host that cannot be reached gets no answer.
+      // The answer is sent from the sonar's own address, from which a host learns this address. A host that cannot be reached
+      // gets no answer.
       error_code ignored;
       for (const protocol::Bytes& answer : answer_(from, std::span(at.datagram).first(size)))
         socket().send_to(asio::buffer(answer), at.from, 0, ignored);

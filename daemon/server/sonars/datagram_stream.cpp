@@ -62,7 +62,7 @@ asio::awaitable<void> DatagramStream::wait() {
     parent_.look_for_host(id_);
 }
 
-/// False: the socket was closed before the message was whole. A receiver that goes meanwhile gets no more of it.
+/// False: the socket was closed before the message was whole. A receiver that is removed in the meantime gets no more parts.
 asio::awaitable<bool> DatagramStream::send_message(const Outbox::Message& message, std::vector<Endpoint> receivers) {
   if (message.datagrams == nullptr) co_return co_await send_datagram(*message.bytes, receivers);
   for (std::size_t i = 0; i < message.datagrams->size(); ++i) {

@@ -123,7 +123,7 @@ void Device::start() {
 
 void Device::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
-  // Listeners first: no client may arrive while the present ones are finished.
+  // Listeners are closed first, so that no client arrives while the present ones are finished.
   for (TcpPort& tcp : tcp_ports_) tcp.listener.stop();
   observer_listener_.stop();
   beacon_.stop();
@@ -157,7 +157,7 @@ void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, c
   perform(sonar_.on_connect(id, role, std::move(peer), network_.clock.now(), port));
 }
 
-/// FIN and no byte. What the client has sent meanwhile is read away, or the kernel would answer it with RST.
+/// Sends FIN and no byte. Bytes that the client has sent are read first, or else the kernel would answer them with RST.
 asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place) {
   error_code ec;
   socket.shutdown(tcp::socket::shutdown_send, ec);
@@ -165,7 +165,7 @@ asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place)
   asio::steady_timer deadline(network_.io, std::chrono::seconds(1));
   deadline.async_wait([&socket, &late](const error_code& e) {
     if (e) return;
-    late = true;  // a read that has just ended is past cancelling, and another would have no end
+    late = true;  // a read that has just ended cannot be cancelled, and another would never end
     socket.cancel();
   });
   std::array<std::byte, 1024> discarded;
@@ -219,7 +219,7 @@ std::optional<std::chrono::milliseconds> Device::longest_silence(ConnectionId of
   return connection == nullptr || !connection->dialogue ? std::nullopt : connection->dialogue->longest_silence();
 }
 
-/// A mistake in sonard, not of a client: it may cost that client its connection, never the others.
+/// This is a mistake in sonard, not of a client. It may end the connection of that client, but not others.
 void Device::on_fault(const std::string& what) { log_fault(network_.log, faults_, what, {"sonar", config().name}); }
 
 void Device::on_send_error(const Endpoint& to, const std::string& why) {

@@ -1,4 +1,4 @@
-// A Device as the control protocol sees it: what it says of itself, and what may be asked of it while it runs.
+// A Device as the control protocol sees it: the status that it reports, and the requests that it takes while it runs.
 #include <algorithm>
 
 #include "core/sonar/range_image.hpp"

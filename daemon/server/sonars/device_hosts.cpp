@@ -52,7 +52,8 @@ void Device::on_receiver_closed(const Endpoint& receiver) {
   if (!known && closed_.size() < most_closed) closed_.emplace_back(receiver, std::chrono::steady_clock::now() + closed_for);
 }
 
-/// A silent host may still be there: its computer answers a datagram to a closed port (ICMP), which counts as a sign of it.
+/// A silent host may still run. Its computer answers a datagram to a closed port (ICMP), and that answer counts as a sign of the
+/// host.
 void Device::look_for_host(ConnectionId stream) {
   const Connection* const host = sonar_.connections().find(stream);
   const StreamPointer dialogue = stream_of(stream);
@@ -60,7 +61,7 @@ void Device::look_for_host(ConnectionId stream) {
   dialogue->send_nothing_to({host->peer.ip, discard});
 }
 
-/// The host that sent last has the dialogue: there are no connections that would end it.
+/// The host that sent last has the dialogue, because there is no connection whose end would end the dialogue.
 void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, const Endpoint& from, protocol::BytesView datagram) {
   if (stopping_ || !sonar_.vendor().is_request(port, datagram)) return;
   const Peer host{text_of(from), from.ip, from.port};

@@ -56,7 +56,7 @@ std::string Fleet::problem() const {
   return {};
 }
 
-/// The position in the configuration, or the first free index if a sonar that continues or was just opened has that.
+/// The sonar's position in the configuration. If a sonar that continues, or one to be opened, has that index: the first free one.
 std::uint32_t Fleet::free_index(std::size_t wanted, const std::vector<Opening>& given) const {
   const auto taken = [&](std::uint32_t index) {
     return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) { return d.sonar().index() == index; }) ||
@@ -74,7 +74,8 @@ void Fleet::retire(std::list<Device>::iterator device) {
   retired_.back().device.splice(retired_.back().device.end(), devices_, device);
 }
 
-/// Handlers that were cancelled by stop() still refer to the device: they were all queued then, and have run after a few turns.
+/// Handlers that stop() cancelled still refer to the device. When the device is gone they are all queued, and a few turns of the
+/// event loop run them. So a device is erased only after several sweeps in a row that find it gone.
 void Fleet::sweep() {
   for (auto it = retired_.begin(); it != retired_.end();) {
     const Device& device = it->device.front();
@@ -131,7 +132,7 @@ std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& nex
   return openings;
 }
 
-/// The previous sonar continues if its vehicle is in the new configuration.
+/// When the changed sonar cannot be opened: the previous one continues if its vehicle is in the new configuration, else it ends.
 void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Config& next) {
   SonarConfig is = device->config();
   const auto vehicle = std::find_if(next.vehicles.begin(), next.vehicles.end(),
@@ -145,9 +146,10 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   Change change;
   Outcomes outcomes;
   std::vector<Opening> openings = sort_out(now, next, outcomes);
-  std::vector<Opening> after;  // at addresses that a sonar still holds which will be stopped
-  // Three passes, so that sonars can swap addresses and none stops in vain: open at free addresses while the previous sonar still
-  // serves, stop those whose address is needed, open at these addresses.
+  std::vector<Opening> after;  // opened after the sonars that hold their addresses have been stopped
+  // Three passes, so that sonars can swap addresses and none is stopped needlessly. First, sonars at free addresses are opened,
+  // while the previous ones still serve. Then the sonars whose addresses are needed are stopped. Then the others are opened
+  // there.
   for (const Opening& o : openings) {
     const bool changed = o.before != devices_.end();
     outcomes[o.sonar->name] = changed ? "changed" : "added";

@@ -91,7 +91,7 @@ asio::awaitable<void> Session::read() {
   }
 }
 
-/// A client that sends too much waits; its FIN, too, is only read then. finish() and over() end the pause.
+/// A client that sends too much waits; its FIN is read only after the wait. finish() and over() end the pause.
 asio::awaitable<void> Session::rest(Steady::time_point until) {
   wake_reader_.expires_at(until);
   error_code ec;
@@ -163,7 +163,7 @@ asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
 }
 
 void Session::end_pauses() {
-  // Only the message that is being written hurries: the next one has pauses of its own.
+  // Only the message that is being written is sent without pauses; the next one has pauses of its own.
   hurries_ = writing_;
   pause_.cancel();
 }
@@ -177,7 +177,8 @@ std::chrono::steady_clock::duration Session::stands_for() const {
   return writing_ ? std::max(Steady::duration{}, Steady::now() - progress_at_) : Steady::duration{};
 }
 
-/// A reset throws away what the client's kernel has not confirmed. The watch ends the session of a client that takes nothing.
+/// A reset discards bytes that the kernel of the client has not confirmed. The watch ends the session of a client that takes
+/// nothing.
 asio::awaitable<bool> Session::deliver() {
   while (!over_ && unconfirmed_bytes() > 0) {
     pause_.expires_after(delivery_watch);

@@ -155,7 +155,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   bool busy_ = false, behind_ = false, wanted_ = false;
 };
 
-/// A slice: measures, or looks for the ping at this moment and draws it.
+/// One slice of the work: measures the recording, or finds the ping at this moment and draws it.
 void RecordingViews::Seen::go_on(Work& work, RecordingPlayer::Ns at) {
   if (!work.player) return;
   RecordingPlayer& player = *work.player;
@@ -271,7 +271,7 @@ std::string RecordingViews::Seen::server_info() const {
   return foxglove::text_of(info);
 }
 
-/// The page's time line is that of a vehicle on a trajectory: here, of the recording.
+/// The page has a time line for a vehicle on a trajectory. Here the trajectory is the recording.
 ViewPayloadPointer RecordingViews::Seen::status() const {
   v1::DaemonStatus status;
   status.set_version(SONARD_VERSION);

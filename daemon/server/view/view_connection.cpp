@@ -24,12 +24,12 @@ namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 
 constexpr std::chrono::seconds handshake_limit{10}, silence_limit{30};  // a ping is sent at half of it
-// Old pictures wait with us, where newer ones replace them, not in the kernel.
+// Old pictures wait in this program, where newer ones replace them, and not in the kernel.
 constexpr int most_unsent = 128 << 10;
 
 }  // namespace
 
-/// A socket that says when bytes move out, and is read at the allowed rate. Beast finds the friends by its type.
+/// A socket that reports when bytes leave it, and that is read at the allowed rate. Beast finds the friends by its type.
 struct ViewConnection::Watched {
   HttpConnection& from;
   Steady::time_point& moved_at;

@@ -298,7 +298,7 @@ void ViewFeed::on_log(LogLevel level, const std::string& line, const std::vector
   const Time now = of_.clock.now();
   lines_.push_back(view_payload(now, foxglove::log_line(now, severity, line, sonar == fields.end() ? "sonard" : sonar->value)));
   if (lines_.size() > lines_kept) lines_.pop_front();
-  changed_ = true;  // most of what is logged shows in the status
+  changed_ = true;  // most logged events also change the status
   offer(log_, lines_.back());
 }
 

@@ -58,7 +58,7 @@ void ViewFeed::begin_slow_ones(SonarView& sonar) {
   });
 }
 
-/// Pings that come meanwhile are skipped, but for the last: it is made when this one is done. Once for each threshold.
+/// Only the last of the pings that arrive in the meantime is kept, and is made when this one is done. Once for each threshold.
 void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload make) {
   Slow& slow = sonar.*which;
   const auto now = Steady::now();
@@ -95,7 +95,7 @@ void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload
   });
 }
 
-/// Where vehicles, sonars and moving objects are: as the last pings saw them, else now.
+/// Poses of vehicles, sonars and moving objects: those of the last pings, else those of now.
 ViewPayloadPointer ViewFeed::places() const {
   const Time now = of_.clock.now();
   std::vector<foxglove::Transform> all;

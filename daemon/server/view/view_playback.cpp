@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// Null = it follows none.
+/// null = it follows no playback
 const motion::Playback* ViewFeed::playback_of(const std::string& vehicle) const {
   const auto& vehicles = of_.config.vehicles;
   const auto found = std::find_if(vehicles.begin(), vehicles.end(), [&](const VehicleConfig& v) { return v.name == vehicle; });
@@ -16,7 +16,7 @@ const motion::Playback* ViewFeed::playback_of(const std::string& vehicle) const 
   return played ? &played->playback : nullptr;
 }
 
-/// As the viewer asked in its URL; empty, or why not.
+/// Begins the playback that the URL of the viewer requests. Empty, or why not.
 std::string ViewFeed::begin_playback(Viewer& viewer, const std::string& vehicle) {
   if (vehicle.empty()) return {};
   const motion::Playback* const playback = playback_of(vehicle);
@@ -71,7 +71,7 @@ bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& a
   return true;
 }
 
-/// With the stamps of the trajectory that the viewer looks at.
+/// The payload with the time stamps of the trajectory that the viewer looks at.
 ViewPayloadPointer ViewFeed::in_time_of(const Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) const {
   const auto watch = watches_.find(viewer.playback());
   if (watch == watches_.end()) return payload;

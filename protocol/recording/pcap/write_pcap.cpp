@@ -81,7 +81,7 @@ void put_u16(Bytes& bytes, std::size_t at, std::uint16_t value) {
   bytes[at + 1] = static_cast<std::byte>(value & 0xFF);
 }
 
-/// One end of the connection as the other sees it.
+/// One end of the connection, as the other end sees it.
 struct End {
   IpEnd place;
   std::uint32_t sequence = 0;  // of its next byte

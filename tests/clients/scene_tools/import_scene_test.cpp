@@ -279,7 +279,7 @@ TEST_F(ImportScene, OddNamesAndSizesStillLoad) {
   ASSERT_EQ(made->objects.size(), 4u);
   EXPECT_EQ(made->objects[0].name, "true");
   EXPECT_EQ(made->objects[1].name, "- 漁船 {x}");
-  EXPECT_THAT(done->left_out, ElementsAre(HasSubstr("box: size is not above 0")));
+  EXPECT_THAT(done->left_out, ElementsAre(HasSubstr("box: size must be greater than 0")));
 }
 
 }  // namespace

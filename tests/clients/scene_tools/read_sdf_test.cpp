@@ -174,7 +174,7 @@ TEST(ReadSdf, WhatASceneCannotHoldIsNamedOnceWithItsLine) {
   EXPECT_THAT(r.findings.left_out(),
               ElementsAre("1 coordinate frame (North East Down frame), 3 lights: without an echo", "w.sdf:4: actor \"walker\"",
                           "w.sdf:5: plugin \"p\"", "w.sdf:5: joint \"j\" (prismatic): stays as it is drawn",
-                          "w.sdf:5: geometry polyline: not a shape that a scene has", "model:/cam:2: sensor \"eye\""));
+                          "w.sdf:5: geometry polyline: scenes have no such shape", "model:/cam:2: sensor \"eye\""));
 }
 
 TEST(ReadSdf, MistakesAreToldWithFileAndLine) {

@@ -25,7 +25,7 @@ TEST(WriteScene, OneObjectAShapeNamedAsShortAsItCanBe) {
                               "pose: {xyz_m: [1, 2, -3], rpy_deg: [0, 0, 28.64789]}}\n"));
   EXPECT_THAT(text, HasSubstr("{name: arm/a, "));
   EXPECT_THAT(text, HasSubstr("{name: arm/b, "));
-  EXPECT_THAT(text, HasSubstr("standing still here (--moving MODEL changes that): arm\n"));
+  EXPECT_THAT(text, HasSubstr("but fixed in this scene (--moving MODEL makes one move): arm\n"));
 }
 
 TEST(WriteScene, NamesAreUniqueAndShortEnough) {

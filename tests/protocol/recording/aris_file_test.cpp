@@ -109,20 +109,20 @@ TEST(ArisFile, CutOrDamagedSaysWhere) {
   Bytes file(whole.begin(), whole.end() - 100);
   ReadBack read = read_back(file);
   EXPECT_EQ(read.frames.size(), 2u);
-  EXPECT_EQ(read.damage, "f: the file ends at byte 32796 within frame 3, of which 10524 bytes are there");
+  EXPECT_EQ(read.damage, "f: the file ends at byte 32796 within frame 3: only 10524 of its 10624 bytes are there");
   read = read_back(Bytes(whole.begin(), whole.end() - static_cast<std::ptrdiff_t>(record)));
   EXPECT_EQ(read.frames.size(), 2u);
-  EXPECT_EQ(read.damage, "f: the file states 3 frames and holds 2");
+  EXPECT_EQ(read.damage, "f: the file's header announces 3 frames, and the file holds 2");
   file = whole;
   file[1024 + record + 12] = std::byte{0};
   read = read_back(file);
   EXPECT_EQ(read.frames.size(), 2u);
   EXPECT_EQ(read.frames.back().index, 2) << "counted without a gap";
-  EXPECT_EQ(read.damage, "f: frame 2 at byte 11648 does not begin with its header");
+  EXPECT_EQ(read.damage, "f: frame 2 at byte 11648 is damaged: its version or number of samples is not the file's");
   EXPECT_EQ(read_back(Bytes(whole.begin(), whole.begin() + 500)).damage, "f ends at byte 500, within its header");
   file = whole;
   file[16 + 1] = std::byte{77};
-  EXPECT_EQ(read_back(file).damage, "f states frames of 19760 beams and 200 samples, which no ARIS sends");
+  EXPECT_EQ(read_back(file).damage, "f announces frames of 19760 beams and 200 samples, which no ARIS sends");
   EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "one sonar without a name";
 }
 

@@ -68,7 +68,7 @@ export function drawConnections(facts) {
   });
   const addresses = facts.sonarStatus?.addresses ?? [];
   showList($('addresses'), addresses, () =>
-    addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), ` · the ${a.sonar_speaks_first ? 'sonar' : 'driver'} speaks first`)));
+    addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), ` · ${a.sonar_speaks_first ? 'sends without a request' : 'waits for the driver'}`)));
   drawHistory($('history'), facts);
 }
 

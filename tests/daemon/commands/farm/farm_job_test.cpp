@@ -101,7 +101,7 @@ TEST_F(FarmJobTest, IdIsOfAllContents) {
   EXPECT_NE(describe(job(), "avx2").value().id, a.id);
   put("job/meshes/a.stl", "b");
   EXPECT_NE(record().id, a.id);
-  EXPECT_THAT(parse_farm_job(a.id, record().to_json()).error().text, HasSubstr("does not fit its id"));
+  EXPECT_THAT(parse_farm_job(a.id, record().to_json()).error().text, HasSubstr("does not match its id"));
   EXPECT_THAT(parse_farm_job(a.id, "{}").error().text, HasSubstr("cannot be read"));
 }
 
@@ -156,14 +156,16 @@ TEST_F(FarmJobTest, CountsThatNoJobHasAreRefused) {
     words[key] = value;
     const auto parsed = parse_farm_job(is.id, words.dump());
     ASSERT_FALSE(parsed) << key << ' ' << value;
-    EXPECT_THAT(parsed.error().text, HasSubstr(std::string("cannot be: ") + key + " is ")) << value;
+    EXPECT_THAT(parsed.error().text, HasSubstr(std::string("is invalid: ") + key + " is ")) << value;
   }
   json words = json::parse(is.to_json());  // fits itself, but not the job file
   words["shards"] = 5, words["shard_pings"] = 1;
   const auto parsed = parse_farm_job(is.id, words.dump());
   ASSERT_TRUE(parsed) << parsed.error().text;
-  EXPECT_THAT(load_files(*parsed, folder_ / "job/set.yaml").error().text,
-              HasSubstr("has 5 shards, and its file set.yaml makes 3"));
+  EXPECT_THAT(
+      load_files(*parsed, folder_ / "job/set.yaml").error().text,
+      HasSubstr("its file set.yaml: the record has 5 shards for 5 pings, up to 1 in each, the file has 3 shards for 5 pings, "
+                "up to 2 in each; "));
   EXPECT_TRUE(load_files(is, folder_ / "job/set.yaml"));
 }
 
@@ -190,7 +192,7 @@ TEST_F(FarmJobTest, AWorkerRemovesWhatIsNoShardOfTheJob) {
       "sonar: {ping: {range_m: 7, beams: 32, rows: 64}}\n"
       "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -10.5], rpy_deg: [0, 10, 0]}}\n");
   EXPECT_EXIT(std::_Exit(work_on_foreign_shards(folder_)), testing::ExitedWithCode(0),
-              "shard 999999999 is none of the 3 of set-");
+              "shard 999999999 is not one of the 3 of set-");
 }
 
 TEST_F(FarmJobTest, TheStatusShowsNoRawBytesOfTheQueue) {
@@ -223,7 +225,7 @@ TEST_F(FarmJobTest, OthersMakeOtherBytes) {
   is.instruction_set = "avx1024";
   EXPECT_THAT(why_unfit(is), HasSubstr("which this processor lacks"));
   is.version = "9.9.9";
-  EXPECT_THAT(why_unfit(is), HasSubstr("was submitted by sonard 9.9.9"));
+  EXPECT_THAT(why_unfit(is), HasSubstr("was submitted with sonard 9.9.9"));
 }
 
 TEST_F(FarmJobTest, AWorkerReadsNothingElse) {
