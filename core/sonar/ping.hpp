@@ -88,7 +88,7 @@ inline constexpr std::array<NamedSwitch, 19> named_switches{{
     {"defocus", &Switches::defocus, "blur of near echoes off broadside"},
     {"shared_noise", &Switches::shared_noise, "noise and leak that receive channels share, near the sonar"},
     {"truncation", &Switches::truncation, "samples cut off to whole codes; off: rounded"},
-    {"interleave", &Switches::interleave, "beams of one picture from successive pings (ARIS); off: from one"},
+    {"interleave", &Switches::interleave, "beams of one picture from successive pings, where the model has them; off: from one"},
 }};
 
 /// How the sonar moves while a ping is under way.
