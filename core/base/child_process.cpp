@@ -26,7 +26,7 @@ struct Actions {
 
 Result<MemoryFile> MemoryFile::make(const char* name) {
   const int any = ::memfd_create(name, MFD_CLOEXEC);
-  // Above the standard streams, which may be closed here: the child gets it as one of them.
+  // The number is above those of the standard streams, which may be closed here. The child gets it as one of them.
   const int descriptor = any < 0 ? -1 : ::fcntl(any, F_DUPFD_CLOEXEC, 3);
   const int error = errno;
   if (any >= 0) ::close(any);

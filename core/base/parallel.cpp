@@ -27,7 +27,7 @@ struct Parallel::Pool {
 
   std::exception_ptr fault;  // the first of a round
 
-  /// In a worker an exception would end the whole program: out of memory in one ping must cost that ping only.
+  /// In a worker an exception would end the whole program. Lack of memory in one ping must only lose that ping.
   void run_items(int worker) {
     try {
       for (std::size_t i = next.fetch_add(1, std::memory_order_relaxed); i < count;

@@ -10,7 +10,8 @@
 namespace sonar {
 namespace {
 
-/// Place in the beam table, fractional; beam k spans [k - 0.5, k + 0.5]. Nothing outside the fan; a full turn has no outside.
+/// The fractional position in the beam table; beam k spans [k - 0.5, k + 0.5]. Nothing outside the fan; a full turn has no
+/// outside.
 std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azimuth) {
   const auto next = std::lower_bound(azimuth_rad.begin(), azimuth_rad.end(), azimuth, std::greater<>());
   const auto right = std::clamp<std::ptrdiff_t>(next - azimuth_rad.begin(), 1, std::ssize(azimuth_rad) - 1);
@@ -26,7 +27,7 @@ std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azi
 struct Interval {
   double low = 0, high = 0;
 };
-/// A box of `width` around `centre`, within the cells there are.
+/// A box of `width` around `centre`, limited to the existing cells.
 Interval box_around(double centre, double width, std::size_t cells) {
   const double limit = static_cast<double>(cells);
   const double low = std::clamp(centre - width / 2, 0.0, limit - 1e-6);

@@ -34,12 +34,12 @@ std::uint8_t mix(std::uint8_t under, std::uint8_t over, float opacity) {
   return static_cast<std::uint8_t>(std::lround(static_cast<float>(under) * (1 - opacity) + static_cast<float>(over) * opacity));
 }
 
-/// An empty file that no other process or thread writes until it is closed, nor renames; -1 and errno.
+/// Opens an empty file that no other process or thread writes or renames until it is closed. -1 and errno on failure.
 int open_alone(const std::filesystem::path& file) {
   while (true) {
     const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
     if (descriptor < 0) return -1;
-    ::flock(descriptor, LOCK_EX);  // a file system without locks: as if alone
+    ::flock(descriptor, LOCK_EX);  // a file system without locks: continues without one
     struct stat opened {
     }, named{};
     const bool is_named = ::fstat(descriptor, &opened) == 0 && ::stat(file.c_str(), &named) == 0 &&
@@ -106,7 +106,7 @@ Result<void> write_whole_file(const std::filesystem::path& file, std::initialize
   int why = 0;
   for (const auto part : parts)
     if (why == 0 && std::fwrite(part.data(), 1, part.size(), out) != part.size()) why = errno;
-  if (std::fclose(out) != 0 && why == 0) why = errno;  // what waited in memory did not fit
+  if (std::fclose(out) != 0 && why == 0) why = errno;  // the bytes that waited in memory did not fit on the disk
   std::error_code error;
   if (why == 0) std::filesystem::rename(unfinished, file, error);
   if (why != 0 || error) return failed(why != 0 ? why : error.value());

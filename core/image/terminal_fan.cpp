@@ -26,7 +26,7 @@ struct Grid {
   }
 };
 
-/// Mean over one half of a cell: a square of the drawn picture.
+/// The mean over one half of a cell, which is a square of the drawn picture.
 Rgb mean_colour(const Raster& raster, int left, int top) {
   int r = 0, g = 0, b = 0, count = 0;
   for (int y = top; y < std::min(top + dots, raster.height); ++y) {

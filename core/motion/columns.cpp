@@ -11,7 +11,7 @@
 namespace sonar::motion {
 namespace {
 
-constexpr double norm_allowed = 0.01;  // of a quaternion, or of a row of a matrix; less is rounding, and repaired
+constexpr double norm_allowed = 0.01;  // of a quaternion, or of a row of a matrix; a smaller error is rounding, which is repaired
 constexpr double farthest = 1e8;       // m, m/s, rad/s
 constexpr std::size_t longest_quoted = 40, longest_name = 64;
 
@@ -22,7 +22,7 @@ Complaint not_a_number(std::string_view word, const char* what = "a number") {
   return in_quotes(word) + " is not " + what + std::string(text::number_hint(word));
 }
 
-/// Finite, decimal; leading zeros are no octals in tables.
+/// Finite, decimal; leading zeros do not mean octal numbers in tables.
 std::optional<double> number(std::string_view word) {
   // from_chars takes no plus sign.
   if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
@@ -33,7 +33,7 @@ std::optional<double> number(std::string_view word) {
   return v;
 }
 
-/// Largest absolute part, to hold all three against one bound.
+/// The largest absolute part, to compare all three with one bound.
 double largest(Vec3d v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
 /// Quaternion of a rotation matrix, by its largest part, so that no divisor is small.

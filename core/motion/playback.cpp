@@ -13,7 +13,7 @@ constexpr std::int64_t one = 1'000'000;  // in millionths
 }  // namespace
 
 std::optional<Speed> Speed::from(double factor) {
-  // So written that NaN is refused, too. In whole millionths a product with nanoseconds is exact.
+  // Written so that NaN is refused, too. In whole millionths a product with nanoseconds is exact.
   if (!(factor >= slowest && factor <= fastest)) return std::nullopt;
   return Speed{std::llround(factor * static_cast<double>(one))};
 }
@@ -30,7 +30,7 @@ Ns Playback::line(Time clock) const {
   Wide passed = product / one;
   if (product % one < 0) --passed;  // downwards, also before clock_at_
   constexpr auto last_ns = static_cast<Wide>(std::numeric_limits<std::int64_t>::max());
-  // Held at 292 years, farther than stamps of a file may be.
+  // Limited to 292 years, which is more than stamps of a file may have.
   return Ns(static_cast<std::int64_t>(std::clamp(place_at_.count() + passed, -last_ns, last_ns)));
 }
 
@@ -64,7 +64,7 @@ void Playback::resume(Time clock) {
 
 void Playback::seek(Time clock, Ns to) {
   clock_at_ = clock;
-  // Speed and pause stay.
+  // Speed and pause do not change.
   place_at_ = std::clamp(to, Ns{0}, duration_);
 }
 

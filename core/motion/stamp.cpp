@@ -17,7 +17,7 @@ std::uint64_t power_of_ten(int n) {
   return v;
 }
 
-/// A number and the power of ten that goes with it. Digits beyond the nineteenth are of no weight here.
+/// A number and the power of ten that goes with it. Digits after the nineteenth do not matter here.
 struct Digits {
   std::uint64_t number = 0;
   int exponent = 0, count = 0;
@@ -37,7 +37,7 @@ struct Digits {
       exponent += !fraction;
     }
   }
-  /// Rounded half up; nothing when it is farther than a stamp may be.
+  /// Rounds half up; nothing if the result is beyond the limit of a stamp.
   std::optional<std::int64_t> scaled(int shift) const {
     // The value is number * 10^by.
     const int by = exponent + shift;

@@ -18,7 +18,7 @@ Trajectory::Trajectory(Points points, Ns duration)
 /// Motion on the way that ends at point `after`, at the share u of it.
 Motion Trajectory::between(std::size_t after, double u) const {
   const std::size_t before = after - 1;
-  // Times of points rise: never divided by 0 s.
+  // Times of points rise, so there is no division by 0 s.
   const double per_s = 1 / seconds(points_.times[after] - points_.times[before]);
   const Pose &a = points_.poses[before], &b = points_.poses[after];
   const auto told = [&](const std::vector<Vec3d>& values) { return values[before] + u * (values[after] - values[before]); };
@@ -32,7 +32,7 @@ Motion Trajectory::between(std::size_t after, double u) const {
 
 Moment Trajectory::at(Ns time) const {
   const std::vector<Ns>& times = points_.times;
-  // Held, and so at rest, outside of the points.
+  // Outside of the points the pose is held, and so at rest.
   if (time < times.front()) return {points_.poses.front(), {}};
   if (time > times.back() || times.size() == 1) return {points_.poses.back(), {}};
   if (time == times.back()) return {points_.poses.back(), between(times.size() - 1, 1)};

@@ -14,7 +14,7 @@
 namespace sonar::motion {
 namespace {
 
-// Bounds for files that are no trajectories.
+// Limits for files that are not trajectories.
 constexpr std::size_t most_bodies = 256;
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
 constexpr std::uint64_t memory_of_a_line = 200;  // bytes: a stamp, a pose and two velocities, and a copy while a vector grows
@@ -30,7 +30,7 @@ std::string_view trimmed(std::string_view s) {
   return s;
 }
 
-/// By hand: the search functions of strings are slow for words as short as numbers.
+/// Written by hand, because the search functions of strings are slow for words as short as numbers.
 void split(std::string_view line, bool commas, Words& words) {
   words.clear();
   for (std::size_t at = 0; at <= line.size();) {
@@ -42,7 +42,7 @@ void split(std::string_view line, bool commas, Words& words) {
   }
 }
 
-/// Tells a line of numbers from a header.
+/// Distinguishes a line of numbers from a header.
 bool is_number(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);
   double v = 0;
@@ -71,7 +71,7 @@ class Reader {
 
   Result<TrajectoryFile> run(std::string_view text) {
     if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
-    // To the first error: those after it mostly follow from it.
+    // Reads up to the first error, because later errors mostly follow from it.
     for (std::size_t at = 0; at < text.size() && wrong_.empty();) {
       const std::size_t end = std::min(text.find('\n', at), text.size());
       ++line_;
@@ -105,7 +105,7 @@ class Reader {
     Row row;
     if (const auto wrong = columns_->refuse(words_, row)) return complain(*wrong);
     if (format_ == Format::kitti) {
-      // From the line's number each time [ns]: a sum of intervals would drift.
+      // Each time [ns] is computed from the line number, because a sum of intervals would drift.
       const double stamp_ns = static_cast<double>(rows_) * 1e9 / *asked_.rate_hz;
       if (stamp_ns > static_cast<double>(farthest_stamp_ns)) return complain("the time is beyond 146 years");
       row.stamp_ns = std::llround(stamp_ns);
@@ -114,7 +114,7 @@ class Reader {
     ++rows_;
   }
 
-  /// Knows the columns from then on. True when the line was a header; else it is one of numbers, or something is wrong.
+  /// Sets the columns. True if the line was a header; else it is a line of numbers, or there is an error.
   bool begin_table() {
     const bool numbers = is_number(words_.front());
     if (format_ == Format::automatic) format_ = guessed(numbers);
@@ -164,7 +164,7 @@ class Reader {
     split(line.substr(word + 6), false, words);
     const auto frame = words.empty() ? std::nullopt : frame_called(words.front());
     if (!frame) return complain("the frame must be ENU_FLU or NED_FRD");
-    // Frames that contradict each other are an error: the file's must not be overruled in silence.
+    // Frames that contradict each other are an error, because the frame of the file must not be ignored silently.
     if (frame_.value_or(*frame) != *frame) return complain("the frame was another one before");
     if (asked_.frame.value_or(*frame) != *frame)
       return complain("the file says " + std::string(name_of(*frame)) + ", but it was to be read as " +

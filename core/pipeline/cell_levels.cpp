@@ -8,7 +8,7 @@ namespace sonar {
 std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m) {
   const int coarsest = static_cast<int>(std::ceil(-std::log2(pulse_width_m) - 1e-9));
   constexpr double level_fade = 1.15;  // levels cross-fade over 15 % of range
-  constexpr double nearest_m = 0.2;    // no image begins nearer; one level serves the rest
+  constexpr double nearest_m = 0.2;    // no image begins nearer; nearer cells have one level
   std::vector<CellLevel> levels;
   double coarser_begins = 2 * max_range_m;  // where the level above takes over
   for (int level = coarsest;; ++level) {

@@ -19,7 +19,7 @@ constexpr double sector_slack_rad = 1e-6;  // of azimuths in double beside an ap
 constexpr double widest_beam_rad = 1.5, narrowest_width_rad = 1e-4;
 constexpr float widest_level_db = 300;
 
-/// Pulses and buffers that no picture needs and no memory holds.
+/// Limits of pulses and buffers. No picture needs more, and memory could not hold more.
 std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings& s) {
   const double samples = static_cast<double>(s.range_bin_count) * s.samples_per_row;
   const double pulse = static_cast<double>(s.pulse_width_m) / (s.range_bin_m / s.samples_per_row);  // in samples

@@ -13,7 +13,7 @@
 namespace sonar {
 namespace {
 
-/// Lets pings in between the parts of another one: each has buffers of its own, and finds scene and cells as it needs them.
+/// Runs pings between the parts of another ping. Each ping has buffers of its own, and finds scene and cells as it needs them.
 class CpuEngine final : public ChangingEngine, private Interruption {
  public:
   CpuEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options)
@@ -80,7 +80,7 @@ class CpuEngine final : public ChangingEngine, private Interruption {
     ping.labels = std::move(labels);
     return ping;
   }
-  /// Between whose parts others may run.
+  /// The ping between whose parts other pings may run.
   Ping run_outer(const PingRequest& request, PingLabels* labels) {
     under_way_ = {&request, cells_, 0};
     struct Finish {

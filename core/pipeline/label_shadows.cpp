@@ -1,4 +1,4 @@
-// The shadows of LabelWork: what the rays saw of a column's gaps, and where nothing is heard in them.
+// The shadows of LabelWork: the gaps that the rays found in a column, and the parts of them without echoes.
 #include <algorithm>
 #include <cmath>
 
@@ -10,8 +10,9 @@ namespace {
 /// Samples of a column that hit something, upwards.
 using Upwards = std::vector<const FanScratch::Sample*>;
 
-/// The straight line, 1 / x over the tangent, of what the objects around sample `of` hide: from its last sample below to its
-/// first above. Where nothing is seen above, on from what is seen lowest. None: low and high are equal.
+/// The straight line, 1 / x over the tangent, that stands for the surface which the object at sample `of` hides. It goes from the
+/// last sample below the object to the first one above. If there is none above, the line continues from the lowest samples.
+/// Without a line low and high are equal.
 struct HiddenLine {
   std::size_t low = 0, high = 0;
   float tangent = 0, inverse_x = 0, slope = 0;

@@ -41,7 +41,7 @@ namespace {
 /// The farthest side lobes of a beam, with this share of its energy, are left out: a label's share has steps of 1/255.
 constexpr double dropped_energy = 1e-3;
 
-/// |p|^2 at whole samples from the peak, as far as it is worth counting.
+/// |p|^2 at whole samples from the peak, up to where it is negligible.
 std::vector<float> pulse_powers(const PingPlan& plan) {
   constexpr double least = 1e-6;
   const int reach = std::max(plan.taps / 2, 1);
@@ -71,7 +71,7 @@ void LabelWork::begin(const PingContext& context, const std::vector<PreparedTile
   find_noise();
 }
 
-/// They cost as much as a ping, and change with the sonar and its beams only.
+/// Computing them takes as long as a ping; they change only with the sonar and its beams.
 void LabelWork::keep_weights() {
   const PingPlan& plan = context_->plan;
   std::vector<std::pair<Taper, double>> widths;
@@ -119,7 +119,7 @@ void LabelWork::add_cells(const simd::GroupView& group, Echoes& scratch) {
   std::vector<Part>& parts = mine.parts;
   std::vector<std::size_t> part_of(scene.objects.size(), SIZE_MAX);
   const int beside = plan.taps / 2 + 1;
-  // The box of each object: of the ranges and columns that its tiles can reach.
+  // The box of ranges and columns that the tiles of each object can reach.
   const auto samples_of = [&](const PreparedTile& t) {
     const double radius = length(to_double(t.seen.tile->box_middle_m)) + length(to_double(t.seen.tile->box_half_m));
     const double middle = static_cast<double>(t.seen.range_m), shift = static_cast<double>(t.seen.sample_shift);

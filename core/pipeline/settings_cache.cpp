@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-/// About, of what a plan keeps.
+/// The approximate memory of a plan.
 std::size_t bytes_of(const PingPlan& p) {
   const auto of = [](const auto&... all) { return (... + (sizeof(all[0]) * all.capacity())); };
   std::size_t bytes = p.shared_noise.bytes() + p.beam_mix.bytes();

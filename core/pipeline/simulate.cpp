@@ -89,7 +89,7 @@ class Stopwatch {
 
 }  // namespace
 
-/// The stages of one ping and what they hand on.
+/// The stages of one ping, and the data that they hand on.
 class PingSimulation {
  public:
   PingSimulation(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
@@ -128,7 +128,7 @@ class PingSimulation {
 
  private:
   bool ray_is_scatterer() const { return plan_.fixed_fan > 0; }
-  /// As even as may be, so that no group is left over that is small.
+  /// Parts are as even as possible, so that no small group remains.
   int traced_columns() const {
     const int parts = (plan_.columns.count + most_traced_columns - 1) / most_traced_columns;
     return (plan_.columns.count + parts - 1) / parts;
@@ -159,7 +159,7 @@ class PingSimulation {
   int group_columns_ = 0;
   std::vector<PointEcho> points_;
   std::vector<ReceivedPulse> other_sonars_;
-  std::vector<float> shared_noise_;  // what the channels share in this ping
+  std::vector<float> shared_noise_;  // noise that the channels share in this ping
 };
 
 /// How many columns a worker takes at once. Tiles that reach into several groups are looked at by each, so the more the better,

@@ -105,7 +105,7 @@ class FanTracer {
   Sample& at(std::int32_t i) { return s_.samples[static_cast<std::size_t>(i)]; }
   int elevations() const { return static_cast<int>(base_.size()); }
 
-  /// Turns a lane of the packet into the sample it was traced for.
+  /// Converts a lane of the packet to the sample for which it was traced.
   void store(int lane, Elevation e, ColumnSine column, Sample& sample) const {
     sample.elevation_rad = e.angle_rad;
     // x of the unit direction: the map holds 1 / x, of flat beams 1 / h, h being the horizontal distance.
@@ -162,7 +162,7 @@ class FanTracer {
     at(index).edge_above = false;
   }
 
-  /// In the side lobes a few columns share a ray, whichever group they are in: what it met is of all of them.
+  /// In the side lobes a few columns share a ray, also across groups. The result counts for all of them.
   void trace_side(int e, Elevation elevation) {
     const int n = elevations(), step = PingPlan::side_columns;
     for (int from = first_; from < last_;) {

@@ -13,7 +13,7 @@ namespace {
 
 using Index = std::uint32_t;
 
-/// For each vertex the first one at its place: files repeat vertices where normals or colours differ.
+/// For each vertex the first vertex at the same position, because files repeat vertices if normals or colours differ.
 std::vector<Index> joined_vertices(const Mesh& mesh) {
   std::vector<Index> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -28,7 +28,7 @@ std::vector<Index> joined_vertices(const Mesh& mesh) {
   return first;
 }
 
-/// Every edge twice, once in each direction.
+/// Whether every edge is used twice, once in each direction.
 bool edges_match(const Mesh& mesh, const std::vector<Index>& joined) {
   std::vector<std::uint64_t> edges;  // lower vertex, higher vertex, direction
   edges.reserve(3 * mesh.triangles.size());
@@ -72,7 +72,7 @@ Skin skin_of(const Mesh& mesh) {
   Skin skin;
   if (mesh.triangles.empty()) return skin;
   skin.low = skin.high = to_double(mesh.vertices[mesh.triangles[0][0]]);
-  Vec3d twice_area;  // as a vector: of a closed mesh it is 0, of terrain not, which saves sorting its edges
+  Vec3d twice_area;  // as a vector; it is 0 for a closed mesh and not for terrain, whose edges then need no sorting
   for (const auto& t : mesh.triangles) {
     const Vec3d a = to_double(mesh.vertices[t[0]]), b = to_double(mesh.vertices[t[1]]), c = to_double(mesh.vertices[t[2]]);
     const Vec3d twice = cross(b - a, c - a);

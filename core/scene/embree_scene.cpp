@@ -158,7 +158,7 @@ struct RayScene::Impl {
     double all = 1;
     for (const Group& group : groups) all += static_cast<double>(group.triangles);
     struct {
-      double before, share;  // of the groups that are built, of the one under way
+      double before, share;  // for the finished groups, for the group in progress
     } parts{0, 0};
     const auto tell = [](void* of, double part) {
       const auto& p = *static_cast<decltype(parts)*>(of);
@@ -175,7 +175,7 @@ struct RayScene::Impl {
       device.check();
     }
   }
-  // The static group becomes an instance too: then moving a body rebuilds a handful of boxes and nothing else.
+  // The static group becomes an instance too. Then a moved body only rebuilds a few boxes.
   void make_top() {
     top = SceneHandle(device);
     rtcSetSceneBuildQuality(top.handle, RTC_BUILD_QUALITY_LOW);
@@ -245,7 +245,7 @@ struct RayScene::Impl {
     std::memset(q.ray.mask, 0xFF, sizeof q.ray.mask);
     std::memset(q.hit.geomID, 0xFF, sizeof q.hit.geomID);
     std::memset(q.hit.instID, 0xFF, sizeof q.hit.instID);
-    // A ray that ends before it begins: no code path of Embree may follow what a caller left in an inactive lane.
+    // An inactive lane gets a ray that ends before it begins, so that Embree does not use values that a caller left there.
     for (int i = 0; i < lanes; ++i) {
       if (valid[i] != 0) continue;
       q.ray.org_x[i] = q.ray.org_y[i] = q.ray.org_z[i] = q.ray.dir_y[i] = q.ray.dir_z[i] = 0;

@@ -15,7 +15,7 @@ constexpr double side_lobes_db = 30;
 /// A peak that is weaker than the loudest sample of its direction by more than this may be the tail of a pulse, or of an echo
 /// from another direction.
 constexpr double tail_db = 12;
-/// As much speckle may lie between neighbours on a floor.
+/// Neighbours on a floor may differ by this much because of speckle.
 constexpr double fill_db = 20;
 
 /// Levels [dB] of a picture.
@@ -59,7 +59,7 @@ double top_of(double before, double middle, double after) {
   return curve < 0 ? std::clamp(0.5 * (before - after) / curve, -0.5, 0.5) : 0;
 }
 
-/// The beams of a ping and what the directions are.
+/// The beams of a ping and their directions.
 struct Fan {
   const Ping& ping;
   int directions;

@@ -172,7 +172,7 @@ std::string complaint_about(const CLI::App& app, const CLI::ParseError& error, c
   if (is_help && unknown.command == nullptr) return {};
   std::string text =
       unknown.command != nullptr ? error_of_unknown(unknown) : with_its_source(error_of_parser(asked, error), app, words);
-  // One line, whatever was typed.
+  // Makes one line of any input.
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
   return text + where_help_is(app);

@@ -8,7 +8,7 @@ namespace sonar::text {
 namespace {
 
 std::string folded(std::string_view s) {
-  std::string out(s.substr(0, 64));  // a name longer than this is not a slip of the finger
+  std::string out(s.substr(0, 64));  // a longer name is not a typing error
   for (char& c : out) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
     if (c == '-' || c == ' ') c = '_';
@@ -42,7 +42,7 @@ std::string_view nearest(std::string_view name, std::span<const std::string_view
   for (const std::string_view candidate : candidates) {
     const std::string c = folded(candidate);
     std::size_t d = distance(wanted, c);
-    // Half a name is a common slip too: "xyz" for "xyz_m", "temperature" for "temperature_c".
+    // Half a name is a common mistake too: "xyz" for "xyz_m", "temperature" for "temperature_c".
     if (wanted.size() >= 3 && (c.starts_with(wanted + "_") || wanted.starts_with(c + "_"))) d = std::min<std::size_t>(d, 1);
     if (d < best_distance) {
       best_distance = d;

@@ -21,7 +21,7 @@ std::size_t character_at(std::string_view text) {
     if ((byte(i) & 0xc0u) != 0x80) return 0;
     code = code << 6 | (byte(i) & 0x3fu);
   }
-  constexpr std::array<std::uint32_t, 5> least{0, 0, 0xa0, 0x800, 0x10000};  // below: longer than it need be, or a control
+  constexpr std::array<std::uint32_t, 5> least{0, 0, 0xa0, 0x800, 0x10000};  // smaller values are overlong, or control characters
   const bool is_surrogate = code >= 0xd800 && code < 0xe000;
   return code >= least[size] && code < 0x110000 && !is_surrogate ? size : 0;
 }

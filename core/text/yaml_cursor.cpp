@@ -1,4 +1,4 @@
-// Node and Map: reading values out of the tree, and the sentences said when they are wrong.
+// Node and Map: read values from the tree, and report errors in them.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

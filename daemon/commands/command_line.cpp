@@ -23,7 +23,7 @@ using text::whole_number;
 
 constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the names of the files
 
-/// Names that --demo takes, with `between` between two of them; `first`: also that of the demo without a name.
+/// The names that --demo takes, separated by `between`. `first`: with the name of the demo that needs no name.
 std::string demo_names(std::string_view between, bool first = true) {
   std::string names;
   for (const protocol::Make& make : protocol::makes())
@@ -31,7 +31,7 @@ std::string demo_names(std::string_view between, bool first = true) {
   return names;
 }
 
-/// Null: there is no such demo.
+/// Null if there is no such demo.
 const protocol::Make* find_demo(std::string_view name) {
   for (const protocol::Make& make : protocol::makes())
     if (make.name_in_demo() == name) return &make;
@@ -45,7 +45,7 @@ void add_run_options(CLI::App& app, RunCommand& run) {
          "run the built-in demo, whatever files there are; --demo " + demo_names(", ", false) +
              ": with such a sonar instead of " + std::string(protocol::makes().front().title))
       ->expected(0, 1)
-      ->type_name("TEXT:" + demo_names("|"));  // complaint() judges it: a file is not meant for a maker
+      ->type_name("TEXT:" + demo_names("|"));  // complaint() checks the name, so that a file name is not taken as an unknown make
   app.add_option("--profile", run.profile, "run the demo with this product (docs/configuration.md)");
   app.add_option(
          "--clock", run.clock,

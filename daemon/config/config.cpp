@@ -128,7 +128,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     Map observers = node.map();
     sonar.max_observers = static_cast<int>(observers.optional("max").integer_or(observers_of_product, 0, 16));
     sonar.observer_port = static_cast<std::uint16_t>(observers.optional("port").integer_or(0, 0, 65535));
-    // Such a product has several clients, or sends its pings by datagrams: there is no port of observers.
+    // Such a product has several clients, or sends its pings by datagrams, so it has no port for observers.
     if (observers_of_product == 0) sonar.max_observers = 0;
   }
   if (Node node = map.optional("outbox")) {
@@ -146,7 +146,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     if (!tuned) options.fail(tuned.error().text);
     sonar.profile.model = tuned.value_or(profile->model);
   } else if (options.present()) {
-    // The product is unknown, which is reported: its options cannot be checked and are not reported as unknown keys.
+    // The product is unknown, and that is reported. Its options cannot be checked, and are not reported as unknown keys.
     options.map().entries();
   }
   for (const SonarConfig& other : config.sonars) {  // a missing key is reported once, not also as a duplicate
@@ -208,7 +208,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   Config config;
   config.source = name;
   Map root = document.root();
-  // Files of other kinds are named as such: errors about their keys would not help.
+  // For files of other kinds the error names the kind, because errors about their keys would not help.
   if (root.has("dataset") && !root.has("world"))
     return failure(ErrorKind::config, name + ": this is a data set's job, not a configuration: sonard dataset " + name +
                                           " --out DIR (docs/datasets.md)");
@@ -235,7 +235,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   config.clock = read_enum(clock, config.clock, clock_modes);
   config.clock_place = clock.present() ? clock.location() + ": " + clock.path() : name + ": clock";
   read_log(root.optional("log"), config.log);
-  // The first error of all keys, unknown ones included.
+  // Returns the first error of all keys, unknown keys included.
   if (auto error = document.finish()) return tl::make_unexpected(*error);
   return config;
 }

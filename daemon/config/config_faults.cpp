@@ -53,7 +53,7 @@ FaultRecord read_record(const Node& node) {
   return record;
 }
 
-/// Empty when one sonar at least can have it.
+/// Empty if at least one sonar can have the fault.
 std::string why_not(const std::vector<Fault>& faults, const std::vector<SonarConfig>& sonars) {
   const std::string& name = faults.front().sonar;
   std::vector<std::string_view> names;

@@ -25,7 +25,7 @@ Endpoint read_endpoint(const Node& node, bool port_needed) {
 
 namespace {
 
-/// `given` = by the file: then it must be free; the default gives way with a warning.
+/// `given`: the file names the address, so it must be free. The default address may be in use, which is a warning.
 void read_control_listener(const Node& node, bool has_token, PoseListener& listener, bool& given) {
   if (!node.present()) return;
   given = true;

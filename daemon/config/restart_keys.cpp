@@ -3,8 +3,8 @@
 namespace sonar {
 namespace {
 
-// Each function names all members of its struct: a new key does not compile until it is listed here, among those that are kept
-// or among those that a reload changes.
+// Each function names all members of its struct. So a new key does not compile until it is listed here, either as kept or as
+// changed by a reload.
 class Keeper {
  public:
   explicit Keeper(std::vector<std::string>& changed) : changed_(changed) {}

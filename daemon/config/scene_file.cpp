@@ -12,8 +12,8 @@
 namespace sonar {
 namespace {
 
-/// Where the program was put first, so that an unpacked or moved installation finds its own; in a build folder links lead to the
-/// tree (CMakeLists.txt), whose place the program does not know.
+/// Looks first near the program, so that an unpacked or moved installation finds its own files. In a build folder, links lead to
+/// the tree (CMakeLists.txt), whose place the program does not know.
 std::vector<std::filesystem::path> make_shipped_folders() {
   std::error_code ec;
   std::vector<std::filesystem::path> folders;
@@ -42,7 +42,7 @@ bool is_below(const std::filesystem::path& file, const std::filesystem::path& fo
 
 constexpr int most_looked_at = 256;  // files of a folder, which can be a home directory
 
-/// By its first column: configurations and libraries of materials lie beside scenes.
+/// A scene is recognised by its first column, because configurations and libraries of materials lie beside scenes.
 bool is_like_a_scene(const std::filesystem::path& file) {
   std::ifstream in(file);
   bool has_objects = false;

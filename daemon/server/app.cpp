@@ -116,7 +116,7 @@ int App::run() {
   return exit_code_;
 }
 
-/// Status line for `systemctl status`.
+/// The status line for `systemctl status`.
 std::string App::status_line() const {
   std::string line = "Serving";
   for (const Device& d : devices())

@@ -30,7 +30,7 @@ void Reload::stop() {
 void Reload::begin() {
   if (!steps_.read_config || !steps_.load_scene) return log_.info("reload: there is no configuration file; nothing changed");
   if (changes_.is_full()) return log_.warning("reload: too many changes of the scene wait already; nothing changed");
-  if (under_way_ == 2) return;  // one is under way; the other waits, and will read what the file says then
+  if (under_way_ == 2) return;  // one reload is under way; the next one waits, and reads the file when it begins
   ++under_way_;
   steps_.begin();
   auto next = std::make_shared<Config>();

@@ -73,7 +73,7 @@ std::vector<SceneChanges::Make> SceneChanges::next_makes() const {
 void SceneChanges::build_next() {
   building_ = true;
   building_since_ = std::chrono::steady_clock::now();
-  // Without `done`: what that holds (a connection, say) must not end on another thread.
+  // `done` is not passed on, because an object that it holds (such as a connection) must not end on another thread.
   asio::post(thread_, [this, makes = next_makes(), now = scene_] {
     auto built = std::make_shared<Built>(build(makes, now));
     asio::post(io_, [this, built] { finish(std::move(*built)); });
@@ -120,7 +120,7 @@ void SceneChanges::finish(Built built) {
   if (built.engine) {
     scene_ = built.scene;
     simulator_.use(std::move(*built.engine), [this](std::shared_ptr<PingEngine> before) {
-      // Its cells are a hundred megabytes: they are freed on this thread, not on the I/O thread.
+      // Its cells may be a hundred megabytes. They are freed on this thread, not on the I/O thread.
       if (!stopped_) asio::post(thread_, [before = std::move(before)]() mutable { before.reset(); });
     });
     in_use_(scene_);

@@ -32,7 +32,7 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   const bool may_come = next && (*next <= bound.last_tick || (converses && *next <= clock_.now()));
   if (!may_come && bound.then) advance(*bound.then);
   const bool answered = time_.answer(next);
-  if (answered) on_change_();  // first the answers, in turns of their own
+  if (answered) on_change_();  // first the answers, in separate turns of the event loop
   if (enough_served()) return !answered;
   if (!may_come) return false;
   advance(time_.tick_at(*next));

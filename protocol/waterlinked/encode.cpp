@@ -12,7 +12,8 @@ namespace {
 constexpr double gravity_mps2 = 9.81;
 constexpr std::chrono::nanoseconds imu_period = std::chrono::milliseconds(10), longest_batch = std::chrono::seconds(1);
 
-/// So that both images have the same mask: a range beyond 16 bits or a strength below the first pixel value is no return.
+/// A range beyond 16 bits, or a strength below the first pixel value, counts as no return, so that both images have the same
+/// mask.
 struct Pixel {
   std::uint32_t range = 0;
   std::uint8_t strength = 0;

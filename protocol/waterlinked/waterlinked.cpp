@@ -20,7 +20,7 @@ class WaterLinkedVendor final : public protocol::Vendor {
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return waterlinked::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return waterlinked::options(); }
-  int default_max_clients() const override { return 1; }  // of TCP streams, which it has none of
+  int default_max_clients() const override { return 1; }  // of TCP streams; this sonar has none
   Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
                                                   const protocol::OptionValues&) const override {
     return model;
@@ -33,7 +33,7 @@ class WaterLinkedVendor final : public protocol::Vendor {
                                                   const protocol::DeviceState& device) const override {
     return waterlinked::apply_override(wanted, device);
   }
-  double gain_percent(const protocol::DeviceState&) const override { return 0; }  // it turns its own
+  double gain_percent(const protocol::DeviceState&) const override { return 0; }  // the device sets its gain itself
   bool pings_before_first_request(const protocol::DeviceState&) const override { return true; }
   protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
   protocol::ResourceReply on_http(const protocol::Port&, const protocol::ResourceRequest& request,

@@ -17,7 +17,7 @@ constexpr double bent_slack = 0.1;      // the same, in radii of curvature
 constexpr double most_bent_slack_m = 0.2;
 constexpr std::size_t most_surfaces_of_a_mesh = 4;
 
-/// Looks from the sonar at places of one object.
+/// Traces rays from the sonar to places of one object.
 class Sight {
  public:
   Sight(const RayScene& scene, const PingScalars& s, std::uint32_t object, const Pose& object_in_world)

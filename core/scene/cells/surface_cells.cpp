@@ -25,7 +25,7 @@ int coarsest_wanted(const CellView& view) {
 
 }  // namespace
 
-/// Parts of scenes before, for those that have the same again.
+/// Parts of earlier scenes, for later scenes that have the same parts.
 struct SurfaceCells::Known {
   struct SkinOf {
     std::shared_ptr<const Mesh> mesh;
@@ -128,7 +128,7 @@ void SurfaceCells::plant(std::size_t o) {
   }
 }
 
-/// Forgets scenes before, those first that are longest ago.
+/// Forgets earlier scenes, the oldest first.
 void SurfaceCells::forget_known() {
   std::size_t n = 0;
   const auto is_of_the_last = [&] {  // an object's patches come and go together
@@ -201,7 +201,7 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
     const std::lock_guard lock(dividing_[reinterpret_cast<std::uintptr_t>(&node) / sizeof(Node) % dividing_.size()]);
     if (!node.divided.load(std::memory_order_relaxed)) found.new_bytes += patch.divide(node);
   }
-  for (const auto& child : node.children) {  // they lie anywhere in memory: ask for all before the first
+  for (const auto& child : node.children) {  // they are scattered in memory, so all are prefetched before the first
     if (!child) continue;
     const auto* at = reinterpret_cast<const char*>(child.get());
     __builtin_prefetch(at);
@@ -265,7 +265,8 @@ void SurfaceCells::build(std::vector<Node*>& missing, Parallel& pool) {
 }
 
 const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
-  // Stretches of roots side by side; what each finds stays apart, so that the order does not depend on who looked.
+  // Searches ranges of roots in parallel. The results of each range stay separate, so that the order does not depend on the
+  // threads.
   constexpr std::size_t stretch = 16;
   raise_roots(view);
   prepare(view, ++now_, looked_);
@@ -319,7 +320,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
   pool.for_each(missing.empty() ? 0 : views.size(), [&](std::size_t v, int) { std::erase_if(found[v].tiles, is_empty); });
 }
 
-/// Forgets what was not looked at for longest; it comes back identical when wanted again.
+/// Forgets the tiles that were not used for the longest time. They are made again identically when needed.
 void SurfaceCells::keep_within_budget() {
   if (cached_bytes_ > cache_bytes_) forget_known();
   for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {

@@ -119,7 +119,7 @@ std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
 
 namespace {
 
-/// Adds up what `of` returns of a cube and of those inside it.
+/// Adds the results of `of` for a cube and for the cubes inside it.
 template <class Node, class Of>
 std::size_t sum_over(Node& node, const Of& of) {
   std::size_t sum = of(node);
@@ -155,7 +155,7 @@ std::size_t SurfaceCells::SurfacePatch::forget_below(Node& node, std::uint64_t t
     freed += forget_below(*child, then);
     stale = stale && child->last_visited < then;
   }
-  if (!stale) return freed;  // cubes come and go eight at a time, so that `divided` stays true or false
+  if (!stale) return freed;  // eight cubes are added or removed at a time, so that `divided` is correct
   for (auto& child : node.children) {
     if (!child) continue;
     freed += child->own_bytes();

@@ -7,7 +7,7 @@
 namespace sonar {
 namespace {
 
-/// In a binary file; 1 of a type that is not known.
+/// Size in a binary file; 1 for an unknown type.
 std::uint64_t bytes_of(std::string_view type) {
   if (type == "short" || type == "ushort" || type == "int16" || type == "uint16") return 2;
   if (type == "int" || type == "uint" || type == "float" || type == "int32" || type == "uint32" || type == "float32") return 4;
@@ -18,7 +18,7 @@ std::uint64_t bytes_of(std::string_view type) {
 }  // namespace
 
 MeshFault check_ply(std::string_view head, std::uint64_t file_bytes) {
-  // Assimp 5.2 never comes back from a header that does not end.
+  // Assimp 5.2 never returns if a header does not end.
   const std::size_t end = head.find("end_header");
   if (!head.starts_with("ply") || end == std::string_view::npos || head.find('\n', end) == std::string_view::npos)
     return "cannot be read: not a PLY file with a whole header";

@@ -51,7 +51,7 @@ void begin_import_limits(const ImportRequest& request, int descriptor) {
   limits.at_start = address_space_bytes().value_or(std::uint64_t{256} << 20);
   offer_for_out_of_memory();
   limit(RLIMIT_FSIZE, RLIM_INFINITY, RLIM_INFINITY);  // no limit, because this program writes to memory only
-  ::prctl(PR_SET_DUMPABLE, 0);                        // no core dump: the fault is the file's
+  ::prctl(PR_SET_DUMPABLE, 0);                        // no core dump, because the file caused the error
   std::set_new_handler(end_for_memory);
   struct sigaction action {};
   action.sa_handler = end_for_time;

@@ -40,8 +40,8 @@ std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint
   return triangles;
 }
 
-// Node transforms in double: far offsets in a node must not cost the vertices their millimetres.
-// A face whose vertices are not there is left out.
+// Node transforms are in double, so that vertices far from the origin stay exact to millimetres.
+// A face with missing vertices is left out.
 void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>& parent, unsigned depth,
                    const TriangleSink& take) {
   if (depth > NodeGraph::deepest) return;
@@ -79,7 +79,7 @@ Result<std::string> text_of(const MeshFile& request, std::size_t most) {
   return read_regular(request.file, most);
 }
 
-/// Why the importer cannot read it, if that can be said better than by the importer.
+/// Why the importer cannot read the file, if this check has a better reason than the importer.
 std::string better_reason(const MeshFile& request, const std::string& extension, std::string reason) {
   if (extension != ".glb" && extension != ".gltf") return reason;
   const auto text = text_of(request, max_mesh_bytes);

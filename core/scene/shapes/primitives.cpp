@@ -61,7 +61,7 @@ Mesh revolve(const std::vector<ProfilePoint>& profile, int segments) {
   return mesh;
 }
 
-// Straight part of a profile, cut so that no facet is long and thin without need.
+// A straight part of a profile, cut so that facets are not needlessly long and thin.
 void add_straight(std::vector<ProfilePoint>& profile, ProfilePoint to) {
   const ProfilePoint from = profile.back();
   const int n = patches(std::hypot(to.radius - from.radius, to.z - from.z), 0.5);

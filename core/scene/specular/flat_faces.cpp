@@ -46,12 +46,12 @@ struct Candidate {
   Triangles triangles;
 };
 
-/// Collects coplanar triangles. Planes are distinguished by rounded numbers; where one lies close to a rounding border, the
-/// neighbour's drawer is looked into as well.
+/// Collects coplanar triangles. Planes are put into bins by rounded numbers. If a plane is close to the border of its bin, the
+/// neighbouring bin is searched as well.
 class FaceSorter {
  public:
   void add(const Mesh& mesh, std::uint32_t t) {
-    // Plane of the largest triangle so far: rounding matters least there.
+    // The plane of the largest triangle so far, where rounding matters least.
     const Vec3d twice = area_vector(mesh, t);
     const double area = 0.5 * length(twice);
     if (!(area > 0)) return;
@@ -75,14 +75,14 @@ class FaceSorter {
     const std::array<double, 4> x{p.normal.x * normal_steps, p.normal.y * normal_steps, p.normal.z * normal_steps,
                                   p.offset_m / same_plane_m};
     Key own{};
-    std::array<int, 4> beside{};  // the next drawer, if that is close
+    std::array<int, 4> beside{};  // the next bin, if that is close
     for (std::size_t i = 0; i < 4; ++i) {
       own[i] = std::llround(x[i]);
       const double over = x[i] - static_cast<double>(own[i]);
       if (std::abs(over) > 0.5 - close_to_border) beside[i] = over > 0 ? 1 : -1;
     }
     own[4] = material;
-    // The drawer of the rounded plane, then those across a rounding border nearby.
+    // The bin of the rounded plane, then those across a nearby border.
     for (int pick = 0; pick < 16; ++pick) {
       Key key = own;
       bool sensible = true;

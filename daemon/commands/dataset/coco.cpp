@@ -25,7 +25,7 @@ Result<void> write_coco(const DatasetJob& job, const std::filesystem::path& set,
     id_of.emplace(name, id_of.size() + 1);
     categories.push_back({{"id", id_of.size()}, {"name", name}, {"supercategory", "thing"}});
   }
-  // An array with what `add` makes of each ping's notes.
+  // An array of the entries that `add` makes from the notes of each ping.
   const auto write_array = [&](const std::string& begin, const auto& add) -> Result<void> {
     std::string text = begin;
     bool is_first = true;

@@ -31,7 +31,7 @@ bool is_in_fan(Vec3d in_world, const PingRequest& r) {
          std::abs(std::atan2(p.z, std::hypot(p.x, p.y))) <= static_cast<double>(mode.pattern.elevation_width_rad) / 2;
 }
 
-/// Height of an object's surface over a place, object axes; the highest.
+/// The largest height of an object's surface over a place, in the axes of the object.
 std::optional<double> height_at(const Mesh& mesh, double x, double y) {
   std::optional<double> highest;
   for (const auto& corners : mesh.triangles) {

@@ -23,7 +23,7 @@ constexpr Rgb shadow_colour{70, 130, 230};
 constexpr std::array<Rgb, 6> class_colours{
     {{80, 220, 120}, {240, 90, 160}, {250, 220, 80}, {90, 220, 230}, {190, 130, 250}, {250, 140, 60}}};
 
-/// Each class of things has a colour, by its place among the names.
+/// Each class has a colour, which depends on its position among the names.
 Rgb colour_of(const std::vector<std::string>& classes, const std::string& name) {
   const auto place = std::ranges::lower_bound(classes, name) - classes.begin();
   return class_colours[static_cast<std::size_t>(place) % class_colours.size()];

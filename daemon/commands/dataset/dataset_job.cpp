@@ -25,7 +25,7 @@ void read_constraints(const text::Node& node, Constraints& c) {
   if (!c.above_bed.empty() && c.bed.empty()) above.fail("needs bed: the name of the object that is the bed");
 }
 
-/// Where the keys of a root in flow style ({a: 1, ..}) begin; nothing of one in block style.
+/// The position of the keys of a root in flow style ({a: 1, ..}); nothing if the root is in block style.
 std::optional<std::size_t> flow_root(std::string_view text) {
   std::size_t at = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
   while (at < text.size() && (text[at] == '#' || text[at] == '%' || text.substr(at).starts_with("---")))
@@ -71,7 +71,7 @@ std::string with_sweep(std::string text, const std::string& sweep) {
   return text + "\n" + sweep + "\n";
 }
 
-/// Hides what the counts and a negative leave out, which ones by draws; the others keep their numbers.
+/// Hides the objects that the counts, or a negative, leave out. Draws decide which; the others keep their numbers.
 Result<std::shared_ptr<const Scene>> with_counts(const DatasetJob& job, const text::Document& filled, const DrawnPing& ping,
                                                  std::uint64_t number) {
   auto changed = std::make_shared<Scene>(*ping.job.scene);
@@ -96,7 +96,7 @@ Result<std::shared_ptr<const Scene>> with_counts(const DatasetJob& job, const te
   return std::shared_ptr<const Scene>(std::move(changed));
 }
 
-/// Names of files in YAML are words of it. `variations` are filled in, each of their words.
+/// Finds names of files among the words of the YAML text, with each word of `variations` filled in.
 void add_files_in(std::string_view text, const std::filesystem::path& folder, const std::vector<Variation>& variations,
                   std::set<std::filesystem::path>& seen, std::vector<NamedFile>& files) {
   const auto add_file = [&](const std::string& word) {

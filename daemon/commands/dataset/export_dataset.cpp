@@ -247,7 +247,9 @@ Result<Split> parse_split(const std::string& shares, const std::string& by) {
 std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const std::array<double, 3>& shares) {
   double sum = 0;
   for (const double share : shares) sum += share;
-  // Whole numbers of scenes: rounded down, then one more for the largest remainders, and one at least while there are enough.
+  // Whole numbers of scenes: shares are rounded down, then the largest remainders get one more. Each split gets at least one
+  // scene
+  /// while there are enough.
   std::array<std::size_t, 3> count{};
   std::size_t left = scenes.size();
   for (std::size_t s = 0; s < count.size(); ++s) {
@@ -267,7 +269,7 @@ std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const
     const auto largest = static_cast<std::size_t>(std::ranges::max_element(count) - count.begin());
     if (count[s] == 0 && shares[s] > 0 && count[largest] > 1) --count[largest], ++count[s];
   }
-  // In an order that no draw and no number of pings is related to.
+  // The order is independent of the draws and of the number of pings.
   std::vector<std::pair<std::string, std::size_t>> order;
   for (std::size_t i = 0; i < scenes.size(); ++i) order.emplace_back(order_key(scenes[i]), i);
   std::ranges::sort(order);

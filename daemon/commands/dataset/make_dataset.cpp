@@ -30,7 +30,7 @@ constexpr std::uint64_t pings_a_thread = 4;  // of a batch: they wait in memory 
 
 constexpr std::array<std::string_view, 5> own_names{"job.json", "README.md", "manifest.json", "coco.json", "contact.png"};
 
-/// Pings of a shard that is not complete, and what is noted of them.
+/// Pings of a shard that is not complete, and the notes on them.
 path aside_file(const path& out, std::uint64_t shard) { return out / path(shard_name(shard)).replace_extension(".aside"); }
 path aside_note(const path& out, std::uint64_t shard) { return aside_file(out, shard).string() + ".json"; }
 
@@ -77,7 +77,7 @@ class Folder final : public DatasetFolder {
     if (ec)
       return failure(ErrorKind::io, "cannot make the folder " + o_.out.string() + ": " + ec.message() + "; choose another --out");
     const path about = o_.out / "job.json";
-    const std::string foreign = own_file_in(o_.out);  // before the question whose it is: another process may just be beginning
+    const std::string foreign = own_file_in(o_.out);  // before the owner is checked, because another process may be beginning
     if (!std::filesystem::exists(about, ec)) {
       if (!foreign.empty())
         return failure(ErrorKind::usage, (o_.out / foreign).string() +
@@ -103,7 +103,7 @@ class Folder final : public DatasetFolder {
     return {};
   }
 
-  /// Killed between rename and digest, a shard has none: then it gets it now.
+  /// If a run was killed between rename and digest, the shard has no digest yet, and gets it now.
   Result<bool> holds(std::uint64_t shard) override {
     differs_ = false;
     const path file = o_.out / shard_name(shard), noted = file.string() + ".sha256";
@@ -143,7 +143,7 @@ class Folder final : public DatasetFolder {
       }
       on_progress_(progress_);
     }
-    // The part first: where the archive has its name, all of the shard is there.
+    // The part is written first. So if the archive has its final name, the whole shard is there.
     if (const auto done = write_durably(part_file(o_.out, shard), part.dump() + "\n"); !done) return done;
     progress_.bytes += tar->bytes();
     if (const auto done = tar->commit(); !done) {
@@ -158,7 +158,7 @@ class Folder final : public DatasetFolder {
     return {};
   }
 
-  /// When no shard is missing, of this part or another. One shard's labels at a time are in memory.
+  /// Called when no shard is missing, of this part or another. The labels of one shard at a time are in memory.
   Result<DatasetProgress> conclude() override {
     json shards = json::array(), pixels = json::object();
     std::uint64_t negatives = 0;
@@ -210,7 +210,7 @@ class Folder final : public DatasetFolder {
   std::uint64_t first_of(std::uint64_t shard) const { return shard * job_.shard_pings + 1; }
   std::uint64_t end_of(std::uint64_t shard) const { return std::min((shard + 1) * job_.shard_pings, job_.pings) + 1; }
 
-  /// The first file there that has a name that a data set gives, but for job.json; empty without any.
+  /// The first file in the folder, except job.json, that has a name of a data set file; empty if there is none.
   static std::string own_file_in(const path& folder) {
     std::error_code ec;
     std::string first;
@@ -232,7 +232,7 @@ class Folder final : public DatasetFolder {
 
   bool is_stopped() const { return o_.stop != nullptr && *o_.stop; }
 
-  /// The shard's archive; what an interrupted run set aside of it is in it, and in `part`.
+  /// The archive of the shard. It and `part` contain the pings that an interrupted run set aside.
   Result<ShardWriter> begin(std::uint64_t shard, json& part) {
     auto tar = ShardWriter::open(o_.out / shard_name(shard));
     if (!tar) return tar;

@@ -75,7 +75,7 @@ bool is_plain_name(std::string_view name) {
   return !name.empty() && name.front() != '.' && std::ranges::all_of(name, is_plain);
 }
 
-/// Makes a rename last: the folder's own entry.
+/// Makes a rename permanent, by syncing the folder itself.
 void sync_folder(const path& folder) {
   const int fd = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) return;
@@ -135,7 +135,7 @@ Result<void> DurableFile::commit() {
 
 Result<bool> DurableFile::commit_new() {
   if (::fsync(descriptor_) != 0) return cannot_write(file_, errno);
-  // Unlike rename(), link() fails where the name exists: of two workers the first one wins, and the second compares its bytes.
+  // Unlike rename(), link() fails if the name exists. So the first of two workers wins, and the second compares its bytes.
   if (::link(unfinished_.c_str(), file_.c_str()) != 0) {
     if (errno == EEXIST) return false;
     if (const auto done = commit(); !done) return tl::make_unexpected(done.error());  // a file system without links

@@ -85,7 +85,7 @@ Result<int> submit(const FarmCommand& c) {
   return 0;
 }
 
-/// Values of a table, by key; values removed meanwhile are left out.
+/// Values of a table, by key; values removed in the meantime are left out.
 Result<std::map<std::string, std::string>> read_table(Queue& queue, Table table) {
   const auto keys = queue.keys(table);
   if (!keys) return tl::make_unexpected(keys.error());

@@ -111,7 +111,7 @@ class NatsQueue final : public Queue {
   }
 
   Result<std::vector<std::string>> keys(Table table) override {
-    // Not kvStore_Keys: it waits without end for an entry that expires while it is listing.
+    // kvStore_Keys is not used, because it waits without end for an entry that expires during the listing.
     natsStatus s = NATS_TIMEOUT;
     for (int attempt = 0; s == NATS_TIMEOUT && attempt < 3; ++attempt) {
       std::set<std::string> found;
@@ -136,7 +136,8 @@ class NatsQueue final : public Queue {
     config.AckPolicy = js_AckExplicit;
     config.AckWait = patience.count() * ns_per_ms;
     config.MaxAckPending = 100'000;
-    // Without the server's MaxDeliver: a shard that it gives up would disappear without a report. Workers count and bury it.
+    // MaxDeliver of the server is not used, because a shard that the server gives up would disappear without a report. Workers
+    // count deliveries and bury such a shard.
     jsErrCode code{};
     const natsStatus s = js_AddConsumer(nullptr, jetstream_.get(), stream, &config, nullptr, &code);
     return s == NATS_OK ? Result<void>{} : refused("cannot open job " + job, s, code);
@@ -144,7 +145,7 @@ class NatsQueue final : public Queue {
 
   Result<bool> publish(const std::string& job, std::uint64_t shard) override {
     const std::string number = std::to_string(shard), id = job + "/" + number;
-    // The server drops an id that it has seen within two minutes. When that shard has left the queue since, it is to be made
+    // The server drops an id that it has seen within two minutes. If that shard has left the queue since then, it must be made
     // anew.
     for (const char* message_id : {id.c_str(), static_cast<const char*>(nullptr)}) {
       jsPubOptions options;

@@ -32,7 +32,7 @@ constexpr milliseconds most_between_beats = 5s, for_a_shard = 2s, least_rest = 5
 
 volatile std::sig_atomic_t stopping = 0;
 
-/// To the console, without control characters: texts of the queue come from other programs.
+/// Prints to the console without control characters, because texts of the queue come from other programs.
 void say_to(const WorkerCommand& command, const std::string& words) {
   if (!command.quiet) std::fprintf(stderr, "%s\n", text::printable(words).c_str());
 }
@@ -72,7 +72,7 @@ class Worker {
  private:
   void say(const std::string& words) const { say_to(c_, words); }
 
-  /// Longer each time until a shard is made, so that a thousand idle workers do not keep the server from its work.
+  /// The pause gets longer until a shard is made, so that a thousand idle workers do not overload the server.
   void rest() {
     pause_for(rest_);
     rest_ = std::min(2 * rest_, most_rest);
@@ -105,7 +105,7 @@ class Worker {
     return first;
   }
 
-  /// Until the queue has none of its shards for a moment.
+  /// Works on the job until the queue has no shard of it to give.
   Result<void> serve(const FarmJob& record) {
     if (opened_ != record.id)
       if (const auto opened = open(record); !opened) {
@@ -114,7 +114,7 @@ class Worker {
         if (opened.error().kind == ErrorKind::unavailable)
           rest();
         else
-          unfit_[record.id] = opened.error().text;  // its shards are left to workers that have what is missing here
+          unfit_[record.id] = opened.error().text;  // its shards are left to workers that are fit for it
         return {};
       }
     while (!stopping) {
@@ -172,7 +172,7 @@ class Worker {
     return {};
   }
 
-  /// An error keeps this worker from any work.
+  /// An error means that this worker cannot do any work.
   Result<void> work(const FarmJob& record, Task& task) {
     if (task.delivery() > most_tries)
       return refuse(
@@ -186,7 +186,7 @@ class Worker {
       if (!done) return tl::make_unexpected(done.error());
       return false;
     });
-    // After `patience` without a sign the queue gives the shard to another worker; one sign may be lost.
+    // After `patience` without a report the queue gives the shard to another worker. One report may be lost.
     const milliseconds between_signs = record.patience / 3;
     const milliseconds tick = std::min(between_signs, most_between_beats);
     auto signed_at = Clock::now();
@@ -219,7 +219,7 @@ class Worker {
     return tl::make_unexpected(why);
   }
 
-  /// The shard has its name already: when the queue loses the word, the shard is found.
+  /// The shard already has its final name. If the queue loses this message, the shard is found by its name.
   void acknowledge(Task& task) {
     constexpr int most = 60;
     for (int i = 0; i < most && !stopping; ++i) {
@@ -230,7 +230,7 @@ class Worker {
     }
   }
 
-  /// The threads that compute are not waited for: what they write has no name yet.
+  /// The worker does not wait for the computing threads, because the files that they write have no final name yet.
   [[noreturn]] void leave(Task& task) {
     task.again({});
     queue_.erase(beat_table, name_);

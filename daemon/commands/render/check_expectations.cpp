@@ -58,7 +58,7 @@ tl::unexpected<Error> at_place(const Expectation& e, const Error& error) {
   return failure(error.kind, e.place + ": " + error.text);
 }
 
-/// One ping of the job, everything measured in it.
+/// One ping of the job, with everything that is measured in it.
 Result<Step> take_step(const std::string& source, const RenderJob& job, Parallel& pool) {
   const auto make = [&](std::shared_ptr<const Scene> s) {
     return make_engine(std::move(s), pool, {.simd = job.config.engine.simd});

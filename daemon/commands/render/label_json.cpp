@@ -31,7 +31,7 @@ PolarImage shape_of(const Ping& ping) {
   return shape;
 }
 
-/// Corners between beams and rows as places in the fan's picture.
+/// The corners between beams and rows, as positions in the picture of the fan.
 class Cartesian {
  public:
   explicit Cartesian(const PolarImage& shape)

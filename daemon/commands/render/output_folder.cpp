@@ -34,7 +34,7 @@ std::string inputs_of(const path& file) {
   return about.is_object() && about.contains("inputs") && about["inputs"].is_string() ? about["inputs"].get<std::string>() : "";
 }
 
-/// NNNNNN.json, NNNNNN_pressure.npy and so on: ours to remove.
+/// Files such as NNNNNN.json and NNNNNN_pressure.npy, which sonard may remove.
 bool is_of_a_ping(const path& file) {
   const std::string name = file.filename().string();
   const bool digits =
@@ -44,7 +44,7 @@ bool is_of_a_ping(const path& file) {
   return digits && std::any_of(std::begin(ends), std::end(ends), [&](std::string_view end) { return name.substr(6) == end; });
 }
 
-/// NNNNNN.json as sonard has ever written it: then files of that number are ours.
+/// Whether NNNNNN.json was written by any version of sonard. Then files of that number are from sonard.
 bool is_sidecar(const path& file) {
   std::ifstream in(file);
   const json side = json::parse(in, nullptr, false);
@@ -61,7 +61,7 @@ Result<std::vector<path>> pings_in(const path& folder) {
   return found;
 }
 
-/// A lock that ends with the process, however it ends, and leaves no file behind.
+/// A lock that ends when the process ends, in any way, and leaves no file behind.
 Result<int> lock(const path& folder) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0 || ::flock(fd, LOCK_EX | LOCK_NB) == 0) return fd;
@@ -72,7 +72,7 @@ Result<int> lock(const path& folder) {
                  "another sonard render is writing into " + folder.string() + ": wait until it ends, or choose another --out");
 }
 
-/// Removes pings of other inputs, if that is allowed.
+/// Removes the pings of other inputs, if that is allowed.
 Result<void> make_way(const OutputOptions& o, const std::string& digest) {
   std::error_code ec;
   const path about = o.folder / about_file;

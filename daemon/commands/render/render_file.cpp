@@ -18,7 +18,7 @@ using text::Range;
 
 constexpr std::size_t most_steps = 1000;
 
-/// A sonar that is no product: a wide fan of 1 by 20 degrees at 900 kHz, 16 bit samples.
+/// A sonar that is not a product: a wide fan of 1 by 20 degrees at 900 kHz, 16 bit samples.
 SonarModel plain_model() {
   FrequencyMode mode;
   mode.name = "plain";

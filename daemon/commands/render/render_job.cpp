@@ -23,7 +23,7 @@ PingSettings device_settings(const RenderJob& job) {
 
 namespace {
 
-/// As the device keeps them in the job's mode; without vendor settings where there is no device.
+/// The settings that the device has in the mode of the job; without vendor settings if there is no device.
 protocol::ChangeSettings as_the_device_keeps(const RenderJob& job) {
   const protocol::Vendor* const vendor = job.sonar().profile.vendor;
   if (vendor == nullptr) return {};

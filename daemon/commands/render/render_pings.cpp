@@ -227,7 +227,7 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
     const World world = world_of(job);
     const SonarConfig& sonar = job.sonar();
     const Extent scene = surroundings_of(job.config, *job.scene).scene;
-    const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // its z = 0 is no surface
+    const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // z = 0 of this scene is not a water surface
     for (const Time at : *times) {
       const Pose sonar_in_world = compose(world.vehicle_at(sonar.vehicle, at), sonar.mount);
       const bool is_above = sonar_in_world.position_m.z > least_depth_m, hears_nothing = is_in_air(sonar_in_world, *job.scene);

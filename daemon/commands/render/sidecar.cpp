@@ -21,7 +21,7 @@ json json_of(const Pose& pose) {
   return {{"xyz_m", json_of(pose.position_m)}, {"wxyz", {q.w, q.x, q.y, q.z}}};
 }
 double deg(float rad) { return deg_from_rad(static_cast<double>(rad)); }
-/// JSON has no infinity.
+/// JSON has no infinite numbers.
 json finite(float x) { return std::isfinite(x) ? json(x) : json(nullptr); }
 
 const char* name_of(Taper taper) {

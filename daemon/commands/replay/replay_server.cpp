@@ -69,7 +69,7 @@ Result<void> ReplayServer::open_http() {
   return {};
 }
 
-/// An exception in one of its coroutines would leave a server that runs and serves no client.
+/// After an exception in one of its coroutines, the server would run and serve no client.
 template <class Coroutine>
 void ReplayServer::spawn(Coroutine coroutine) {
   asio::co_spawn(io_, std::move(coroutine), [this](std::exception_ptr fault) {
@@ -81,7 +81,7 @@ void ReplayServer::spawn(Coroutine coroutine) {
 
 void ReplayServer::start() {
   if (!device_.is_only_seen.empty()) {
-    // The page alone is served, until a signal comes.
+    // Serves only the page, until a signal comes.
   } else if (http_) {
     http_->start();
     spawn(serve(client_));
@@ -140,7 +140,7 @@ asio::awaitable<void> ReplayServer::accept() {
     tcp::socket socket(io_);
     co_await acceptor_.async_accept(socket, into(ec));
     if (over_ || stopping_) co_return;
-    if (ec) {  // out of descriptors, say: not for ever
+    if (ec) {  // for example no descriptor is free, which may pass
       asio::steady_timer pause(io_, std::chrono::milliseconds(100));
       co_await pause.async_wait(into(ec));
       continue;

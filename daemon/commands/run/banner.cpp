@@ -15,7 +15,7 @@ using text::format;
 
 std::string address_text(const Endpoint& e) { return text_of(e); }
 
-/// Where the drop-in SDK's library lies, installed with this program or built beside it; empty = not there.
+/// The folder of the drop-in SDK library, installed with this program or built beside it; empty if there is none.
 std::filesystem::path sdk_library_folder() {
   std::error_code ec;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ec);
@@ -26,7 +26,7 @@ std::filesystem::path sdk_library_folder() {
   return {};
 }
 
-/// How a host comes to a sonar by a library of ours, not by a driver as it is.
+/// How a program connects to a sonar that needs our library in place of an unchanged driver.
 std::string library_lines(const protocol::Make& make, std::string at, unsigned port) {
   const std::string folder = sdk_library_folder().string();
   if (port != make.ports.front().number) at += format(":%u", port);
@@ -89,7 +89,7 @@ std::string view_line(const App& app) {
          "   Foxglove, Lichtblick: docs/live-view.md\n";
 }
 
-/// Largest resident memory so far [MB]; 0 where the system does not tell.
+/// Largest resident memory so far [MB]; 0 if the system does not report it.
 double peak_memory_mb() {
   std::ifstream status("/proc/self/status");
   std::string word;

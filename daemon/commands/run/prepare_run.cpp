@@ -30,7 +30,7 @@ Result<FoundConfig> read_config(const RunCommand& command, bool& json) {
   return found;
 }
 
-/// The server opens them again: this finds what is wrong with them before the scene is loaded.
+/// The server opens them again. This check finds errors before the scene is loaded.
 Result<void> check_files(const Config& config, std::string& token_warning) {
   if (!config.control.token_file.empty())
     if (const auto token = Token::read(config.control.token_file, token_warning); !token)

@@ -16,7 +16,7 @@ using std::chrono::nanoseconds;
 
 constexpr double longest_s = 86400;
 constexpr std::uint64_t most_pings = 1'000'000'000;
-constexpr double least_probability = 1e-9;  // below, it never acts: nothing makes so many pings
+constexpr double least_probability = 1e-9;  // below this probability it never acts, because no run has so many pings
 
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
@@ -207,13 +207,13 @@ class Check {
       return wrong("for: pings and count must be from 1 to 1000000000");
     if (lasts.pings && !kind.per_ping() && kind.stage != FaultStage::payload && kind.stage != FaultStage::framing)
       return wrong(std::string(kind.code) + " lasts for a time: give for: {seconds: ...}");
-    // A span is a time or a number of pings: where one is given, the other is 0.
+    // A span is a time or a number of pings. If one is given, the other is 0.
     const double seconds = lasts.seconds.value_or(lasts.pings || kind.per_ping() ? 0 : default_s);
     fault.span.time = nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9)));
     fault.span.pings = lasts.pings.value_or(seconds > 0 ? 0 : 1);
     const bool once = !record_.at.every && !record_.at.probability && record_.at.on.empty();
     fault.span.count = lasts.count.value_or(once ? 1 : 0);
-    // A record without a trigger and with a count is that many pings in a row.
+    // A record without a trigger and with a count acts on that many pings in a row.
     if (once && kind.per_ping() && lasts.count && !lasts.pings && !lasts.seconds) {
       fault.span.pings = *lasts.count;
       fault.span.count = 1;

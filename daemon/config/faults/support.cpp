@@ -12,8 +12,8 @@ namespace {
 using E = FaultEffect;
 using S = FaultStage;
 
-/// Whether a kind acts on a sonar whose pings travel as datagrams alone: it changes the first datagram, or no ping; in a dialogue
-/// by datagrams it may also hold pings back.
+/// Whether a kind acts on a sonar that sends its pings only as datagrams. Such a kind changes the first datagram, or no ping. In
+/// a dialogue by datagrams it may also hold pings back.
 bool acts_without_stream(const FaultKind& kind, bool dialogue) {
   if (kind.stage == S::stream) return false;
   if (kind.stage == S::framing)
@@ -58,7 +58,7 @@ std::size_t accepted(const protocol::Vendor& vendor, std::optional<T> protocol::
   return most;
 }
 
-/// `what`: of the kind's parameter of that name. As Vendor::apply_override refuses it, whatever the value.
+/// `what` is the name of a parameter of the kind. Vendor::apply_override refuses it whatever the value is.
 std::string why_without_setting(std::string_view what, const protocol::Vendor& vendor) {
   using Wanted = protocol::SettingsOverride;
   const auto has_modes = [](const auto& model) { return model->modes.size() > 1; };

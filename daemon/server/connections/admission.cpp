@@ -12,7 +12,7 @@ namespace sonar {
 namespace {
 
 constexpr auto accept_pause = std::chrono::milliseconds(100);  // after an accept that failed
-constexpr auto spell = std::chrono::seconds(60);               // without a refusal: the next one is news again
+constexpr auto spell = std::chrono::seconds(60);               // without a refusal; then the next refusal is logged again
 
 constexpr std::uint64_t most_kept_for_drivers = 64;
 

@@ -173,7 +173,7 @@ void HttpConnection::next_request() {
   wake_reader_.cancel();
 }
 
-/// Closing while the client still sends would destroy our last answer (RST): its input is discarded for a moment first.
+/// Closing while the client still sends would destroy our last answer (RST). So its input is discarded for a moment first.
 void HttpConnection::finish_sending() {
   all_sent_ = true;
   if (peer_closed_ || over()) return close();

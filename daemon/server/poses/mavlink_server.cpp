@@ -7,7 +7,7 @@ namespace {
 
 constexpr auto tick_period = std::chrono::milliseconds(250);
 
-/// Heartbeats and silences are those of the wires, also where the daemon's time is stepped.
+/// Heartbeats and silence are measured in real time, also if the daemon's time is stepped.
 Time wire_time() { return Time(std::chrono::steady_clock::now().time_since_epoch()); }
 
 mavlink::Settings settings_of(const MavlinkConfig& link, const Config& config) {
@@ -49,7 +49,7 @@ Result<void> MavlinkServer::open() {
       link.config.at.port = link.socket.local_endpoint().port();
     link.name = std::string("mavlink ").append(text_of(link.config));
     error_code ec;
-    link.socket.non_blocking(true, ec);  // what a full buffer does not take is lost, as datagrams may be
+    link.socket.non_blocking(true, ec);  // bytes that do not fit into a full buffer are lost, as datagrams may be
   }
   return {};
 }

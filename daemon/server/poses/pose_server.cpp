@@ -212,7 +212,7 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   return Turn::not_over;
 }
 
-/// Gives other connections their turns. The pause is longer if this one sent more than its limit or its share of all.
+/// Lets other connections proceed. The pause is longer if this one sent more than its limit or its share of all.
 asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
   const auto pause = std::max(c.rate.pause_after(work.bytes, now), together_.pause_after(c.of_all, work.bytes, now));

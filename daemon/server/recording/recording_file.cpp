@@ -21,7 +21,7 @@ const protocol::Make& make_of(std::string_view vendor) {
   return found != nullptr ? *found : protocol::makes().front();
 }
 
-/// All that it sends of a ping, as it is sent.
+/// All messages of a ping, as they are sent.
 bool is_one_stream(const protocol::Make& make) {
   return make.codec.framing != nullptr && !make.each_ping_requested && make.device->pings_by() != protocol::PingsBy::datagrams;
 }

@@ -42,7 +42,7 @@ Recordings::Recordings(WriterThread& writer, const Config& config, Log& log, std
 
 Recordings::~Recordings() = default;
 
-/// `job` on the thread, `after` takes here what came of it and how far the file is.
+/// Runs `job` on the thread of the recording. `after` runs here, with the result and the size of the file.
 template <class Job, class After>
 void Recordings::on_thread(const std::shared_ptr<Work>& work, Job job, After after) {
   const auto figures = std::make_shared<RecordingFile::Figures>();

@@ -61,7 +61,7 @@ void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit) {
   // Three probes, the last with a second to spare where there is one: kernel timers are late rather than early.
   const auto probe_s =
       static_cast<int>(std::max(std::chrono::floor<std::chrono::seconds>(limit).count() - 1, std::int64_t{3}) / 3);
-  error_code ec;  // a refused option leaves the kernel's own patience, a quarter of an hour and more
+  error_code ec;  // if the option is refused, the time-out of the kernel stays: a quarter of an hour or more
   socket.set_option(asio::socket_base::keep_alive(true), ec);
   socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPIDLE>(probe_s), ec);
   socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPINTVL>(probe_s), ec);

@@ -14,9 +14,9 @@
 namespace sonar {
 namespace {
 
-constexpr std::size_t longest_line = 3900;  // what a pipe takes at once is 4096 bytes
+constexpr std::size_t longest_line = 3900;  // a pipe takes 4096 bytes at once
 
-/// Names of files may hold any bytes: what is no UTF-8 is replaced.
+/// Names of files may hold any bytes. Bytes that are not UTF-8 are replaced.
 std::string json_string(std::string_view text) {
   return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

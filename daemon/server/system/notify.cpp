@@ -20,7 +20,7 @@ std::string from_environment(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-/// One line: the protocol knows no other end of a value.
+/// The value is one line, because the protocol ends a value with its line.
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
@@ -41,7 +41,7 @@ Notify::Notify(asio::io_context& io, NotifyTarget target, std::function<std::chr
     : target_(std::move(target)), ping_under_way_(std::move(ping_under_way)), log_(log), timer_(io) {
   if (target_.socket.empty()) return;
   socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  // A manager that does not read must not hold us up for longer than a client would notice.
+  // A service manager that does not read must not delay sonard for longer than a client would notice.
   const timeval patience{0, 200000};
   if (socket_ >= 0) ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
 }
@@ -68,7 +68,7 @@ void Notify::stopping() {
   timer_.cancel();
 }
 
-/// Twice in the watchdog's period. A ping that takes longer than that period silences us, and the manager acts.
+/// Reports twice per watchdog period. If a ping takes longer than that period, sonard does not report, and the manager acts.
 void Notify::keep_alive() {
   const bool stuck = ping_under_way_() > target_.watchdog;
   if (stuck && !stuck_)

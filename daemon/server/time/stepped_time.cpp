@@ -39,8 +39,8 @@ std::string SteppedTime::step(double dt_s) {
 void SteppedTime::wait(Reached reached) { waiting_.push_back({bound(), std::move(reached)}); }
 
 bool SteppedTime::answer(std::optional<Time> next) {
-  // The bound falls when a vehicle that is behind joins those that are followed. A request that waits for a later time is
-  // answered then, or sender and sonard would wait for each other. An answered request may add another.
+  // The bound becomes smaller when a vehicle that is behind joins those that are followed. A request that waits for a later time
+  // is answered then, or sender and sonard would wait for each other. An answered request may add another.
   bool any = false;
   while (!waiting_.empty() && (!next || *next > std::min(waiting_.front().until.last_tick, bound().last_tick))) {
     const Waiting done = std::move(waiting_.front());

@@ -16,14 +16,14 @@ using control::StatusCode;
 constexpr std::array<std::string_view, 2> protocols = {"foxglove.websocket.v1", "foxglove.sdk.v1"};
 
 HttpAnswer socket_refusal(unsigned status, const std::string& text) { return answer_of(status, StatusCode::refused, text); }
-/// `cure` is for the log only: what the configuration would say.
+/// `cure` is for the log only: the key of the configuration that would allow it.
 HttpAnswer socket_refusal(unsigned status, const std::string& text, const std::string& cure) {
   HttpAnswer answer = socket_refusal(status, text);
   answer.why = text + "; " + cure;
   return answer;
 }
 
-/// The words of a header that lists them.
+/// The words of a header that is a list.
 std::vector<std::string> words_of(std::string_view list) {
   std::vector<std::string> words;
   while (!list.empty()) {

@@ -6,7 +6,7 @@
 namespace sonar {
 namespace {
 
-// Only what we serve ourselves, and only to us: no inline code, no other hosts, no frames around the page.
+// The page may use only files of this server: no inline code, no other hosts, no frames around the page.
 constexpr const char* policy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";

@@ -142,7 +142,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   std::map<std::uint32_t, ViewChannel> channels_;
   std::shared_ptr<Work> work_ = std::make_shared<Work>();
   std::optional<motion::Playback> playback_;  // once the length is known
-  // As of the last job:
+  // Results of the last job:
   std::string failure_, profile_;
   Time begin_{};
   std::uint64_t count_ = 0;
@@ -186,7 +186,7 @@ void RecordingViews::Seen::draw(Work& work, const RecordingPlayer::Shown& shown)
   event.SerializeToArray(bytes.data(), static_cast<int>(bytes.size()));
   work.made[ping_channel] = view_payload(at, std::move(bytes));
   const auto picture = protocol::drawing_of(shown.ping);
-  if (!picture) return;  // too few lines of a sweep, say
+  if (!picture) return;  // for example too few lines of a sweep
   work.made[picture_channel] = picture_payload(at, *picture);
   work.made[fan_channel] = fan_payload(sonar_name, at, *picture, work.painter);
 }
@@ -376,7 +376,7 @@ RecordingViews::~RecordingViews() {
 
 std::shared_ptr<HttpTakeover> RecordingViews::open(ConnectionServices& services, HttpConnection& from, const HttpRequest& request,
                                                    ViewWelcome welcome, const PlayedRecording& wanted) {
-  welcome.may_steer = true;  // its own time line is all that there is to steer
+  welcome.may_steer = true;  // only its own time line can be steered
   const auto seen = std::make_shared<Seen>(io_, thread_, wanted);
   return std::make_shared<ViewConnection>(
       services, from, *seen, request, welcome, [this, seen, wanted](const std::shared_ptr<ViewConnection>& viewer) {

@@ -10,7 +10,7 @@
 namespace sonar {
 namespace {
 
-/// Seen from above it would hide everything else.
+/// It is left out, because from above it would hide everything else.
 constexpr std::string_view not_shown = "sea surface";
 
 bool is_shown(const Object& object) { return !object.name.empty() && object.name != not_shown && object.mesh != nullptr; }
@@ -19,7 +19,8 @@ ViewBytes shared(wire::Bytes bytes) { return std::make_shared<const wire::Bytes>
 
 using Colour = std::array<double, 3>;
 
-/// Materials have no colours: that of the first word found in the name ("rusty pipe", "quay_stone"), else a calm one of its own.
+/// Materials have no colours: that of the first word found in the name ("rusty pipe", "quay_stone"), else a muted colour of its
+/// own.
 Colour colour_of(const std::string& material) {
   struct Row {
     std::string_view word;

@@ -82,7 +82,7 @@ struct ViewConnection::Watched {
       rest.expires_after(pause);
       rest.async_wait(std::move(self));
     }
-    /// The pause is over, or the connection is.
+    /// The pause, or the connection, is over.
     template <class Self>
     void operator()(Self& self, const error_code&) {
       self.complete(watched.from.over() ? error_code(asio::error::operation_aborted) : error_code(), size);
@@ -202,7 +202,7 @@ asio::awaitable<bool> ViewConnection::write(const ViewMessage& message) {
   co_return !ec;
 }
 
-/// Closes the socket when nothing of a message moves.
+/// Closes the socket when no byte of a message is taken.
 void ViewConnection::look_for_progress() {
   stall_.expires_at(moved_at_ + services_.limits.stall);
   stall_.async_wait([weak = weak_from_this()](const error_code& ec) {

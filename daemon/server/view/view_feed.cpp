@@ -379,7 +379,7 @@ void ViewFeed::offer_status() {
   if (wanted(tf_) && status_at_ - ping_at_ >= status_period) offer(tf_, places());
 }
 
-/// Those that wait, act, or are over.
+/// The faults that wait, act, or are over.
 ViewPayloadPointer ViewFeed::faults() const {
   ViewPayloadPointer payload;
   const control::GetFaults without_journal{.journal_after = std::numeric_limits<std::uint64_t>::max()};

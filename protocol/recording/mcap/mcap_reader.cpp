@@ -136,7 +136,7 @@ std::optional<Message> Reader::take_message(BytesView content, std::uint64_t at)
   return message;
 }
 
-/// Sets chunk_end_, or leaves the chunk out. Of one that is cut short the records that are whole are read, unchecked.
+/// Sets chunk_end_, or leaves the chunk out. If a chunk is cut short, its whole records are read without a check.
 void Reader::enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut) {
   const std::uint64_t end = scan_.position() + length;
   const std::size_t front_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(length, 40 + 256));

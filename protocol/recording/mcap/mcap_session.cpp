@@ -118,7 +118,7 @@ Result<void> McapSession::write_image(Time at, const std::shared_ptr<const Ping>
   return writer_.write(image_, at, foxglove::raw_image(at, sonar_, foxglove::image_of(ping)));
 }
 
-/// Full scale is the largest code of that many bits: messages do not state another.
+/// Full scale is the largest code of that many bits, because messages state no other.
 Result<void> McapSession::write_image(Time at, const Samples& samples) {
   const auto image =
       foxglove::image_of(samples.beams, samples.rows, samples.bits, 0xFFFFFFFFu >> (32 - samples.bits), samples.codes);

@@ -170,7 +170,7 @@ void Writer::append_statistics(Bytes& out) const {
   record.end();
 }
 
-/// Groups of records of one kind each, then where each group lies, then the footer but for its checksum.
+/// Writes groups of records of one kind each, then the position of each group, then the footer without its checksum.
 Bytes Writer::summary() const {
   Bytes out;
   const std::uint64_t start = position_;

@@ -151,7 +151,7 @@ class PcapReader final : public RecordingReader {
     if (segment.target == device) add(at, segment, segment.source, Origin::client);
   }
 
-  /// Pings, or the status beside pings by TCP.
+  /// Takes pings, or the status beside pings by TCP.
   void add_datagram(Time at, const Segment& segment) {
     const auto take = [&](Origin from) {
       ready_.push_back({at, from, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});
