@@ -115,12 +115,12 @@ Result<void> run_replay(const ReplayCommand& command) {
   const auto where = open_page(page, command, log);
   if (!where) return tl::make_unexpected(where.error());
   if (!device->is_only_seen.empty() && where->empty()) return failure(ErrorKind::bad_data, device->is_only_seen);
-  log.announce(*where);
   if (!device->is_only_seen.empty())
     log.announce(device->is_only_seen + "; Ctrl-C stops\n");
   else
     log.announce(std::string("replaying ") + command.file + " (" + std::string(opened->format) + ") as " + device->name() +
                  " on tcp " + text_of(server.at()) + "; Ctrl-C stops\n");
+  log.announce(*where);
   server.start();
   io.run();
   const ReplayServer::Figures& done = server.figures();

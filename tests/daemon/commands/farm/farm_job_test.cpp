@@ -124,7 +124,7 @@ TEST_F(FarmJobTest, FilesArriveAsTheyWere) {
 TEST_F(FarmJobTest, NothingLeadsOutOfTheFolder) {
   put("job/set.yaml", "dataset: {pings: 5}\nscene: {objects: [{type: mesh, file: ../else.stl}]}\n");
   put("else.stl", "x");
-  EXPECT_THAT(describe(job(), "portable").error().text, HasSubstr("../else.stl is not below"));
+  EXPECT_THAT(describe(job(), "portable").error().text, HasSubstr("../else.stl is outside the job's folder"));
   put("job/set.yaml", "dataset: {pings: 5}\n");
   for (const char* name : {"../else.stl", "/etc/else", "a/../../b", "", "a/"}) {
     TableInMemory queue;
