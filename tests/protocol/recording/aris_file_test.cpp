@@ -45,7 +45,7 @@ TEST(ArisFile, HoldsWholeFramesInTheVendorsLayout) {
   ASSERT_TRUE(writer->write({tests::start, Origin::device, Carrier::stream, Bytes(50)}));
   const auto changed = write(*writer, datagrams(4, 300));
   ASSERT_FALSE(changed);
-  EXPECT_THAT(changed.error().text, ::testing::HasSubstr("settings have changed"));
+  EXPECT_THAT(changed.error().text, ::testing::HasSubstr("settings were changed"));
   EXPECT_EQ(u32(file, 4), 2u) << "before it is closed";
   ASSERT_TRUE(writer->close());
   ASSERT_EQ(file.size(), 1024 + 2 * (1024 + 48 * 200u));
