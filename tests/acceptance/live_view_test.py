@@ -547,7 +547,7 @@ class Doctor(unittest.TestCase):
             finding = self.named(viewer, "address", " of programs of this computer failed")
             self.assertIn(f"point the driver at {daemon.address}, TCP port 52100", finding["cure"])
             with socket.create_server(("127.99.0.1", 52100)) as other, socket.create_connection(other.getsockname()):
-                self.named(viewer, "address", "is connected to 127.99.0.1:52100, which is no sonar")
+                self.named(viewer, "address", "is connected to 127.99.0.1:52100, which is not a sonar")
 
     def test_does_not_read(self):
         with self.daemon_and_viewer() as (daemon, viewer), Client(daemon.address) as client:

@@ -262,7 +262,7 @@ TEST(EsriGrid, SaysWhatItTakesForDegrees) {
   EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.05", 12, true), {.geographic = true}), "degrees");
   const std::string seattle = degrees_of("xllcorner 237.5\nyllcorner 47", "0.016666667", 12);
   EXPECT_EQ(is_geographic(seattle, {.origin = Geodetic{rad_from_deg(47), rad_from_deg(-122.5), 0}}), "degrees");
-  EXPECT_THAT(is_geographic(degrees_of(far, "1"), {.geographic = true}), HasSubstr("no longitudes and latitudes"));
+  EXPECT_THAT(is_geographic(degrees_of(far, "1"), {.geographic = true}), HasSubstr("not longitudes and latitudes"));
   EXPECT_THAT(is_geographic(degrees_of(near_zero, "1", 40, true), {.geographic = true}), HasSubstr("at most 5"));
   EXPECT_THAT(is_geographic(degrees_of("xllcorner 3\nyllcorner 89.5", "0.0002"), {}), HasSubstr("of a pole"));
   EXPECT_THAT(is_geographic(degrees_of(far, "1"), {.origin = Geodetic{}}), HasSubstr("origin is for a grid in degrees"));
@@ -767,7 +767,7 @@ TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
   TiffFile turned = TiffFile::of(3, 2, six);
   turned.doubles(34264, {10, 1, 0, 0, 1, -10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1});
   EXPECT_THAT(refusal(turned), HasSubstr("gdalwarp"));
-  EXPECT_THAT(refusal(TiffFile::of(3, 2, six).at(0, 0, 0, 10)), HasSubstr("cells that are no lengths"));
+  EXPECT_THAT(refusal(TiffFile::of(3, 2, six).at(0, 0, 0, 10)), HasSubstr("cells whose sizes are not"));
   EXPECT_THAT(refusal(TiffFile::of(2, 2, std::vector<float>{1e9f, 1, 2, 3}).at(0, 0, 1, 1)),
               HasSubstr("row 1, column 1 is beyond 1e7 m"));
   // Four tiles of 64 MiB for 256 KiB of heights: small when packed, minutes to unpack if there were thousands.

@@ -99,7 +99,7 @@ TEST(Judge, OneOnAWrongAddress) {
   const auto texts = texts_of({{tries, held, ours, web}, 3});
   ASSERT_EQ(texts.size(), 3u);
   EXPECT_THAT(texts[0], HasSubstr("tries to connect to 192.168.2.3:52100, and nothing answers"));
-  EXPECT_THAT(texts[2], HasSubstr("is connected to 127.0.0.9:52100, which is no sonar"));
+  EXPECT_THAT(texts[2], HasSubstr("is connected to 127.0.0.9:52100, which is not a sonar of this sonard"));
   EXPECT_THAT(texts_of({{ours, web}, 3}), testing::Contains(HasSubstr("3 connections of programs of this computer failed")));
   EXPECT_EQ(trouble(judge(with(""), nullptr, {{tries}, 0}), "address").cure, "point the driver at 127.0.0.2, TCP port 52100");
   EXPECT_THAT(troubles(judge(with(pinging + driver), nullptr, {{tries}, 3})), IsEmpty());
