@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "core/base/geometry.hpp"
+#include "protocol/ping/one_beam.hpp"
 
 namespace sonar::ping::omniscan {
 namespace {
@@ -112,10 +113,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
     p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
   }
-  if (wanted.mode && *wanted.mode != 0) return refused("an Omniscan has one mode, 0");
-  if (wanted.beams && *wanted.beams != 1) return refused("an Omniscan has one beam");
-  if (wanted.sample_bits && *wanted.sample_bits != 16) return refused("an Omniscan sends samples of 16 bits");
-  if (wanted.row_gains && *wanted.row_gains) return refused("an Omniscan sends no row gains");
+  if (const std::string why = one_beam_complaint(wanted, "an Omniscan", 16); !why.empty()) return refused(why);
   if (const std::string why = complaint(p); !why.empty()) return refused("Omniscan: " + why);
   return change_to(s);
 }

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "core/base/geometry.hpp"
+#include "protocol/ping/one_beam.hpp"
 
 namespace sonar::ping::ping1d {
 namespace {
@@ -120,10 +121,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     p.gain = static_cast<std::uint8_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
     p.mode_auto = 0;
   }
-  if (wanted.mode && *wanted.mode != 0) return refused("a Ping1D has one mode, 0");
-  if (wanted.beams && *wanted.beams != 1) return refused("a Ping1D has one beam");
-  if (wanted.sample_bits && *wanted.sample_bits != 8) return refused("a Ping1D sends samples of 8 bits");
-  if (wanted.row_gains && *wanted.row_gains) return refused("a Ping1D sends no row gains");
+  if (const std::string why = one_beam_complaint(wanted, "a Ping1D", 8); !why.empty()) return refused(why);
   if (const std::string why = complaint(p); !why.empty()) return refused("Ping1D: " + why);
   return change_to(s);
 }

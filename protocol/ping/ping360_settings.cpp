@@ -7,6 +7,7 @@
 
 #include "core/base/geometry.hpp"
 #include "protocol/ping/conversation.hpp"
+#include "protocol/ping/one_beam.hpp"
 
 namespace sonar::ping::ping360 {
 namespace {
@@ -163,10 +164,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
     s.ping.gain = static_cast<std::uint8_t>(std::lround(*wanted.gain_percent / 50));
   }
-  if (wanted.mode && *wanted.mode != 0) return refused("a Ping360 has one mode, 0");
-  if (wanted.beams && *wanted.beams != 1) return refused("a Ping360 has one beam");
-  if (wanted.sample_bits && *wanted.sample_bits != 8) return refused("a Ping360 sends samples of 8 bits");
-  if (wanted.row_gains && *wanted.row_gains) return refused("a Ping360 sends no row gains");
+  if (const std::string why = one_beam_complaint(wanted, "a Ping360", 8); !why.empty()) return refused(why);
   return change_to(s, device);
 }
 
