@@ -120,7 +120,6 @@ class DeviceEngine final : public PingEngine {
       throw;
     }
     wanted_.erase(begin, end);
-    restore_requested_pose(call.pings, pings);
     std::vector<Ping> pictures;
     std::size_t first = 0;
     for (const PingRequest& picture : call.pictures) {

@@ -64,7 +64,6 @@ class CpuEngine final : public ChangingEngine, private Interruption {
       pings.push_back(run(request));
       add(statistics, work_[0].statistics());
     }
-    restore_requested_pose(wanted, pings);
     return interleaved(picture, pings);
   }
   Ping run(const PingRequest& request) {

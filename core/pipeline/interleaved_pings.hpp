@@ -13,7 +13,7 @@ namespace sonar {
 int pings_in(const PingRequest& picture);
 /// Its pings, the first first, each when and where it is fired. Their numbers, which key the noise, are their own.
 std::vector<PingRequest> pings_of(const PingRequest& picture);
-/// The picture: every beam as its ping found it. `pings`: of pings_of(), in their order.
+/// The picture, with its own request: every beam as its ping found it. `pings`: of pings_of(), in their order.
 Ping interleaved(const PingRequest& picture, std::span<Ping> pings);
 
 }  // namespace sonar
