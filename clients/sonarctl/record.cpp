@@ -243,7 +243,7 @@ Result<void> convert(const RecordOptions& options) {
   return {};
 }
 
-/// Whether two names mean the same file, also if the file does not exist yet.
+/// Returns whether two names mean the same file, also if the file does not exist yet.
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code ec;
   if (a == b || std::filesystem::equivalent(a, b, ec)) return true;

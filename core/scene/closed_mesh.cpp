@@ -28,7 +28,7 @@ std::vector<Index> joined_vertices(const Mesh& mesh) {
   return first;
 }
 
-/// Whether every edge is used twice, once in each direction.
+/// Returns whether every edge is used twice, once in each direction.
 bool edges_match(const Mesh& mesh, const std::vector<Index>& joined) {
   std::vector<std::uint64_t> edges;  // lower vertex, higher vertex, direction
   edges.reserve(3 * mesh.triangles.size());

@@ -34,8 +34,8 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// Goes on with another scene. What stands still and has the same meshes at the same places keeps its trees, also while scenes
-  /// take turns; the hits are those of a new RayScene.
+  /// Replaces the scene. Objects that stand still, with the same mesh at the same place, keep their trees, also when scenes
+  /// alternate. The hits are those of a new RayScene.
   void change(std::shared_ptr<const Scene> scene);
   const Scene& scene() const;
   Vec3d origin() const;  // world position that float coordinates are relative to

@@ -31,7 +31,7 @@ std::string demo_names(std::string_view between, bool first = true) {
   return names;
 }
 
-/// Null if there is no such demo.
+/// Returns null if there is no such demo.
 const protocol::Make* find_demo(std::string_view name) {
   for (const protocol::Make& make : protocol::makes())
     if (make.name_in_demo() == name) return &make;

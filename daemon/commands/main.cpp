@@ -31,7 +31,7 @@ int report_error(const Error& error, bool json) {
   return exit_code(error.kind);
 }
 
-/// Whether an exception that std::thread or Boost threw means that no more threads can be started.
+/// Returns whether an exception that std::thread or Boost threw means that no more threads can be started.
 bool is_short_of_threads(const std::exception& e) {
   if (const auto* error = dynamic_cast<const std::system_error*>(&e))
     return error->code() == std::errc::resource_unavailable_try_again;

@@ -99,7 +99,7 @@ double bubble_factor(const BubbleLayer& bubbles, const Path& path, const std::ve
     const Vec3d source = two_left ? image_in(at(mirrors, path.second)).of(image_in(at(mirrors, path.first)).of({}))
                                   : image_in(at(mirrors, path.first)).of({});
     const double from = at(mirrors, mirror).height_of(source), to = at(mirrors, mirror).height_of(end);
-    // For a place on the dark side there is no such line. Tiles that reach through the mirror may have their middle there.
+    // A place on the dark side has no such line. Tiles that reach through the mirror may have their middle there.
     const double part = from == to ? 0.5 : std::clamp(from / (from - to), 0.0, 1.0);
     bends.push_back(source + part * (end - source));
   }

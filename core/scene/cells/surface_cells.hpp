@@ -101,8 +101,8 @@ struct CellFields {
 class SurfaceCells {
  public:
   SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, CellFields fields = {});
-  /// Goes on with another scene. Cells of objects that have the same mesh and materials at the same place of the list stay, also
-  /// while scenes take turns.
+  /// Replaces the scene. Objects with the same mesh and materials at the same place of the list keep their cells, also when
+  /// scenes alternate.
   void change(std::shared_ptr<const Scene> scene);
   ~SurfaceCells();
   SurfaceCells(const SurfaceCells&) = delete;

@@ -248,8 +248,7 @@ std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const
   double sum = 0;
   for (const double share : shares) sum += share;
   // Whole numbers of scenes: shares are rounded down, then the largest remainders get one more. Each split gets at least one
-  // scene
-  /// while there are enough.
+  // scene while there are enough.
   std::array<std::size_t, 3> count{};
   std::size_t left = scenes.size();
   for (std::size_t s = 0; s < count.size(); ++s) {

@@ -61,7 +61,7 @@ std::string digest_of(std::string_view bytes) {
   return hash.hex();
 }
 
-/// Whether a name is a relative path that stays inside its folder, in normal form, so that a file has only one name.
+/// Returns whether a name is a relative path that stays inside its folder, in normal form, so that a file has only one name.
 bool is_confined(const path& name) {
   return !name.empty() && name.is_relative() && name.lexically_normal() == name && name.has_filename() && *name.begin() != "..";
 }

@@ -44,7 +44,7 @@ bool is_of_a_ping(const path& file) {
   return digits && std::any_of(std::begin(ends), std::end(ends), [&](std::string_view end) { return name.substr(6) == end; });
 }
 
-/// Whether NNNNNN.json was written by any version of sonard. Then files of that number are from sonard.
+/// Returns whether NNNNNN.json was written by any version of sonard. Then files of that number are from sonard.
 bool is_sidecar(const path& file) {
   std::ifstream in(file);
   const json side = json::parse(in, nullptr, false);
