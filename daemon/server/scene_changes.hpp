@@ -39,7 +39,7 @@ class SceneChanges {
   static constexpr std::size_t most_waiting = 64;
   /// While drivers are served: each engine costs a driver at 40 Hz between one and two pings.
   static constexpr int most_at_once = 2;
-  static constexpr std::chrono::milliseconds between_engines{1000};
+  static constexpr std::chrono::milliseconds between_engines{1500};
 
   /// `nice_by` is added to the niceness of the thread; `on_change` is called when a Change is done.
   SceneChanges(asio::io_context& io, Simulator& simulator, ScenePointer scene, EngineFactory make_engine, int nice_by,

@@ -4,6 +4,7 @@ namespace sonar::ping {
 namespace {
 
 constexpr std::size_t longest_reason = 80;   // of a nack: an answer is little longer than a request
+constexpr std::size_t most_beyond = 128;     // bytes by which the answers to a datagram may exceed it before the rest is ignored
 constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hostile host can cause
 
 }  // namespace
@@ -24,13 +25,28 @@ protocol::Option type_option(std::string_view usual, std::string_view meaning) {
 protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now) {
   protocol::Reaction reaction;
   framer_.append(received);
+  if (by_datagrams_) return on_datagram(received.size(), now);
+  while (const auto frame = framer_.next()) on_frame(*frame, now, reaction);
+  return reaction;
+}
+
+/// The address of a datagram's sender may be forged. So there is one datagram of answers, little longer than what was received.
+protocol::Reaction Conversation::on_datagram(std::size_t size, Time now) {
+  protocol::Reaction reaction;
+  Bytes answers;
+  std::size_t frames = 0;
   while (const auto frame = framer_.next()) {
-    // Sends one answer per datagram, because the address of its sender may be forged.
-    const bool is_all = header_size + frame->header.length + sum_size == received.size();
-    if (!by_datagrams_ || frame->sum_is_right || is_all) on_frame(*frame, now, reaction);
-    if (by_datagrams_ && frame->sum_is_right) break;
+    const bool is_all = header_size + frame->header.length + sum_size == size;
+    if (!frame->sum_is_right && !is_all) continue;
+    const std::size_t before = reaction.replies.size();
+    on_frame(*frame, now, reaction);
+    ++frames;
+    for (std::size_t i = before; i < reaction.replies.size(); ++i)
+      answers.insert(answers.end(), reaction.replies[i].begin(), reaction.replies[i].end());
+    if (answers.size() > size + most_beyond) break;
   }
-  if (by_datagrams_) framer_.drop_rest();
+  framer_.drop_rest();
+  if (frames > 1 && !answers.empty()) reaction.replies = {std::move(answers)};
   return reaction;
 }
 

@@ -67,6 +67,7 @@ class Conversation : public protocol::Dialogue {
   std::uint8_t id_;
 
  private:
+  protocol::Reaction on_datagram(std::size_t size, Time now);
   void on_frame(const Frame& frame, Time now, protocol::Reaction& reaction);
   void on_general_request(const Frame& frame, Time now, protocol::Reaction& reaction);
 

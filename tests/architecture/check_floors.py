@@ -118,7 +118,7 @@ MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping)/|protocol/ma
 NAME_MAKES = {
     "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py",
     "clients/python/sonard_client/daemon.py", "clients/python/sonard_client/judge/__main__.py",
-    "clients/python/sonard_client/judge/cases.py", "clients/python/sonard_client/judge/scene.py",
+    "clients/python/sonard_client/judge/cases.py", "clients/python/sonard_client/judge/truth.py",
     "clients/python/sonard_client/lab.py", "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/oculus.py",
     "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py", "clients/web/src/panels/head.js",
     "clients/wireshark/aris.lua", "clients/wireshark/oculus.lua", "clients/wireshark/ping.lua",

@@ -1,12 +1,13 @@
 // Input of the HTTP port: requests out of a stream, and their routing. First byte: length of the pieces,
 // second: the policy; the rest is the stream. Whatever the pieces, the requests are the same; nothing passes without its Host,
-// and nothing but /healthz without the token.
+// and nothing but /healthz and the files of the page without the token.
 #include <algorithm>
 #include <string>
 #include <vector>
 
 #include "daemon/server/control/http_router.hpp"
 #include "daemon/server/view/door.hpp"
+#include "daemon/server/view/page.hpp"
 #include "tests/fuzz/byte_script.hpp"
 
 namespace {
@@ -57,8 +58,13 @@ void check(const HttpRequest& request, const HttpPolicy& policy) {
   require(request.body.size() <= HttpReader::longest_body);
   const RoutedRequest routed = route_request(request, policy);
   if (const auto* answer = std::get_if<HttpAnswer>(&routed.action)) {
-    require(answer->status >= 400 && answer->status < 500 && answer->body.starts_with('{'));
-    return;
+    if (answer->status >= 400 && answer->body.starts_with('{')) return require(answer->status < 500);
+    // Files of the page hold no data, so they need no token.
+    const std::string path = request.target.substr(0, request.target.find('?'));
+    const auto page = page_answer({path, request.accept, request.accept_encoding, request.if_none_match});
+    require(page && page->status == answer->status && (request.method == "GET" || request.method == "HEAD"));
+    require(request.has_host ? host_allowed(request.host, policy.reached, policy.hosts) : request.http_1_0);
+    return require(!request.has_origin || origin_allowed(request.origin, policy.reached, policy.hosts));
   }
   if (const auto* asked = std::get_if<SocketAction>(&routed.action)) return check_door(request, *asked, policy);
   require(request.has_host ? host_allowed(request.host, policy.reached, policy.hosts) : request.http_1_0);

@@ -23,7 +23,7 @@ from sonard_client.judge import __main__ as judge_main
 from sonard_client.judge import cases, driver, report, ros_tap, run_case, wire
 from sonard_client.judge.cases import CASES
 from sonard_client.judge.scene import Scene
-from sonard_client.judge.truth import TruePing, TruthReader
+from sonard_client.judge.truth import PingProtocolReader, TruePing, TruthReader, reader_for
 from sonard_client.judge.verdicts import Observation, back_at, colour, judge, sort_published
 from sonard_client.judge.wire import Seen
 
@@ -109,6 +109,68 @@ def observed(shown=TICKS, wire_pings=TICKS, **more):
 
 def verdict(seen, must=None, should=None, notice=False):
     return judge(seen, must or {}, should or {}, notice)
+
+
+def ping_frame(message, payload):
+    body = b"BR" + struct.pack("<HHBB", len(payload), message, 1, 0) + payload
+    return body + struct.pack("<H", sum(body) & 0xFFFF)
+
+
+class PingProtocol(unittest.TestCase):
+    """Messages of the Ping family, by TCP and by UDP."""
+
+    def setUp(self):
+        self.profiles = [ping_frame(1300, bytes(8) + struct.pack("<I", number) + bytes([number]) * 210) for number in (7, 8)]
+        self.sector = ping_frame(2300, bytes(14) + bytes(range(200)))
+        self.answer = ping_frame(5, bytes(4))
+
+    def numbers(self, *pieces):
+        reader = PingProtocolReader()
+        return [ping.number for piece in pieces for ping in reader.feed(piece)]
+
+    def test_every_split_gives_the_same_pings(self):
+        stream = self.answer + self.profiles[0] + b"noise B" + self.sector + self.sector + self.profiles[1]
+        for size in (1, 7, 64, len(stream)):
+            self.assertEqual(self.numbers(*(stream[at:at + size] for at in range(0, len(stream), size))), [7, -1, -2, 8])
+
+    def test_samples_are_the_payload(self):
+        (ping,) = PingProtocolReader().feed(b"??" + self.sector)
+        self.assertEqual((ping.crcs, ping.begin, ping.end), ({zlib.crc32(self.sector[8:-2])}, 2, 2 + len(self.sector)))
+
+    def test_damage_is_no_ping_and_hides_none(self):
+        damaged = bytearray(self.profiles[0])
+        damaged[40] ^= 1
+        self.assertEqual(self.numbers(bytes(damaged) + self.profiles[1]), [8])
+        self.assertEqual(self.numbers(self.profiles[0][:50] + self.profiles[1]), [8])
+        self.assertEqual(self.numbers(b"BR\xff\xff", self.profiles[0], self.profiles[1]), [7, 8], "a length that is never reached")
+
+    def test_makes_whose_pings_are_known(self):
+        self.assertIs(reader_for("oculus-m1200d"), TruthReader)
+        for profile in ("ping1d", "ping360", "omniscan-450-fs", "surveyor-240-16"):
+            self.assertIs(reader_for(profile), PingProtocolReader, profile)
+        self.assertIsNone(reader_for("aris-explorer-3000"))
+
+    def test_datagrams_whole_and_in_fragments(self):
+        with mock.patch("socket.socket"):
+            capture = wire.Capture("lo", "127.0.0.2", 9090, PingProtocolReader)
+        device, driver = bytes([127, 0, 0, 2]), bytes([127, 0, 0, 1])
+
+        def packets(source, destination, ports, payload, cut=None):
+            datagram = struct.pack(">HHHH", *ports, 8 + len(payload), 0) + payload
+            parts = [(0, datagram)] if cut is None else [(cut, datagram[cut:]), (0, datagram[:cut])]  # the last one comes first
+            for at, part in parts:
+                place = at // 8 | (0x2000 if at + len(part) < len(datagram) else 0)
+                yield bytes(12) + b"\x08\x00" + struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(part), 5, place, 64, 17, 0) + \
+                    source + destination + part
+
+        for packet in (*packets(device, driver, (9090, 4000), self.profiles[0]),  # before the driver has sent anything
+                       *packets(driver, device, (4000, 9090), ping_frame(6, b"\x14\x05")),
+                       *packets(device, driver, (9090, 4000), self.profiles[0]),
+                       *packets(device, driver, (9090, 4000), self.profiles[1], cut=64),
+                       *packets(device, driver, (9999, 4000), self.profiles[1])):
+            capture._packet(1.0, 0, packet)
+        self.assertEqual([s.ping.number for s in capture.delivered()], [7, 8])
+        self.assertEqual([(c.peer, len(c.fires)) for c in capture.connections], [("127.0.0.1:4000", 1)])
 
 
 class Verdicts(unittest.TestCase):

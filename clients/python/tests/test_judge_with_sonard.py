@@ -69,6 +69,12 @@ class Few(Judging):
         index = self.judged("right_driver.py {ip}", *FEW)
         self.assertEqual(self.failures(index, "must"), {})
 
+    @unittest.skipIf(lab.missing(), lab.missing())
+    def test_the_data_of_a_ping1d_are_judged(self):
+        index = self.judged("right_ping_driver.py {ip} {port}", "--profile", "ping1d", "--case", "N00.1", "--case", "L05.1", code=0)
+        found = {r["data"] for r in index["drivers"][0]["cases"]}
+        self.assertLessEqual(found, {"CLEAN", "LOST"}, "LOST: a busy computer may drop datagrams")
+
     def test_a_driver_that_ignores_the_end_of_the_stream_does_not(self):
         index = self.judged("planted_driver.py {ip} --plant ignores-fin", *FEW, code=1)
         self.assertIn("L02.1", self.failures(index, "must"))

@@ -19,7 +19,7 @@ constexpr std::size_t most_lines_of_a_datagram = 64;
 constexpr std::size_t work_of_a_turn = 4096;            // bytes processed before yielding
 constexpr std::size_t least_work = 64;                  // bytes: cost of a read or of a line, beside its own bytes
 constexpr int most_not_json = 8;                        // lines in a row that are too long or not JSON; then the connection ends
-constexpr std::size_t dropped_per_s = 256u << 20;       // limit of discarded bytes: discarding costs little, but not nothing
+constexpr std::size_t dropped_per_s = 1024u << 20;      // limit of discarded bytes: 32 floods hold 0.1 to 1 GB in the kernel
 constexpr std::chrono::milliseconds between_looks{10};  // for new input
 constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
 
@@ -216,7 +216,8 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
 asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
   const auto pause = std::max(c.rate.pause_after(work.bytes, now), together_.pause_after(c.of_all, work.bytes, now));
-  const bool within_limits = !drop_backlog(c) && pause.count() == 0;
+  const bool pauses = pause.count() > 0;
+  const bool within_limits = !drop_backlog(c, pauses) && !pauses;
   if (!within_limits) c.proved = false;
   if (work.has_pose && within_limits) {
     c.proved = true;
@@ -228,7 +229,7 @@ asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& 
     c.turn.expires_at(std::min(until, std::chrono::steady_clock::now() + between_looks));
     co_await c.turn.async_wait(into(ec));
     if (!c.socket.is_open() || stopping_) co_return Rested::goes_on;
-    drop_backlog(c);
+    drop_backlog(c, pauses);
     if (std::chrono::steady_clock::now() >= until) co_return Rested::goes_on;
   } while (!has_left(c.socket));
   co_return Rested::leaves_much;
@@ -246,12 +247,14 @@ void PoseServer::take_newest(Connection& c) {
   if (newest) on_line(*newest, c.sender);
 }
 
-/// Keeps the newest bytes that wait in the kernel, 0.1 s of the allowed rate. True: the rest was dropped.
-bool PoseServer::drop_backlog(Connection& c) {
+/// Keeps the newest bytes that wait in the kernel: 0.1 s of the allowed rate, or one line of a sender that is paused for
+/// exceeding it. The kernel of such a sender holds megabytes more, even after the sender has closed; reading them at the allowed
+/// rate would let old poses act for seconds. True: the rest was dropped.
+bool PoseServer::drop_backlog(Connection& c, bool pauses) {
   int waiting = 0;
   if (::ioctl(c.socket.native_handle(), FIONREAD, &waiting) != 0 || waiting <= 0) return false;
   const auto now = std::chrono::steady_clock::now();
-  const std::size_t burst = std::min(limits_.input_bytes_per_s, together_.share()) / 10;
+  const std::size_t burst = pauses ? 0 : std::min(limits_.input_bytes_per_s, together_.share()) / 10;
   const std::size_t kept = std::max(burst, 2 * control::longest_line);
   if (static_cast<std::size_t>(waiting) <= kept || dropping_.left(now) == 0) return false;
   // The kernel frees the bytes without copying them (tcp(7), MSG_TRUNC).

@@ -84,7 +84,7 @@ class PoseServer {
   enum class Rested { goes_on, leaves_much };  // it has hung up, and has sent more than limits allow
   asio::awaitable<Rested> rest(Connection& connection, const Work& work);
   void take_newest(Connection& connection);
-  bool drop_backlog(Connection& connection);
+  bool drop_backlog(Connection& connection, bool pauses);
   void admit(tcp::socket socket);
 
   void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);

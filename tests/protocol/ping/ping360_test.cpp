@@ -182,6 +182,27 @@ TEST(Ping360, ADatagramHasOneAnswerAndDevicesHaveNone) {
   }
 }
 
+/// As of hosts behind a bridge to a serial line.
+TEST(Ping360, FramesOfADatagramAreAnsweredByOneThatIsLittleLonger) {
+  Talk talk("ping360");
+  Bytes three = request(Id::set_device_id, hex("09"));
+  for (const Bytes& more : {general(Id::protocol_version), ping_at(0)}) three.insert(three.end(), more.begin(), more.end());
+  auto reaction = talk.dialogue->on_bytes(three, at_s(2));
+  EXPECT_EQ(reaction.replies.size(), 1u);
+  talk.apply(std::move(reaction));
+  talk.run_to(3);
+  std::vector<Id> ids;
+  for (const Frame& frame : talk.take()) ids.push_back(frame.header.id);
+  EXPECT_THAT(ids, testing::ElementsAre(Id::ack, Id::protocol_version, Id::device_data));
+
+  Bytes flood;
+  for (int i = 0; i < 140; ++i)
+    for (const std::byte b : request(Id{2222})) flood.push_back(b);
+  const auto answers = talk.dialogue->on_bytes(flood, at_s(4)).replies;
+  ASSERT_EQ(answers.size(), 1u);
+  EXPECT_LT(answers.front().size(), flood.size() + 256);
+}
+
 TEST(Ping360, ItsNumberMayBeSet) {
   Talk talk("ping360");
   talk.say(request(Id::set_device_id, hex("09")));

@@ -19,8 +19,9 @@ from .cases import Case
 from .driver import Driver, expand
 from .outcome import result_of
 from .scene import Journal, Scene, StatusWire
+from .truth import TruthReader, reader_for
 from .verdicts import BACK_PINGS, Observation, back_at, judge
-from .wire import Capture, Seen
+from .wire import Capture, DatagramFlow, Seen
 
 NOMINAL_PINGS, NOMINAL_S = 20, 20.0  # a driver that works at all
 _SETTLE_S = 0.52
@@ -93,7 +94,8 @@ def _with_driver(spec: Dict[str, Any], case: Optional[Case], folder: pathlib.Pat
     words = expand(spec["driver"], address, port, _DEVICE_ID)
     driver = Driver(words, laboratory.host if laboratory else [], folder / "driver.log", spec["tap"] == "json")
     try:
-        capture: Optional[Capture] = Capture(lab.LINK if laboratory else "lo", address, port)
+        capture: Optional[Capture] = Capture(lab.LINK if laboratory else "lo", address, port,
+                                              reader_for(spec["profile"]) or TruthReader)
     except (PermissionError, OSError):
         capture = None
     scene = Scene(spec, folder, address, sonard, driver, capture, StatusWire(control), Journal(folder / "journal.jsonl"),
@@ -154,7 +156,7 @@ def explanation(scene: Scene) -> str:
     if scene.capture and not connections:
         lines.append(f"It made no connection to {scene.address}:{scene.spec['port']}. Does its command have {{ip}}?")
     elif scene.reads_pings and not any(c.fires for c in connections):
-        lines.append("It connected but sent no settings (fire message): the sonar pings only after one.")
+        lines.append("It connected but sent neither settings nor a request: the sonar pings only after one.")
     elif not taken:
         lines.append("It sent settings, but took no complete ping.")
     elif scene.tapped and not scene.driver.published:
@@ -162,7 +164,7 @@ def explanation(scene: Scene) -> str:
                      '{"id": 812, "crc32": "0a1b2c3d"}; without a tap give --tap none.')
     elif scene.tapped and len(scene.good()) < len(scene.driver.published):
         lines.append(f"It took {taken} pings, but of {len(scene.driver.published)} published ones {len(scene.good())} have the "
-                     "CRC-32 of a ping's samples: row after row as sent, little-endian, without row gains (docs/judge.md).")
+                     "CRC-32 of a ping's samples: docs/judge.md, \"The tap\", says which bytes these are for each make.")
     else:
         lines.append(f"It took {taken} pings, but not {NOMINAL_PINGS} consecutive ones.")
     log = (scene.folder / "driver.log").read_text(encoding="utf-8", errors="replace").splitlines()[-12:]
@@ -268,6 +270,9 @@ def _observe(scene: Scene, case: Case, began: float, ended: float, watched_until
         connections = [(c.opened, c.ended, c.ended_by) for c in scene.capture.connections]
     touched = [int(r["ping"]) for r in scene.journal.records if int(r.get("ping", 0) or 0) > 0 and r.get("event") == "injected"]
     delivered: List[Seen] = scene.capture.delivered() if scene.capture else []
+    if scene.capture and case.needs_lab:  # no one knows which datagrams arrived while the laboratory dropped packets
+        flows = {c.number for c in scene.capture.connections if isinstance(c, DatagramFlow)}
+        delivered = [s for s in delivered if s.connection not in flows or not began <= s.mono <= ended]
     return Observation(
         began=began, ended=ended, watched_until=watched_until, tapped=scene.tapped, published=published,
         true_pings=scene.capture.seen() if scene.capture else [], delivered=delivered,

@@ -14,6 +14,7 @@ from .. import lab
 from ..control import Control, ControlError
 from ..daemon import Daemon
 from .driver import Driver, Published
+from .truth import reader_for
 from .verdicts import sort_published
 from .wire import Capture
 
@@ -119,8 +120,8 @@ class Scene:
 
     @property
     def reads_pings(self) -> bool:
-        """Whether the truth can be read from the wire: there is a capture, and it is the Oculus protocol."""
-        return self.capture is not None and bool(self.spec["profile"].startswith("oculus"))
+        """Whether the truth can be read from the wire: there is a capture, and a reader of the make's protocol."""
+        return self.capture is not None and reader_for(self.spec["profile"]) is not None
 
     def say(self, what: str) -> None:
         self.moments.append((time.monotonic(), what))

@@ -1,12 +1,13 @@
 """The pings that a stream really contains, whatever faults are in it: what a driver may publish.
 
-A ping counts when the samples it announces are there: image, dimensions and one of the lengths agree, and no header of another
+An Oculus' ping counts when the samples it announces are there: image, dimensions and one of the lengths agree, and no header of another
 message lies inside. So a driver may use any of the length fields, as long as what it publishes is what the sonar measured.
 """
 from __future__ import annotations
 
+import struct
 import zlib
-from typing import FrozenSet, List, NamedTuple
+from typing import Callable, Dict, FrozenSet, List, NamedTuple, Optional, Protocol
 
 from .. import layouts
 
@@ -23,6 +24,12 @@ class TruePing(NamedTuple):
     begin: int       # offset in the stream
     end: int
     start_s: float   # start of the ping in the device's clock; versions 0 and 1: the raw counter
+
+
+class Reader(Protocol):
+    """Finds the pings of one make in the bytes of a connection; feed() returns those that became complete."""
+
+    def feed(self, received: bytes) -> List[TruePing]: ...
 
 
 def sample_crcs(image: bytes, rows: int, row_bytes: int, has_gains: bool) -> FrozenSet[int]:
@@ -100,3 +107,63 @@ class TruthReader:
         found.append(TruePing(f.number, sample_crcs(image, f.rows, row_bytes, has_gains), f.rows, f.beams, self._base + at,
                               self._base + at + end, start))
         return end
+
+
+# Messages of the ping protocol that have what a driver publishes: its number, and where in it a number of the ping stands.
+_PROFILE, _MONO_PROFILE, _DEVICE_DATA, _AUTO_DEVICE_DATA, _ATOF = 1300, 2198, 2300, 2301, 3012
+_NUMBER_AT: Dict[int, Optional[int]] = {_PROFILE: 8, _MONO_PROFILE: None, _DEVICE_DATA: None, _AUTO_DEVICE_DATA: None, _ATOF: 20}
+_FRAME = struct.Struct("<2sHHBB")  # "BR", length of the payload, message, source, destination; behind the payload a sum of 16 bits
+
+
+class PingProtocolReader:
+    """Finds undamaged messages of the ping protocol, at any offset. The samples are the payload of such a message. Where it has no
+    number, pings count down from -1: no driver prints such a number, and no two are one ping."""
+
+    def __init__(self) -> None:
+        self._data = bytearray()
+        self._base = self._without_number = 0
+
+    def feed(self, received: bytes) -> List[TruePing]:
+        self._data += received
+        found: List[TruePing] = []
+        at, waiting = 0, -1  # waiting: the first message that is not complete; one behind it shows that it is none
+        while (begin := self._data.find(b"BR", at)) >= 0:
+            end = self._end(begin)
+            if end > 0:
+                self._add(begin, end, found)
+            elif end < 0 and waiting < 0:
+                waiting = begin
+            at, waiting = (end, -1) if end > 0 else (begin + 1, waiting)
+        kept = waiting if waiting >= 0 else max(at, len(self._data) - self._data.endswith(b"B"))
+        del self._data[:kept]
+        self._base += kept
+        return found
+
+    def _end(self, begin: int) -> int:
+        """Where an undamaged message ends; 0 if this is none, -1 while bytes of it are missing."""
+        if len(self._data) - begin < _FRAME.size:
+            return -1
+        end = begin + _FRAME.size + int.from_bytes(self._data[begin + 2:begin + 4], "little") + 2
+        if len(self._data) < end:
+            return -1
+        return end if sum(self._data[begin:end - 2]) & 0xFFFF == int.from_bytes(self._data[end - 2:end], "little") else 0
+
+    def _add(self, begin: int, end: int, found: List[TruePing]) -> None:
+        message = int.from_bytes(self._data[begin + 4:begin + 6], "little")
+        if message not in _NUMBER_AT:
+            return
+        payload = bytes(self._data[begin + _FRAME.size:end - 2])
+        number_at = _NUMBER_AT[message]
+        if number_at is None or len(payload) < number_at + 4:
+            self._without_number -= 1
+            number = self._without_number
+        else:
+            number = int.from_bytes(payload[number_at:number_at + 4], "little")
+        found.append(TruePing(number, frozenset({zlib.crc32(payload)}), 1, len(payload), self._base + begin, self._base + end, 0.0))
+
+
+def reader_for(profile: str) -> Optional[Callable[[], Reader]]:
+    """What finds the pings of such a product; None where none is written: its data are not judged."""
+    if profile.startswith("oculus"):
+        return TruthReader
+    return PingProtocolReader if profile.startswith(("ping", "omniscan", "surveyor")) else None

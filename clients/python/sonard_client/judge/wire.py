@@ -10,16 +10,17 @@ import socket
 import struct
 import threading
 import time
-from typing import Deque, Dict, List, NamedTuple, Optional, Tuple
+from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Tuple
 
 from .. import layouts
-from .truth import TruePing, TruthReader
+from .truth import Reader, TruePing, TruthReader
 
 _ALL_PROTOCOLS, _OUTGOING = 0x0003, 4
 _FIN, _SYN, _RST, _PSH, _ACK = 1, 2, 4, 8, 16
 _STREAM_KEPT = 48 << 20   # bytes of a connection kept for the hex view
 _BEFORE, _AFTER = 512 << 10, 1280 << 10  # bytes of packets kept before and after the fault
 _WRAP = 1 << 32
+_MOST_FRAGMENTED = 64     # datagrams whose fragments are kept at once
 
 
 class Seen(NamedTuple):
@@ -32,11 +33,11 @@ class Seen(NamedTuple):
 class Connection:
     """One TCP connection of the driver."""
 
-    def __init__(self, number: int, peer: str, mono: float) -> None:
+    def __init__(self, number: int, peer: str, mono: float, reader: Callable[[], Reader] = TruthReader) -> None:
         self.number, self.peer, self.opened, self.established = number, peer, mono, False
         self.ended: Optional[float] = None
         self.ended_by = ""            # "driver FIN", "device RST", ...
-        self.fires: List[float] = []  # when settings were sent
+        self.fires: List[float] = []  # when settings or requests were sent
         self.zero_windows = 0
         self.sent = 0                 # bytes of the device, without repetitions
         self.acked = 0                # of them, acknowledged
@@ -44,7 +45,7 @@ class Connection:
         self.stream = bytearray()
         self._first: Optional[int] = None  # sequence number of the device's first byte
         self._waiting: Dict[int, bytes] = {}
-        self._reader = TruthReader()
+        self._reader = reader()
         self._repeat_until: Optional[int] = None
 
     def end(self, mono: float, by: str) -> None:
@@ -94,17 +95,34 @@ class Connection:
         fresh = self._repeat_until is None or (sequence - self._repeat_until) % _WRAP < _WRAP // 2
         if payload and fresh:
             self._repeat_until = (sequence + len(payload)) % _WRAP
-            if payload[:2] == layouts.MAGIC and payload[6:8] == struct.pack("<H", layouts.FIRE):
+            if payload[:2] == b"BR" or payload[:2] == layouts.MAGIC and payload[6:8] == struct.pack("<H", layouts.FIRE):
                 self.fires.append(mono)
+
+
+class DatagramFlow(Connection):
+    """Datagrams between the sonar and one port of the driver. It begins with the driver's first one; nothing says that it ends.
+    What was on the wire counts as delivered: UDP has no acknowledgement."""
+
+    def __init__(self, number: int, peer: str, mono: float, reader: Callable[[], Reader]) -> None:
+        super().__init__(number, peer, mono, reader)
+        self.established = True
+
+    def datagram(self, mono: float, payload: bytes) -> None:
+        self._take(mono, payload)
+        self.acked = self.sent
 
 
 class Capture(threading.Thread):
     """Reads an interface from start() to stop(). Needs CAP_NET_RAW, as a namespace of one's own gives.
 
-    interface: "lo" or the end of the cable. device: the sonar's address."""
+    interface: "lo" or the end of the cable. device: the sonar's address. reader: what finds the pings of its make."""
 
-    def __init__(self, interface: str, device: str, port: int = layouts.DATA_PORT) -> None:
+    def __init__(self, interface: str, device: str, port: int = layouts.DATA_PORT,
+                 reader: Callable[[], Reader] = TruthReader) -> None:
         super().__init__(daemon=True)
+        self._reader = reader
+        self._flows: Dict[Tuple[bytes, int], DatagramFlow] = {}
+        self._fragments: Dict[Tuple[bytes, bytes, bytes], Dict[int, bytes]] = {}  # of datagrams that are not complete
         self._lo, self._device, self._port = interface == "lo", ipaddress.IPv4Address(device).packed, port
         self.connections: List[Connection] = []
         self.lost_packets = 0
@@ -188,11 +206,50 @@ class Capture(threading.Thread):
         at = ip + header
         if protocol == 17:
             self._keep(utc_ns, packet)
+            datagram = self._whole_datagram(packet, ip, at, end)
+            if len(datagram) >= 8:
+                self._udp(mono, source, destination, datagram)
         elif protocol == 6 and len(packet) >= at + 20:
             if end == ip:  # more than a length field holds: one large segment of the network card
                 end = len(packet)
             if self._tcp(mono, source, destination, packet, at, end):
                 self._keep(utc_ns, packet)
+
+    def _whole_datagram(self, packet: bytes, ip: int, at: int, end: int) -> bytes:
+        """With its header; empty while fragments are missing."""
+        place = struct.unpack_from(">H", packet, ip + 6)[0]
+        offset, more = (place & 0x1FFF) * 8, bool(place & 0x2000)
+        if offset == 0 and not more:
+            return packet[at:end]
+        key = (packet[ip + 12:ip + 16], packet[ip + 16:ip + 20], packet[ip + 4:ip + 6])
+        if len(self._fragments) > _MOST_FRAGMENTED:  # some never become complete
+            self._fragments.clear()
+        parts = self._fragments.setdefault(key, {})
+        parts[offset] = packet[at:end]
+        whole = b""
+        for begin in sorted(parts):
+            if begin != len(whole):
+                return b""
+            whole += parts[begin]
+        if len(whole) < 8 or len(whole) < struct.unpack_from(">H", whole, 4)[0]:
+            return b""
+        del self._fragments[key]
+        return whole
+
+    def _udp(self, mono: float, source: bytes, destination: bytes, datagram: bytes) -> None:
+        source_port, destination_port = struct.unpack_from(">HH", datagram)
+        payload = datagram[8:]
+        if source == self._device and source_port == self._port:
+            flow = self._flows.get((destination, destination_port))
+            if flow is not None:
+                flow.datagram(mono, payload)
+        elif destination == self._device and destination_port == self._port:
+            key = (source, source_port)
+            if key not in self._flows:
+                peer = f"{ipaddress.IPv4Address(source)}:{source_port}"
+                self._flows[key] = DatagramFlow(len(self.connections) + 1, peer, mono, self._reader)
+                self.connections.append(self._flows[key])
+            self._flows[key].fires.append(mono)
 
     def _tcp(self, mono: float, source: bytes, destination: bytes, packet: bytes, at: int, end: int) -> bool:
         source_port, destination_port, sequence, ack, offset, flags, window = struct.unpack_from(">HHIIBBH", packet, at)
@@ -208,7 +265,7 @@ class Capture(threading.Thread):
                 old = self._open.get(key)
                 if old is None or old.established or old.ended is not None:
                     peer = f"{ipaddress.IPv4Address(source)}:{source_port}"
-                    self._open[key] = Connection(len(self.connections) + 1, peer, mono)
+                    self._open[key] = Connection(len(self.connections) + 1, peer, mono, self._reader)
                     self.connections.append(self._open[key])
                 return True
             connection = self._open.get(key)

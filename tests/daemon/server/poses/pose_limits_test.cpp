@@ -94,6 +94,15 @@ TEST_F(PoseLimits, FloodsThatHaveEndedSteerNothingAndHoldNoPlace) {
   EXPECT_TRUE(is_at_x(33, 0, milliseconds(0))) << "and nothing moves it away again";
 }
 
+/// The sender's kernel holds megabytes after the close, and hands them over only as fast as this end reads.
+TEST_F(PoseLimits, WhatTheSendersKernelHoldsAfterItsEndIsDropped) {
+  begin("input_bytes_per_s: 1048576");
+  constexpr std::size_t sent = 16 << 20;
+  Client(daemon->address(), port).send(lines(sent) + line_at_x(77));  // and gone
+  EXPECT_TRUE(is_at_x(77));
+  EXPECT_LT(heard() * 50, sent / 2);
+}
+
 TEST_F(PoseLimits, TheLastPoseOfOneThatSendsAndLeavesActs) {
   begin("input_bytes_per_s: 65536");
   for (int i = 1; i <= 5; ++i) {
