@@ -56,8 +56,13 @@ void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
 void remark_on_places(const SceneDescription& scene, Remarks& out) {
   const auto far =
       names_where(scene, [](const DescribedObject& o) { return !o.in_world.empty() && o.in_world.distance_m({}) > far_m; });
+  const auto far_grid = std::find_if(scene.objects.begin(), scene.objects.end(), [](const DescribedObject& o) {
+    return o.kind == "heightmap" && !o.in_world.empty() && o.in_world.distance_m({}) > far_m;
+  });
   if (!far.empty())
-    out.warnings.push_back(std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far));
+    out.warnings.push_back(
+        std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far) +
+        (far_grid == scene.objects.end() ? "" : "; centred: true brings the middle of " + far_grid->file + " to its pose"));
   const auto above = names_where(
       scene, [](const DescribedObject& o) { return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > 0; });
   const auto grid = std::find_if(scene.objects.begin(), scene.objects.end(), [](const DescribedObject& o) {

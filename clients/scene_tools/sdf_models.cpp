@@ -46,7 +46,11 @@ std::string fetch_command(std::string_view uri) {
   constexpr std::string_view safe = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789:/._-+~% ";
   if (!uri.starts_with("https://") && !uri.starts_with("http://")) return {};
   if (uri.size() > 200 || uri.find_first_not_of(safe) != std::string_view::npos) return {};
-  return "gz fuel download --url '" + std::string(uri) + "'";
+  std::string url(uri);  // the command does not take the addresses of web pages
+  for (const std::string_view page : {"://app.gazebosim.org/", "://app.ignitionrobotics.org/"})
+    if (const std::size_t at = url.find(page), models = url.find("/fuel/models/"); at != url.npos && models != url.npos)
+      url.replace(models, 13, "/models/").replace(0, at + page.size(), "https://fuel.gazebosim.org/1.0/");
+  return "gz fuel download --url '" + url + "'";
 }
 
 std::string text_or(std::string_view text, const char* otherwise) { return std::string(text.empty() ? otherwise : text); }

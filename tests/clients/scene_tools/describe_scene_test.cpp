@@ -112,6 +112,9 @@ TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
   files.write("km.asc", "ncols 2\nnrows 2\ncellsize 0.5\n-20 -40 -22 -23\n");
   EXPECT_THAT(remarks("objects: [{name: bed, type: heightmap, file: km.asc, material: sand, geographic: false}]\n").warnings,
               ElementsAre(HasSubstr("degrees (geographic: true), or kilometres?")));
+  files.write("utm.asc", "ncols 2\nnrows 2\nxllcorner 5e5\nyllcorner 6.6e6\ncellsize 10\n-20 -40 -22 -23\n");
+  EXPECT_THAT(remarks("objects: [{name: bed, type: heightmap, file: utm.asc, material: sand}]\n").warnings,
+              ElementsAre(HasSubstr("every product: bed; centred: true brings the middle of utm.asc to its pose")));
 }
 
 TEST_F(DescribeScene, ErrorsAreTheLoadersOwn) {

@@ -216,6 +216,13 @@ TEST(ReadSdf, MissingModelsAreNamedOnceEachWithTheCommandThatFetchesThem) {
                                                  "w.sdf:5: include of model://gone: not found"));
 }
 
+TEST(ReadSdf, AddressesOfWebPagesAreNotGivenToTheCommand) {
+  Reading r;
+  for (const char* page : {"app.gazebosim.org", "app.ignitionrobotics.org"})
+    EXPECT_THAT(r.error(sdf("<include><uri>https://" + std::string(page) + "/Cole/fuel/models/Ocean Rock 03</uri></include>")),
+                HasSubstr("gz fuel download --url 'https://fuel.gazebosim.org/1.0/Cole/models/Ocean Rock 03'"));
+}
+
 TEST(ReadSdf, NoCommandIsGivenForAddressesThatAShellWouldRun) {
   Reading r;
   for (const char* more : {"$(id)", "`id`", "x' ; id ; '", "x\" ; id ; \"", "a\nid", "a;id", "a|id", "a&amp;id", "a\\"}) {
