@@ -94,6 +94,11 @@ TEST_F(DescribeScene, WarnsOfWhatLooksWrong) {
                                    HasSubstr("mm: big.stl is 3 mm long"), HasSubstr("more than 1 km from the origin"),
                                    HasSubstr("wholly above z = 0, the water's surface: gull"), HasSubstr("no seabed")));
   EXPECT_THAT(remarks("objects: []").warnings, ElementsAre(HasSubstr("the scene is empty")));
+  // Ground as a mesh may be long.
+  files.write("bed.obj", "v 0 0 -9\nv 300 0 -9\nv 300 250 -8\nf 1 2 3\n");
+  EXPECT_THAT(remarks("objects: [{name: bed, type: mesh, file: bed.obj, material: sand}]").warnings, IsEmpty());
+  EXPECT_THAT(remarks("objects: [{name: bed, type: mesh, file: bed.obj, material: sand, scale: 100}]").warnings,
+              ElementsAre(HasSubstr("bed: bed.obj is 30000 m long")));
 }
 
 TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
