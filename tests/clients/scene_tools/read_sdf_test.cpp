@@ -177,6 +177,16 @@ TEST(ReadSdf, WhatASceneCannotHoldIsNamedOnceWithItsLine) {
                           "w.sdf:5: geometry polyline: scenes have no such shape", "model:/cam:2: sensor \"eye\""));
 }
 
+TEST(ReadSdf, ThePlaceOfAWorldIsGivenAsTheKeyThatTakesIt) {
+  Reading r;
+  ASSERT_TRUE(
+      r.read(sdf("<spherical_coordinates><latitude_deg>56.71</latitude_deg><longitude_deg>-3.5</longitude_deg>"
+                 "</spherical_coordinates>" +
+                 model("m", link("l")))));
+  EXPECT_THAT(r.findings.left_out(),
+              ElementsAre("w.sdf:3: spherical_coordinates: in the configuration, world.origin: {lat: 56.71, lon: -3.5}"));
+}
+
 TEST(ReadSdf, MistakesAreToldWithFileAndLine) {
   Reading r;
   EXPECT_THAT(r.error(sdf(model("m", link("base", "<pose relative_to='bse'/>")))),
