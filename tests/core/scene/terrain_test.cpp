@@ -181,7 +181,8 @@ TEST(EsriGrid, KnowsNoDataInEveryForm) {
     EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value " + few_digits, few_digits), false), "1") << few_digits;
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -99999.99", "-99999.9921875"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value 0", "0"), false), "1");
-  for (const char* fill : {"-32768", "-99999", "-3.4028234663852886e+38", "9.96921e+36"})
+  for (const char* fill :
+       {"-32768", "-99999", "-9999999", "-2147483648", "2147483647", "4294967295", "-3.4028234663852886e+38", "9.96921e+36"})
     EXPECT_EQ(holes_in(grid_of(metre, fill), true), "1") << fill;
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -32768", "-9999"), true), "1");
   // Ground deeper than 9999 m is none.
