@@ -16,6 +16,7 @@ bool is_true(std::string_view text) { return text == "true" || text == "1"; }
 /// The name of a model in small letters: "coast water" for ".../models/Coast%20Water/2".
 std::string model_name(std::string_view uri) {
   const auto last = [&] { return uri.substr(uri.find_last_of('/') + 1); };
+  uri = uri.substr(0, uri.find("/files/"));  // a file in a model of Fuel
   while (uri.ends_with('/')) uri.remove_suffix(1);
   while (uri.find('/') != std::string_view::npos &&
          (last() == "tip" || last().find_first_not_of("0123456789") == std::string_view::npos))

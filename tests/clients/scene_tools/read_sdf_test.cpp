@@ -169,10 +169,11 @@ TEST(ReadSdf, WhatASceneCannotHoldIsNamedOnceWithItsLine) {
                 "<link name='l'><inertial/><visual name='v'><geometry><polyline/></geometry></visual></link>") +
           "\n<include><uri>model://cam</uri></include><include><uri>model://cam</uri><name>b</name></include>"
           "<include><uri>model://sun</uri></include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Sun/2</uri>"
-          "</include><include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/North East Down frame</uri></include>"));
+          "</include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Sun/tip/files/model.sdf</uri></include>"
+          "<include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/North East Down frame</uri></include>"));
   ASSERT_TRUE(world) << world.error().text;
   EXPECT_THAT(r.findings.left_out(),
-              ElementsAre("1 coordinate frame (North East Down frame), 3 lights: without an echo", "w.sdf:4: actor \"walker\"",
+              ElementsAre("1 coordinate frame (North East Down frame), 4 lights: without an echo", "w.sdf:4: actor \"walker\"",
                           "w.sdf:5: plugin \"p\"", "w.sdf:5: joint \"j\" (prismatic): stays as it is drawn",
                           "w.sdf:5: geometry polyline: scenes have no such shape", "model:/cam:2: sensor \"eye\""));
 }
