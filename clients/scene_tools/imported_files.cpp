@@ -112,7 +112,7 @@ bool FileResolver::convert(PlacedShape& placed, const fs::path& file) {
 bool FileResolver::resolve_heightmap(PlacedShape& placed, const fs::path& file) {
   const std::string what = std::string("heightmap ") + plain(placed.shape.uri, 200) + ": ";
   if (mesh_extension(file) != ".png")
-    return findings_.leave_out(placed.at, what + "a scene reads grey PNG, or ESRI ASCII grids (gdal_translate -of AAIGrid)"),
+    return findings_.leave_out(placed.at, what + "only grey PNG is imported; add a grid by hand, as an object of type heightmap"),
            false;
   if (try_files_) {
     const Vec3d size = placed.shape.size_m;

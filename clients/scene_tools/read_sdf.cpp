@@ -49,6 +49,12 @@ class SdfReader {
           findings_.leave_out_of_no_echo("light");
           continue;
         }
+        if (kind == "spherical_coordinates") {
+          findings_.leave_out(element.place(), "spherical_coordinates: in the configuration, world.origin: {lat: " +
+                                                   plain(element.child("latitude_deg").text(), 30) +
+                                                   ", lon: " + plain(element.child("longitude_deg").text(), 30) + "}");
+          continue;
+        }
       } else if (kind == "joint") {
         if (element.attribute("type") != "fixed")
           findings_.leave_out(element.place(),

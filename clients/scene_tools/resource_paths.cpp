@@ -1,6 +1,7 @@
 #include "clients/scene_tools/resource_paths.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -157,8 +158,11 @@ std::vector<fs::path> fuel_caches() {
 }
 
 fs::path find_in_fuel_caches(const FuelAddress& address) {
-  std::vector<std::string> hosts{address.host, "fuel.gazebosim.org", "fuel.ignitionrobotics.org"};  // two names of one server
-  if (address.host != hosts[1] && address.host != hosts[2] && address.host != "app.gazebosim.org") hosts.resize(1);
+  static constexpr std::array<std::string_view, 4> of_one_server{"fuel.gazebosim.org", "fuel.ignitionrobotics.org",
+                                                                 "app.gazebosim.org", "app.ignitionrobotics.org"};
+  std::vector<std::string> hosts{address.host};
+  if (std::find(of_one_server.begin(), of_one_server.end(), address.host) != of_one_server.end())
+    hosts.insert(hosts.end(), {std::string(of_one_server[0]), std::string(of_one_server[1])});
   for (const fs::path& cache : fuel_caches())
     for (const std::string& host : hosts) {
       fs::path model = cache;

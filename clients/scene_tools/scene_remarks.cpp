@@ -10,6 +10,7 @@ namespace {
 
 constexpr double far_m = 1000, tiny_m = 0.005, wide_m = 5;
 constexpr double tiny_ground_m = 1, steepest_ground = 10;  // width of the ground; its height over its width
+constexpr double flat_ground = 0.1, huge_ground_m = 5000;  // the same of ground as a mesh, which may be long
 constexpr std::size_t many_triangles = 2'000'000;
 
 std::string list_of(const std::vector<std::string>& names) {
@@ -48,7 +49,8 @@ void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
       out.warnings.push_back(o.name + ": " + o.file + " is " + size_text(size) +
                              " m; are its coordinates degrees (geographic: true), or kilometres?");
     if (o.kind != "mesh") continue;
-    if (o.own.longest_m() > huge_mesh_m) warn(o, huge_mesh_cure);
+    const bool is_flat = std::min(size.x, size.y) >= wide_m && size.z < flat_ground * std::min(size.x, size.y);
+    if (o.own.longest_m() > (is_flat ? huge_ground_m : huge_mesh_m)) warn(o, huge_mesh_cure);
     if (o.own.longest_m() < tiny_m) warn(o, "lengths are metres after scale: is scale too small?");
   }
 }
@@ -56,8 +58,13 @@ void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
 void remark_on_places(const SceneDescription& scene, Remarks& out) {
   const auto far =
       names_where(scene, [](const DescribedObject& o) { return !o.in_world.empty() && o.in_world.distance_m({}) > far_m; });
+  const auto far_grid = std::find_if(scene.objects.begin(), scene.objects.end(), [](const DescribedObject& o) {
+    return o.kind == "heightmap" && !o.in_world.empty() && o.in_world.distance_m({}) > far_m;
+  });
   if (!far.empty())
-    out.warnings.push_back(std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far));
+    out.warnings.push_back(
+        std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far) +
+        (far_grid == scene.objects.end() ? "" : "; centred: true brings the middle of " + far_grid->file + " to its pose"));
   const auto above = names_where(
       scene, [](const DescribedObject& o) { return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > 0; });
   const auto grid = std::find_if(scene.objects.begin(), scene.objects.end(), [](const DescribedObject& o) {

@@ -16,6 +16,7 @@ bool is_true(std::string_view text) { return text == "true" || text == "1"; }
 /// The name of a model in small letters: "coast water" for ".../models/Coast%20Water/2".
 std::string model_name(std::string_view uri) {
   const auto last = [&] { return uri.substr(uri.find_last_of('/') + 1); };
+  uri = uri.substr(0, uri.find("/files/"));  // a file in a model of Fuel
   while (uri.ends_with('/')) uri.remove_suffix(1);
   while (uri.find('/') != std::string_view::npos &&
          (last() == "tip" || last().find_first_not_of("0123456789") == std::string_view::npos))
@@ -46,7 +47,11 @@ std::string fetch_command(std::string_view uri) {
   constexpr std::string_view safe = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789:/._-+~% ";
   if (!uri.starts_with("https://") && !uri.starts_with("http://")) return {};
   if (uri.size() > 200 || uri.find_first_not_of(safe) != std::string_view::npos) return {};
-  return "gz fuel download --url '" + std::string(uri) + "'";
+  std::string url(uri);  // the command does not take the addresses of web pages
+  for (const std::string_view page : {"://app.gazebosim.org/", "://app.ignitionrobotics.org/"})
+    if (const std::size_t at = url.find(page), models = url.find("/fuel/models/"); at != url.npos && models != url.npos)
+      url.replace(models, 13, "/models/").replace(0, at + page.size(), "https://fuel.gazebosim.org/1.0/");
+  return "gz fuel download --url '" + url + "'";
 }
 
 std::string text_or(std::string_view text, const char* otherwise) { return std::string(text.empty() ? otherwise : text); }

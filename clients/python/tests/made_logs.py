@@ -322,7 +322,7 @@ def ulog_message(kind, content):
     return struct.pack("<HB", len(content), ord(kind)) + content
 
 
-def ulog(truth=False, steps=50):
+def ulog(truth=False, steps=50, has_place=True):
     formats = ["vehicle_attitude:uint64_t timestamp;uint64_t timestamp_sample;float[4] q;float[4] delta_q_reset;uint8_t n;"
                "uint8_t[7] _padding0",
                "vehicle_local_position:uint64_t timestamp;float x;float y;float z;double ref_lat;double ref_lon;float ref_alt;"
@@ -340,7 +340,7 @@ def ulog(truth=False, steps=50):
         stamp = round(1e6 * t)
         out += ulog_message("D", struct.pack("<HQ4f", 9, stamp, *quaternion(1, 1, 1)))
         out += ulog_message("D", struct.pack("<HQQ4f4fB", 0, stamp + 2000, stamp, *quaternion(*angles), 0, 0, 0, 0, 1))
-        out += ulog_message("D", struct.pack("<HQ3f2df4?", 1, stamp, north, east, down, *ORIGIN, True, step > 0, True, True))
+        out += ulog_message("D", struct.pack("<HQ3f2df4?", 1, stamp, north, east, down, *ORIGIN, has_place, step > 0, True, True))
         if truth:
             out += ulog_message("D", struct.pack("<HQ4f", 2, stamp, *quaternion(*angles)))
             out += ulog_message("D", struct.pack("<HQ6f", 3, stamp, 0, 0, 0, north, east, down + 100))

@@ -57,7 +57,7 @@ class Ros:
     def __init__(self, **parameters):
         ros = self
         self.parameters, self.declared = parameters, {}
-        self.logged, self.subscribed, self.timers, self.published, self.static = [], {}, [], {}, []
+        self.logged, self.subscribed, self.timers, self.published, self.quality = [], {}, [], {}, {}
         self.now_ns, self.transform, self.spin, self.shut_down = 0, None, lambda node: None, 0
 
         class Node:
@@ -72,6 +72,7 @@ class Ros:
                 ros.subscribed[topic] = call
 
             def create_publisher(self, kind, topic, qos):
+                ros.quality[topic] = qos
                 sent = ros.published.setdefault(topic, [])
                 return types.SimpleNamespace(publish=sent.append)
 
@@ -95,10 +96,6 @@ class Ros:
                     raise NoTransform(f"{child} in {parent}")
                 return ros.transform()
 
-        class Broadcaster:
-            def __init__(self, node):
-                self.sendTransform = ros.static.append
-
         def message(*names):
             return {name: Message for name in names}
 
@@ -107,16 +104,22 @@ class Ros:
 
         made = {"rclpy": {"init": lambda: None, "spin": lambda node: ros.spin(node), "try_shutdown": shut,
                           "time": types.SimpleNamespace(Time=object)},
-                "rclpy.node": {"Node": Node}, "rclpy.qos": {"qos_profile_sensor_data": 5},
+                "rclpy.node": {"Node": Node}, "rclpy.qos": {"qos_profile_sensor_data": 5, "QoSProfile": Recorded,
+                              "DurabilityPolicy": types.SimpleNamespace(TRANSIENT_LOCAL="transient local")},
                 "rclpy.executors": {"ExternalShutdownException": ExternalShutdown},
                 "geometry_msgs": {}, "geometry_msgs.msg": message("PoseStamped", "TransformStamped"),
                 "nav_msgs": {}, "nav_msgs.msg": message("Odometry"),
                 "rcl_interfaces": {}, "rcl_interfaces.msg": message("ParameterDescriptor"),
                 "rosgraph_msgs": {}, "rosgraph_msgs.msg": message("Clock"),
                 "sensor_msgs": {}, "sensor_msgs.msg": message("LaserScan", "PointCloud2", "PointField"),
-                "tf2_ros": {"Buffer": Buffer, "TransformException": NoTransform, "TransformListener": Recorded,
-                            "StaticTransformBroadcaster": Broadcaster}}
+                "tf2_msgs": {}, "tf2_msgs.msg": message("TFMessage"),
+                "tf2_ros": {"Buffer": Buffer, "TransformException": NoTransform, "TransformListener": Recorded}}
         self.modules = modules_of(made)
+
+    @property
+    def static(self):
+        """The transforms of each message on /tf_static."""
+        return [message.transforms for message in self.published.get("/tf_static", [])]
 
     @contextlib.contextmanager
     def module(self):

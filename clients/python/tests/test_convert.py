@@ -322,6 +322,12 @@ class WithoutHorizontalPosition(WithFolder):
                 self.assertEqual(track.source, "ATT+depth")
                 self.assert_held(track, range(20))
 
+    def test_px4(self):
+        track = self.convert(made.ulog(has_place=False))
+        self.assertEqual(track.source, "vehicle_attitude+depth")
+        self.assert_held(track, range(1, 50))  # the first depth is not valid
+        self.assert_held(self.convert(made.ulog(has_place=False), at=(3, 4)), range(1, 50), (3, 4))
+
     def test_a_filter_whose_position_does_not_change_is_reported(self):
         log = self.dataflash("XKF1", lambda down, angles: [(0, *angles, 0, 0, 0, 0, 0.5, 0.25, down, 0, 0, 0, 0)])
         track = self.convert(log)
@@ -374,10 +380,11 @@ class RecordingsOfRos2(WithFolder):
                         made.db3(folder / name, [("/odom", "nav_msgs/msg/Odometry", messages)])
                     else:
                         (folder / name).write_bytes(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", messages)]))
-                self.assertEqual(format_of(folder), kind)
-                track = convert(folder, warn=self.warned.append)
-                self.assertEqual(self.warned, [])
-                self.assert_track(track, range(6), t0=100, metres=1e-9, radians=1e-6)
+                for named in (folder, folder / "metadata.yaml"):
+                    self.assertEqual(format_of(named), kind)
+                    track = convert(named, warn=self.warned.append)
+                    self.assertEqual(self.warned, [])
+                    self.assert_track(track, range(6), t0=100, metres=1e-9, radians=1e-6)
                 shutil.rmtree(folder)
 
     def test_folders_without_files(self):

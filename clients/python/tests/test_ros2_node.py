@@ -265,6 +265,7 @@ class Mounts(WithNode):
         for x in (0.3, 0.3 + 1e-9, 0.3):
             ros.node.on_mounts([world, self.mount(x=x), self.mount("left")])
         self.assertEqual(len(ros.static), 1)
+        self.assertEqual(ros.quality["/tf_static"].named, {"depth": 1, "durability": "transient local"})
         (front, left), = ros.static
         self.assertEqual((front.header.frame_id, front.child_frame_id, left.child_frame_id), ("rov", "front", "left"))
         self.assertEqual((front.transform.translation.x, front.transform.rotation.w, front.transform.rotation.x), (0.3, 1, 0))

@@ -15,10 +15,11 @@ from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan, PointCloud2, PointField
-from tf2_ros import Buffer, StaticTransformBroadcaster, TransformException, TransformListener
+from tf2_msgs.msg import TFMessage
+from tf2_ros import Buffer, TransformException, TransformListener
 
 from . import live_view
 from .conversions import Unusable, json_line, name_in_topic, scan_of, stamp_ns, stamp_s, vehicle_in, wxyz, xyzw
@@ -158,7 +159,9 @@ class Bridge(Node):
         self.of_sonars = {}  # publishers, by topic
         self.last_clock_ns = -1
         if wanted["tf_static"]:
-            self.static = StaticTransformBroadcaster(self)  # latched: late listeners get the last one
+            # Late listeners get the last message. The StaticTransformBroadcaster of Jazzy ignores changes of a known frame.
+            latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            self.static = self.create_publisher(TFMessage, "/tf_static", latched)
         if wanted["clock"]:
             self.clock_topic = self.create_publisher(Clock, "/clock", 10)
         endings = [ending for name, ending in (("clouds", "/cloud"), ("scans", "/truth")) if wanted[name]]
@@ -205,7 +208,7 @@ class Bridge(Node):
             place.x, place.y, place.z = t.position
             turn.x, turn.y, turn.z, turn.w = xyzw(t.orientation)
             messages.append(message)
-        self.static.sendTransform(messages)
+        self.static.publish(TFMessage(transforms=messages))
 
     def publisher_of(self, kind, topic: str, ending: str):
         name = f"~/{name_in_topic(topic.split('/')[1])}/{ending}"

@@ -16,7 +16,8 @@ constexpr std::size_t most_bytes = std::size_t{512} << 20;
 // Words of a file with their line numbers, read through one block of memory.
 class Words {
  public:
-  explicit Words(std::string text) : text_(std::move(text)) {}
+  explicit Words(std::string text)
+      : text_(std::move(text)), at_(text_.starts_with(byte_order_mark) ? byte_order_mark.size() : 0) {}
   std::string_view next() {
     while (at_ < text_.size() && is_space(text_[at_])) line_ += text_[at_++] == '\n';
     const std::size_t from = at_;
@@ -29,7 +30,7 @@ class Words {
  private:
   static bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
   std::string text_;
-  std::size_t at_ = 0, line_ = 1;
+  std::size_t at_, line_ = 1;
 };
 
 std::string lower(std::string_view s) {

@@ -146,6 +146,15 @@ std::optional<std::uint16_t> unit_of_band(std::string_view metadata) {
                                                                                                    : std::nullopt;
 }
 
+/// Whether an item of that role has another value than the neutral one, which changes no height.
+bool has_other(std::string_view metadata, std::string_view role, double neutral) {
+  for (std::size_t at = metadata.find(role); at != metadata.npos; at = metadata.find(role, at + 1)) {
+    const std::size_t from = at + role.size();
+    if (height_number(metadata.substr(from, metadata.find('<', from) - from)) != neutral) return true;
+  }
+  return false;
+}
+
 class GeoTiffReader {
  public:
   GeoTiffReader(TIFF* tiff, const std::filesystem::path& file, const HeightOptions& options)
@@ -245,7 +254,7 @@ class GeoTiffReader {
     const auto more = values_of<char>(tiff_, gdal_metadata, TIFF_ASCII);
     const std::string_view metadata(more.data(), more.size());
     // Heights that are not what the cells hold would be wrong by a factor without a word.
-    if (metadata.find("role=\"scale\"") != metadata.npos || metadata.find("role=\"offset\"") != metadata.npos)
+    if (has_other(metadata, "role=\"scale\">", 1) || has_other(metadata, "role=\"offset\">", 0))
       return bad("stores heights with a scale or an offset; write the heights themselves: gdal_translate -unscale -ot Float32");
     const Keys keys(values_of<std::uint16_t>(tiff_, key_directory, TIFF_SHORT));
     const auto model = keys.value_of(model_type);

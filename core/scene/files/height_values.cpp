@@ -16,8 +16,10 @@ constexpr double highest_m = 1e7, least_fill = 1e20;
 constexpr double farthest_deg = 5, nearest_pole_deg = 89;
 constexpr float none = std::numeric_limits<float>::quiet_NaN();
 /// Fill values of programs that write grids, besides those that no height can be.
-constexpr std::array<float, 12> usual_fills{-9999,   -32768, -32767, 32767, -99999, 99999,
-                                            -999999, 65535,  -999,   9999,  -10000, 999999};
+constexpr std::array<float, 14> usual_fills{-9999, -32768, -32767, 32767,  -99999,   99999,  -999999,
+                                            65535, -999,   9999,   -10000, -9999999, 999999, 9999999};
+/// The ends of whole numbers of 32 bits, which no height reaches.
+constexpr std::array<double, 4> ends_of_32_bits{-2147483648.0, -2147483647.0, 2147483647.0, 4294967295.0};
 
 /// The value of one unit in the last digit of a number as it is written.
 double last_digit(std::string_view word, double value) {
@@ -51,7 +53,7 @@ void take_out_fills(RawHeights& raw, std::vector<std::string>& notes) {
           text::format("%zu cell%s of %.0f, far from all heights, taken as no data, although the file does not declare it",
                        cells[k], cells[k] == 1 ? "" : "s", static_cast<double>(usual_fills[k])));
   if (raw.fill_values > 0)
-    notes.push_back(text::format("%zu cell%s beyond 1e20 m taken as no data, although the file does not declare it",
+    notes.push_back(text::format("%zu cell%s beyond every height taken as no data, although the file does not declare it",
                                  raw.fill_values, raw.fill_values == 1 ? "" : "s"));
 }
 
@@ -159,7 +161,9 @@ HeightValues::HeightValues(std::optional<std::string_view> declared) {
 std::optional<float> HeightValues::height_of(double value) {
   if (std::isnan(value) || (declared_ && std::abs(value - *declared_) <= tolerance_)) return none;
   if (std::abs(value) <= highest_m) return static_cast<float>(value);
-  if (std::abs(value) < least_fill) return std::nullopt;
+  const bool is_end = std::any_of(ends_of_32_bits.begin(), ends_of_32_bits.end(),
+                                  [&](double end) { return std::abs(value - end) <= 1; });  // single precision rounds them
+  if (std::abs(value) < least_fill && !is_end) return std::nullopt;
   ++fill_values_;
   return none;
 }

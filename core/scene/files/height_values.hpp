@@ -13,6 +13,8 @@ namespace sonar {
 /// The number of a grid file, which may have zeros before it ("007"); nan is one too.
 std::optional<double> height_number(std::string_view word);
 bool is_nan_word(std::string_view word);
+/// The byte order mark that may precede the first word of a text in UTF-8.
+constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
 /// Which values of a file stand for no data: nan, the declared one, and fill values beyond every height.
 class HeightValues {

@@ -7,6 +7,8 @@
 
 #include "core/base/load_step.hpp"
 #include "core/base/memory_left.hpp"
+#include "core/base/regular_file.hpp"
+#include "core/scene/files/height_values.hpp"
 #include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/shapes/primitives.hpp"
 #include "core/text/format.hpp"
@@ -14,6 +16,7 @@
 namespace sonar {
 namespace {
 
+using namespace std::string_view_literals;
 using text::Map;
 using text::Node;
 using text::Range;
@@ -31,6 +34,18 @@ std::string shape_key(std::string_view type, std::uint16_t material, std::initia
   key += ' ' + std::to_string(material);
   for (const double number : numbers) key += text::format(" %.17g", number);
   return key;
+}
+
+/// The usual extension of a grid by the first bytes of its file, which may have any name; empty if they are not of a grid.
+std::string grid_by_content(const std::filesystem::path& file) {
+  auto head = read_regular(file, 64);
+  if (!head) return {};
+  for (const std::string_view magic : {"II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv})
+    if (head->starts_with(magic)) return ".tif";
+  if (head->starts_with(byte_order_mark)) head->erase(0, byte_order_mark.size());
+  head->erase(0, head->find_first_not_of(" \t\r\n"));
+  for (char& c : *head) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
+  return head->starts_with("ncols ") || head->starts_with("ncols\t") ? ".asc" : "";
 }
 
 constexpr std::uint64_t memory_of_a_height = 64;  // bytes, while a grid becomes a mesh
@@ -191,7 +206,7 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   }
   const Node file = keys.required("file");
   const std::filesystem::path path = folder / file.text(1024);
-  const std::string extension = mesh_extension(path);
+  std::string extension = mesh_extension(path);
   std::error_code no_size;
   const std::uintmax_t bytes = std::filesystem::file_size(path, no_size);
   begin_load_step("reading " + path.filename().string(), no_size ? 0 : bytes / 4);
@@ -204,6 +219,7 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   using Read = Result<HeightGrid> (*)(const std::filesystem::path&, const HeightOptions&);
   static const std::map<std::string, Read> readers{
       {".asc", read_esri_heights}, {".xyz", read_xyz_heights}, {".tif", read_geo_tiff_heights}, {".tiff", read_geo_tiff_heights}};
+  if (!readers.contains(extension)) extension = grid_by_content(path);
   if (const auto reader = readers.find(extension); reader != readers.end()) {
     HeightOptions options{.z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000))};
     const bool centred = keys.optional("centred").boolean_or(false);

@@ -80,6 +80,7 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
   std::array<std::string_view, 3> words;
   std::size_t line = 0;
   bool north_first = false;
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
     const std::size_t count = split(text.substr(at, end - at), words);

@@ -94,6 +94,11 @@ TEST_F(DescribeScene, WarnsOfWhatLooksWrong) {
                                    HasSubstr("mm: big.stl is 3 mm long"), HasSubstr("more than 1 km from the origin"),
                                    HasSubstr("wholly above z = 0, the water's surface: gull"), HasSubstr("no seabed")));
   EXPECT_THAT(remarks("objects: []").warnings, ElementsAre(HasSubstr("the scene is empty")));
+  // Ground as a mesh may be long.
+  files.write("bed.obj", "v 0 0 -9\nv 300 0 -9\nv 300 250 -8\nf 1 2 3\n");
+  EXPECT_THAT(remarks("objects: [{name: bed, type: mesh, file: bed.obj, material: sand}]").warnings, IsEmpty());
+  EXPECT_THAT(remarks("objects: [{name: bed, type: mesh, file: bed.obj, material: sand, scale: 100}]").warnings,
+              ElementsAre(HasSubstr("bed: bed.obj is 30000 m long")));
 }
 
 TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
@@ -112,6 +117,9 @@ TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
   files.write("km.asc", "ncols 2\nnrows 2\ncellsize 0.5\n-20 -40 -22 -23\n");
   EXPECT_THAT(remarks("objects: [{name: bed, type: heightmap, file: km.asc, material: sand, geographic: false}]\n").warnings,
               ElementsAre(HasSubstr("degrees (geographic: true), or kilometres?")));
+  files.write("utm.asc", "ncols 2\nnrows 2\nxllcorner 5e5\nyllcorner 6.6e6\ncellsize 10\n-20 -40 -22 -23\n");
+  EXPECT_THAT(remarks("objects: [{name: bed, type: heightmap, file: utm.asc, material: sand}]\n").warnings,
+              ElementsAre(HasSubstr("every product: bed; centred: true brings the middle of utm.asc to its pose")));
 }
 
 TEST_F(DescribeScene, ErrorsAreTheLoadersOwn) {

@@ -117,12 +117,13 @@ TEST_F(ImportScene, FuelModelsAreFoundInTheCachesOfGazebo) {
                             "hmoyen/models/Sand Bed</uri><pose>0 0 -5 0 0 0</pose></include>" + fuel +
                             "hmoyen/models/Sand%20Bed/2</uri></include>" + fuel + "Cole/models/Coral01/tip</uri></include>" +
                             fuel + "hmoyen/models/Vase</uri></include>" +
-                            "<include><uri>https://app.gazebosim.org/hmoyen/fuel/models/Sand Bed</uri></include>"));
+                            "<include><uri>https://app.gazebosim.org/hmoyen/fuel/models/Sand Bed</uri></include>" +
+                            "<include><uri>https://app.ignitionrobotics.org/hmoyen/fuel/models/Sand Bed/</uri></include>"));
   ASSERT_TRUE(done) << done.error().text;
   EXPECT_THAT(done->left_out, ElementsAre("1 light: without an echo"));
   const auto described = describe_scene(options.out);
   ASSERT_TRUE(described) << described.error().text;
-  ASSERT_EQ(described->objects.size(), 5u) << text();
+  ASSERT_EQ(described->objects.size(), 6u) << text();
   EXPECT_EQ(described->objects[0].name, "bed");
   EXPECT_NEAR(described->objects[0].in_world.size_m().x, 20, 1e-5);
   EXPECT_NEAR(described->objects[0].in_world.centre_m().z, -5, 1e-5);

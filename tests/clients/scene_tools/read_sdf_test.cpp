@@ -169,12 +169,23 @@ TEST(ReadSdf, WhatASceneCannotHoldIsNamedOnceWithItsLine) {
                 "<link name='l'><inertial/><visual name='v'><geometry><polyline/></geometry></visual></link>") +
           "\n<include><uri>model://cam</uri></include><include><uri>model://cam</uri><name>b</name></include>"
           "<include><uri>model://sun</uri></include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Sun/2</uri>"
-          "</include><include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/North East Down frame</uri></include>"));
+          "</include><include><uri>https://fuel.gazebosim.org/1.0/OpenRobotics/models/Sun/tip/files/model.sdf</uri></include>"
+          "<include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/North East Down frame</uri></include>"));
   ASSERT_TRUE(world) << world.error().text;
   EXPECT_THAT(r.findings.left_out(),
-              ElementsAre("1 coordinate frame (North East Down frame), 3 lights: without an echo", "w.sdf:4: actor \"walker\"",
+              ElementsAre("1 coordinate frame (North East Down frame), 4 lights: without an echo", "w.sdf:4: actor \"walker\"",
                           "w.sdf:5: plugin \"p\"", "w.sdf:5: joint \"j\" (prismatic): stays as it is drawn",
                           "w.sdf:5: geometry polyline: scenes have no such shape", "model:/cam:2: sensor \"eye\""));
+}
+
+TEST(ReadSdf, ThePlaceOfAWorldIsGivenAsTheKeyThatTakesIt) {
+  Reading r;
+  ASSERT_TRUE(
+      r.read(sdf("<spherical_coordinates><latitude_deg>56.71</latitude_deg><longitude_deg>-3.5</longitude_deg>"
+                 "</spherical_coordinates>" +
+                 model("m", link("l")))));
+  EXPECT_THAT(r.findings.left_out(),
+              ElementsAre("w.sdf:3: spherical_coordinates: in the configuration, world.origin: {lat: 56.71, lon: -3.5}"));
 }
 
 TEST(ReadSdf, MistakesAreToldWithFileAndLine) {
@@ -214,6 +225,13 @@ TEST(ReadSdf, MissingModelsAreNamedOnceEachWithTheCommandThatFetchesThem) {
                                                      "download --url '" +
                                                      rock + "'",
                                                  "w.sdf:5: include of model://gone: not found"));
+}
+
+TEST(ReadSdf, AddressesOfWebPagesAreNotGivenToTheCommand) {
+  Reading r;
+  for (const char* page : {"app.gazebosim.org", "app.ignitionrobotics.org"})
+    EXPECT_THAT(r.error(sdf("<include><uri>https://" + std::string(page) + "/Cole/fuel/models/Ocean Rock 03</uri></include>")),
+                HasSubstr("gz fuel download --url 'https://fuel.gazebosim.org/1.0/Cole/models/Ocean Rock 03'"));
 }
 
 TEST(ReadSdf, NoCommandIsGivenForAddressesThatAShellWouldRun) {

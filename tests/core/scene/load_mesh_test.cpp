@@ -11,6 +11,7 @@
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
 #include "core/scene/files/binary_stl.hpp"
+#include "core/text/format.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/temporary_files.hpp"
 
@@ -362,6 +363,32 @@ TEST_F(LoadMesh, TrianglesOutsideOfTheSceneOfACollada) {
   const LoadedMesh twice = good("c.dae", changed("<node>", "<node><instance_geometry url=\"#g\"/>"));
   EXPECT_EQ(twice.centred.mesh.triangles.size(), 8u);
   EXPECT_EQ(twice.lost + twice.hidden, 0u);
+}
+
+// As models of vehicles are: three of bluerov2_gz have more than 4 MiB.
+TEST_F(LoadMesh, AColladaOfManyMebibytesIsRead) {
+  constexpr int edge = 350;
+  std::string places, corners;
+  for (int k = 0; k < edge * edge; ++k) {
+    places += text::format("%.9f %.9f %.9f ", 0.01 * (k % edge), 0.01 * (k / edge), 0.001 * (k % 7));
+    const int right = k + 1, up = k + edge, both = up + 1;
+    if (k % edge + 1 < edge && k / edge + 1 < edge) corners += text::format("%d %d %d %d %d %d ", k, right, both, k, both, up);
+  }
+  std::string whole = collada("Z_UP");
+  const auto put = [&](const std::string& from, const std::string& to, const std::string& content) {
+    const std::size_t at = whole.find(from) + from.size();
+    whole.replace(at, whole.find(to, at) - at, content);
+  };
+  put("<p>", "</p>", corners);
+  put("<triangles count=\"", "\"", std::to_string(2 * (edge - 1) * (edge - 1)));
+  put("count=\"12\">", "</float_array>", places);
+  put("<float_array id=\"a\" count=\"", "\"", std::to_string(3 * edge * edge));
+  put("<accessor source=\"#a\" count=\"", "\"", std::to_string(edge * edge));
+  ASSERT_GT(whole.size(), std::size_t{8} << 20);
+  const LoadedMesh mesh = good("vehicle.dae", whole);
+  EXPECT_EQ(mesh.centred.mesh.triangles.size(), 2u * (edge - 1) * (edge - 1));
+  EXPECT_EQ(mesh.lost + mesh.hidden, 0u);
+  EXPECT_NEAR(extent(mesh.centred).high.x, 0.01 * (edge - 1), 1e-6);
 }
 
 TEST_F(LoadMesh, FaultsOfAGlbAreNamed) {

@@ -201,8 +201,15 @@ objects:
   EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 1003, 1e-9);
   EXPECT_NEAR(scene->objects[0].in_world.position_m.z, -16.5, 1e-9);
   EXPECT_NEAR(scene->objects[1].in_world.position_m.x, 0, 1e-9);
-  EXPECT_THAT(refusal(object("type: heightmap, file: g.txt, material: sand"), files.folder()),
-              HasSubstr("unknown height format"));
+  for (const char* other : {"g.txt", "g.grd"}) {  // downloads have many names
+    const std::string grid = "type: heightmap, material: sand, file: " + std::string(other);
+    EXPECT_THAT(refusal(object(grid), files.folder()), HasSubstr("unknown height format"));
+    files.write(other, "Ncols 2\nnrows 2\nxllcorner 1\nyllcorner 1\ncellsize 1\n1 2\n3 4\n");
+    EXPECT_NEAR(parsed(object(grid), files.folder())->objects[0].in_world.position_m.x, 2, 1e-9);
+  }
+  files.write("g.bin", std::string("II*\0", 4));
+  EXPECT_THAT(refusal(object("type: heightmap, file: g.bin, material: sand"), files.folder()),
+              ::testing::Not(HasSubstr("unknown height format")));
 }
 
 TEST(LoadScene, LostTrianglesOfAMeshAreANote) {

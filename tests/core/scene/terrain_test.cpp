@@ -173,6 +173,7 @@ TEST(EsriGrid, KnowsNoDataInEveryForm) {
   };
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value nan", "nan"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre, "NaN"), false), "1");
+  EXPECT_EQ(holes_in("\xEF\xBB\xBF" + grid_of(metre, "-9999"), false), "1");  // as editors on Windows begin a text
   EXPECT_EQ(holes_in(grid_of(at + "dx 1\ndy 2", "-9999"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.40282e+38", "-3.4028234663852886e+38"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.4E+38", "-3.4028234663852886e+38"), false), "1");
@@ -180,7 +181,8 @@ TEST(EsriGrid, KnowsNoDataInEveryForm) {
     EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value " + few_digits, few_digits), false), "1") << few_digits;
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -99999.99", "-99999.9921875"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value 0", "0"), false), "1");
-  for (const char* fill : {"-32768", "-99999", "-3.4028234663852886e+38", "9.96921e+36"})
+  for (const char* fill :
+       {"-32768", "-99999", "-9999999", "-2147483648", "2147483647", "4294967295", "-3.4028234663852886e+38", "9.96921e+36"})
     EXPECT_EQ(holes_in(grid_of(metre, fill), true), "1") << fill;
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -32768", "-9999"), true), "1");
   // Ground deeper than 9999 m is none.
@@ -412,6 +414,7 @@ TEST(XyzGrid, PointsOfAnEvenGridInAnyOrder) {
   EXPECT_EQ(rounded->x.size(), 400u);
   EXPECT_EQ(rounded->y.size(), 30u);
   EXPECT_TRUE(rounded->origin);
+  EXPECT_TRUE(read("\xEF\xBB\xBF" + degrees));
 }
 
 TEST(XyzGrid, NamesOfColumnsMayPutNorthFirst) {
@@ -763,6 +766,10 @@ TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
   TiffFile scaled = good();
   scaled.text(42112, R"(<GDALMetadata><Item name="SCALE" sample="0" role="scale">0.1</Item></GDALMetadata>)");
   EXPECT_THAT(refusal(scaled), HasSubstr("gdal_translate -unscale"));
+  TiffFile unscaled = good();
+  unscaled.text(42112, R"(<GDALMetadata><Item name="OFFSET" sample="0" role="offset">0</Item>)"
+                       R"(<Item name="SCALE" sample="0" role="scale">1</Item></GDALMetadata>)");
+  EXPECT_EQ(refusal(unscaled), "accepted");
   EXPECT_THAT(refusal(good().keys({{{1024, 1}, {3076, 32767}}})), HasSubstr("units of length of code 32767"));
   TiffFile turned = TiffFile::of(3, 2, six);
   turned.doubles(34264, {10, 1, 0, 0, 1, -10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1});

@@ -12,7 +12,7 @@ from .mavlink import frame_length
 from .mcap import read_mcap
 from .nmea_log import read_nmea
 from .rosbag import read_rosbag
-from .rosbag2 import files_of, read_rosbag2
+from .rosbag2 import files_of, read_rosbag2, recording_at
 from .tlog import STAMP_BYTES, read_tlog
 from .track import ConvertError, Place2, Track, Warn
 from .ulog import read_ulog
@@ -47,6 +47,7 @@ def _described(path: pathlib.Path, head: bytes) -> str:
 
 def format_of(path: pathlib.Path) -> str:
     """Returns one of FORMATS, or raises ConvertError. Of a folder: that of its first recording."""
+    path = recording_at(path)
     if path.is_dir():
         path = files_of(path)[0]
     with path.open("rb") as file:
@@ -76,7 +77,7 @@ def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source
     topic: topic of a recording. system, component: MAVLink system and component of a telemetry log. at: north and east [m]
     of a vehicle whose log has its depth and no horizontal position. Raises ConvertError and
     OSError."""
-    file = pathlib.Path(path)
+    file = recording_at(pathlib.Path(path))
     chosen = kind or format_of(file)
     readers: "dict[str, Callable[[], Track]]" = {
         "dataflash": lambda: read_dataflash(file, warn, source, origin, at),

@@ -165,6 +165,11 @@ def files_of(folder: pathlib.Path, warn: Warn = lambda text: None) -> List[pathl
     return sorted(there, key=lambda p: (rank.get(p.name, len(rank)), p.name))
 
 
+def recording_at(path: pathlib.Path) -> pathlib.Path:
+    """The recording that a path names; its metadata stands for the folder."""
+    return path.parent if path.name == METADATA and path.is_file() else path
+
+
 def read_rosbag2(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
     """Reads the poses of one topic of a file or a folder, ENU_FLU."""
     messages: List[Recorded] = []

@@ -13,7 +13,7 @@ from typing import Dict, List, NamedTuple, Optional, Tuple, Union
 
 from ..geodesy import Geodetic
 from ..rotations import Quaternion, unit
-from .track import ConvertError, Place2, Source, Stream, Track, Warn, chosen, track_of
+from .track import ConvertError, Place2, Source, Stream, Track, Warn, chosen, depth_source, track_of
 
 MAGIC = b"ULog\x01\x12\x35"
 HEAD_BYTES = 16
@@ -69,6 +69,7 @@ class _Log:
     def __init__(self, data: bytes, name: str, warn: Warn) -> None:
         self.attitudes: Dict[str, Stream[Quaternion]] = {}
         self.positions: "Dict[str, Stream]" = {}
+        self.depths: Stream[float] = []  # down [m], of local positions, whose x and y may be invalid
         self.origin: Optional[Geodetic] = None
         self._layouts: Dict[str, Layout] = {}
         self._short: Dict[str, int] = {}  # messages that are shorter than their format
@@ -114,7 +115,10 @@ class _Log:
                 self.attitudes.setdefault(name, []).append((t, unit(q)))
         elif name.startswith(LOCAL):
             place = tuple(fields.get(axis, math.nan) for axis in "xyz")
-            if fields.get("z_valid", True) and fields.get("xy_valid", True) and all(map(math.isfinite, place)):
+            z_valid = fields.get("z_valid", True) and math.isfinite(place[2])
+            if z_valid and name == LOCAL:
+                self.depths.append((t, place[2]))
+            if z_valid and fields.get("xy_valid", True) and all(map(math.isfinite, place)):
                 self.positions.setdefault(name, []).append((t, place))
             if self.origin is None and fields.get("xy_global") and fields.get("z_global"):
                 there = Geodetic(fields.get("ref_lat", 0.0), fields.get("ref_lon", 0.0), fields.get("ref_alt", 0.0))
@@ -126,7 +130,8 @@ class _Log:
 
     def sources(self) -> List[Source]:
         return [Source(f"{ATTITUDE}{more}+{position}{more}", self.attitudes.get(ATTITUDE + more, []),
-                       self.positions.get(position + more, [])) for more in (TRUTH, "") for position in (LOCAL, GLOBAL)]
+                       self.positions.get(position + more, [])) for more in (TRUTH, "") for position in (LOCAL, GLOBAL)] + \
+            [depth_source(ATTITUDE, self.attitudes.get(ATTITUDE, []), self.depths)]
 
 
 def read_ulog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None,
