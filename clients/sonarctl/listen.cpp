@@ -35,8 +35,10 @@ class Listener {
         return ran;
       const Endpoint device = stream_->device();
       before_ = counts();
+      outage_.begins();
       stream_.reset();  // its ports are wanted again
-      auto again = open_again(options_.source, device, ran.error(), [](const std::string& line) { print_notices({line}); });
+      auto again =
+          open_again(options_.source, device, outage_, ran.error(), [](const std::string& line) { print_notices({line}); });
       if (!again) return interrupted != 0 ? Result<void>{} : tl::unexpected(again.error());
       use(std::move(again->stream));
     }
@@ -102,6 +104,7 @@ class Listener {
     if (!last_ping_) first_ping_after_s_ = first_ping_time();
     log_.add(ping, at_s);
     last_ping_ = ping;
+    outage_.ends();
     if (options_.json && !options_.quiet) std::puts(json_from(ping, at_s).c_str());
     if (!options_.json && (!options_.quiet || !ping.errors.empty())) std::puts(line_from(ping).c_str());
   }
@@ -116,6 +119,7 @@ class Listener {
   std::optional<PingStream> stream_;
   std::optional<protocol::Host::Counts> before_;  // of connections that are lost
   bool received_ = false, asked_ = false;
+  Outage outage_;
   PingLog log_;
   Clock::time_point start_, last_message_ = Clock::now();
   std::optional<HostPing> last_ping_;

@@ -116,21 +116,32 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
                      observed.error().text);
 }
 
-Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, const Error& why,
+void Outage::begins() {
+  if (!since_) since_ = Clock::now();
+}
+
+double Outage::left_s(const SourceOptions& source) const {
+  if (!since_) return source.return_limit_s;
+  const std::chrono::duration<double> lasts = Clock::now() - *since_;
+  return std::max(0.0, source.return_limit_s - lasts.count());
+}
+
+Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, Outage& outage, const Error& why,
                                 const std::function<void(const std::string&)>& say) {
   using Clock = std::chrono::steady_clock;
-  const auto until = Clock::now() + milliseconds_from(source.return_limit_s);
-  say(why.text + "; connecting again, for " + text::format("%g s", source.return_limit_s));
+  const double left_s = outage.left_s(source);
+  const auto until = Clock::now() + milliseconds_from(left_s);
+  if (left_s > 0) say(why.text + "; connecting again, for " + text::format("%.0f s", left_s));
   while (interrupted == 0 && Clock::now() < until) {
-    const auto next = Clock::now() + std::chrono::milliseconds(500);
-    auto opened = open_stream(source, device);
-    if (opened) {
-      say("connected again to " + opened->stream.about());
-      return opened;
-    }
+    const auto next = std::min(outage.next_attempt(), until);
     while (interrupted == 0 && Clock::now() < next) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    auto opened = open_stream(source, device);
+    if (!opened) continue;
+    say("connected again to " + opened->stream.about());
+    return opened;
   }
-  return tl::unexpected(why);
+  if (interrupted != 0) return tl::unexpected(why);
+  return failure(why.kind, why.text + "; it did not come back within " + text::format("%g s", source.return_limit_s));
 }
 
 void print_notices(const std::vector<std::string>& notices) {

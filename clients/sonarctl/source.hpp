@@ -2,8 +2,10 @@
 // Shared by the commands.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
+#include <optional>
 
 #include "clients/sonarctl/commands.hpp"
 
@@ -24,9 +26,25 @@ struct OpenedStream {
 /// observers; then with a note on standard error.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
-/// The stream again after `why` it was lost, within source.return_limit_s; both lines go to `say`. The error is `why` when the
-/// device does not come back, or when Ctrl-C is pressed.
-Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, const Error& why,
+/// When the pings stopped. A connection without pings is no return of the device: by UDP one can always be opened.
+class Outage {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  void begins();  // no effect in an outage
+  void ends() { since_.reset(); }
+  double left_s(const SourceOptions& source) const;  // until source.return_limit_s is over
+  /// When the next attempt may begin: a device that ends each connection at once is not asked more often than once a second.
+  Clock::time_point next_attempt() { return last_attempt_ = std::max(Clock::now(), last_attempt_ + std::chrono::seconds(1)); }
+
+ private:
+  std::optional<Clock::time_point> since_;
+  Clock::time_point last_attempt_;
+};
+
+/// The stream again after `why` it was lost, within what is left of the outage; both lines go to `say`. The error is `why` when
+/// Ctrl-C is pressed, and says so when the device does not come back.
+Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, Outage& outage, const Error& why,
                                 const std::function<void(const std::string&)>& say);
 
 /// To standard error.

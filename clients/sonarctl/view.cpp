@@ -81,13 +81,17 @@ class LiveView {
         if (!lost_ || interrupted != 0 || options_.pings > 0 || figures_.pings() == 0) break;
         const Endpoint device = stream_->device();
         stream_.reset();  // its ports are wanted again
-        auto again = open_again(options_.source, device, ran.error(), [&](const std::string& line) {
+        outage_.begins();
+        auto again = open_again(options_.source, device, outage_, ran.error(), [&](const std::string& line) {
           if (has_screen)
             static_cast<void>(screen.show({line}));
           else
             print_notices({line});
         });
-        if (!again) break;
+        if (!again) {
+          ran = tl::unexpected(again.error());
+          break;
+        }
         stream_.emplace(std::move(again->stream));
         lost_ = false;
       }
@@ -125,6 +129,7 @@ class LiveView {
   /// False when the output was closed.
   Result<bool> show(const HostPing& ping, const LiveScreen& screen) {
     figures_.add(ping, stream_->host().counts(), now_s());
+    outage_.ends();
     const Result<SonarPicture> picture = protocol::drawing_of(ping);
     if (!picture) return tl::unexpected(picture.error());
     if (!options_.png.empty())
@@ -146,6 +151,7 @@ class LiveView {
   ViewCaption figures_;
   std::vector<std::string> notices_;
   bool lost_ = false;  // the device is gone, or silent
+  Outage outage_;
 };
 
 Result<void> view_live(const ViewOptions& options) {

@@ -49,7 +49,7 @@ class Sonar:
         self.process = None
 
     def power_on(self):
-        self.process = subprocess.Popen([SONARD, "run", str(self.config)], stdin=subprocess.DEVNULL)
+        self.process = subprocess.Popen([SONARD, "run", "--faults", str(self.config)], stdin=subprocess.DEVNULL)
         deadline = time.monotonic() + 30
         while time.monotonic() < deadline:  # /healthz answers as soon as drivers can connect
             try:
@@ -150,6 +150,15 @@ class DriverTest(unittest.TestCase):
         time.sleep(4)
         self.sonar.power_on()
         self.driver.wait_for_pings(3, 15)
+
+    def test_driver_recovers_when_the_sonar_hangs(self):
+        """A fault on purpose (docs/faults.md): the connection stays open, and no ping comes for 6 s."""
+        self.driver.wait_for_pings(3, 30)
+        self.sonar.request("faults", **{"name": "hang", "do": "silent-open", "for": {"seconds": 6}})
+        time.sleep(6)
+        self.driver.wait_for_pings(3, 30)
+        times = [at for at, _ in self.driver.pings]
+        self.assertGreater(max(b - a for a, b in zip(times, times[1:])), 5, "the fault had no effect")
 
     def test_no_echo_when_the_transmitter_fails(self):
         self.driver.wait_for_pings(3, 30)

@@ -101,6 +101,13 @@ class Preview(unittest.TestCase):
             viewer.socket.close()
             eventually(lambda: "preview ends" in daemon.log().rpartition("preview begins")[2])
 
+    def test_a_host_that_has_left_is_no_trouble(self):
+        with demo("ping360"):
+            self.assertEqual(run(SONARCTL, "listen", "--pings", 5, "--quiet").returncode, 0)
+            said = run(SONARCTL, "doctor", "--within", 60).stdout
+            self.assertIn("ok    udp 127.0.0.2:12345", said)
+            self.assertNotIn("The connection of", said)
+
     def test_faults_are_armed(self):
         with demo("oculus"):
             self.assertEqual(run(SONARCTL, "fault", "list").stdout, "no faults\n")

@@ -1,11 +1,12 @@
 """The example of docs/writing-a-driver-test.md as it is, with its own little driver."""
 import os
+import re
 import subprocess
 import sys
 import time
 import unittest
 
-from running_sonard import ROOT, SONARD
+from running_sonard import ROOT, SONARCTL, SONARD
 
 EXAMPLE = ROOT / "docs/driver-test"
 
@@ -32,7 +33,17 @@ class DriverExample(unittest.TestCase):
     def test_the_page_is_true(self):
         run = run_example("test_driver.py")
         self.assertEqual(run.returncode, 0, run.stdout)
-        self.assertIn("Ran 4 tests", run.stdout)
+        self.assertIn("Ran 5 tests", run.stdout)
+
+    def test_ci_jobs_call_the_judge_as_it_is(self):
+        usage = subprocess.run([SONARCTL, "judge", "--help"], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60, check=True)
+        for name in ("judge-github.yml", "judge-gitlab.yml"):
+            with self.subTest(name):
+                text = (ROOT / "docs/examples" / name).read_text(encoding="utf-8")
+                (command,) = re.findall(r"sonard/(build/release/clients/sonarctl) judge((?:.|\n +(?=--))+)\n", text)
+                options = re.findall(r"--[a-z-]+", command[1])
+                self.assertIn("--driver", options)
+                self.assertEqual(set(options) - set(re.findall(r"--[a-z-]+", usage.stdout)), set())
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import urllib.request
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
@@ -88,6 +89,8 @@ class Recordings(PageChecks, unittest.TestCase):
                 with Replay(path) as replay, Viewer(HTTP) as viewer:
                     self.look(viewer, kind)
                     self.assertIn("open      http://127.0.0.1:8088", replay.text())
+                    with urllib.request.urlopen("http://127.0.0.1:8088/healthz", timeout=PATIENCE_S) as answer:  # doctor asks for it
+                        self.assertEqual(answer.read(), b"ok\n")
                     if maker not in ("blueview", "ping360"):
                         done = run(SONARCTL, "listen", f"{replay.address}:{port}", "--quiet", "--pings", 2)
                         self.assertIn("pings 2", done.stdout, "the driver is served beside it: " + done.stderr)
@@ -137,6 +140,20 @@ class Recordings(PageChecks, unittest.TestCase):
                         page.touch("#tabs [data-tab=fan]")
                     shown(page)
                     page.close()
+
+    @unittest.skipIf(WHY_NOT, WHY_NOT)
+    def test_the_page_says_that_previews_are_not_recorded(self):
+        with demo("oculus"), Browser() as browser:
+            page = self.opened(browser.open(f"http://{HTTP}:8088/", 1600, 1000))
+            shown(page)
+            page.press_mouse("#record")
+            page.wait("document.querySelector('#recordings')?.innerText.includes('waits for a driver, such as sonarctl listen')")
+            with subprocess.Popen([SONARCTL, "listen", SONAR, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
+                page.wait("/ [1-9]\\d* pings .* running/.test(document.querySelector('#recordings').innerText)")
+                driver.terminate()
+            page.press_mouse("#record")
+            page.wait("document.querySelector('#record').innerText === 'Record'")
+            page.close()
 
 
 if __name__ == "__main__":

@@ -172,13 +172,18 @@ class Images(unittest.TestCase):
     def test_doctor_listen_and_a_recording(self):
         with tempfile.TemporaryDirectory() as folder:
             daemon = sonar(**START)
-            daemon.more = f"recording: {{folder: {folder}}}"
+            daemon.more = f"recording: {{folder: {folder}}}\nfaults: {{armed: true}}"
             with daemon:
                 control = ("--control", f"{daemon.address}:14770")
                 begun = run(SONARCTL, "recording", "start", "run.sonar", *control)
                 self.assertEqual(begun.returncode, 0, begun.stderr)
                 said = run(SONARCTL, "doctor", "--within", 60, *control, "--http", f"{daemon.address}:8088")
-                self.assertIn("images by UDP at 5 Hz", said.stdout)
+                self.assertIn("images by UDP, 5 Hz asked", said.stdout)
+                self.assertNotIn("A fault acts", said.stdout)
+                self.assertEqual(run(SONARCTL, "fault", "add", "deaf-head", *control).returncode, 0)
+                said = run(SONARCTL, "doctor", "--within", 60, *control, "--http", f"{daemon.address}:8088")
+                self.assertIn("fail  A fault acts on front: deaf-head", said.stdout)
+                run(SONARCTL, "fault", "reset", *control)
                 eventually(lambda: int(daemon.status()["recordings"][0]["messages"]) > 10)
                 run(SONARCTL, "recording", "stop", *control)
             recorded, at, kinds = (pathlib.Path(folder) / "run.sonar").read_bytes(), 0, []

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Follows the links of all Markdown pages of a tree: files, pictures and headings; and, in a checkout, the files that pages name in
-backticks (`daemon/commands/main.cpp`).
+backticks (`daemon/commands/main.cpp`). Finds tables that an empty line cuts: GitHub shows the rows below it as text.
 
 usage: check_links.py ROOT              a checkout: its tracked files
        check_links.py --installed ROOT  what an installation made below ROOT: a page may link to what is there, nowhere else
 
-Prints one line a dead link, exits 1 when there is any. Links to the web are not followed.
+Prints one line a dead link or cut table, exits 1 when there is any. Links to the web are not followed.
 """
 import pathlib
 import re
@@ -22,6 +22,9 @@ LINK = re.compile(r"\]\(\s*<?(?P<inline>[^\s)>]+)>?(?:\s+\"[^\"]*\")?\s*\)|^ {0,
 WEB = re.compile(r"[a-z][a-z0-9+.-]*:", re.I)
 # What a page names in backticks, alone or at the beginning of a command: a path; `*` and `{a,b}` stand for several files.
 NAMED = re.compile(r"(?:\./)?(?P<path>[\w.+-]+/[\w./+*{},-]*?)/?(?::\d+(?:-\d+)?)?(?:\s.*)?", re.S)
+
+TABLE = re.compile(r"(?:^\|.*\n?)+", re.M)
+RULE = re.compile(r"\|(?: *:?-+:? *\|)+ *")  # below the head of a table
 
 
 def blank(match):
@@ -109,10 +112,16 @@ class Tree:
                 if not self.names_a_file(page, path):
                     yield f"{page}:{line_of(text, match.start())}: file: {path}: does not exist"
 
+    def cut_tables(self, page):
+        text = prose_of(self.text(page))
+        for match in TABLE.finditer(text):
+            if RULE.fullmatch((match.group().splitlines() + [""])[1]) is None:
+                yield f"{page}:{line_of(text, match.start())}: table: has no head: an empty line cuts it from the rows above?"
+
 
 def dead_links(root, installed=False):
     tree = Tree(pathlib.Path(root), installed)
-    return [dead for page in tree.pages for dead in tree.dead_links(page)]
+    return [dead for page in tree.pages for found in (tree.dead_links(page), tree.cut_tables(page)) for dead in found]
 
 
 def main():

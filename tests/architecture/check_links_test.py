@@ -40,7 +40,7 @@ class Planted(unittest.TestCase):
     def test_files_pictures_and_folders(self):
         for target in ("nowhere.txt", "../docs/nowhere/", "deep/../nowhere.txt", "../../outside.txt", "/docs/picture.png"):
             for line in (f"see [it]({target})", f"![a picture]({target})", f"[![both]({target})](picture.png)", f"[it]: {target}",
-                         f'[it]({target} "title")', f"[it](<{target}>)", f"| [in a table]({target}) |", f"- [in a list]({target})"):
+                         f'[it]({target} "title")', f"[it](<{target}>)", f"| [in a table]({target}) |\n|---|", f"- [in a list]({target})"):
                 for installed in (False, True):
                     with self.subTest(line=line, installed=installed):
                         self.expect(line, f"link: {target}: does not exist", installed)
@@ -53,6 +53,12 @@ class Planted(unittest.TestCase):
         for target in ("#nowhere", f"{name}#nowhere", f"{name}#twice-2", f"{name}#Big-title", "#big-title"):
             with self.subTest(target=target):
                 self.expect(f"[it]({target})", "has no heading of that name")
+
+    def test_tables_that_an_empty_line_cuts(self):
+        head = "| a | b |\n|---|:-:|\n| 1 | 2 |\n"
+        self.expect("| 3 | 4 |", "table: has no head")
+        found = found_in({PAGE: head + "\n| 3 | 4 |\n| 5 | 6 |\n", OTHER: head + "\n" + head + "```\n| 3 | 4 |\n```\n"})
+        self.assertEqual([f.partition(": ")[0] for f in found], [f"{PAGE}:5"])
 
     def test_files_in_backticks(self):
         for named in ("core/base/nowhere.hpp", "core/nowhere/", "core/base/nowhere", "daemon/main.hpp:12", "core/base/u*.h",

@@ -8,6 +8,7 @@
 #include <array>
 #include <atomic>
 #include <fstream>
+#include <regex>
 #include <thread>
 
 #include "clients/sonarctl/commands.hpp"
@@ -55,13 +56,14 @@ wire::Bytes ping_bytes(std::uint32_t id, const oculus::FireSettings& echo) {
   return oculus::encode_ping(head, {bearings, {}, samples});
 }
 
-/// Accepts one client, waits for its fire message and sends what `answer` makes of it, then waits until the client leaves. With
-/// `visits` > 1 it ends the connection instead, and so on for so many clients; then it is gone.
+/// Accepts one client, waits for its fire message and sends what `answer` makes of it, then waits until the client leaves. Later
+/// clients are connected, and hear nothing. With `visits` > 1 it ends the connection instead, and so on for so many clients; then
+/// it is gone.
 class FakeDevice {
  public:
   using Answer = std::function<wire::Bytes(std::uint32_t number, const oculus::FireSettings& asked)>;
   explicit FakeDevice(std::uint32_t pings, Answer answer, int visits = 1) : listener_(bound(SOCK_STREAM, port_)) {
-    ::listen(listener_.fd(), 1);
+    ::listen(listener_.fd(), 16);
     thread_ = std::thread([this, pings, answer = std::move(answer), visits] {
       for (int i = 0; i < visits; ++i) serve(pings, answer, visits == 1);
       if (visits > 1) ::shutdown(listener_.fd(), SHUT_RDWR);
@@ -184,6 +186,33 @@ TEST(Listen, ConnectsAgainInARunWithoutAnEnd) {
     if (!live) {
       EXPECT_THAT(out, HasSubstr("pings 6")) << "of both connections";
     }
+  }
+}
+
+TEST(Listen, EndsWhenTheDeviceConnectsAndStaysSilent) {
+  for (const bool live : {false, true}) {
+    SCOPED_TRACE(live ? "view --live" : "listen");
+    FakeDevice device(3, [](std::uint32_t i, const oculus::FireSettings& echo) { return ping_bytes(i + 1, echo); });
+    ListenOptions options = quiet(device.endpoint(), 0);
+    options.seconds = 0;
+    options.source.silence_limit_s = 0.5;
+    options.source.return_limit_s = 1;
+    ViewOptions view_options;
+    view_options.source = options.source;
+    view_options.png = std::filesystem::path(testing::TempDir()) / "view_silent_test.png";
+    view_options.style = options.style;
+    view_options.live = true;
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    const Result<void> done = live ? view(view_options) : listen(options);
+    testing::internal::GetCapturedStdout();
+    const std::string err = testing::internal::GetCapturedStderr();
+    std::filesystem::remove(view_options.png);
+    ASSERT_FALSE(done);
+    EXPECT_THAT(done.error().text, HasSubstr("it did not come back within 1 s"));
+    const std::regex again("connected again");
+    const auto found = std::sregex_iterator(err.begin(), err.end(), again);
+    EXPECT_LE(std::distance(found, std::sregex_iterator()), 3) << err;  // each takes half a second of silence
   }
 }
 

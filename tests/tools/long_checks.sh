@@ -25,7 +25,7 @@ step() {  # step NAME COMMAND...: runs it, when wished, and remembers how it end
 
 step load tests/load/load.sh
 step mission env SONARD_BUILD=build/release python3 -B tests/acceptance/mission_test.py --long
-step page env SONARD_BUILD=build/release SONARD_PAGE_MINUTES=20 python3 -B tests/acceptance/page_live_test.py Long
+step page env SONARD_BUILD=build/release python3 -B tests/acceptance/page_figures.py
 step tsan tests/tools/sanitized_tests.sh tsan
 step asan tests/tools/sanitized_tests.sh asan-all
 step fuzz tests/tools/fuzz.sh

@@ -423,15 +423,17 @@ class Launch(unittest.TestCase):
         start, = self.of("OpaqueFunction", actions)
         return start.named["function"]({**names, **given})
 
-    def test_the_bridge_and_the_driver_wait_for_sonard(self):
-        handler, sonard = self.started(config="dive.yaml", options="--clock stepped", driver="ros2 launch 'my driver' x.py")
+    def test_the_others_wait_for_sonard(self):
+        handler, sonard = self.started(config="dive.yaml", options="--clock stepped", driver="ros2 launch 'my driver' x.py",
+                                       autopilot="sim_vehicle.py -v ArduSub")
         self.assertEqual(sonard.named["cmd"], ["sonard", "run", "dive.yaml", "--clock", "stepped"])
         self.assertEqual(type(sonard.named["on_exit"]).__name__, "Shutdown")
         hear = handler.arguments[0].named
         self.assertIs(hear["target_action"], sonard)
         self.assertEqual(hear["on_stdout"](Message(text=b"sonard 0.1.0\nrea")), [])
-        bridge, driver = hear["on_stdout"](Message(text=b"dy in 0.21 s."))
+        bridge, autopilot, driver = hear["on_stdout"](Message(text=b"dy in 0.21 s."))
         self.assertEqual(type(bridge).__name__, "Node")
+        self.assertEqual(autopilot.named["cmd"], ["sim_vehicle.py", "-v", "ArduSub"])
         self.assertEqual(driver.named["cmd"], ["ros2", "launch", "my driver", "x.py"])
         self.assertEqual(hear["on_stderr"](Message(text=b"ready in 1 s.")), [])  # once
 

@@ -1,4 +1,4 @@
-"""sonard, then the bridge and a driver once sonard is ready; when sonard ends, all end.
+"""sonard, then the bridge, an autopilot and a driver once sonard is ready; when sonard ends, all end.
 
 ros2 launch sonard_bridge sonard.launch.py config:=dive.yaml odometry:=/odom driver:="ros2 launch oculus_ros2 default.launch.py"
 """
@@ -20,8 +20,9 @@ def start(context):
     command = [value("program"), "run", value("config") or "--demo", *shlex.split(value("options"))]
     sonard = ExecuteProcess(cmd=command, name="sonard", output="screen", on_exit=Shutdown(reason="sonard has ended"))
     then = [bridge()]
-    if value("driver"):
-        then.append(ExecuteProcess(cmd=shlex.split(value("driver")), name="driver", output="screen"))
+    for name in ("autopilot", "driver"):
+        if value(name):
+            then.append(ExecuteProcess(cmd=shlex.split(value(name)), name=name, output="screen"))
     heard = bytearray()
 
     def on_output(event):
@@ -40,6 +41,7 @@ def start(context):
 def generate_launch_description():
     own = {"program": ("sonard", "the daemon"), "config": ("", "its configuration; empty: the demo"),
            "options": ("", "more of its command line, such as --clock stepped"),
+           "autopilot": ("", "command that starts an autopilot, simulated or not; empty: none"),
            "driver": ("", "command that starts a driver; empty: none")}
     declared = [DeclareLaunchArgument(name, default_value=value, description=meaning) for name, (value, meaning) in own.items()]
     return LaunchDescription([*declared, *arguments(), OpaqueFunction(function=start)])

@@ -79,10 +79,21 @@ class SonarChecks {
                  at + ": no images are made" + (is_waited_for ? ", although " + who + " has set it up" : ""),
                  std::string(sonar_.make->remedy) + ", of " + sonar_.at.host);
     }
-    add(Level::ok, "ping",
-        at + ": images by UDP at " + format("%g", sonar_.reported->rate_hz()) + " Hz, " +
-            std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",
-        "");
+    const double asked_hz = sonar_.reported->rate_hz();
+    const std::string text = at + ": images by UDP, " + format("%g", asked_hz) + " Hz asked, " +
+                             std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped";
+    if (too_slow_for(asked_hz))
+      add(Level::warn, "ping", text + ", " + computing_text(computing_ms()), less_to_compute);
+    else
+      add(Level::ok, "ping", text, "");
+    check_faults();
+  }
+
+  /// Without drivers that stay connected only faults can be in the way.
+  void check_faults() {
+    for (const Finding& found : sonar::doctor::judge(*facts_.control.status, nullptr))
+      if (found.check == "fault" && found.level != Level::ok && (found.sonar.empty() || found.sonar == sonar_.reported->name()))
+        add(found.level, found.check, found.text, found.cure);
   }
 
   void check_status() {

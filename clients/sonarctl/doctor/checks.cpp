@@ -122,8 +122,8 @@ void check_ports(const Facts& facts, std::vector<Finding>& findings) {
                                ""});
   const std::string reserved = ports.reserved.empty() ? exposed : ports.reserved + "," + exposed;
   findings.push_back({Level::warn, "ports",
-                      "ports " + exposed + " lie in the ephemeral range " + range +
-                          ": an outgoing connection may occupy one before sonard starts",
+                      (exposed.find(',') == std::string::npos ? "port " + exposed + " lies" : "ports " + exposed + " lie") +
+                          " in the ephemeral range " + range + ": an outgoing connection may occupy one before sonard starts",
                       "to reserve them: sysctl net.ipv4.ip_local_reserved_ports=" + reserved});
 }
 

@@ -77,6 +77,13 @@ export class Facts {
   get preview() {
     return !this.listened && Boolean(this.sonarStatus?.preview || this.of('preview'));
   }
+  /// Pings are made at less than the rate, by an engine that is busy for a good part of the time. A sonar whose host asks for each
+  /// ping has a rate that none reaches.
+  get isSlow() {
+    const sonar = this.sonarStatus;
+    const wanted = sonar?.rate_hz ?? 0;
+    return Boolean(this.realtime && wanted > 0 && this.rate < 0.9 * wanted && this.rate * (sonar.figures?.simulation_ms ?? 0) > 300);
+  }
   /// The vehicle that carries the sonar: by the frames, else the only one.
   get vehicle() {
     const name = this.frames.get(this.sonar)?.parent;

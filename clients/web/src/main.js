@@ -23,16 +23,16 @@ import { activeTroubles, titleOf } from './panels/faults.js';
 const test = Number(new URLSearchParams(location.search).get('test'));  // for tests: the fan so wide, without rings
 const look = makeRemembered('look', { theme: '', tab: 'fan' });
 
+const scene_waits_ms = 1500;
+
 const facts = new Facts();
-const fan = new Fan(facts, test);
-const scene = new Scene(facts, fan);
 const connection = new Connection({
   open(info) {
     facts.opened(info);
     $('name').title = `${info.name} at ${location.host}`;
     setText($('about'), `${info.name} at ${location.host}. Documents: docs/live-view.md of the source tree, /usr/share/doc/sonard of the package.`);
     document.body.classList.toggle('plays', Boolean(facts.recording));
-    scene.forget();
+    scene?.forget();
     allEchoesOf = '';
     choose();
   },
@@ -46,9 +46,9 @@ const connection = new Connection({
   topics: choose,
   message(topic, value, ns) {
     facts.message(topic, value, ns);
-    if (topic === '/scene') scene.update(value);
-    if (topic === '/swath') scene.swath(value);
-    if (topic === `/${facts.sonar}/cloud`) scene.cloud(value);
+    if (topic === '/scene') scene?.update(value);
+    if (topic === '/swath') scene?.swath(value);
+    if (topic === `/${facts.sonar}/cloud`) scene?.cloud(value);
     if (topic === '/status') choose();
     if (topic === `/${facts.sonar}/picture` && facts.pictureKind !== chosenKind) choose();
   },
@@ -58,7 +58,10 @@ const connection = new Connection({
     if (id?.startsWith('param:')) refusals.show(id, message, id.slice('param:'.length));
   },
 });
+connection.open();  // answers come once all below is there
 const refusals = new Refusals();
+const fan = new Fan(facts, test);
+let scene = null;
 
 const steering = {
   set(name, value, type = facts.parameters.get(name)?.type) {
@@ -98,10 +101,11 @@ function choose() {
   chosenKind = facts.pictureKind;
   const topics = ['/status', '/doctor', '/faults', '/log'];
   const own = (name) => `/${facts.sonar}/${name}`;
-  if (!document.hidden) topics.push(own('geometry'), own('ping'), own('picture'), own(fan.drawn ? 'fan' : 'image'), ...(facts.pictureKind === 'range image' ? [own('cloud')] : []), '/tf', '/scene', '/swath');
+  if (!document.hidden) topics.push(own('geometry'), own('ping'), own('picture'), own(fan.drawn ? 'fan' : 'image'), '/tf');
+  if (!document.hidden && scene) topics.push('/scene', '/swath', ...(facts.pictureKind === 'range image' ? [own('cloud')] : []));
   showAllEchoes(own('view/cloud_threshold'));
   facts.judged = connection.byTopic.has('/doctor');
-  if (!document.hidden && !connection.topics.has('/scene')) scene.removeObjects();  // those that went meanwhile are not named
+  if (!document.hidden && !connection.topics.has('/scene')) scene?.removeObjects();  // those that went meanwhile are not named
   connection.want(topics);
 }
 
@@ -140,9 +144,19 @@ function announce() {
   setText($('announce'), text);
 }
 
+/// The scene's meshes and shaders would delay the first picture, with a software renderer by a second: it begins after that one.
+function beginScene() {
+  scene = new Scene(facts, fan);
+  setHidden($('no-scene'), !scene.missing);
+  setHidden($('scene'), scene.missing);
+  choose();
+}
+
 function frame() {
+  const begins = facts.drawnPings > 0 || performance.now() > scene_waits_ms;  // the picture was painted before this frame
   fan.show(facts.ping);
-  scene.draw();
+  if (scene) scene.draw();
+  else if (begins) beginScene();
   requestAnimationFrame(frame);
 }
 
@@ -219,10 +233,7 @@ setTheme(look.theme);
 showTab(test ? 'fan' : look.tab);
 showMap();
 showGain();
-setHidden($('no-scene'), !scene.missing);
-setHidden($('scene'), scene.missing);
 setClass($('fan-glass'), 'fresh');
-connection.open();
 setInterval(draw, 200);
 requestAnimationFrame(frame);
-if (test) window.sonardTest = { facts, fan, scene, connection };
+if (test) window.sonardTest = { facts, fan, connection, get scene() { return scene; } };

@@ -13,13 +13,14 @@ void DatagramStream::start() {
       socket_.get_executor(), [self] { return self->send(); },
       [self](std::exception_ptr fault) {
         if (fault) self->parent_.on_fault(text_of(fault));
-        self->parent_.on_over(self->id_, fault ? "an internal fault" : self->why_, false);
+        self->parent_.on_over(self->id_, fault ? "an internal fault" : self->why_, !fault && self->by_host_);
       });
 }
 
-void DatagramStream::finish(std::string why) {
+void DatagramStream::finish(std::string why, bool by_host) {
   if (std::exchange(finishing_, true)) return;
   why_ = std::move(why);
+  by_host_ = by_host;
   parent_.on_finish(id_);
   wake_.cancel();
 }

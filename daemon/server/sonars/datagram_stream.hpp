@@ -20,7 +20,7 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   /// There is something to send.
   void wake() { wake_.cancel(); }
   /// No more pings after the one being sent, and no more of that when the socket is closed.
-  void finish(std::string why);
+  void finish(std::string why, bool by_host = false);
   /// An empty datagram.
   void send_nothing_to(const Endpoint& to);
   /// A request of the host came, or a sign of it: it has not gone.
@@ -43,7 +43,7 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   std::chrono::nanoseconds gap_;
   asio::steady_timer wake_, pause_;
   std::chrono::steady_clock::time_point heard_at_ = std::chrono::steady_clock::now();
-  bool finishing_ = false, looked_ = false;
+  bool finishing_ = false, looked_ = false, by_host_ = false;
   std::string why_;
 };
 

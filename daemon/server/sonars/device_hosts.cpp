@@ -83,7 +83,7 @@ void Device::on_host_closed(const protocol::Port& port, const Endpoint& host) {
   const Peer& last = sonar_.connections().find(dialogue->id())->peer;
   if (last.ip != host.ip) return;
   if (last.port == host.port)
-    dialogue->finish("its port is closed");
+    dialogue->finish("its port is closed", true);
   else if (host.port == discard)
     dialogue->heard();
 }

@@ -41,7 +41,7 @@ void add_sonar(std::vector<Parameter>& all, const Device& device, bool has_previ
   all.push_back({at + "range_m", s.range_m});
   all.push_back({at + "rate_hz", static_cast<double>(s.rate_hz)});
   all.push_back({at + "gain_percent", device.config().profile.vendor->gain_percent(device.sonar().state())});
-  all.push_back({at + "mode", std::int64_t{s.mode}});
+  if (device.config().profile.model->modes.size() > 1) all.push_back({at + "mode", std::int64_t{s.mode}});
   all.push_back({at + "beams", std::int64_t{s.beam_count}});
   all.push_back({at + "transmit", device.sonar().transmits()});
   if (has_preview) all.push_back({at + "preview", device.preview().on()});

@@ -67,8 +67,9 @@ export function drawConnections(facts) {
     setClass(dropped, row.rising ? 'rising' : '');
   });
   const addresses = facts.sonarStatus?.addresses ?? [];
-  showList($('addresses'), addresses, () =>
-    addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), ` · ${a.sonar_speaks_first ? 'sends without a request' : 'waits for the driver'}`)));
+  const wait = facts.listened ? '' : ' · waits for the driver';
+  showList($('addresses'), [addresses, wait], () =>
+    addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), a.sonar_speaks_first ? ' · sends without a request' : wait)));
   drawHistory($('history'), facts);
 }
 

@@ -10,8 +10,7 @@ function rateOf(facts) {
   if (!facts.listened) return { word: 'no driver', dot: 'warning', rate: '' };
   if (sonar.rate_hz === 0) return { word: 'standby', dot: 'warning', rate: '0 Hz' };
   if (!sonar.pinging) return { word: 'silent', dot: 'warning', rate: dash };
-  const slow = facts.rate !== undefined && facts.rate < 0.9 * sonar.rate_hz && facts.realtime;
-  return { word: 'pinging', dot: slow ? 'warning' : 'ok', rate: facts.rate === undefined ? dash : `${fixed(facts.rate, 1)} Hz` };
+  return { word: 'pinging', dot: facts.isSlow ? 'warning' : 'ok', rate: facts.rate === undefined ? dash : `${fixed(facts.rate, 1)} Hz` };
 }
 
 /// The product's short name: "oculus-m1200d" -> "M1200d".

@@ -20,17 +20,18 @@ export function toggleRecording(facts, call) {
 }
 
 /// Of those of earlier runs only the size is known.
-function about(r) {
+function about(r, facts) {
+  if (r.running && r.sonar === facts.sonar && !facts.listened) return 'waits for a driver, such as sonarctl listen: previews are not recorded';
   const size = `${fixed(r.bytes / 1e6, 1)} MB`;
   return r.sonar ? `${r.sonar} · ${whole(r.pings)} pings · ${size} · ${r.running ? 'running' : r.why || 'ended'}` : size;
 }
 
 export function drawRecordings(facts) {
-  const all = facts.status?.recordings ?? [];
+  const all = [...(facts.status?.recordings ?? [])].reverse();  // the newest first
   const one = running(facts);
   setText($('record'), one ? 'Stop recording' : 'Record');
   $('record').setAttribute('aria-pressed', String(Boolean(one)));
   $('record').disabled = !facts.maySteer || facts.connection !== 'open' || !facts.sonar;
-  showList($('recordings'), all, () => all.map((r) => make('li', {}, r.running ? make('b', { title: r.file }, nameOf(r)) : make('a', { href: `/?recording=${encodeURIComponent(nameOf(r))}`, title: `Play ${r.file}` }, `▶ ${nameOf(r)}`),
-    make('small', {}, ` ${about(r)}`))));
+  showList($('recordings'), [all, facts.sonar, facts.listened], () => all.map((r) => make('li', {}, r.running ? make('b', { title: r.file }, nameOf(r)) : make('a', { href: `/?recording=${encodeURIComponent(nameOf(r))}`, title: `Play ${r.file}` }, `▶ ${nameOf(r)}`),
+    make('small', {}, ` ${about(r, facts)}`))));
 }

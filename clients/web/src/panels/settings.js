@@ -44,7 +44,7 @@ function rowsOf(facts, steering) {
   const modes = [{ value: 0, text: 'low frequency' }, { value: 1, text: 'high frequency' }];
   const mode = facts.of('mode');
   if (mode !== undefined) rows.push(mode <= 1 ? choiceRow('mode', of('mode'), modes, steering) : numberRow({ label: 'mode', unit: '', step: 1 }, of('mode'), steering));
-  if (facts.parameters.has(of('beams'))) rows.push(choiceRow('beams', of('beams'), [...new Set([256, 512, facts.of('beams')])].map((n) => ({ value: n, text: String(n) })), steering));
+  if ([256, 512].includes(facts.of('beams'))) rows.push(choiceRow('beams', of('beams'), [256, 512].map((n) => ({ value: n, text: String(n) })), steering));
   if (facts.parameters.has(of('transmit'))) rows.push(choiceRow('transmit', of('transmit'), yesNo, steering));
   rows.push(...water.filter((s) => facts.parameters.has(s.name)).map((s) => numberRow(s, s.name, steering)));
   return rows;
