@@ -17,9 +17,9 @@ namespace {
 
 constexpr double none_db = -150;
 /// The part of the whole array leaves the sector at some range. The noise is followed up to `margin` times that range, and fades
-/// from `fades_from` times on. Without the fade, noise of groups would stay in the outer beams at all ranges. In the M1200d's high
-/// mode the range is 0.47 m (sine 0.5) and the fade ends at 1.41 m; the recording has no such noise at 1.75 m, and from 0.6 m to
-/// there its bed hides it.
+/// from `fades_from` times on. Without the fade, noise of groups would stay in the outer beams at all ranges. In the M1200d's
+/// high mode the range is 0.47 m (sine 0.5) and the fade ends at 1.41 m; the recording has no such noise at 1.75 m, and from 0.6
+/// m to there its bed hides it.
 constexpr double margin = 3, fades_from = 2;
 
 /// A beam's blocks of samples of a part are left out if nowhere louder than this share of the channels' own noise (30),
