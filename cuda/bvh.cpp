@@ -13,7 +13,7 @@ namespace {
 constexpr int bins = 16;
 constexpr std::size_t most_in_leaf = 4;
 constexpr int deepest_by_area = 32;  // deeper down items are halved by number, which ends within another 32 levels
-constexpr float node_cost = 1.2f;    // of a step down, in triangle tests
+constexpr float node_cost = 1.2f;    // cost of a step down, in triangle tests
 
 void grow(Box& box, const Box& by) {
   for (int k = 0; k < 3; ++k) {

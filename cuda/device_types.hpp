@@ -51,10 +51,10 @@ struct alignas(16) FlatTriangle {
 struct PlacedBody {
   float turn[9];      // body to world axes, row-major
   float position[3];  // relative to the scene's origin [m]
-  std::int32_t root;  // of its hierarchy
+  std::int32_t root;  // root of its hierarchy
 };
 struct TracerView {
-  const BvhNode* nodes = nullptr;  // of everything that stands still and of all bodies
+  const BvhNode* nodes = nullptr;  // everything that stands still, and all bodies
   const FlatTriangle* triangles = nullptr;
   const BvhNode* top = nullptr;  // over `bodies`
   const PlacedBody* bodies = nullptr;
@@ -252,7 +252,7 @@ inline constexpr std::int32_t step_count = static_cast<std::int32_t>(Step::steps
 struct Launch {
   const PingView* views = nullptr;
   std::int32_t pings = 0, from = 0, to = step_count, timed = 0;
-  std::uint32_t largest[step_count] = {};  // of the pings' step_size
+  std::uint32_t largest[step_count] = {};  // largest step_size of the pings
 };
 struct StepSeconds {
   double of[step_count] = {};

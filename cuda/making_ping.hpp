@@ -15,7 +15,7 @@ struct PingPreparer::Making {
   std::vector<LawTable> laws = {};
   std::vector<float> turned_away = {};
   CellView looks_at = {};
-  const CellsInView* seen = nullptr;  // of PingPreparer::found_
+  const CellsInView* seen = nullptr;  // points into PingPreparer::found_
   PingView view{};
   BatchRoom::Ping ping{};
   bool fits = true;

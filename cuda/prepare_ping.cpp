@@ -68,7 +68,7 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
   all.reserve(pings.size());
   for (const AskedPing& asked : pings) all.push_back(begin(asked, lane, room));
   const bool alone = all.size() == 1;
-  Parallel& pool = alone ? pool_ : one_thread_;  // of the loops within a ping
+  Parallel& pool = alone ? pool_ : one_thread_;  // pool for the loops within a ping
   const auto context_of = [&](Making& m) -> PingContext {
     if (m.laws.empty() && !m.request().blank) {
       m.laws = laws_of(*scene_, m.plan, m.scalars);

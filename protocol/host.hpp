@@ -40,9 +40,9 @@ struct PingFacts {
 /// A ping as a host decoded it.
 struct HostPing {
   PingFacts facts;
-  std::function<Result<PolarImage>()> picture;    // of a mechanical scan: the sector as scanned so far
-  bool is_whole = true;                           // of pictures of many pings: there are enough of them
-  std::vector<std::string> errors = {};           // of identities and sequence
+  std::function<Result<PolarImage>()> picture;    // for a mechanical scan: the sector as scanned so far
+  bool is_whole = true;                           // for a picture of many pings: there are enough of them
+  std::vector<std::string> errors = {};           // errors of identities and sequence
   std::vector<std::string> echo_mismatches = {};  // settings that do not have the requested value yet
   std::optional<double> fired_s = {};             // by the clock of the device
   /// What people look at; unset: a fan of `picture`.
@@ -145,9 +145,9 @@ struct Make {
   std::string_view driver_call = {};            // opens the sonar at {at}, where a library of ours is between
   char own_faults = 0;                          // first letter of the kinds of faults that only this make has
   bool each_ping_requested = false;             // by its hosts; a rate is a limit
-  bool own_numbers = false;                     // of pings: not those of sonard's events
+  bool own_numbers = false;                     // pings have numbers of their own, not those of sonard's events
   bool scans = false;                           // pings come as fast as its head turns
-  std::string_view demo_name = {};              // of `sonard --demo NAME`; empty: name()
+  std::string_view demo_name = {};              // NAME of `sonard --demo NAME`; empty: name()
   std::string_view demo_profile = {};           // its product; empty: the first model
   std::optional<RollPitchYaw> demo_mount = {};  // in the demo; nullopt: it looks ahead
   PictureKind picture = PictureKind::fan;

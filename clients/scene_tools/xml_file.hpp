@@ -42,7 +42,7 @@ class Element {
   std::string_view text() const;                          // trimmed
   std::string_view attribute(const char* name) const;     // trimmed
   Element child(const char* name) const;                  // the first of that name
-  std::vector<Element> children(const char* name) const;  // of that name
+  std::vector<Element> children(const char* name) const;  // the children of that name
   std::vector<Element> children() const;                  // all
   Place place() const;
   const XmlFile* file() const { return file_; }

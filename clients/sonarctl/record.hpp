@@ -15,7 +15,7 @@ namespace sonar::clients {
 struct RecordOptions {
   SourceOptions source;                                     // a device; or source.recording, a recording of any kind
   std::filesystem::path pcap, mcap, raw;                    // at least one, or of the next
-  std::map<std::string_view, std::filesystem::path> files;  // of a make's own kinds, by FileKind::ending
+  std::map<std::string_view, std::filesystem::path> files;  // files of a make's own kinds, by FileKind::ending
   double seconds = 0;                                       // 0 = no limit
   std::uint64_t pings = 0;                                  // 0 = no limit
   bool status = true;                                       // also record the status datagrams of the device

@@ -12,7 +12,7 @@
 
 namespace sonar {
 
-inline constexpr Rgb outside_colour{13, 17, 23}, ring_colour{150, 160, 170}, label_colour{190, 198, 206};  // of all pictures
+inline constexpr Rgb outside_colour{13, 17, 23}, ring_colour{150, 160, 170}, label_colour{190, 198, 206};  // used in all pictures
 
 struct FanStyle {
   int width_px = 1000;  // 64..8000
@@ -50,7 +50,7 @@ class FanPainter {
   static float mean(const PolarImage& image, const Footprint& of);
 
   FanStyle style_;
-  PolarImage shape_;  // of the images that footprints_ are for; without samples
+  PolarImage shape_;  // shape of the images for which footprints_ were made; without samples
   FanLayout layout_;
   std::vector<Footprint> footprints_;  // [height][width]
 };

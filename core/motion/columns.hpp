@@ -21,7 +21,7 @@ struct Row {
   std::int64_t stamp_ns = 0;
   Pose pose;
   Vec3d velocity_mps, angular_velocity_radps;
-  std::string_view body;  // of a body column
+  std::string_view body;  // from the column "body"
 };
 
 /// A word of a file made printable and short enough for an error text.

@@ -25,7 +25,7 @@ struct Speed {
 struct PlaybackRules {
   Speed speed;
   bool loop = false;
-  Ns start{0};  // of the trajectory, where playing begins; before 0: so long it waits at the first pose
+  Ns start{0};  // time in the trajectory at which playing begins; if it is negative, playing waits so long at the first pose
   bool operator==(const PlaybackRules&) const = default;
 };
 
@@ -47,7 +47,7 @@ class Playback {
       : duration_(duration), rules_(rules), clock_at_(begun), place_at_(rules.start) {}
 
   struct Place {
-    Ns at{0};         // of the trajectory, 0 to its duration
+    Ns at{0};         // time in the trajectory, 0 to its duration
     double rate = 0;  // seconds of the trajectory for one of the clock: 0 while paused, before the start, after the end
   };
   /// A loop takes as long as the file: its last moment is the first one of the next round, not one beside it.

@@ -15,7 +15,7 @@
 namespace sonar::motion {
 
 enum class Format { automatic, csv, tum, euroc, kitti };
-enum class Frame { enu_flu, ned_frd };  // of the world and of the body
+enum class Frame { enu_flu, ned_frd };  // axes of the world and of the body
 std::string_view name_of(Format format);
 std::string_view name_of(Frame frame);
 

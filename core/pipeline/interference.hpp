@@ -37,7 +37,7 @@ class Leak {
   Leak() = default;
   Leak(const PingPlan& plan, const Switches& switches);
   bool is_audible() const { return !rms_upa_.empty(); }
-  const std::vector<float>& rms_upa() const { return rms_upa_; }  // of a column, per sample
+  const std::vector<float>& rms_upa() const { return rms_upa_; }  // rms of a column, for each sample
   float steady() const { return steady_; }                        // amplitude of the part that the columns receive in every ping
   /// Adds it to columns [first, last). The table of `noise` must be prepared with the request's seed and the plan's filter;
   /// unused in expected power.
@@ -80,7 +80,7 @@ class Crosstalk {
 
  private:
   double amplitude_ = 0;
-  double share_ = 1;         // of the sum over beams that is one lone echo: beams overlap
+  double share_ = 1;         // share of the sum over beams that belongs to one echo, because beams overlap
   double own_in_power_ = 0;  // expected power: 2 sum W / sum W^2, how a beam adds up with its own leakage
 };
 

@@ -67,14 +67,14 @@ class LabelWork {
   const std::vector<PreparedTile>* tiles_ = nullptr;
   const std::vector<std::vector<std::uint32_t>>* by_group_ = nullptr;
   int group_columns_ = 1;
-  BeamWeights weights_;  // of powers, for these columns and beams
+  BeamWeights weights_;  // weights of powers, for these columns and beams
   std::vector<double> beam_sine_;
   std::vector<std::pair<Taper, double>> beam_widths_;  // taper and aperture of each
   double first_sine_ = 0, spacing_ = 0;
   std::vector<float> pulse_;  // |p|^2 at whole samples, the peak in the middle
   struct Group {
     std::vector<Part> parts;                    // the first `used` are of this ping; all keep their memory
-    std::vector<std::vector<float>> by_sample;  // of each part: [columns][samples], before the pulse
+    std::vector<std::vector<float>> by_sample;  // values of each part: [columns][samples], before the pulse
     std::size_t used = 0;
     std::span<const Part> of_this_ping() const { return std::span(parts).first(used); }
   };

@@ -24,11 +24,11 @@ namespace sonar {
 
 /// Directions of the rays: angles about the array axis, and the tangent axis of the depth map.
 struct Fan {
-  double half_angle_rad = 0;  // of the main part; the fixed fan and paths by mirrors cover no more
+  double half_angle_rad = 0;  // half of the main part; the fixed fan and paths by mirrors cover no more
   double reach_rad = 0;       // with the side lobes
   TangentAxis axis{};
   int bins = 0;
-  std::vector<float> tangent;        // of every bin's lower edge, and of the end: bins + 1
+  std::vector<float> tangent;        // tangents of the lower edge of every bin, and of the end: bins + 1
   std::vector<float> elevation_rad;  // the base fan, from below to above
   int side_elevations = 0;           // so many at either end of them lie in side lobes: not refined, shared by some columns
   bool is_side(int interval) const {
@@ -50,7 +50,7 @@ struct BeamPanel {
 };
 /// How beams are made of columns.
 struct BeamWeightOptions {
-  double dropped_energy = 1e-4;  // of the band: -40 dB
+  double dropped_energy = 1e-4;  // share of the energy outside the band: -40 dB
   bool transform = true;         // instead of a band that is wider than a transform is long, where beams allow it
 };
 struct BeamWeights {

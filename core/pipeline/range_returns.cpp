@@ -13,7 +13,7 @@ namespace {
 
 constexpr double speckle_cell_m = 0.02;  // surfaces keep their speckle as long as a beam's centre stays within such a cell
 constexpr std::uint32_t draws = 4096;    // that the range cells of all returns share
-constexpr double least_blur = 0.5;       // of a range cell: half the length of the shortest echo
+constexpr double least_blur = 0.5;       // least blur as a share of a range cell: half the length of the shortest echo
 
 // Rays round the middle of a cell: what the middle ray passes by is heard by the share of the cell that it fills.
 constexpr int rays_across = 2, rays_up = 2, rays_around = rays_across * rays_up;

@@ -18,7 +18,7 @@ namespace sonar {
 struct PreparedSettings {
   std::shared_ptr<const SonarModel> model;
   PingPlan plan;
-  NoiseTable noise, grains;  // of the receiver; of the pulse's correlation, where that is another
+  NoiseTable noise, grains;  // noise of the receiver; noise with the pulse's correlation, if that is different
   std::uint64_t last_used = 0;
 
   bool one_table() const { return plan.noise_filter == plan.pulse_filter; }

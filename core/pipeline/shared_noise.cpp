@@ -45,7 +45,7 @@ double focus_m(const SharedNoise& law, const PingSettings& settings) {
 /// The noise is followed to `end_m`. Over the last `fade_m` its power falls to 0.
 struct Reach {
   double end_m = 0, fade_m = 1;
-  double share(double range_m) const { return std::clamp((end_m - range_m) / fade_m, 0.0, 1.0); }  // of its power
+  double share(double range_m) const { return std::clamp((end_m - range_m) / fade_m, 0.0, 1.0); }  // share of its power
 };
 /// In a sector of beams of sines up to `widest`. Where the whole array's part never leaves it, the noise has no end.
 Reach reach_of(const FrequencyMode& mode, const PingSettings& settings, double widest) {

@@ -64,7 +64,7 @@ struct PointEcho {
   double sine = 0;  // y / r
   double sample = 0;
   std::complex<double> amplitude;  // [uPa]
-  std::uint32_t instance = 0;      // of what sent it, in labels (core/pipeline/labels.hpp); 0 = of nothing that has one
+  std::uint32_t instance = 0;      // instance that sent it, in labels (core/pipeline/labels.hpp); 0 = none
 };
 
 /// A pulse on the sample grid: complex values of samples from first_sample on.

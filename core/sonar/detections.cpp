@@ -63,7 +63,7 @@ double top_of(double before, double middle, double after) {
 struct Fan {
   const Ping& ping;
   int directions;
-  double width_sine;         // of a beam, -3 dB
+  double width_sine;         // -3 dB width of a beam
   double port_rad, end_rad;  // edges of the sector
 
   Fan(const Ping& of, int count, double beam_width_rad)

@@ -38,7 +38,7 @@ struct BeamProfile {
 
 /// Noise that receive channels share, with opposite signs in neighbours (docs/acoustics.md, section 5).
 struct SharedNoise {
-  float level_db = -200;  // of a channel, re the channel's own noise; below -150 = none
+  float level_db = -200;  // level of a channel, re the channel's own noise; below -150 = none
   int channels = 128;     // even
   int group = 32;         // so many neighbours share it, less towards both ends; even; the channels a multiple of its half
   float sine = 0.56f;     // from where the beams hear it, far away: half a wavelength over the channels' spacing

@@ -87,7 +87,7 @@ class App {
   void log_new_notes();
   void wait_for_signal();
   Reload::Steps reload_steps();
-  void take_over(Config next);  // of a reload
+  void take_over(Config next);  // takes over a reloaded configuration
   std::string status_line() const;
   asio::awaitable<void> housekeeping();
 

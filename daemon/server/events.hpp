@@ -12,7 +12,7 @@
 
 namespace sonar {
 
-namespace v1 {  // of control.pb.h
+namespace v1 {  // from control.pb.h
 class Event;
 }  // namespace v1
 

@@ -67,7 +67,7 @@ class SceneChanges {
   struct Built {
     ScenePointer scene;
     std::shared_ptr<std::unique_ptr<PingEngine>> engine;  // empty: the scene stays
-    std::vector<Result<void>> outcomes;                   // of each Change that was made
+    std::vector<Result<void>> outcomes;                   // outcome of each Change that was made
   };
   void begin();
   void build_next();

@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 using protocol::HostActions;
 
 constexpr auto silence_of_host = 2s;     // after the last message sent
-constexpr std::uint16_t abi_of_sdk = 4;  // of the SDK; the answers do not depend on it
+constexpr std::uint16_t abi_of_sdk = 4;  // abi of the SDK; the answers do not depend on it
 
 /// "no head 3 (code 2010)"
 std::string text_of_error(wire::BytesView payload) {

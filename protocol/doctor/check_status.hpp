@@ -6,7 +6,7 @@
 
 #include "protocol/doctor/finding.hpp"
 
-namespace sonar::v1 {  // of control.pb.h
+namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;
 }  // namespace sonar::v1
 

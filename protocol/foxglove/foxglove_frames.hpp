@@ -41,7 +41,7 @@ struct PlaybackControl {
   bool pause = false;
   float speed = 1;
   bool seeks = false;
-  Time to{};  // of a seek
+  Time to{};  // target of a seek
   std::string request;
 };
 /// Reads a frame that a viewer sent. bad_data: it is shorter than its layout, its lengths do not fit, or viewers do not send that

@@ -9,7 +9,7 @@ namespace sonar::recording {
 namespace {
 
 constexpr std::size_t file_header_bytes = wire::wire_size<OculusLogHeader>(), item_bytes = wire::wire_size<OculusLogItem>();
-constexpr std::size_t most_payload = oculus::reply_limit + 1024;  // of an item with a message; other items are skipped
+constexpr std::size_t most_payload = oculus::reply_limit + 1024;  // limit for an item with a message; other items are skipped
 
 template <class M>
 M read_as(BytesView bytes) {

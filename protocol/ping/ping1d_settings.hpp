@@ -37,7 +37,7 @@ inline Results results_of(Id id) {
 }
 
 struct Settings {
-  std::uint8_t id = 1;  // of the device
+  std::uint8_t id = 1;  // id of the device
   Parameters parameters;
   Results results = no_result;  // that the ping is fired for; a ping without a host has its profile
 };

@@ -11,7 +11,7 @@
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 
-namespace sonar::v1 {  // of control.pb.h
+namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;
 class Event;
 }  // namespace sonar::v1

@@ -7,7 +7,7 @@
 #include "core/base/result.hpp"
 #include "protocol/control/fault_record.hpp"
 
-namespace sonar::v1 {  // of control.pb.h
+namespace sonar::v1 {  // from control.pb.h
 class FaultEntry;
 class FaultReport;
 }  // namespace sonar::v1

@@ -5,7 +5,7 @@
 
 #include "core/base/geometry.hpp"
 
-namespace sonar::v1 {  // of control.pb.h
+namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;
 class Event;
 class ObjectStatus;

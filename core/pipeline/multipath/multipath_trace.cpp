@@ -86,7 +86,7 @@ class ChainTracer {
   Vec3 origin_;
   float turn_[9], far_[RayPacket::size] = {};
   std::vector<std::uint8_t> mirror_of_face_;
-  std::vector<Vec3> normals_;  // of the mirrors, world axes
+  std::vector<Vec3> normals_;  // normals of the mirrors, in world axes
   int count_ = 0;
 };
 

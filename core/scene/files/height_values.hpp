@@ -32,7 +32,7 @@ class HeightValues {
 /// Coordinates and heights as a file describes them.
 struct CoordinateSystem {
   std::optional<bool> geographic = {};  // coordinates in degrees
-  double unit_m = 1;                    // of coordinates that are no degrees
+  double unit_m = 1;                    // unit of coordinates that are not degrees
   double height_unit_m = 1;
   bool web_mercator = false;  // its metres are longer than metres on the ground
 };

@@ -21,7 +21,8 @@ struct Shape {
 
 class ShapeCache {
  public:
-  static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;  // of shapes that were not among the last used
+  // Limits for shapes that were not among the last used.
+  static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;
 
   /// The shape of that key, made with make() when it is not known. A shape without a mesh is not kept.
   template <class Make>

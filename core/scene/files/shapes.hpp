@@ -22,8 +22,8 @@ struct ShapeReader {
   Scene& scene;
   MaterialTable& materials;
   std::filesystem::path folder;                   // paths in the scene are relative to it
-  std::span<const BuiltInFile> in_memory = {};    // of a built-in scene: its mesh files, which are then not looked for on disk
-  ShapeCache* cache = nullptr;                    // of scenes before
+  std::span<const BuiltInFile> in_memory = {};    // mesh files of a built-in scene, which are then not looked for on disk
+  ShapeCache* cache = nullptr;                    // shapes of earlier scenes
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
   std::set<std::string> noted = {};               // whose losses the scene's notes have
   std::map<std::string, Shape> files = {};        // the same with their materials: objects that agree share one

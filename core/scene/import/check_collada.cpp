@@ -130,7 +130,7 @@ class Geometries {
       at = end;
     }
   }
-  std::map<std::string_view, std::uint64_t> triangles_;   // of geometries
+  std::map<std::string_view, std::uint64_t> triangles_;   // triangles of each geometry
   std::map<std::string_view, std::string_view> skin_of_;  // geometry or controller that a controller moves
   std::string_view geometry_, controller_, kind_;         // that are being read
   std::uint64_t values_a_corner_ = 1;

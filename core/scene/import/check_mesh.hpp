@@ -16,7 +16,7 @@ using MeshFault = std::optional<std::string>;
 /// Triangles by the text of a file that names its parts.
 struct ListedFaces {
   std::uint64_t shown = 0;   // in the file's scene, each as often as the scene shows it
-  std::uint64_t hidden = 0;  // of parts that the scene does not name
+  std::uint64_t hidden = 0;  // triangles of parts that the scene does not refer to
 };
 
 /// `head`: the header at least, of a file of `file_bytes`.

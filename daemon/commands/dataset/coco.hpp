@@ -20,7 +20,7 @@ void count_instances(const nlohmann::json& part, Instances& instances);
 
 struct CocoFile {
   std::filesystem::path file;
-  const Instances& instances;  // of the whole set: its categories have the same numbers in every split
+  const Instances& instances;  // instances of the whole set, so that categories have the same numbers in every split
   std::function<std::string(std::uint64_t ping)> name_of;
   std::function<bool(const nlohmann::json& image)> is_in;  // images of the parts
 };

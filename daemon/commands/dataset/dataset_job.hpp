@@ -38,7 +38,7 @@ struct DatasetJob {
   std::vector<std::string> targets;  // names or labels
   bool fan = false;                  // also a picture of each ping
   std::vector<Variation> variations;
-  std::vector<std::pair<std::string, std::string>> formulas;  // of let, as written
+  std::vector<std::pair<std::string, std::string>> formulas;  // formulas of `let`, as written
   Constraints constraints;
 
   std::uint64_t shards() const { return (pings + shard_pings - 1) / shard_pings; }

@@ -13,9 +13,9 @@ namespace sonar {
 struct ReplayDevice {
   oculus::StatusMessage status;
   bool recorded_status = false;              // else made up from the device id
-  const protocol::Vendor* vendor = nullptr;  // of one that is asked, else null; and what it is like
+  const protocol::Vendor* vendor = nullptr;  // the vendor of a device that answers requests, else null; and its state
   std::shared_ptr<protocol::DeviceState> state;
-  std::uint32_t serial = 0;  // of an ARIS
+  std::uint32_t serial = 0;  // serial number of an ARIS
   std::string is_only_seen;  // why no driver can be served; empty = one can
 
   /// Null: it listens by TCP for connections that last.

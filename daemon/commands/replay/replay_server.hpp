@@ -18,7 +18,7 @@ namespace sonar {
 struct ReplayOptions {
   Endpoint at{{127, 0, 0, 2}, 0};   // port 0: any
   std::vector<Endpoint> status_to;  // empty = the broadcast address of `at`'s network, the device's port
-  double speed = 1;                 // of the recorded pace
+  double speed = 1;                 // multiple of the recorded pace
   bool stepped = false;             // no pace: the next message when the client has taken the last
   bool loop = false;                // from the front again and again
   double rate_hz = 10;              // messages a second of recordings that know no times
@@ -100,7 +100,7 @@ class ReplayServer {
   asio::signal_set signals_;
   LimitConfig limits_;
   Admission admission_{limits_, log_};
-  std::unique_ptr<SonarHttp> http_;  // of a device with settings over HTTP; then nothing else listens
+  std::unique_ptr<SonarHttp> http_;  // for a device with settings over HTTP; then nothing else listens
   ClientPointer client_;
   LogLimiter refused_limit_, unsent_limit_;
   Figures figures_;

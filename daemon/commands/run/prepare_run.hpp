@@ -17,10 +17,10 @@ namespace sonar {
 struct PreparedRun {
   FoundConfig found;
   std::shared_ptr<const Scene> scene;
-  std::unique_ptr<Parallel> pool;  // of the engines
+  std::unique_ptr<Parallel> pool;  // pool of the engines
   EngineFactory make_engine;
-  std::unique_ptr<PingEngine> engine;  // of the scene
-  std::string token_warning;           // of Token::read(); empty = the file is safe
+  std::unique_ptr<PingEngine> engine;  // engine of the scene
+  std::string token_warning;           // warning of Token::read(); empty = the file is safe
 };
 
 /// The configuration as the command line changes it, its token, journal, scene and engine. `json`: how errors are to be written

@@ -10,7 +10,7 @@ namespace sonar {
 
 struct FaultDraws {
   Seed seed{};
-  std::uint32_t fault = 0;  // of its name
+  std::uint32_t fault = 0;  // made from its name
   std::uint32_t sonar = 0, ping = 0, client = 0;
 
   /// The draw of that index, any of 2^32.

@@ -55,10 +55,10 @@ class Pacer {
 
   bool running_ = false, triggered_ = false, trigger_waits_ = false, has_fired_ = false;
   std::chrono::nanoseconds period_{0}, travel_{0};  // travel: of sound to the range and back
-  Time start_{};                                    // of the grid
-  std::int64_t index_ = 0;                          // of the next tick on it
+  Time start_{};                                    // start of the grid
+  std::int64_t index_ = 0;                          // index of the next tick on the grid
   Time trigger_at_{};
-  Time last_tick_{}, home_at_{};  // of the last ping, and when its sound is back
+  Time last_tick_{}, home_at_{};  // time of the last ping, and when its sound is back
   std::uint64_t ticks_ = 0;
   SkippedTicks skipped_;
 };

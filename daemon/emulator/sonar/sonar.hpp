@@ -28,7 +28,7 @@ class Sonar {
   struct Surroundings {
     const Config& config;
     const World& world;
-    FaultJournal* journal = nullptr;  // of faults; may be null
+    FaultJournal* journal = nullptr;  // journal of faults; may be null
   };
   /// `index` keys its noise; `skipped`: what stepped time has jumped over so far.
   Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time now, std::chrono::nanoseconds skipped = {});

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-constexpr std::size_t most_receivers = 16;  // of one list
+constexpr std::size_t most_receivers = 16;  // limit for one list
 
 /// The next receiver of a stream is not sent pings that were made for the last one.
 void drop_unreceived(Connections& connections) {

@@ -37,7 +37,7 @@ struct ViewChannel {
 /// A message of a channel: its pieces one after the other, shared by all viewers.
 struct ViewPayload {
   struct Piece {
-    std::string key;  // of a part of the message that a later one replaces
+    std::string key;  // key of a message part that a later one with the same key replaces
     ViewBytes bytes;
   };
   Time at{};
@@ -85,7 +85,7 @@ class Viewer {
   using Moment = std::chrono::nanoseconds;
   struct Rights {
     bool may_steer = false;
-    double most_hz = 0;  // of pictures; 0 = no bound
+    double most_hz = 0;  // limit for the rate of pictures; 0 = none
   };
   enum class CloseCode : std::uint16_t { none = 0, policy = 1008, try_again_later = 1013 };
   static constexpr const char* may_only_look = "this connection may only look";

@@ -35,8 +35,8 @@ using MeshShapes = std::map<std::shared_ptr<const Mesh>, MeshShape>;
 /// Facts against which poses are judged. The sea surface is not one of them.
 struct Surroundings {
   Extent scene;                // where the scene puts what can be seen
-  std::vector<Extent> ground;  // of each plane, seabed and height map that stands still
-  double longest_range_m = 0;  // of any sonar
+  std::vector<Extent> ground;  // extent of each plane, seabed and height map that stands still
+  double longest_range_m = 0;  // longest range of any sonar
   MeshShapes meshes;           // that can be seen
 };
 /// `known`: of a scene before, whose meshes need no second look.

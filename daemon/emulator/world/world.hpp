@@ -120,7 +120,7 @@ class World {
   struct Track {
     BodyStart body;
     PoseHistory history;
-    motion::Playback playback{};  // of body.plan
+    motion::Playback playback{};  // playback of body.plan
     std::string sender_id, source;
     std::uint64_t seq = 0;
     std::uint32_t reset_counter = 0;

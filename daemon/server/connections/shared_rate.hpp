@@ -46,7 +46,7 @@ class SharedRate {
   }
 
  private:
-  static constexpr std::size_t at_once = 4096;  // of a new sender; more would reward reconnecting again and again
+  static constexpr std::size_t at_once = 4096;  // limit for a new sender; a larger one would reward connecting again and again
   std::size_t bytes_per_s_;
   InputRate together_;
   std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // by us and by each Part

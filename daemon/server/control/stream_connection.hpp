@@ -65,7 +65,7 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   control::DelimitedParser parser_;
   InputRate rate_;
   std::optional<SharedRate::Part> pose_rate_;  // from the first pose without an answer
-  std::optional<control::Bytes> newest_pose_;  // of those beyond the rate
+  std::optional<control::Bytes> newest_pose_;  // newest of the poses beyond the rate
   std::deque<control::Bytes> answers_;         // framed
   std::size_t unsettled_ = 0;                  // work: answers
   std::size_t in_progress_ = 0;                // requests whose answer is not in answers_ yet

@@ -45,7 +45,7 @@ class Simulator : private Interruption {
   struct Job {
     PingRequest request;
     Done done;
-    std::shared_ptr<PingEngine> engine;  // of a job that changes the engine
+    std::shared_ptr<PingEngine> engine;  // engine of a job that changes the engine
     Retired retired;
     asio::executor_work_guard<asio::io_context::executor_type> io_stays;
   };

@@ -41,7 +41,7 @@ class PoseIntake {
   Events* events_;
   Plausibility* plausibility_;
   LogLimiter refusals_, notices_;
-  std::uint32_t placements_ = 0;            // of moving objects: none is a movement from the one before
+  std::uint32_t placements_ = 0;            // placements of moving objects; each begins a new history
   std::chrono::nanoseconds wall_shift_{0};  // our time = WALL stamp + shift
 };
 

@@ -43,7 +43,7 @@ class PoseServer {
         : encoding(e), datagrams(std::move(s)), lines(io, admission, Admission::Purpose::client) {}
     Encoding encoding;
     udp::socket datagrams;
-    Listener lines;  // of JSON only
+    Listener lines;  // for JSON only
   };
   /// One TCP sender; closed by stop(), or when its place is needed and it has sent no pose, or too much, for longest. One that
   /// has hung up has no place any more.
@@ -100,7 +100,7 @@ class PoseServer {
   LogLimiter notices_, faults_;
   std::list<Port> ports_;
   ConnectionSlots<Connection> connections_;
-  SharedRate together_;  // of all connections
+  SharedRate together_;  // limit for all connections together
   InputRate dropping_;   // likewise, of bytes that are read away
   Endpoint protobuf_at_, json_at_;
   bool stopping_ = false;

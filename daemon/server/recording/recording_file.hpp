@@ -25,9 +25,9 @@ struct RecordedPing {
   Time at{};  // when it was made
   std::shared_ptr<const Ping> ping;
   std::shared_ptr<const protocol::Bytes> bytes;  // the vendor's, as clients get them; null = not sent over TCP
-  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // of each stream, as receivers get them
+  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream, as receivers get them
   protocol::Bytes status;                   // what the sonar announced of itself then; empty = nothing
-  std::shared_ptr<const SceneNames> names;  // of the scene that it was made in
+  std::shared_ptr<const SceneNames> names;  // names of the scene in which it was made
 
   /// That it keeps in memory while it waits.
   std::size_t size() const;

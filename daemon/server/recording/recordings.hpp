@@ -21,14 +21,14 @@
 
 namespace sonar {
 
-namespace v1 {  // of control.pb.h
+namespace v1 {  // from control.pb.h
 class RecordingStatus;
 }  // namespace v1
 
 class Recordings {
  public:
   static constexpr std::size_t most_at_once = 4, most_remembered = 8;
-  static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // of all recordings together
+  static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // limit for all recordings together
   /// Called once, when it was begun or has ended, before this returns or later; never after finish().
   using Done = std::function<void(const Result<void>&)>;
 

@@ -30,7 +30,7 @@
 
 namespace sonar {
 
-namespace v1 {  // of control.pb.h
+namespace v1 {  // from control.pb.h
 class PingEvent;
 class SonarStatus;
 }  // namespace v1

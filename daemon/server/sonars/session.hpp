@@ -54,7 +54,7 @@ class Session : public std::enable_shared_from_this<Session> {
   struct Setup {
     ConnectionId id = 0;
     bool digest = false;                // SHA-256 of what is sent
-    LimitConfig limits;                 // of one client
+    LimitConfig limits;                 // limits for one client
     std::shared_ptr<const void> place;  // kept as long as the session lives
   };
   /// Longest time a client may take for its last message after finish(); then it is reset. One whose computer has all of it, and

@@ -17,7 +17,7 @@ namespace sonar {
 struct PlayedRecording {
   std::filesystem::path file;
   std::string sonar = {};  // one of several in it, as --sonar of `sonard replay`
-  double rate_hz = 10;     // of files that store no times
+  double rate_hz = 10;     // rate of files that store no times
 };
 
 class RecordingViews {

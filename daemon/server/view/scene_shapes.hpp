@@ -18,7 +18,7 @@ class SceneShapes {
 
   struct Job {
     std::shared_ptr<const Scene> scene;
-    std::vector<std::size_t> objects;  // of it, to be made
+    std::vector<std::size_t> objects;  // objects of the scene that are still to be made
     Time at{};
   };
   struct Made {

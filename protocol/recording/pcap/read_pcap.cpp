@@ -13,7 +13,7 @@ namespace sonar::recording {
 namespace {
 
 constexpr std::size_t most_senders = 4096, most_connections = 64;
-constexpr std::size_t most_held_bytes = 64u << 20;  // of all connections: early segments and messages under way
+constexpr std::size_t most_held_bytes = 64u << 20;  // limit for all connections: early segments and messages under way
 
 // ---- first pass: find the sonar
 
