@@ -90,7 +90,7 @@ class Builder {
 
   std::size_t halve(std::size_t from, std::size_t to) const { return from + (to - from) / 2; }
 
-  /// By the cheapest of the planes between bins; where all centres are one, by number.
+  /// Splits at the cheapest of the planes between bins; if all centres are equal, by number.
   std::size_t divide(std::size_t from, std::size_t to) {
     Box centres = no_box;
     for (std::size_t i = from; i < to; ++i)

@@ -303,7 +303,7 @@ class DeviceEngine final : public PingEngine {
     room.results.download(room.lane);
   }
 
-  /// In one slice, or in three where transforms stand between.
+  /// Runs in one slice, or in three if transforms are between them.
   void run_steps(const BatchRoom& room, Launch launch) {
     const auto run_to = [&](int to) {
       launch.to = to;
@@ -366,8 +366,8 @@ class DeviceEngine final : public PingEngine {
   std::size_t work_a_ping_ = 0;  // bytes, of the last batch
   BatchRoom rooms_[2];
   std::size_t which_ = 0;          // the room that is filled next; if both are launched, the older one
-  std::deque<Call> calls_;         // that were not collected, in order
-  std::deque<WantedPing> wanted_;  // theirs
+  std::deque<Call> calls_;         // calls that were not collected, in order
+  std::deque<WantedPing> wanted_;  // pings of these calls
   Workspace work_;                 // workspace of the CPU
   std::set<std::string> reported_;
   PingStatistics statistics_;

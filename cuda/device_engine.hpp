@@ -19,7 +19,7 @@ struct DeviceEngineOptions {
   std::size_t cell_bytes = std::size_t{2} << 30;  // device memory for surface cells; a ping gets what it needs
   int batch = 0;                                  // pings that are launched together; 0 = 8, more with more threads, at most 32
   std::size_t work_bytes = std::size_t{1} << 30;  // memory of a batch on the device: if pings are large, a batch has fewer
-  bool cpu_after_failure = true;                  // else a device that fails is the end: run() throws EngineUnavailable
+  bool cpu_after_failure = true;                  // if false, a failing device is the end: run() throws EngineUnavailable
   /// Called once for each reason: what the CPU computes instead, and why. May be empty.
   std::function<void(const std::string&)> say = {};
 };

@@ -19,7 +19,7 @@ inline constexpr std::uint32_t counters_a_ping = 2;
 inline constexpr std::uint32_t beams_a_panel = 4;   // as BeamPanel has
 inline constexpr std::uint32_t sum_parts = 8;       // threads that share the sum of one column: a pulse has about as many taps
 inline constexpr std::uint32_t spread_parts = 32;   // likewise, of one column's grid
-inline constexpr std::uint32_t panels_at_once = 2;  // that one thread sums
+inline constexpr std::uint32_t panels_at_once = 2;  // panels that one thread sums
 
 /// Boxes of both children, one line of the cache. Links as in bvh_link.
 struct alignas(64) BvhNode {

@@ -55,8 +55,9 @@ class Machine {
   virtual void wait(int lane) = 0;
 };
 
-/// In which order host loops take a step's indices. A device takes them in any: where another order makes other bytes, there is a
-/// race. But forwards, memory begins with what is no number, as a device's may: where that shows, something was read unwritten.
+/// The order in which host loops take a step's indices. A device takes them in any: where another order makes other bytes, there
+/// is a race. But forwards, memory begins with what is no number, as a device's may: where that shows, something was read
+/// unwritten.
 enum class LoopOrder { forwards, backwards, scattered };
 /// Loops on the calling thread; for tests, which so run what the device runs.
 std::unique_ptr<Machine> make_host_loops(LoopOrder order = LoopOrder::forwards);

@@ -12,7 +12,7 @@ namespace {
 
 // Bytes that an arena takes at a time: large enough that a batch needs few, and kept from batch to batch.
 constexpr std::size_t table_chunk = 4u << 20, work_chunk = 16u << 20, result_chunk = 4u << 20, cell_chunk = 8u << 20;
-constexpr std::size_t tiles_per_part = 256;  // that one worker writes
+constexpr std::size_t tiles_per_part = 256;  // tiles that one worker writes
 
 }  // namespace
 

@@ -113,7 +113,7 @@ class Host {
 
 /// The content of a beacon for hosts.
 struct Announcement {
-  Ipv4 address{}, client{};  // where hosts connect; who is connected, 0.0.0.0: no one
+  Ipv4 address{}, client{};  // address where hosts connect; who is connected, 0.0.0.0: no one
   std::uint32_t device_id = 0;
   std::vector<std::string> complaints;  // deviations that hosts reject
 };
@@ -148,7 +148,7 @@ struct Make {
   bool own_numbers = false;                     // pings have numbers of their own, not those of sonard's events
   bool scans = false;                           // pings come as fast as its head turns
   std::string_view demo_name = {};              // NAME of `sonard --demo NAME`; empty: name()
-  std::string_view demo_profile = {};           // its product; empty: the first model
+  std::string_view demo_profile = {};           // product of the demo; empty: the first model
   std::optional<RollPitchYaw> demo_mount = {};  // in the demo; nullopt: it looks ahead
   PictureKind picture = PictureKind::fan;
 

@@ -35,7 +35,7 @@ struct Port {
 struct DriverAddress {
   std::string_view protocol;  // "tcp", "udp", "http", "multicast", "status": status messages, by UDP
   Endpoint at;
-  bool sonar_speaks_first = false;  // else the driver does
+  bool sonar_speaks_first = false;  // if false, the driver does
 };
 
 /// One request for a resource of the device, its sizes already limited by the server.

@@ -29,7 +29,7 @@ struct PingSummary {
 class PingLog {
  public:
   void add(const HostPing& ping, Seconds at);
-  const PingSummary& counts() const { return summary_; }  // so far, without rate and intervals
+  const PingSummary& counts() const { return summary_; }  // counts so far, without rate and intervals
   PingSummary summary(const std::optional<protocol::Host::Counts>& of_wire) const;
 
  private:

@@ -84,13 +84,13 @@ class PingStream {
   std::vector<std::optional<Socket>> sockets_;  // by port; none of kind http
   std::uint32_t device_ip_ = 0;                 // in network order
   std::chrono::milliseconds answer_patience_{};
-  std::deque<Item> items_;                           // to be handed out
+  std::deque<Item> items_;                           // items to be handed out
   std::optional<Error> ended_;                       // the conversation is over; empty text: the sonar closed it
   bool interrupted_ = false, has_answered_ = false;  // has_answered_: at the first port
   bool is_started_ = false;                          // the sonar is to hear that we leave
   std::ofstream record_;
   bool keeps_ = false;
-  std::vector<recording::RecordedMessage> kept_;        // since the last item
+  std::vector<recording::RecordedMessage> kept_;        // messages since the last item
   std::optional<recording::MessageSplitter> splitter_;  // splits the bytes of the first port, while messages are kept
   Time last_kept_{};                                    // UNIX time, which never decreases
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);

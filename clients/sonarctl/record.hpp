@@ -19,8 +19,8 @@ struct RecordOptions {
   double seconds = 0;                                       // 0 = no limit
   std::uint64_t pings = 0;                                  // 0 = no limit
   bool status = true;                                       // also record the status datagrams of the device
-  std::string status_on;                                    // where: HOST:PORT; empty = 0.0.0.0 and the make's port
-  std::optional<ControlOptions> control;                    // ask this sonard for the sonar's name and poses, for the MCAP file
+  std::string status_on;                  // where to listen for status: HOST:PORT; empty = 0.0.0.0 and the make's port
+  std::optional<ControlOptions> control;  // ask this sonard for the sonar's name and poses, for the MCAP file
 };
 /// Succeeds at its limits, on Ctrl-C and at the end of a recording. In every case the files hold what was recorded.
 Result<void> record(const RecordOptions& options);

@@ -20,8 +20,8 @@ struct OpenedStream {
   std::chrono::steady_clock::time_point connected_at;
   bool observes = false;  // no settings sent: pings as requested by the sonar's clients
 };
-/// As an observer when source.observe is set, or when the sonar has no free client slot and its sonard reports an address for
-/// observers; then with a note on standard error.
+/// Connects as an observer if source.observe is set, or when the sonar has no free client slot and its sonard reports an address
+/// for observers; then with a note on standard error.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
 /// The stream again after `why` it was lost, within source.return_limit_s; both lines go to `say`. The error is `why` when the
@@ -29,7 +29,7 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
 Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, const Error& why,
                                 const std::function<void(const std::string&)>& say);
 
-/// To standard error.
+/// Writes to standard error.
 void print_notices(const std::vector<std::string>& notices);
 
 /// Error: `what` did not arrive within source.silence_limit_s, or no message of the make arrived at all (`received` false).

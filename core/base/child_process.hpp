@@ -25,7 +25,7 @@ class MemoryFile {
 };
 
 struct ChildEnd {
-  int signal = 0;     // that ended it; 0 = it exited
+  int signal = 0;     // signal that ended it; 0 = it exited
   int exit_code = 0;  // -1: not known, because this process ignores its children
 };
 

@@ -39,7 +39,7 @@ class FanPainter {
   Result<Raster> draw(const PolarImage& image);
 
  private:
-  /// In rows and beams, cell i being [i, i + 1).
+  /// Units are rows and beams; cell i is [i, i + 1).
   struct Footprint {
     double row_low = 0, row_high = -1, beam_low = 0, beam_high = 0;
     bool is_outside() const { return row_high < row_low; }

@@ -16,7 +16,7 @@ namespace sonar::motion {
 
 using Words = std::vector<std::string_view>;
 
-/// As written: in the frame of the file.
+/// Values as written, in the frame of the file.
 struct Row {
   std::int64_t stamp_ns = 0;
   Pose pose;

@@ -33,7 +33,7 @@ struct PlaybackRules {
 struct Plan {
   std::shared_ptr<const Trajectory> trajectory = {};  // null = nothing
   PlaybackRules rules = {};
-  std::string file = {};   // as it was named
+  std::string file = {};   // the file, as it was named
   std::string about = {};  // format, frame, length, for people
   explicit operator bool() const { return trajectory != nullptr; }
 };

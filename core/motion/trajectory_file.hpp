@@ -31,11 +31,11 @@ struct TrajectoryFile {
     std::string name;  // empty when the file names none
     std::shared_ptr<const Trajectory> trajectory;
   };
-  std::vector<Body> bodies;  // as they appear; at least one
+  std::vector<Body> bodies;  // bodies in the order of the file; at least one
   Format format = Format::csv;
   Frame frame = Frame::enu_flu;
   Ns begins_at{0};           // the earliest stamp: what the trajectories call 0
-  Ns duration{0};            // to the latest
+  Ns duration{0};            // time to the latest stamp
   std::size_t replaced = 0;  // poses that a later line of the same stamp took the place of
 };
 

@@ -30,7 +30,7 @@ class BeamMix {
   const std::vector<float>& share() const { return share_; }
   BeamMixView view() const;
   std::size_t bytes() const;
-  /// In place; `scratch` keeps its memory. Nothing where blurs() or blends() is false.
+  /// Works in place; `scratch` keeps its memory. Does nothing if blurs() or blends() is false.
   void blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector<float>& scratch) const;
   void blend(BeamSignals& beams, std::vector<float>& scratch) const;
 

@@ -50,7 +50,7 @@ class Leak {
 
 /// A pulse of another sonar while we listen: a tone through our receiver, somewhere on the sample grid.
 struct ReceivedPulse {
-  double sine = 0;  // where it comes from, y / r at its arrival
+  double sine = 0;  // direction from which it comes, y / r at its arrival
   double from_sample = 0, to_sample = 0;
   double amplitude_upa = 0;     // in a beam that looks at it
   double phase_turns = 0;       // at from_sample

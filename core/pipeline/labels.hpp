@@ -18,7 +18,7 @@ namespace sonar {
 
 /// Why the samples of such pings have no labels; empty = they have.
 std::string why_unlabelled(const PingRequest& request, const Scene& scene);
-/// Those of a ping that receives nothing.
+/// Labels of a ping that receives nothing.
 PingLabels no_labels(const PingRequest& request, const Scene& scene);
 
 /// The labels of one ping while it is made. Kept from ping to ping for its buffers.
@@ -41,7 +41,7 @@ class LabelWork {
     int first_sample = 0, last_sample = 0;     // half-open
     int first_row = 0, rows = 0;               // multiples of `window`
     std::vector<float> power = {};             // [columns][rows], the pulse's length included
-    std::vector<double> seen = {}, open = {};  // by column: energy, of objects with a label; open: were nothing in the way
+    std::vector<double> seen = {}, open = {};  // energy of objects with a label, by column; `open`: as if nothing were in the way
   };
   struct Gap {  // samples of a column that lie in an object's shadow, where nothing else is
     float from = 0, to = 0;

@@ -116,7 +116,7 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
   return {power.begin(), power.end()};
 }
 
-/// To a millionth: settings whose rows differ only by rounding have the same filter, and share the draws of noise.
+/// Rounded to a millionth: settings whose rows differ only by rounding have the same filter, and share the draws of noise.
 std::vector<float> rounded(std::vector<float> filter) {
   constexpr float steps = 1 << 20;
   for (float& tap : filter) tap = std::round(tap * steps) / steps;
@@ -337,7 +337,7 @@ void set_gain(PingPlan& plan, float gain_db) {
 }
 
 bool serves(const PingPlan& plan, const PingRequest& r) {
-  PingSettings asked = r.settings;  // as the plan's, but for what no table depends on
+  PingSettings asked = r.settings;  // the plan's settings, except those on which no table depends
   asked.rate_hz = plan.settings.rate_hz;
   asked.gain_db = plan.settings.gain_db;
   asked.gain_assist = plan.settings.gain_assist;

@@ -30,7 +30,7 @@ struct Fan {
   int bins = 0;
   std::vector<float> tangent;        // tangents of the lower edge of every bin, and of the end: bins + 1
   std::vector<float> elevation_rad;  // the base fan, from below to above
-  int side_elevations = 0;           // so many at either end of them lie in side lobes: not refined, shared by some columns
+  int side_elevations = 0;           // number at either end that lie in side lobes: not refined, shared by some columns
   bool is_side(int interval) const {
     return interval < side_elevations || interval + 1 >= static_cast<int>(elevation_rad.size()) - side_elevations;
   }
@@ -82,7 +82,7 @@ struct PingPlan {
   BeamWeights beam_weights;
   double bearing_scale = 1;                  // bearing_scale_of() the request
   std::vector<float> beam_azimuth_rad;       // reported
-  std::vector<double> beam_sine;             // where the beams look, as all sines here but those of tables by reported sine
+  std::vector<double> beam_sine;             // where the beams point, as all sines here except those of tables by reported sine
   std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.

@@ -12,7 +12,7 @@ namespace sonar {
 namespace {
 
 constexpr double speckle_cell_m = 0.02;  // surfaces keep their speckle as long as a beam's centre stays within such a cell
-constexpr std::uint32_t draws = 4096;    // that the range cells of all returns share
+constexpr std::uint32_t draws = 4096;    // number of draws, which the range cells of all returns share
 constexpr double least_blur = 0.5;       // least blur as a share of a range cell: half the length of the shortest echo
 
 // Rays round the middle of a cell: what the middle ray passes by is heard by the share of the cell that it fills.
@@ -138,7 +138,7 @@ void RangeReturns::trace_middles(int row, std::vector<RangeReturn>& middles) con
 
 /// Aims rays of a cell's lattice, from `first_ray` on, by lanes of a packet.
 void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ray, int rays, RayPacket& p, int first_lane) const {
-  // In the plane across the middle ray, which the few tenths of a degree allow.
+  // Computed in the plane across the middle ray, which is good enough for a few tenths of a degree.
   const auto [ca, sa] = azimuth_[static_cast<std::size_t>(column)];
   const Vec3d ahead = direction(column, row), to_port{-sa, ca, 0};
   const double width = column_step_rad_ * elevation_[static_cast<std::size_t>(row)].cosine;

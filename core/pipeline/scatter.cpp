@@ -49,7 +49,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   const Rotation sonar_from_object = s.moves ? at.turn * seen_from_object : seen_from_object;
   const Vec3d from_sonar_object_m =
       s.moves ? t.from_sonar_object_m - transposed(seen_from_object) * at.moved_m : t.from_sonar_object_m;
-  // In double; cells add a float difference to it (section 1).
+  // Computed in double; cells add a float difference to it (section 1).
   const double range = length(at.from_sonar_m);
   seen.tile = &tile;
   const Vec3 q = to_float(from_sonar_object_m), p = to_float(at.from_sonar_m);

@@ -301,7 +301,7 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
   if (labels_) w_.labels.add_cells(group, mine.echoes);
 }
 
-/// In time where the pulse is real and tabulated, else by way of the spectrum.
+/// Computed in time if the pulse is real-valued and tabulated, otherwise by way of the spectrum.
 void PingSimulation::sum_pulses(int first, Workspace::Buffers::PerWorker& mine) {
   if (plan_.spectral)
     plan_.spectral->add(mine.echoes, first, mine.spectral);

@@ -14,7 +14,7 @@ namespace sonar {
 
 /// Buffers of Volume::add that are kept from ping to ping; one per worker.
 struct VolumeScratch {
-  std::vector<double> blocked;     // by sample: how much of the fan ends there
+  std::vector<double> blocked;     // how much of the fan ends at each sample
   std::vector<float> rms, grains;  // by sample; grains are complex
 };
 

@@ -10,7 +10,7 @@ namespace sonar {
 /// Arrays are [rows][beams], as Ping::samples. Instance i + 1 is Scene::objects[i]; the point targets follow them.
 struct PingLabels {
   int rows = 0, beams = 0;
-  std::vector<std::uint16_t> instance;  // whose energy is largest, and above the receiver's noise; 0 = none
+  std::vector<std::uint16_t> instance;  // instance whose energy is largest, if above the receiver's noise; 0 = none
   std::vector<std::uint8_t> share;      // share of that instance in the sample's energy, noise included; 255 = all
   /// Where no instance is: the object, of several the nearest, that blocks the line of sight over all of the beam's -3 dB width;
   /// 0 = no shadow. What the beam receives there through its side lobes is ignored.

@@ -62,7 +62,7 @@ struct ReceiverModel {
   std::vector<float>
       leak_ring_db;  // of a ringing leak: re leak_upa at 0, 1, 2 .. leak_ring_step_m, then over; takes the decay's place
   float leak_ring_step_m = 0.003f;
-  bool leak_is_shared = false;  // by the channels, as shared_noise is; else its phases are random from column to column
+  bool leak_is_shared = false;  // shared by the channels, as shared_noise is; else its phases are random from column to column
   BeamProfile profile;
   /// Gains of the receive channels, each of which serves as many neighbouring beams, from port; empty = no difference.
   std::vector<float> channel_gain_db;

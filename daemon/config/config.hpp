@@ -37,7 +37,7 @@ inline constexpr std::array<std::string_view, 2> overload_names = {"slow", "coun
 
 struct VehicleConfig {
   std::string name;
-  Pose initial_pose;  // in world
+  Pose initial_pose;  // pose in the world
   bool orbits = false;
   motion::Plan plan{};            // instead
   bool has_initial_pose = false;  // from the file, not the default
@@ -94,7 +94,7 @@ struct PoseConfig {
 /// A site whose pages may open the live view (docs/live-view.md), exactly as browsers name it: "https://example.com".
 struct ViewOrigin {
   std::string origin;
-  bool steer = false;  // else its pages only look
+  bool steer = false;  // if false, its pages may only look
   bool operator==(const ViewOrigin&) const = default;
 };
 /// The control interfaces (docs/control.md).
@@ -128,7 +128,7 @@ struct RecordingConfig {
 };
 /// Faults on purpose (docs/faults.md).
 struct FaultConfig {
-  bool armed = false;             // else every request for a fault is refused
+  bool armed = false;             // if false, every request for a fault is refused
   std::filesystem::path journal;  // JSON lines are appended to it; empty = none
   std::vector<FaultRecord> plan;  // checked
   std::string plan_place;         // file:line:col: faults.plan, for errors found with the command line

@@ -30,7 +30,7 @@ class SceneChanges {
   using Make = std::function<Result<ScenePointer>(const ScenePointer& now)>;
   struct Change {
     Make make;  // empty: nothing is to be made, it only waits for those before
-    /// On the I/O thread, when the new scene is in use, or nothing was changed. Never after stop().
+    /// Called on the I/O thread when the new scene is in use, or nothing was changed. Never called after stop().
     std::function<void(const Result<void>& outcome)> done;
     bool shares_engine = false;  // with such Changes beside it; its `done` then meets the scene of all of them
   };
@@ -84,7 +84,7 @@ class SceneChanges {
   InUse in_use_;
   std::function<void()> on_change_;
   std::deque<Change> waiting_;  // the first ones are under way
-  bool under_way_ = false;      // until its `done` has returned, which may submit another
+  bool under_way_ = false;      // true until its `done` has returned, which may submit another
   bool stopped_ = false, building_ = false;
   std::chrono::steady_clock::time_point building_since_{}, engine_due_{};
   std::function<bool()> drivers_wait_;

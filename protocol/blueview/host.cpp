@@ -274,7 +274,7 @@ class BlueViewHost final : public protocol::Host {
   protocol::SettingsOverride wanted_;
   Framer framer_{longest_payload};
   Greeting greeting_;
-  std::deque<std::pair<Key, Value>> settings_;  // not sent yet
+  std::deque<std::pair<Key, Value>> settings_;  // settings that are not sent yet
   std::size_t head_;                            // index into greeting_.heads
   std::uint32_t last_id_ = 0;
   bool is_open_ = false, asked_ = false;  // asked_: a requested ping has not arrived yet

@@ -122,7 +122,8 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
   const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
   if (field == nullptr || field->containing_oneof() == nullptr) return refused("unknown request");
   if (json.size() > largest_json) return refused("longer than 1 MiB");
-  if (const auto zero = json.find('\0'); zero != std::string_view::npos)  // to the reader the end, to protobuf more to read
+  // For the reader this is the end, for protobuf there is more to read.
+  if (const auto zero = json.find('\0'); zero != std::string_view::npos)
     return refused("not JSON: a zero byte at character " + std::to_string(zero + 1));
   StrictReader reader;
   if (!nlohmann::json::sax_parse(json, &reader)) return refused(reader.why);

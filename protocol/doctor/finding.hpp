@@ -13,7 +13,7 @@ struct Finding {
   std::string text;
   std::string cure;         // empty for Level::ok
   std::string sonar = {};   // empty = of none
-  std::string client = {};  // its address; empty = of none
+  std::string client = {};  // address of the client; empty = none
 };
 
 }  // namespace sonar::doctor

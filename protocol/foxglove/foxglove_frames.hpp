@@ -33,7 +33,7 @@ struct PlaybackState {
   Time at{};
   float speed = 1;
   bool did_seek = false;
-  std::string request;  // its id; empty = nothing was asked
+  std::string request;  // id of the request; empty = nothing was asked
 };
 Bytes playback_frame(const PlaybackState& state);
 

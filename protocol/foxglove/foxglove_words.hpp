@@ -16,7 +16,7 @@
 
 namespace sonar::foxglove {
 
-inline constexpr std::size_t longest_word = 64u << 10;  // that a viewer may send
+inline constexpr std::size_t longest_word = 64u << 10;  // longest word that a viewer may send
 inline constexpr std::size_t most_parameters = 64;      // limit for one request
 
 /// How messages are described to viewers: text is base64 where the encoding is "protobuf".

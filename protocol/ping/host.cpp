@@ -280,7 +280,7 @@ class Ping360Host final : public PingHost {
 
   bool is_open_ = false;
   Turn turn_;
-  std::uint32_t pings_ = 0;  // which a Ping360 does not number
+  std::uint32_t pings_ = 0;  // a Ping360 does not number its pings
 };
 
 }  // namespace

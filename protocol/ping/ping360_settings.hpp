@@ -33,7 +33,7 @@ struct HeldSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
   Settings settings;
 };
-/// As the device comes, for null.
+/// The settings of a new device, for null.
 Settings settings_from(const VendorSettings* held);
 
 /// Why the device refuses it; empty = it does not.

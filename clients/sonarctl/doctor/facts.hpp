@@ -54,7 +54,7 @@ struct StreamFacts {
   double asked_hz = 0, rate_hz = 0;
   // Spread of the delays by the stamps in the pings: lateness relative to the earliest.
   std::optional<double> spread_p99_ms;
-  // From transmission to the last byte received, by the events of the control stream.
+  // Time from transmission to the last byte received, by the events of the control stream.
   std::optional<double> latency_p50_ms, latency_p99_ms;
   std::optional<double> computing_ms;  // median time to compute a ping, from the same events
 };
@@ -74,7 +74,7 @@ struct SonarFacts {
 
 struct ControlFacts {
   Endpoint at;
-  bool given = false;                              // by the user: then no answer is an error
+  bool given = false;                              // given by the user: then no answer is an error
   std::string error;                               // why there is no status
   bool token_required = false;                     // the reason, and none was given
   std::shared_ptr<const v1::DaemonStatus> status;  // null = there is none

@@ -14,7 +14,7 @@ namespace sonar {
 /// Inputs of one ping's echoes via mirrors.
 struct ImagePaths {
   std::vector<FlatMirror> mirrors;
-  std::vector<Path> paths;  // those that own a part of the map; [0] is the straight one
+  std::vector<Path> paths;  // paths that own a part of the map; [0] is the straight one
   BounceMap map;
   BubbleLayer bubbles;
 };

@@ -50,7 +50,7 @@ struct GroupView {
   TangentAxis axis;                         // axis t of the depth map
   int bins;                                 // values per column of the depth map; the map has bins + 1
   int map_first_column, fan_columns;        // first of the depth map; of the whole fan
-  int columns_beside;                       // so far from its own column a cell is looked up, where the sonar moves
+  int columns_beside;                       // how far from its own column a cell is looked up while the sonar moves
   const float* inverse_depth;               // DepthMap::inverse_x
   const float* depth_slope;                 // DepthMap::per_column
   bool has_upper_marks;                     // in depth_slope

@@ -87,7 +87,7 @@ struct TileInView {
 /// Cells of a view. Valid until the next call of in_view() or in_views().
 struct CellsInView {
   std::vector<TileInView> tiles;
-  std::vector<Rotation> sonar_from_object;  // to the sonar's axes, per object
+  std::vector<Rotation> sonar_from_object;  // rotations to the sonar's axes, per object
   std::size_t built = 0;                    // tiles that were missing, also where another view of the call wanted them too
 };
 
@@ -142,7 +142,7 @@ class SurfaceCells {
   };
   struct Found {  // by those who look through some of the roots
     std::vector<TileInView> in_view;
-    std::vector<Node*> missing;  // those of them without a tile
+    std::vector<Node*> missing;  // nodes among them without a tile
     std::size_t new_bytes = 0;
   };
   struct Look {  // a view as the cubes are compared with it

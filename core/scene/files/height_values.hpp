@@ -51,9 +51,9 @@ struct RawHeights {
 /// Scale, holes, and the origin of degrees. Errors lack the file's name.
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 
-/// By the .prj file beside the heights: WKT of version 1 or 2, or the lines that Arc/Info writes.
+/// Read from the .prj file beside the heights: WKT of version 1 or 2, or the lines that Arc/Info writes.
 CoordinateSystem system_by_prj(const std::filesystem::path& heights);
-/// By WKT; units that it does not name are metres.
+/// From WKT; units that it does not name are metres.
 CoordinateSystem system_of_wkt(std::string_view text);
 
 }  // namespace sonar

@@ -15,7 +15,7 @@ namespace sonar {
 
 struct Shape {
   std::shared_ptr<const Mesh> mesh;  // null after an error
-  Vec3d centre_m;                    // where the mesh's own zero lies in the object's frame
+  Vec3d centre_m;                    // the mesh's own zero in the object's frame
   Primitive primitive = {};          // the true surface, of shapes that have one
 };
 

@@ -25,7 +25,7 @@ struct ShapeReader {
   std::span<const BuiltInFile> in_memory = {};    // mesh files of a built-in scene, which are then not looked for on disk
   ShapeCache* cache = nullptr;                    // shapes of earlier scenes
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
-  std::set<std::string> noted = {};               // whose losses the scene's notes have
+  std::set<std::string> noted = {};               // meshes whose losses are in the scene's notes
   std::map<std::string, Shape> files = {};        // the same with their materials: objects that agree share one
 
   /// Names that `type` may have here, without "point".

@@ -24,7 +24,7 @@ struct CocoFile {
   std::function<std::string(std::uint64_t ping)> name_of;
   std::function<bool(const nlohmann::json& image)> is_in;  // images of the parts
 };
-/// From the notes of the set's shards, one in memory at a time; twice through them.
+/// Made from the notes of the set's shards, which are read twice, one in memory at a time.
 Result<void> write_coco(const DatasetJob& job, const std::filesystem::path& set, const CocoFile& coco);
 
 }  // namespace sonar::dataset

@@ -12,7 +12,7 @@ namespace sonar {
 /// An Oculus, which sends by itself, or a sonar that hosts ask for pings: an ARIS, a Sonar 3D-15, a sonar of the ping protocol.
 struct ReplayDevice {
   oculus::StatusMessage status;
-  bool recorded_status = false;              // else made up from the device id
+  bool recorded_status = false;              // if false, it is made up from the device id
   const protocol::Vendor* vendor = nullptr;  // the vendor of a device that answers requests, else null; and its state
   std::shared_ptr<protocol::DeviceState> state;
   std::uint32_t serial = 0;  // serial number of an ARIS

@@ -43,7 +43,7 @@ class ReplayServer {
   void stop();
 
   const Figures& figures() const { return figures_; }
-  /// After io.run(). bug, when an exception in one of its parts ended it.
+  /// Call it after io.run(). The error is `bug` if an exception in one of its parts ended it.
   const Result<void>& outcome() const { return outcome_; }
   Endpoint at() const { return at_; }
 
@@ -58,7 +58,7 @@ class ReplayServer {
     bool gone = false;
     // For a sonar that sends pings on request:
     std::unique_ptr<protocol::Dialogue> dialogue;
-    protocol::Bytes replies;  // not yet sent
+    protocol::Bytes replies;  // replies that are not sent yet
     std::vector<udp::endpoint> receivers;
     bool wants_frames = false;
     std::int64_t frames = 0;

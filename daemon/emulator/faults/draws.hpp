@@ -22,7 +22,7 @@ struct FaultDraws {
   }
   /// Below `end`, which is above 0.
   std::size_t below(std::size_t end, std::uint32_t index) const { return static_cast<std::size_t>(bits(index)) % end; }
-  /// In (0, 1).
+  /// A value in (0, 1).
   double uniform(std::uint32_t index) const { return static_cast<double>(uniform_open(bits(index))); }
 };
 

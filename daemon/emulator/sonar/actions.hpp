@@ -66,9 +66,9 @@ struct Reset {
 };
 /// A connection is closed and forgotten.
 struct Closed {
-  std::string peer;  // its name
+  std::string peer;  // name of the peer
   Role role{};
-  bool served = false;  // else it waited for a slot
+  bool served = false;  // if false, it waited for a slot
   std::uint64_t pings_written = 0, pings_dropped = 0;
   std::string why;
   bool by_client = false;  // it left

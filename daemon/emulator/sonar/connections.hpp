@@ -39,10 +39,10 @@ struct Connection {
   Outbox outbox;
   /// Receivers that a client requested, one list for each stream it named; for a stream the device's own list, one.
   std::vector<protocol::SetReceivers> receivers;
-  struct Held {  // by a fault
+  struct Held {  // held back by a fault
     Outbox::Message ping;
     Time until{};
-    bool after_next = false;  // until the next ping has overtaken it
+    bool after_next = false;  // held until the next ping has overtaken it
   };
   std::deque<Held> held;
   bool finishing = false;  // no more bytes are taken in, no more pings offered

@@ -46,9 +46,9 @@ struct DeviceFigures {
   std::uint64_t unwanted = 0;                            // pings whose clients had gone or had requested other settings
   std::uint64_t out_of_water = 0;                        // pings of noise only, because the sonar was above the sea surface
   std::uint64_t served = 0;                              // written whole to at least one client
-  std::uint64_t offered = 0;                             // to clients: a ping counts for each of them
+  std::uint64_t offered = 0;                             // pings offered to clients: a ping counts for each of them
   std::uint64_t sent = 0;                                // written whole to a client
-  std::uint64_t dropped = 0;                             // not written to a client
+  std::uint64_t dropped = 0;                             // pings that were not written to a client
   std::array<std::uint64_t, drop_reasons> dropped_by{};  // why, by DropReason
   std::uint64_t waiting = 0;                             // in outboxes now, not yet begun
   std::uint64_t clients = 0, refused_clients = 0;        // since the start

@@ -39,7 +39,7 @@ class Outbox {
   };
   struct Message {
     std::shared_ptr<const Bytes> bytes;
-    std::uint32_t ping = 0;       // its number; 0 = a reply
+    std::uint32_t ping = 0;       // number of the ping; 0 = a reply
     std::vector<Bytes> prefixes;  // prefixes of a ping: it is sent once for each, the prefix first; none = once, as it is
     Time fired_at{};              // when the ping was fired
     std::shared_ptr<const std::vector<Bytes>> datagrams = nullptr;  // datagrams of a ping, in place of bytes

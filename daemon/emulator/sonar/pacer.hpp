@@ -44,7 +44,7 @@ class Pacer {
   Time last_tick() const { return last_tick_; }
   bool trigger_waits() const { return trigger_waits_; }
   std::chrono::nanoseconds period() const { return period_; }
-  /// That were due; those skipped, fired, and a trigger that waits add up to it.
+  /// Ticks that were due: those skipped, those fired, and a trigger that waits.
   std::uint64_t ticks() const { return ticks_; }
   const SkippedTicks& skipped() const { return skipped_; }
   std::uint64_t skipped_ticks() const { return skipped_.total(); }

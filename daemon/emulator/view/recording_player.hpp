@@ -23,7 +23,7 @@ class RecordingPlayer {
   /// Reads one ping more to find the length; false: there is none, and the recording is at its front again.
   bool measure();
   Time begin() const { return begin_.value_or(Time{}); }
-  /// From the first ping to the last.
+  /// Time from the first ping to the last.
   Ns length() const { return length_; }
   std::uint64_t count() const { return count_; }
   const recording::SentBy& by() const { return pings_.by(); }

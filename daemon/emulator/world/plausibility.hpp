@@ -52,7 +52,7 @@ std::vector<Carrier> carriers_of(const Config& config);
 std::vector<Note> notes_on_mounts(const Config& config);
 /// `around`: of this scene.
 std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around);
-/// At most one on the place, and one on the attitude.
+/// At most one concerns the place, and one the attitude.
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
 /// `largest_angle_rad`: as in PoseSample.
 std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad);

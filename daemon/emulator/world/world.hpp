@@ -29,7 +29,7 @@ struct PoseRules {
 /// A vehicle, or a moving object of the scene.
 struct BodyStart {
   std::string name;
-  Pose initial_pose;    // in world
+  Pose initial_pose;    // pose in the world
   bool orbits = false;  // circles the world's z axis until the first accepted pose
   motion::Plan plan{};  // followed until the first accepted pose
 };

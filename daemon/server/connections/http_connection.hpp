@@ -24,10 +24,10 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   asio::awaitable<void> write();
   void close();
   bool over() const { return !socket_.is_open(); }
-  /// Before read(): no slot is free. Answers 503 and discards input for a moment.
+  /// Call it before read() if no slot is free. Answers 503 and discards input for a moment.
   void reject();
-  /// Before read(): the client is untrusted until it shows the token; `claim_slot` is then called, and is false when no slot is
-  /// free.
+  /// Call it before read(). The client is untrusted until it shows the token; `claim_slot` is then called, and is false when no
+  /// slot is free.
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
   /// Our end of the connection.

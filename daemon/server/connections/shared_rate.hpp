@@ -21,7 +21,7 @@ class SharedRate {
   };
 
   explicit SharedRate(std::size_t bytes_per_s) : bytes_per_s_(bytes_per_s), together_(bytes_per_s) {}
-  /// For one more client; the rate is this from now on.
+  /// Adds a client; the rate is this one from now on.
   Part join(std::size_t bytes_per_s) {
     bytes_per_s_ = bytes_per_s;
     together_.use(bytes_per_s);

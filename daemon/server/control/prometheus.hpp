@@ -41,7 +41,7 @@ struct DaemonFigures {
   ProcessFigures process;
   std::vector<std::pair<std::string, std::uint64_t>> active_faults;          // by sonar
   std::vector<std::pair<std::string_view, std::uint64_t>> fault_injections;  // by code, since the start
-  std::uint64_t fault_entries_lost = 0;                                      // not in the journal's file
+  std::uint64_t fault_entries_lost = 0;                                      // entries that are not in the journal's file
 };
 std::string metrics_text(const DaemonFigures& figures);
 

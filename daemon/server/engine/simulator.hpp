@@ -73,7 +73,7 @@ class Simulator : private Interruption {
   bool working_ = false;
   int under_way_ = 0;          // pings, one let in by another included
   double let_in_s_ = 0;        // time of pings let in by the one under way
-  std::uint32_t running_ = 0;  // whose ping is under way
+  std::uint32_t running_ = 0;  // sonar whose ping is under way
   std::chrono::steady_clock::time_point running_since_{};
 
   asio::io_context queue_{1};

@@ -21,7 +21,8 @@ class MavlinkServer {
   /// Links and origin are those of `config` as it is now; who may send follows it.
   MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log);
 
-  /// Before open(): what the command to inject a failure does, on every link. Without it the command is answered as unsupported.
+  /// Call it before open(). Sets what the command to inject a failure does, on every link. Without it the command is answered as
+  /// unsupported.
   void inject_failures_with(mavlink::InjectFailure inject) { inject_ = std::move(inject); }
   Result<void> open();
   void start();

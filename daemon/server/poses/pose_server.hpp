@@ -56,7 +56,7 @@ class PoseServer {
           of_all(std::move(part)) {}
     tcp::socket socket;
     Sender sender;
-    asio::steady_timer turn;  // until more of what it sent is worked on
+    asio::steady_timer turn;  // waits until more of what it sent is worked on
     InputRate rate;
     SharedRate::Part of_all;
     control::LineParser lines;

@@ -26,10 +26,10 @@ struct RecordedPing {
   std::shared_ptr<const Ping> ping;
   std::shared_ptr<const protocol::Bytes> bytes;  // the vendor's, as clients get them; null = not sent over TCP
   std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream, as receivers get them
-  protocol::Bytes status;                   // what the sonar announced of itself then; empty = nothing
+  protocol::Bytes status;                   // status that the sonar announced then; empty = none
   std::shared_ptr<const SceneNames> names;  // names of the scene in which it was made
 
-  /// That it keeps in memory while it waits.
+  /// Bytes that it keeps in memory while it waits.
   std::size_t size() const;
 };
 
@@ -37,7 +37,7 @@ struct RecordedPing {
 struct RecordedSonar {
   std::string name, vendor;
   recording::PcapConversation ends;  // for the headers of a capture
-  bool has_range_images = false;     // which have no labels
+  bool has_range_images = false;     // range images have no labels
 };
 
 class RecordingFile {

@@ -25,7 +25,7 @@ std::string why_without_labels(RecordingFile::Kind kind, const RecordedSonar& so
 
 struct Recordings::Recording {
   enum class State { opening, running, ending, ended } state = State::opening;
-  std::string name;  // in the folder
+  std::string name;  // file name in the folder
   RecordingFile::Kind kind{};
   bool labels = false;
   v1::RecordingStatus status;

@@ -59,12 +59,12 @@ class Recordings {
   /// An entry of the journal of faults, in JSON; kept in MCAP only.
   void take_fault(const std::string& sonar, Time at, const std::string& json);
 
-  /// Before anything is taken, and whenever another scene is put to use.
+  /// Call it before anything is recorded, and whenever another scene is used.
   void use_scene(const Scene& scene);
   /// Names of the scene that pings are made in from now on.
   const std::shared_ptr<const SceneNames>& names() const { return names_; }
 
-  /// Those that run, and the last that have ended, oldest first.
+  /// Recordings that run, and the last ones that have ended, oldest first.
   std::vector<v1::RecordingStatus> status() const;
   /// Whether no recording is open.
   bool idle() const { return running() == 0; }

@@ -24,7 +24,7 @@ class Beacon {
 
   Result<void> open(const SonarConfig& sonar, const protocol::Port& port);
   void start();
-  /// Without waiting for the period to pass, but not more often than every `shortest_pause`.
+  /// Sends without waiting for the period to pass, but not more often than every `shortest_pause`.
   void send_now() { timer_.expires_at(std::max(std::chrono::steady_clock::now(), sent_at_ + shortest_pause)); }
   void stop();
   const std::vector<udp::endpoint>& destinations() const { return to_; }

@@ -78,7 +78,7 @@ class Fleet final : public DeviceParent {
     std::uint32_t index = 0;
     std::list<Device>::iterator before;  // the one it replaces, or end()
   };
-  /// By the name of a sonar: the word of the summary for what the reload did to it.
+  /// For each sonar, by name: the word of the summary for what the reload did to it.
   using Outcomes = std::map<std::string, std::string>;
   bool is_held(Ipv4 ip) const;
   std::vector<Opening> sort_out(const Config& now, const Config& next, Outcomes& outcomes);

@@ -122,7 +122,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Steady::time_point received_at_ = connected_at_;  // a byte came in
   Steady::time_point progress_at_{};                // a byte went out, while writing; in a pause its end
   Steady::time_point finish_by_{}, fin_at_{};
-  std::uint32_t ping_ = 0;  // that is written now or was last; 0 = a reply
+  std::uint32_t ping_ = 0;  // number of the ping that is or was written last; 0 = a reply
   bool reading_ = true, writing_ = false, hurries_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
   bool fin_by_fault_ = false;
   std::string why_;

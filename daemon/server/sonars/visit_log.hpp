@@ -33,7 +33,7 @@ class VisitLog {
   asio::steady_timer timer_;
   bool in_spell_ = false, ended_ = false;
   bool crowded_ = false;  // the spell before had more than its lines: this one is summed up as a whole
-  int visits_ = 0;        // in this spell
+  int visits_ = 0;        // visits in this spell
   std::array<std::uint64_t, static_cast<std::size_t>(Kind::kinds)> unsaid_{};
   std::string last_unsaid_;
 };

@@ -11,7 +11,7 @@ namespace sonar::recording::mcap {
 class Writer {
  public:
   static constexpr std::size_t chunk_bytes = 1 << 20;           // a chunk ends behind the message that fills it
-  static constexpr std::chrono::seconds longest_chunk_time{2};  // so that little is lost with the program
+  static constexpr std::chrono::seconds longest_chunk_time{2};  // short, so that little is lost with the program
 
   explicit Writer(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
 

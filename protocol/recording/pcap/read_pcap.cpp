@@ -26,7 +26,7 @@ struct SenderEnd {
 };
 struct Sent {
   std::uint64_t bytes = 0;
-  const Make* make = nullptr;  // whose messages it sends; null: no sonar's
+  const Make* make = nullptr;  // make whose messages it sends; null: not a sonar
 };
 struct Found {
   SenderEnd device;
