@@ -20,7 +20,7 @@ class DeviceMemoryFull : public std::runtime_error {
 };
 
 /// Lanes are queues of work: in order within one, at the same time between two. Whatever fails throws std::runtime_error: the
-/// device is not to be used again, unless that is DeviceMemoryFull. One caller at a time, but for allocate, allocate_host and
+/// device is not to be used again, unless that is DeviceMemoryFull. One caller at a time, except for allocate, allocate_host and
 /// upload: threads that prepare pings call them at once.
 class Machine {
  public:

@@ -36,8 +36,8 @@ struct Fan {
   }
 };
 
-/// A ray of the fixed fan: its elevation about the array axis, and pattern times root of the solid angle, of flat beams but for
-/// what depends on the column.
+/// A ray of the fixed fan: its elevation about the array axis, and pattern times root of the solid angle, of flat beams except
+/// for what depends on the column.
 struct FixedFanRay {
   float elevation_rad = 0, cosine = 1, sine = 0, weight = 0;
 };
@@ -139,7 +139,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
 /// The client's gain alone, which may change with every ping.
 void set_gain(PingPlan& plan, float gain_db);
-/// Whether the plan still serves this request, but for its gain.
+/// Whether the plan still serves this request, except for its gain.
 bool serves(const PingPlan& plan, const PingRequest& request);
 
 // The parts of a plan, callable alone.

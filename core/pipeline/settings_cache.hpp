@@ -30,7 +30,7 @@ class SettingsCache {
   static constexpr std::size_t usual_bytes = std::size_t{64} << 20;
   explicit SettingsCache(std::size_t most_bytes = usual_bytes) : most_bytes_(most_bytes) {}
 
-  /// Makes what is missing, and forgets what was used least recently until all fit, but for these. Valid until the next call.
+  /// Makes what is missing, and forgets what was used least recently until all fit, except for these. Valid until the next call.
   PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Parallel& pool);
   /// About, of all that are kept.
   std::size_t bytes() const;

@@ -24,7 +24,7 @@ struct SampleFormat {
 };
 
 /// Rows in the device's metres (with its believed sound speed): row i covers range_start_m + [i, i + 1) range_bin_m. The picture
-/// ends at range_start_m + range_bin_count range_bin_m, which is range_m but for the vendor's rounding to whole rows.
+/// ends at range_start_m + range_bin_count range_bin_m, which is range_m except for the vendor's rounding to whole rows.
 struct PingSettings {
   int mode = 0;  // index into SonarModel::modes
   int beam_count = 512;

@@ -146,7 +146,7 @@ constexpr void fields(V& visit, M& m) {
   visit("pressure", m.pressure_bar);
 }
 
-/// Last fields of a ping result, the same in both versions but for the spare words between beams and offset.
+/// Last fields of a ping result, the same in both versions except for the spare words between beams and offset.
 struct ImageSizes {
   std::uint32_t image_offset = 0, image_size = 0, message_size = 0;
 };

@@ -80,7 +80,7 @@ struct HitsToScatter {
   static constexpr int most = 256;  // at once
   HitDraw draw;
   const float* range_m;
-  const float* weight;  // amplitude but for the absorption of the water
+  const float* weight;  // amplitude except for the absorption of the water
   float decay_per_m;    // 2 alpha [Np/m]
   double turns_per_m;   // 2 f / c
 };

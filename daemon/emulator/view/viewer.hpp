@@ -49,7 +49,7 @@ using ViewPayloadPointer = std::shared_ptr<const ViewPayload>;
 /// One WebSocket message to write.
 struct ViewMessage {
   bool is_text = false;
-  wire::Bytes head;               // all of it, but for channels
+  wire::Bytes head;               // all of it, except for channels
   std::vector<ViewBytes> pieces;  // what follows
 };
 
@@ -151,7 +151,7 @@ class Viewer {
     Moment interval{0};
     std::size_t deepest = 1;
     std::optional<Moment> sent_at;
-    std::deque<ViewPayloadPointer> waiting;  // one, but for events
+    std::deque<ViewPayloadPointer> waiting;  // one, except for events
     bool is_due(Moment now) const { return !sent_at || now - *sent_at >= interval; }
   };
   static wire::Bytes bytes_of(std::string_view text);

@@ -1,4 +1,4 @@
-// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor, but for those of web pages, which Host and
+// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor, except for those of web pages, which Host and
 // Origin tell. Owned by Device.
 #pragma once
 

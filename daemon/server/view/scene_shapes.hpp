@@ -1,5 +1,5 @@
 // The objects of the scene as viewers get them, each with its mesh: made once on the thread of the live view, again when an
-// object changes. Called on the I/O thread, but for make().
+// object changes. Called on the I/O thread, except for make().
 #pragma once
 
 #include <map>
