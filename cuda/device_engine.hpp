@@ -1,5 +1,5 @@
 // The ping engine that computes on a device: requests in batches, two of them under way at a time, only finished images come
-// back. Any Machine will do; with host loops it is the same engine without a device.
+// back. It works with any Machine; with host loops it is the same engine without a device.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// For prepare_ping.cpp and fill_view.cpp alone.
+// Internal to prepare_ping.cpp and fill_view.cpp.
 #pragma once
 
 #include "cuda/prepare_ping.hpp"

@@ -1,5 +1,5 @@
 // The first surface a ray meets: down the hierarchy of what stands still, then down those of the bodies in its way. Runs on host
-// and device alike; every ray by itself, nothing rounded that a crack between two triangles could open by.
+// and device, for each ray by itself. No rounding can open a crack between two triangles.
 #pragma once
 
 #include <cmath>

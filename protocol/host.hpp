@@ -1,5 +1,6 @@
-// The driver's end of a make's wire: what a driver sends, and how the bytes of a sonar become pings. The counterpart of Dialogue,
-// as pure: no sockets, no clock, no log. The caller opens the ports, reports what arrives and carries out the HostActions.
+// The driver's end of a make's protocol: what a driver sends, and how the bytes of a sonar become pings. It is the counterpart of
+// Dialogue and as pure: no sockets, no clock, no log. The caller opens the ports, reports what arrives and carries out the
+// HostActions.
 #pragma once
 
 #include <cstdint>

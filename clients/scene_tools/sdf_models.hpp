@@ -1,4 +1,4 @@
-// The models of an SDF file as a tree, includes resolved, and where the frames in them stand. Internal to read_sdf.
+// The models of an SDF file as a tree, with includes resolved, and the poses of their frames. Internal to read_sdf.
 #pragma once
 
 #include <map>

@@ -1,5 +1,5 @@
-// An XML file as the importers see it: elements that know where they stand, and one place where complaints are kept. The only
-// door to tinyxml2; sizes are bounded here, so that the readers behind it need not fear any text.
+// An XML file as the importers see it: elements that know their position, and one list of complaints. Only this file uses
+// tinyxml2; it bounds all sizes, so that the readers can accept any text.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Statistics of a stream of pings: number, regularity, faults, and whether the settings took effect. Without I/O: listen feeds
+// Statistics of a stream of pings: number, regularity, faults, and whether the settings took effect. It has no I/O: listen feeds
 // it, prints its lines and derives its exit code from it.
 #pragma once
 

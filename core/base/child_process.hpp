@@ -1,4 +1,5 @@
-// Runs a program of ours on work that may end it: with files in memory as its standard streams, and nothing else of this process.
+// Runs one of our programs for work that may crash it. Its standard streams are files in memory; it gets nothing else of this
+// process.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// The step that a long load is at: the readers and builders of scenes set it, a console reads it. One for the process.
+// The present step of a long load. The readers and builders of scenes set it, a console reads it. The process has one.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Which moment of a trajectory is shown when: start, speed, loop, pause and seek against a clock that is passed in.
-// In whole nanoseconds and millionths, so that a stepped run gives the same moments every time; daemon/world has one per body.
+// Computes which moment of a trajectory is shown at a time of a clock, with start, speed, loop, pause and seek. It uses integer
+// nanoseconds and millionths, so that a stepped run gives the same moments every time; daemon/world has one per body.
 #pragma once
 
 #include <cstdint>

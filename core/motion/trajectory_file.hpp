@@ -1,5 +1,5 @@
-// Files of trajectories: own CSV with a header, TUM, EuRoC CSV, KITTI matrices; what each looks like is in docs/poses.md.
-// Read by `sonard run` for what it plays and by `sonard render`; the result is in our frames, its times from the file's start.
+// Reads files of trajectories: our CSV with a header, TUM, EuRoC CSV and KITTI matrices (docs/poses.md). Used by `sonard run` and
+// `sonard render`. The result is in our frames, with times from the start of the file.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// From hits to beams as Choi 2025 (Sensors 25(5):1516, "P25") prints it: eq. (1)-(4) per column, the reference code's beam
+// Computes beams from hits as Choi 2025 (Sensors 25(5):1516, "P25") prints it: eq. (1)-(4) per column, the reference code's beam
 // beamforming, an inverse transform. Second stage of core/paper; what differs from the canonical model: docs/acoustics.md,
 // section 8.
 #pragma once

@@ -1,5 +1,5 @@
-// Beams that hear more than their own direction: near the sonar because the array is focused for broadside only, everywhere by a
-// fitted share of their neighbours (docs/acoustics.md, section 6). A function of the plan alone.
+// Mixes neighbouring beams: near the sonar because the array is focused only for broadside, and everywhere by a fitted share
+// (docs/acoustics.md, section 6). A function of the plan alone.
 #pragma once
 
 #include <cstddef>

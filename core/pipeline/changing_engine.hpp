@@ -1,4 +1,4 @@
-// The CPU's engine for those who make pings of many scenes that are alike, such as data sets.
+// The CPU's engine for pings of many similar scenes, as in data sets.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
 // How fans of rays are refined: a column's interval between two directions is halved until both ends see one surface that
-// interpolates, or an edge. One rule for what is seen directly (trace_fan) and via mirrors (multipath_trace).
+// interpolates, or an edge. This one rule is used for direct views (trace_fan) and for views by way of mirrors (multipath_trace).
 #pragma once
 
 #include <algorithm>

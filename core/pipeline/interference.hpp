@@ -1,6 +1,6 @@
 // Signals besides the ping's own echoes: leakage of the transmitter into the first rows, pulses of other sonars, and crosstalk
-// between the channels. Three small stages of a ping, each nothing when its data are absent
-// (docs/acoustics.md, sections 5 and 6).
+// between the channels. They are three small stages of a ping, each of which does nothing without its data (docs/acoustics.md,
+// sections 5 and 6).
 #pragma once
 
 #include <complex>

@@ -1,5 +1,5 @@
-// Which object's echo each sample holds: expected energy per object, from the cells, columns, pulse and beams that the picture is
-// made of (docs/datasets.md). Multipath, crosstalk and defocus are not followed; what the water sends counts for nothing.
+// Finds out which object's echo each sample holds: expected energy per object, from the cells, columns, pulse and beams that the
+// picture is made of (docs/datasets.md). Multipath, crosstalk, defocus and echoes of the water have no labels.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// The hits of the rays of a range image (core/pipeline/range_image.hpp): each cell of the grid of beams is seen by one ray along
-// its middle and a few round it, and by many where things are thinner than it.
+// The hits of the rays of a range image (core/pipeline/range_image.hpp): one ray passes through the middle of each cell of the
+// beam grid and a few around it; if things are thinner than the cell, many rays do.
 #pragma once
 
 #include <cstddef>

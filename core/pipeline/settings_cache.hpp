@@ -1,4 +1,4 @@
-// Tables of settings, kept from ping to ping: several sonars take turns, and clients come back to settings they had before.
+// Tables of settings that are kept from ping to ping, because several sonars take turns and clients return to earlier settings.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// Reverberation of the water itself: what floats in it scatters a little everywhere, as far as nothing solid stands in the way.
-// Added to the column signals between synthesis and beamforming (docs/acoustics.md, section 3).
+// Reverberation of the water itself: particles in it scatter a little everywhere, up to the first solid surface. Added to the
+// column signals between synthesis and beamforming (docs/acoustics.md, section 3).
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// The box that things fill along some axes, and what its size may give away. Used to judge scenes and poses: `sonarctl scene`,
-// daemon/emulator/world/plausibility.
+// The box that things fill along some axes, and mistakes that its size may reveal. Used to judge scenes and poses: `sonarctl
+// scene`, daemon/emulator/world/plausibility.
 #pragma once
 
 #include <algorithm>

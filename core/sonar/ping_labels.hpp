@@ -1,4 +1,4 @@
-// Which object's echo each sample of a ping holds (docs/datasets.md); filled by core/pipeline/labels.hpp.
+// For each sample of a ping, the object whose echo it holds (docs/datasets.md); filled by core/pipeline/labels.hpp.
 #pragma once
 
 #include <cstddef>

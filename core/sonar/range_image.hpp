@@ -1,5 +1,5 @@
 // Range images: one transmission lights the whole field of view, and each direction of a grid of beams reports one return, its
-// range and its strength. Such a ping's settings and samples. No vendor's format.
+// range and its strength. These are the settings and samples of such a ping, in no vendor's format.
 #pragma once
 
 #include <cmath>

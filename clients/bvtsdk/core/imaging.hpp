@@ -1,6 +1,6 @@
-// Images from polar pings: the library forms them, not the sonar, exactly as with the real SDK. Geometry first, then pixels.
-// Marks in this folder: verified = seen in public client code; inferred = concluded from it; chosen = ours, nothing to be
-// faithful to.
+// Forms images from polar pings. As with the real SDK, the library does this, not the sonar. It computes the geometry first, then
+// the pixels. Marks in this folder: verified = seen in public client code; inferred = concluded from it; chosen = our choice, as
+// nothing is known.
 #pragma once
 
 #include <array>

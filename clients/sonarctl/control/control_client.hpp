@@ -1,5 +1,5 @@
-// Client of a daemon's control stream: Hello, requests and their answers, events. Blocking, with a limit on every wait. Used by
-// pose, status, events, set, load, object and doctor.
+// Client of a daemon's control stream: Hello, requests and their answers, events. Calls block, with a limit on every wait. Used
+// by pose, status, events, set, load, object and doctor.
 #pragma once
 
 #include <deque>

@@ -1,4 +1,5 @@
-// Faults of a daemon as text, and the arguments of `fault add` as a record. No I/O; fault and events print it.
+// Faults of a daemon as text, and the arguments of `fault add` as a record. This has no I/O; the commands fault and events print
+// it.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Status and events of a daemon as text. No I/O; status and events print it.
+// Status and events of a daemon as text. This has no I/O; the commands status and events print it.
 #pragma once
 
 #include <string>

@@ -1,6 +1,5 @@
-// The hot loops of a ping, compiled once per instruction set from kernels.inl and picked at run time.
-// Plain arrays in, plain arrays out: what they compute is explained where they are called (scatter, synthesize, form_beams,
-// receive).
+// The hot loops of a ping, compiled once per instruction set from kernels.inl and picked at run time. They read and write plain
+// arrays. What they compute is explained where they are called (scatter, synthesize, form_beams, receive).
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// Messages between the daemon and the program that imports meshes: the request as arguments and standard input, the answer as
-// a file. Neither believes the other's lengths.
+// Messages between the daemon and the program that imports meshes: the request as arguments and standard input, the answer as a
+// file. Neither side trusts the lengths that the other sends.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
-// Meshes of shapes that were made before, for those who read many scenes that are alike: equal shapes share one mesh, so that
-// all that is made of meshes can be kept too. One thread at a time.
+// Meshes of shapes that were made before, for readers of many similar scenes. Equal shapes share one mesh, so that everything
+// that is computed from meshes can be kept too. Used by one thread at a time.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// From an object's keys to its mesh: primitives, made ground, height files and mesh files. Internal to the scene loader.
+// Makes the mesh of an object from its keys: primitives, generated ground, height files and mesh files. Internal to the scene
+// loader.
 #pragma once
 
 #include <filesystem>

@@ -1,6 +1,6 @@
-// Cheap checks of mesh files before an importer reads them: numbers that the file cannot hold, and what contains itself, is
-// nested too deep or multiplies. Each takes a time linear in the text, and the memory of its nodes. They refuse what would cost
-// much; the importer finds the other faults.
+// Cheap checks of mesh files before an importer reads them: numbers that the file cannot hold, and nodes that contain themselves,
+// are nested too deep or multiply. Each takes a time linear in the text, and the memory of its nodes. They refuse what would take
+// much time or memory; the importer finds the other faults.
 #pragma once
 
 #include <cstdint>

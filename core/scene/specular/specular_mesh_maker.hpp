@@ -1,4 +1,4 @@
-// The workshop in which a SpecularMesh is made. Internal to specular_mesh.
+// Makes a SpecularMesh. Internal to specular_mesh.
 #pragma once
 
 #include <vector>

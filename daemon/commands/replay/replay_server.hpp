@@ -1,7 +1,7 @@
-// Serves a recording as the sonar it came from would: TCP, one client at a time, its messages byte for byte; status datagrams.
-// A sonar that is asked for pings answers its host, and sends them from when on the host wants them: an ARIS by datagrams, to the
-// receivers that its controller sets; a Sonar 3D-15 likewise, to those set over HTTP, as of one client that does not leave.
-// The whole of `sonard replay` but its command line; one thread, no scene, no engine.
+// Serves a recording as the recorded sonar would: over TCP, to one client at a time, its messages byte for byte; and status
+// datagrams. A sonar that sends pings on request answers its host, and sends them once the host wants them: an ARIS as datagrams
+// to the receivers that its controller sets; a Sonar 3D-15 in the same way, to the receivers set over HTTP, as for one client
+// that does not leave. This is all of `sonard replay` except its command line; it has one thread, no scene and no engine.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
-// All of a run that comes before its first socket: what `sonard run` starts from and `sonard check` judges, so that both refuse
-// the same with the same sentence.
+// All steps of a run before its first socket. `sonard run` starts with them and `sonard check` does only them, so that both
+// refuse the same with the same sentence.
 #pragma once
 
 #include <functional>

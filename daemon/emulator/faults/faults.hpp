@@ -1,6 +1,6 @@
-// The faults of one emulated sonar. The Sonar calls it at every place where a fault may act; with no fault each call is a look at
-// an empty list. No sockets, no clock: what has to be done to ports and connections comes back as orders. Everything random is
-// drawn from (seed, fault, sonar, ping, client), so the same plan gives the same bytes.
+// The faults of one emulated sonar. The Sonar calls it at every place where a fault may act; without a fault each call finds an
+// empty list. It has no sockets and no clock: what has to be done to ports and connections is returned as orders. Everything
+// random is drawn from (seed, fault, sonar, ping, client), so the same plan gives the same bytes.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// When the next ping of one sonar is due: a grid computed from its start (never a sum of sleeps), or one ping per trigger.
+// Computes when the next ping of one sonar is due: on a grid from its start (never a sum of sleeps), or one ping per trigger.
 // Pure arithmetic on times passed in; the Sonar asks it and its caller sets the timer.
 #pragma once
 

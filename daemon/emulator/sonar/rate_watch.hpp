@@ -1,5 +1,5 @@
-// Does computing keep a sonar from the rate it was asked for? Looks at stretches of ticks and says so once. Pure: figures in, a
-// sentence out; used by Sonar.
+// Finds out whether the computing time keeps a sonar from the requested rate, and reports it once. Pure: figures in, a sentence
+// out; used by Sonar.
 #pragma once
 
 #include <cstdint>

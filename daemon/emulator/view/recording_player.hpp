@@ -1,5 +1,5 @@
-// Which ping of a recording is shown when: its length, and the last ping at or before a moment. Pure; the caller chooses how many
-// steps it takes at a time.
+// Finds the ping of a recording that is shown at a moment (the last one at or before it), and the length of the recording. Pure;
+// the caller chooses how many steps it takes at a time.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Which axes the poses of a file are in, seen from what a vehicle does: it stays more or less upright.
+// Guesses the axes of the poses in a file from the fact that a vehicle stays more or less upright.
 #pragma once
 
 #include <vector>

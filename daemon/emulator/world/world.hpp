@@ -1,5 +1,5 @@
-// Where everything is: the poses of vehicles and moving objects, taken from senders by the sequence and time rules of
-// docs/configuration.md, and answered for any moment. Pure: time is passed in; the daemon's I/O thread owns the only one.
+// The poses of vehicles and moving objects. They are taken from senders by the rules of docs/poses.md, "Time and order", and
+// returned for any moment. Pure: time is passed in; the daemon's I/O thread owns the only one.
 #pragma once
 
 #include <cstdint>

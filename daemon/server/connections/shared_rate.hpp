@@ -1,5 +1,5 @@
-// How fast several clients are read together: a bucket of bytes that all draw on. A client within its fair share of the rate does
-// not wait for the bucket, so that only those who send more wait when it is empty. Pure arithmetic, as InputRate.
+// Limits how fast several clients are read together: a bucket of bytes for all of them. A client within its fair share of the
+// rate does not wait for the bucket, so that only those who send more wait when it is empty. Pure arithmetic, as InputRate.
 #pragma once
 
 #include <algorithm>

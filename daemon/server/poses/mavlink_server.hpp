@@ -1,5 +1,5 @@
-// The sockets of poses by MAVLink: one a link, listening (udpin) or dialling (udpout), each with a MavlinkPoses behind it.
-// Owned by App, beside PoseServer; what comes goes into the same PoseIntake.
+// The sockets of poses by MAVLink: one for each link, listening (udpin) or sending first (udpout), with a MavlinkPoses each.
+// Owned by App, as PoseServer is; poses go into the same PoseIntake.
 #pragma once
 
 #include <list>
