@@ -43,7 +43,8 @@ BeamWidths beam_width_sines(const FrequencyMode& mode) {
   return widths;
 }
 
-/// Where the peaks of the two-way pattern, 1 / (pi x)^2 at x = L_v / lambda sin psi, have fallen below what is audible.
+/// The angle at which the peaks of the two-way pattern, 1 / (pi x)^2 at x = L_v / lambda sin psi, have fallen below what is
+/// audible.
 double side_lobe_reach_rad(const BeamPattern& pattern) {
   const double sine = 1 / (pi * std::sqrt(side_lobe_two_way) * elevation_aperture_in_wavelengths(pattern));
   return sine < 1 ? std::min(std::asin(sine), widest_fan_rad) : widest_fan_rad;

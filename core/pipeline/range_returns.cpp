@@ -25,9 +25,9 @@ constexpr double thin_share = 0.4;
 constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15;
 constexpr std::size_t most_thin_cells = 512, most_probed_cells = 2048;  // when a net covers the view, the few usual rays must do
 
-/// Where in a cell a ray is, -0.5 to 0.5, along an axis in one of `of` strata: multiples of the golden ratio shift it from line
-/// to line through the grid, so that level and upright edges meet every part of a cell; where the lines begin is random, so that
-/// no oblique edge stays between the rays.
+/// The place of a ray in a cell, -0.5 to 0.5, along an axis in one of `of` strata: multiples of the golden ratio shift it from
+/// line to line through the grid, so that level and upright edges meet every part of a cell; where the lines begin is random, so
+/// that no oblique edge stays between the rays.
 float place_in_cell(int stratum, int of, int line, int across_lines) {
   const auto n = static_cast<std::uint32_t>(across_lines),
              shift = static_cast<std::uint32_t>(line) * 0x9E3779B9u + n * n * 0x85EBCA6Bu;

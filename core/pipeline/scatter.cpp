@@ -14,7 +14,7 @@ namespace {
 /// 1 / length of a ramp [1/m]; a ramp without length becomes a step.
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
-/// Which columns the box round a tile's cells can reach: u = y / r (y / h for flat beams) over it, to second order.
+/// The columns that the box around a tile's cells can reach: u = y / r (y / h for flat beams) over it, to second order.
 void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotation& sonar_from_object, const PingPlan& plan,
                   PreparedTile& out) {
   // All columns, unless the box is small compared with its distance; then u is nearly linear over the box.

@@ -53,7 +53,7 @@ class Levels {
   const SampleFormat& format_;
 };
 
-/// Where a parabola through three levels has its top, from the middle one, within half a step.
+/// The place of the top of a parabola through three levels, relative to the middle one, within half a step.
 double top_of(double before, double middle, double after) {
   const double curve = before - 2 * middle + after;
   return curve < 0 ? std::clamp(0.5 * (before - after) / curve, -0.5, 0.5) : 0;

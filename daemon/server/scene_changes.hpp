@@ -1,6 +1,6 @@
-// Loads and changes the scene while pings go on: one change after the other, made and built into an engine on a thread of its
-// own, then put to use in one moment. Edits that wait together share one engine. Owned by App; everything here is called on the
-// I/O thread, except for Change::make.
+// Loads and changes the scene while pings continue. Changes are made one after the other: on a thread of its own each is made and
+// built into an engine; then the new engine replaces the old one at once. Edits that wait together share one engine. Owned by
+// App; everything here is called on the I/O thread, except for Change::make.
 //
 // Pings are made with the old scene until the new one is ready. Then the simulator gets the new engine and the world the new
 // moving bodies before anything else happens, so that a request's bodies are always those of the scene it meets. In stepped

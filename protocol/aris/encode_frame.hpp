@@ -1,4 +1,4 @@
-// A Ping as the datagrams of a frame: header, channel order, parts. And the way back, for tools and tests.
+// A Ping as the datagrams of a frame: header, channel order, parts. It also converts back, for tools and tests.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// A Ping as the payload of PING_DATA: beam-major 16-bit samples, near to far, left to right, and where the vehicle was.
+// A Ping as the payload of PING_DATA: beam-major 16-bit samples, near to far, left to right, and the vehicle's navigation data.
 #pragma once
 
 #include "protocol/blueview/frames.hpp"

@@ -1,4 +1,4 @@
-// A pose as a sender gave it, checked and turned into the house's frames: world ENU, body FLU, SI units, int64 nanoseconds.
+// A pose as a sender gave it, checked and converted to our frames: world ENU, body FLU, SI units, int64 nanoseconds.
 // protocol/control makes these from protobuf and JSON; daemon/emulator/world/world.hpp keeps them.
 #pragma once
 

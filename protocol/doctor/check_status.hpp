@@ -1,4 +1,4 @@
-// Checks of a status that are the same from outside the daemon and from inside, and the words they share. Pure.
+// Checks of a status that sonarctl and the daemon have in common, and their texts. Pure.
 #pragma once
 
 #include <string>

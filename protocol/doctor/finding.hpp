@@ -1,5 +1,5 @@
-// A finding of doctor: what is well, or a fault with its cause and its cure. Made by sonarctl doctor from outside, and by the
-// daemon from inside for the live view (judge.hpp).
+// A finding of doctor: something that works, or a fault with its cause and a remedy. Made by sonarctl doctor from outside, and by
+// the daemon from inside for the live view (judge.hpp).
 #pragma once
 
 #include <string>

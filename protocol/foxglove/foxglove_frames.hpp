@@ -1,5 +1,5 @@
-// The binary messages of the Foxglove WebSocket protocol, little-endian, the first byte says which. Its text is in the history
-// of https://github.com/foxglove/ws-protocol (the commit before 8e2a044). Pure.
+// The binary messages of the Foxglove WebSocket protocol, little-endian; the first byte gives the type. Its text is in the
+// history of https://github.com/foxglove/ws-protocol (the commit before 8e2a044). Pure.
 #pragma once
 
 #include <cstdint>

@@ -222,7 +222,7 @@ class ColumnsTracer {
   std::vector<FanInterval> open_, halves_;
 };
 
-/// Which part of a block of columns each path owns.
+/// The part of a block of columns that each path owns.
 void find_windows(std::size_t block, BounceMap& map) {
   auto& windows = map.windows[block];
   windows.fill({});

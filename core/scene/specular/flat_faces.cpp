@@ -112,7 +112,7 @@ bool is_narrow(const Mesh& mesh, const Candidate& c) {
   return c.area_m2 < least_width_m * length(high - low);
 }
 
-/// Which triangles share each edge of a mesh.
+/// The triangles that share each edge of a mesh.
 class Edges {
  public:
   explicit Edges(const Mesh& mesh) {

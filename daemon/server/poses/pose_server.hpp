@@ -1,7 +1,7 @@
 // Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. Owned by App; the control stream is a server of its own
-// (daemon/server/control/). A malformed message costs its sender a counted refusal and, now and then, a log line; a connection
-// that does not speak JSON is closed. Connections are served in turns of bounded work, and no faster than the limits allow. Of
-// what exceeds them only the newest is kept, so that no pose takes effect long after it was sent.
+// (daemon/server/control/). A malformed message is refused and counted, and from time to time logged; a connection that does not
+// speak JSON is closed. Connections are served in turns of bounded work, and no faster than the limits allow. Of what exceeds
+// them only the newest is kept, so that no pose takes effect long after it was sent.
 #pragma once
 
 #include <list>

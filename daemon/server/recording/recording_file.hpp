@@ -1,5 +1,5 @@
 // One file of a recording inside the daemon: what a sonar sends, and in MCAP also pictures, true poses and what each beam meets.
-// Made and written on the recording thread (recordings.hpp); knows no queue, no clock and no log.
+// Made and written on the recording thread (recordings.hpp); it has no queue, no clock and no log.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// The status broadcast of an emulated sonar (Port::Kind::udp_beacon): sent again and again from a port of its own. Owned by
-// Device.
+// The status broadcast of an emulated sonar (Port::Kind::udp_beacon): sent periodically from a port of its own. Owned by Device.
 #pragma once
 
 #include <algorithm>

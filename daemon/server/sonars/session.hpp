@@ -1,6 +1,6 @@
-// One connection of a sonar: its socket, read and written by two coroutines, and a timer that watches for peers that stopped.
-// What the bytes mean, and which messages wait, is the emulated sonar's business (daemon/emulator/sonar). Owned by its Device and
-// by its own coroutines; it reports to the Device once when it is over.
+// One connection of a sonar: its socket, read and written by two coroutines, and a timer that watches for peers that stopped. The
+// emulated sonar (daemon/emulator/sonar) interprets the bytes and keeps the messages that wait. Owned by its Device and by its
+// own coroutines; it reports to the Device once when it is over.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor, except for those of web pages, which Host and
-// Origin tell. Owned by Device.
+// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor, except for those of web pages, which are
+// recognised by Host and Origin. Owned by Device.
 #pragma once
 
 #include <functional>

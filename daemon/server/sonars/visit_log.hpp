@@ -1,5 +1,5 @@
-// Log lines on clients that connect and leave: a line each, and for frequent visits one line now and then that states
-// how many did. Used by Device, for what any visitor can cause again and again. I/O thread only.
+// Log lines on clients that connect and leave: one line for each, and for frequent visits one line from time to time with their
+// number. Used by Device, because any client can cause such lines again and again. I/O thread only.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Who may open the live view's socket, and whether they may steer: the rules of docs/live-view.md, each in its place. Pure.
+// Decides who may open the live view's socket, and who may steer, by the rules of docs/live-view.md. Pure.
 #pragma once
 
 #include <chrono>

@@ -1,6 +1,6 @@
-// The live view inside the daemon: who looks, the channels, and what is offered on them (docs/live-view.md). Pings reach it where
-// recordings tap them; with no viewer there is no tap. What takes long is made on a thread of its own, and skipped when that is
-// busy. Looking changes nothing: no driver waits for a viewer. I/O thread only. Owned by App.
+// The live view inside the daemon: its viewers, its channels, and the messages on them (docs/live-view.md). It gets pings at the
+// same place as recordings, and none without viewers. Slow work is done on a thread of its own, and skipped when that thread is
+// busy. No driver waits for a viewer. I/O thread only. Owned by App.
 #pragma once
 
 #include <deque>
