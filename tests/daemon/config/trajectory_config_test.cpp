@@ -21,7 +21,7 @@ using ::testing::StartsWith;
 /// A folder with files of every kind.
 std::string directory() {
   static const std::string made = [] {
-    std::string d = ::testing::TempDir() + "trajectoriesXXXXXX";  // of this process: others run beside it
+    std::string d = ::testing::TempDir() + "trajectoriesXXXXXX";  // a folder of this process, because others run beside it
     EXPECT_NE(mkdtemp(d.data()), nullptr);
     std::filesystem::create_directories(d + "/missions");
     std::ofstream(d + "/scene.yaml") << "name: test\n";
