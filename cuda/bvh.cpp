@@ -13,7 +13,7 @@ namespace {
 constexpr int bins = 16;
 constexpr std::size_t most_in_leaf = 4;
 constexpr int deepest_by_area = 32;  // deeper down items are halved by number, which ends within another 32 levels
-constexpr float node_cost = 1.2f;    // of a step down, in triangle tests
+constexpr float node_cost = 1.2f;    // cost of a step down, in triangle tests
 
 void grow(Box& box, const Box& by) {
   for (int k = 0; k < 3; ++k) {
@@ -90,7 +90,7 @@ class Builder {
 
   std::size_t halve(std::size_t from, std::size_t to) const { return from + (to - from) / 2; }
 
-  /// By the cheapest of the planes between bins; where all centres are one, by number.
+  /// Splits at the cheapest of the planes between bins; if all centres are equal, by number.
   std::size_t divide(std::size_t from, std::size_t to) {
     Box centres = no_box;
     for (std::size_t i = from; i < to; ++i)

@@ -28,7 +28,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float dx = t.position_unit_m * cell_value(t, cell_x, cell), dy = t.position_unit_m * cell_value(t, cell_y, cell),
               dz = t.position_unit_m * cell_value(t, cell_z, cell);
   const float qx = t.from_sonar_object[0], qy = t.from_sonar_object[1], qz = t.from_sonar_object[2];
-  // As see_cells (core/pipeline/simd/cells.inl): r^2 = r0^2 + e, without a difference of large numbers.
+  // The same as see_cells (core/pipeline/simd/cells.inl): r^2 = r0^2 + e, without a difference of large numbers.
   const float e = dx * (2 * qx + dx) + dy * (2 * qy + dy) + dz * (2 * qz + dz);
   const float r = std::sqrt(larger(t.range_m * t.range_m + e, 1e-6f));
   const float inverse_r = 1.0f / r;

@@ -7,7 +7,7 @@ namespace sonar::cuda {
 namespace {
 
 constexpr std::size_t chunk_bytes = 16u << 20;
-constexpr std::size_t tiles_at_once = 256;  // that one worker looks up
+constexpr std::size_t tiles_at_once = 256;  // tiles that one worker looks up
 constexpr std::size_t ahead = 8;            // tiles
 constexpr std::size_t most_values_a_copy = (2u << 20) / sizeof(std::int16_t);
 

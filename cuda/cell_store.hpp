@@ -58,7 +58,7 @@ class CellStore {
   Machine& machine_;
   std::size_t budget_bytes_;
   Arena memory_;
-  std::shared_mutex changing_;  // of tiles_ and memory_
+  std::shared_mutex changing_;  // guards tiles_ and memory_
   Table tiles_;
 };
 

@@ -1,4 +1,4 @@
-// Counting by many threads at once: whole numbers only, whose sum no order can change.
+// Counting by many threads at once. The counts are integers, so that their sum does not depend on the order.
 #pragma once
 
 #include <cstdint>

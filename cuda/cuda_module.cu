@@ -39,7 +39,7 @@ struct Lane {
 };
 struct Opened {
   Lane lane[lanes];
-  bool graphs_work = true;  // until one does not: then launches are plain for good
+  bool graphs_work = true;  // until one fails; then launches are plain for good
   // A wait took too long. Whatever waits for the device would never return: from here on nothing is asked of it or given back.
   bool hung = false;
 };

@@ -9,7 +9,7 @@
 
 namespace sonar::cuda {
 
-inline constexpr std::uint32_t module_version = 7;  // of this file, of device_types.hpp and of the steps
+inline constexpr std::uint32_t module_version = 7;  // version of this file, of device_types.hpp and of the steps
 inline constexpr const char* module_file = "libsonard_cuda.so";
 inline constexpr const char* module_entry = "sonard_cuda_module";
 

@@ -1,4 +1,4 @@
-// cuFFT by name: the module loads without it, and exact pulses are the CPU's then. For cuda_module.cu alone.
+// Loads cuFFT by name. Without it the module still loads, and the CPU computes exact pulses. Used only by cuda_module.cu.
 #pragma once
 
 #include <cuda_runtime.h>

@@ -22,7 +22,7 @@ namespace {
 
 // Sets of settings with tables on the device.
 constexpr std::size_t most_plans = 8;
-constexpr int keeping_lane = 2;  // of what stays on the device: plans and cells; rooms have 0 and 1
+constexpr int keeping_lane = 2;  // lane of what stays on the device: plans and cells; rooms have 0 and 1
 
 /// Whether neither ping waits long for the other where they are computed together: no ghosts, and of about one size.
 bool are_alike(const PingRequest& a, const PingRequest& b) {
@@ -303,7 +303,7 @@ class DeviceEngine final : public PingEngine {
     room.results.download(room.lane);
   }
 
-  /// In one slice, or in three where transforms stand between.
+  /// Runs in one slice, or in three if transforms are between them.
   void run_steps(const BatchRoom& room, Launch launch) {
     const auto run_to = [&](int to) {
       launch.to = to;
@@ -365,13 +365,13 @@ class DeviceEngine final : public PingEngine {
   std::size_t batch_;            // pings that are launched together
   std::size_t work_a_ping_ = 0;  // bytes, of the last batch
   BatchRoom rooms_[2];
-  std::size_t which_ = 0;          // of them is filled next; of two launched ones it is the older
-  std::deque<Call> calls_;         // that were not collected, in order
-  std::deque<WantedPing> wanted_;  // theirs
-  Workspace work_;                 // of the CPU
+  std::size_t which_ = 0;          // the room that is filled next; if both are launched, the older one
+  std::deque<Call> calls_;         // calls that were not collected, in order
+  std::deque<WantedPing> wanted_;  // pings of these calls
+  Workspace work_;                 // workspace of the CPU
   std::set<std::string> reported_;
   PingStatistics statistics_;
-  std::vector<PingStatistics> each_;   // of the last call that was collected
+  std::vector<PingStatistics> each_;   // statistics of the last call that was collected
   bool one_room_ = false;              // for lack of memory: nothing is prepared while the device computes
   bool all_given_back_ = false;        // since the last run that had memory enough
   std::optional<std::string> failed_;  // why

@@ -1,5 +1,5 @@
 // The ping engine that computes on a device: requests in batches, two of them under way at a time, only finished images come
-// back. Any Machine will do; with host loops it is the same engine without a device.
+// back. It works with any Machine; with host loops it is the same engine without a device.
 #pragma once
 
 #include <cstddef>
@@ -16,10 +16,10 @@ namespace sonar::cuda {
 /// for each of the two batches. When memory is full nevertheless, everything is given back and batches become half as large, in
 /// the end one ping without another beside it; the engine fails when that does not fit.
 struct DeviceEngineOptions {
-  std::size_t cell_bytes = std::size_t{2} << 30;  // of the device's memory for surface cells; what one ping needs, it gets
+  std::size_t cell_bytes = std::size_t{2} << 30;  // device memory for surface cells; a ping gets what it needs
   int batch = 0;                                  // pings that are launched together; 0 = 8, more with more threads, at most 32
-  std::size_t work_bytes = std::size_t{1} << 30;  // of a batch on the device: where pings are large, fewer go together
-  bool cpu_after_failure = true;                  // else a device that fails is the end: run() throws EngineUnavailable
+  std::size_t work_bytes = std::size_t{1} << 30;  // memory of a batch on the device: if pings are large, a batch has fewer
+  bool cpu_after_failure = true;                  // if false, a failing device is the end: run() throws EngineUnavailable
   /// Called once for each reason: what the CPU computes instead, and why. May be empty.
   std::function<void(const std::string&)> say = {};
 };

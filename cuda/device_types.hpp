@@ -19,7 +19,7 @@ inline constexpr std::uint32_t counters_a_ping = 2;
 inline constexpr std::uint32_t beams_a_panel = 4;   // as BeamPanel has
 inline constexpr std::uint32_t sum_parts = 8;       // threads that share the sum of one column: a pulse has about as many taps
 inline constexpr std::uint32_t spread_parts = 32;   // likewise, of one column's grid
-inline constexpr std::uint32_t panels_at_once = 2;  // that one thread sums
+inline constexpr std::uint32_t panels_at_once = 2;  // panels that one thread sums
 
 /// Boxes of both children, one line of the cache. Links as in bvh_link.
 struct alignas(64) BvhNode {
@@ -51,10 +51,10 @@ struct alignas(16) FlatTriangle {
 struct PlacedBody {
   float turn[9];      // body to world axes, row-major
   float position[3];  // relative to the scene's origin [m]
-  std::int32_t root;  // of its hierarchy
+  std::int32_t root;  // root of its hierarchy
 };
 struct TracerView {
-  const BvhNode* nodes = nullptr;  // of everything that stands still and of all bodies
+  const BvhNode* nodes = nullptr;  // everything that stands still, and all bodies
   const FlatTriangle* triangles = nullptr;
   const BvhNode* top = nullptr;  // over `bodies`
   const PlacedBody* bodies = nullptr;
@@ -252,7 +252,7 @@ inline constexpr std::int32_t step_count = static_cast<std::int32_t>(Step::steps
 struct Launch {
   const PingView* views = nullptr;
   std::int32_t pings = 0, from = 0, to = step_count, timed = 0;
-  std::uint32_t largest[step_count] = {};  // of the pings' step_size
+  std::uint32_t largest[step_count] = {};  // largest step_size of the pings
 };
 struct StepSeconds {
   double of[step_count] = {};

@@ -83,7 +83,7 @@ SONAR_HD inline bool interpolates(const FanRay& a, const FanRay& m, const FanRay
   return planes_agree(a, m, tolerance_m) && planes_agree(b, m, tolerance_m);
 }
 
-/// As FanTracer::per_column (core/pipeline/trace_fan.cpp).
+/// The same as FanTracer::per_column (core/pipeline/trace_fan.cpp).
 SONAR_HD inline float per_column(const SeaView& s, const FanRay& a, ColumnSine column) {
   if (a.object == no_object || a.offset == 0) return 0;
   const float* m = s.world_from_sonar;

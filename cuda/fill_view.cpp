@@ -79,7 +79,7 @@ void PingPreparer::add_water(Making& m) {
   m.view.slice_count = static_cast<std::int32_t>(slices.size());
   m.view.open_power = m.room.tables.put(volume.open_power_upa2());
   m.view.column_width = m.room.tables.put(width);
-  // By column and sample: how much of the fan [rad] ends there.
+  // How much of the fan [rad] ends in each column and sample.
   m.view.blocked = m.room.work.allocate<double>(m.samples() * m.columns()).device;
   m.view.open_fan = volume.open_fan();
   m.view.volume_samples_per_m = m.scalars.samples_per_m;

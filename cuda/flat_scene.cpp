@@ -20,7 +20,7 @@ struct Bounds {
 };
 
 void add_object(const Mesh& mesh, const Pose& placed, std::uint32_t object, std::vector<FlatTriangle>& triangles) {
-  // In double to the place, then float relative to the origin of rays [m].
+  // Computed in double up to the place, then in float relative to the origin of rays [m].
   const Rotation turn = rotation_from(placed.orientation);
   std::vector<std::array<float, 3>> corners;
   corners.reserve(mesh.vertices.size());

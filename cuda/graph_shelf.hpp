@@ -1,5 +1,5 @@
-// Which launches are worth a captured graph, and which graph serves a launch: the policy alone, without a device, so that tests
-// hold it. cuda_module.cu captures and launches.
+// Decides which launches get a captured graph, and which graph serves a launch. It needs no device, so that it can be tested.
+// cuda_module.cu captures and launches.
 #pragma once
 
 #include <cstddef>

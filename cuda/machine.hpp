@@ -20,7 +20,7 @@ class DeviceMemoryFull : public std::runtime_error {
 };
 
 /// Lanes are queues of work: in order within one, at the same time between two. Whatever fails throws std::runtime_error: the
-/// device is not to be used again, unless that is DeviceMemoryFull. One caller at a time, but for allocate, allocate_host and
+/// device is not to be used again, unless that is DeviceMemoryFull. One caller at a time, except for allocate, allocate_host and
 /// upload: threads that prepare pings call them at once.
 class Machine {
  public:
@@ -55,8 +55,9 @@ class Machine {
   virtual void wait(int lane) = 0;
 };
 
-/// In which order host loops take a step's indices. A device takes them in any: where another order makes other bytes, there is a
-/// race. But forwards, memory begins with what is no number, as a device's may: where that shows, something was read unwritten.
+/// The order in which host loops take a step's indices. A device takes them in any: where another order makes other bytes, there
+/// is a race. But forwards, memory begins with what is no number, as a device's may: where that shows, something was read
+/// unwritten.
 enum class LoopOrder { forwards, backwards, scattered };
 /// Loops on the calling thread; for tests, which so run what the device runs.
 std::unique_ptr<Machine> make_host_loops(LoopOrder order = LoopOrder::forwards);

@@ -1,4 +1,4 @@
-// For prepare_ping.cpp and fill_view.cpp alone.
+// Internal to prepare_ping.cpp and fill_view.cpp.
 #pragma once
 
 #include "cuda/prepare_ping.hpp"
@@ -15,7 +15,7 @@ struct PingPreparer::Making {
   std::vector<LawTable> laws = {};
   std::vector<float> turned_away = {};
   CellView looks_at = {};
-  const CellsInView* seen = nullptr;  // of PingPreparer::found_
+  const CellsInView* seen = nullptr;  // points into PingPreparer::found_
   PingView view{};
   BatchRoom::Ping ping{};
   bool fits = true;

@@ -1,4 +1,4 @@
-// Waiting for a device that may never answer: the policy alone, without a device, so that tests hold it.
+// Decides how to wait for a device that may never answer. It needs no device, so that it can be tested.
 #pragma once
 
 namespace sonar::cuda {

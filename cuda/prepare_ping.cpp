@@ -12,7 +12,7 @@ namespace {
 
 // Bytes that an arena takes at a time: large enough that a batch needs few, and kept from batch to batch.
 constexpr std::size_t table_chunk = 4u << 20, work_chunk = 16u << 20, result_chunk = 4u << 20, cell_chunk = 8u << 20;
-constexpr std::size_t tiles_per_part = 256;  // that one worker writes
+constexpr std::size_t tiles_per_part = 256;  // tiles that one worker writes
 
 }  // namespace
 
@@ -68,7 +68,7 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
   all.reserve(pings.size());
   for (const AskedPing& asked : pings) all.push_back(begin(asked, lane, room));
   const bool alone = all.size() == 1;
-  Parallel& pool = alone ? pool_ : one_thread_;  // of the loops within a ping
+  Parallel& pool = alone ? pool_ : one_thread_;  // pool for the loops within a ping
   const auto context_of = [&](Making& m) -> PingContext {
     if (m.laws.empty() && !m.request().blank) {
       m.laws = laws_of(*scene_, m.plan, m.scalars);

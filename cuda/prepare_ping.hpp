@@ -115,7 +115,7 @@ class PingPreparer {
   TracerView tracer_;
   CellStore store_;
   MultipathWork multipath_;
-  std::vector<CellsInView> found_;  // of the pings that are being added
+  std::vector<CellsInView> found_;  // cells of the pings that are being added
   std::vector<Worker> workers_;     // by number of the thread
 };
 

@@ -47,7 +47,7 @@ void take_results(BatchRoom::Ping& from, const PingView& view) {
   // Rays and echoes are counted on the device; base rays are known beforehand.
   if (view.has_scene != 0) {
     const SeaView& sea = view.sea;
-    // Those of the side lobes serve several columns.
+    // Rays of the side lobes serve several columns.
     const int sides = 2 * sea.side_elevations, shared = (sea.columns + sea.side_columns - 1) / sea.side_columns;
     from.statistics.rays +=
         from.counters.host[0] + static_cast<std::size_t>(sea.columns * (sea.elevations - sides) + shared * sides);

@@ -1,5 +1,5 @@
 // The first surface a ray meets: down the hierarchy of what stands still, then down those of the bodies in its way. Runs on host
-// and device alike; every ray by itself, nothing rounded that a crack between two triangles could open by.
+// and device, for each ray by itself. No rounding can open a crack between two triangles.
 #pragma once
 
 #include <cmath>
@@ -84,8 +84,8 @@ SONAR_HD inline void descend(const BvhNode* nodes, std::int32_t root, const Desc
   }
 }
 
-/// On which side the ray passes the edge from `p` to `q`, both seen from where it starts. With the ends swapped the sign alone
-/// changes, so that a ray between two triangles is in one of them.
+/// The side on which the ray passes the edge from `p` to `q`, both seen from where it starts. With the ends swapped the sign
+/// alone changes, so that a ray between two triangles is in one of them.
 SONAR_HD inline float passes(Vec3 p, Vec3 q, Vec3 along) { return dot(cross(q - p, p + q), along); }
 
 SONAR_HD inline float largest(Vec3 v) { return std::fmax(std::fabs(v.x), std::fmax(std::fabs(v.y), std::fabs(v.z))); }

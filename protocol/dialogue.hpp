@@ -31,7 +31,7 @@ struct Endpoint {
 /// Port::group.
 struct SetReceivers {
   std::vector<Endpoint> to;  // address 0.0.0.0 = that of the host which requests it
-  std::size_t stream = 0;    // which of the vendor's ports of kind udp_stream, counted from 0
+  std::size_t stream = 0;    // index of the vendor's port of kind udp_stream, counted from 0
 };
 /// The client replaced the device's settings, perhaps by the same ones: some drivers repeat them at ping rate.
 struct ChangeSettings {

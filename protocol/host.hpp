@@ -1,5 +1,6 @@
-// The driver's end of a make's wire: what a driver sends, and how the bytes of a sonar become pings. The counterpart of Dialogue,
-// as pure: no sockets, no clock, no log. The caller opens the ports, reports what arrives and carries out the HostActions.
+// The driver's end of a make's protocol: what a driver sends, and how the bytes of a sonar become pings. It is the counterpart of
+// Dialogue and as pure: no sockets, no clock, no log. The caller opens the ports, reports what arrives and carries out the
+// HostActions.
 #pragma once
 
 #include <cstdint>
@@ -40,9 +41,9 @@ struct PingFacts {
 /// A ping as a host decoded it.
 struct HostPing {
   PingFacts facts;
-  std::function<Result<PolarImage>()> picture;    // of a mechanical scan: the sector as scanned so far
-  bool is_whole = true;                           // of pictures of many pings: there are enough of them
-  std::vector<std::string> errors = {};           // of identities and sequence
+  std::function<Result<PolarImage>()> picture;    // for a mechanical scan: the sector as scanned so far
+  bool is_whole = true;                           // for a picture of many pings: there are enough of them
+  std::vector<std::string> errors = {};           // errors of identities and sequence
   std::vector<std::string> echo_mismatches = {};  // settings that do not have the requested value yet
   std::optional<double> fired_s = {};             // by the clock of the device
   /// What people look at; unset: a fan of `picture`.
@@ -113,7 +114,7 @@ class Host {
 
 /// The content of a beacon for hosts.
 struct Announcement {
-  Ipv4 address{}, client{};  // where hosts connect; who is connected, 0.0.0.0: no one
+  Ipv4 address{}, client{};  // address where hosts connect; who is connected, 0.0.0.0: no one
   std::uint32_t device_id = 0;
   std::vector<std::string> complaints;  // deviations that hosts reject
 };
@@ -145,10 +146,10 @@ struct Make {
   std::string_view driver_call = {};            // opens the sonar at {at}, where a library of ours is between
   char own_faults = 0;                          // first letter of the kinds of faults that only this make has
   bool each_ping_requested = false;             // by its hosts; a rate is a limit
-  bool own_numbers = false;                     // of pings: not those of sonard's events
+  bool own_numbers = false;                     // pings have numbers of their own, not those of sonard's events
   bool scans = false;                           // pings come as fast as its head turns
-  std::string_view demo_name = {};              // of `sonard --demo NAME`; empty: name()
-  std::string_view demo_profile = {};           // its product; empty: the first model
+  std::string_view demo_name = {};              // NAME of `sonard --demo NAME`; empty: name()
+  std::string_view demo_profile = {};           // product of the demo; empty: the first model
   std::optional<RollPitchYaw> demo_mount = {};  // in the demo; nullopt: it looks ahead
   PictureKind picture = PictureKind::fan;
 

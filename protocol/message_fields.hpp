@@ -1,4 +1,4 @@
-// Names of fields and regions of messages, the same for every make: what faults change.
+// Names of the fields and regions of messages that faults can change, the same for every make.
 #pragma once
 
 #include <array>

@@ -18,8 +18,8 @@ struct Option {
   std::vector<std::string_view> allowed;  // first = default; empty = a number above 0, or the word of default_value
   std::string_view default_value;
   std::string_view meaning;
-  double lowest = 0, highest = 0;  // of a number, inclusive; 0, 0 = any above 0
-  std::string_view word = {};      // that may stand for a number, beside the default
+  double lowest = 0, highest = 0;  // limits of a number, inclusive; 0, 0 = any number above 0
+  std::string_view word = {};      // word that may stand for a number, beside the default
 };
 /// "number above 0", "number from 5 to 170".
 inline std::string numbers_of(const Option& option) {

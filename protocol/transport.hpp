@@ -22,10 +22,10 @@ struct Port {
     udp_dialogue,  // one Dialogue at `number` with the host that sent the last request; it gets Vendor::datagrams of its pings
   } kind{};
   std::uint16_t number = 0;
-  std::chrono::milliseconds period{0};  // of a beacon
-  bool on_change = false;               // of a beacon: also sent at once when a client comes or goes
-  Endpoint group{};        // of a udp_stream: its receiver until SetReceivers, often a multicast group; port 0 = none
-  bool any_group = false;  // of a udp_stream: receivers may be multicast groups that the configuration does not name
+  std::chrono::milliseconds period{0};  // period of a beacon
+  bool on_change = false;               // a beacon is also sent at once when a client comes or goes
+  Endpoint group{};                     // receiver of a udp_stream until SetReceivers, often a multicast group; port 0 = none
+  bool any_group = false;               // receivers of a udp_stream may be multicast groups that the configuration does not name
   /// Of a udp_stream: least time between two datagrams of a ping. Of a tcp_stream: pause between the parts of a ping that
   /// Vendor::datagrams gives and Vendor::frame holds one behind the other.
   std::chrono::nanoseconds gap{0};
@@ -35,7 +35,7 @@ struct Port {
 struct DriverAddress {
   std::string_view protocol;  // "tcp", "udp", "http", "multicast", "status": status messages, by UDP
   Endpoint at;
-  bool sonar_speaks_first = false;  // else the driver does
+  bool sonar_speaks_first = false;  // if false, the driver does
 };
 
 /// One request for a resource of the device, its sizes already limited by the server.
@@ -47,7 +47,7 @@ struct ResourceReply {
   unsigned status = 200;
   std::string body;
   std::string content_type = "application/json";
-  std::string allow = {};  // of 405
+  std::string allow = {};  // Allow header of status 405
   std::vector<Event> events = {};
 };
 

@@ -1,5 +1,5 @@
-// The one interface between the daemon and a vendor's wire. A vendor is a pure translator: no sockets, no clock, no log.
-// The daemon owns time and bytes in flight; a Dialogue is one client's conversation, a Vendor frames pings and beacons.
+// The one interface between the daemon and a vendor's protocol. A vendor is a pure translator: no sockets, no clock, no log. The
+// daemon owns time and bytes in flight; a Dialogue is one client's conversation, a Vendor frames pings and beacons.
 #pragma once
 
 #include <array>
@@ -42,7 +42,7 @@ struct DeviceState {
   std::shared_ptr<const VendorSettings> settings;  // now; null = Vendor::initial_settings
   std::uint32_t last_ping = 0;                     // number of the ping that was fired last
   Time framed_at{};                                // stamp of the ping that was framed before; Time{} = there is none
-  std::chrono::nanoseconds skipped{0};             // by which stamps of pings are ahead of the dialogues' time
+  std::chrono::nanoseconds skipped{0};             // how far stamps of pings are ahead of the dialogues' time
   bool simulated_time = false;                     // it may stop while clients wait
   StoredAddress stored_address;
 };

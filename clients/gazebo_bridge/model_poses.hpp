@@ -1,5 +1,5 @@
-// Converts model poses of a Gazebo world to JSON lines of poses for sonard; without Gazebo, for tests.
-// Used by the bridge's main.cpp. Gazebo's world is ENU and its bodies FLU, as sonard's: only formatting and checks are needed.
+// Converts model poses of a Gazebo world to JSON lines of poses for sonard. It does not need Gazebo, so tests can use it. Used by
+// the bridge's main.cpp. Gazebo's world is ENU and its bodies FLU, as sonard's: only formatting and checks are needed.
 #pragma once
 
 #include <cmath>

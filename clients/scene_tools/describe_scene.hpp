@@ -32,10 +32,10 @@ struct SceneDescription {
   std::string name;
   std::vector<DescribedObject> objects;  // points among them
   std::vector<DescribedMaterial> materials;
-  std::vector<std::string> unused_materials;  // of the scene's own
+  std::vector<std::string> unused_materials;  // unused ones among the scene's own materials
   std::vector<std::string> moving;
   std::size_t points = 0, other_sonars = 0, triangles = 0;
-  std::size_t mesh_bytes = 0;  // of distinct meshes
+  std::size_t mesh_bytes = 0;  // each mesh counts once
   bool sea_surface = false;
   double volume_db = -200;
   Extent in_world;

@@ -1,5 +1,5 @@
-// Mesh and heightmap files that an imported world names: found, tried with the scene's loader, and converted where a scene
-// cannot express them. Internal to import_scene.
+// Finds the mesh and heightmap files that an imported world names, tries them with the scene's loader, and converts those that a
+// scene cannot express. Internal to import_scene.
 #pragma once
 
 #include <filesystem>

@@ -26,7 +26,7 @@ struct PlacedShape {
   Shape shape;
   Pose in_world;
   std::size_t model = 0;              // index into ImportedWorld::models
-  std::string link = {}, label = {};  // of the visual or collision
+  std::string link = {}, label = {};  // names of the visual or collision
   std::string material = {};          // in: name of its appearance in the file; out: a material of the scene
   Place at = {};
 };

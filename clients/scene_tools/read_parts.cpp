@@ -7,7 +7,7 @@
 namespace sonar::scene_tools {
 namespace {
 
-constexpr double least_m = 1e-4, most_m = 1e5;  // of a length in a scene
+constexpr double least_m = 1e-4, most_m = 1e5;  // limits for a length in a scene
 
 /// Reads one element of geometry. A value is a child element in SDF (<size>..</size>), and an attribute in URDF (size="..").
 class GeometryReader {

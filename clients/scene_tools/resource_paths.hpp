@@ -20,7 +20,7 @@ std::vector<std::filesystem::path> resource_folders(const std::vector<std::files
 std::filesystem::path find_resource(std::string_view uri, const std::filesystem::path& from_file,
                                     const std::vector<std::filesystem::path>& folders);
 
-/// At most max_xml_bytes of a file.
+/// Reads at most max_xml_bytes of a file.
 Result<std::string> read_text(const std::filesystem::path& path);
 
 /// File access for the readers.

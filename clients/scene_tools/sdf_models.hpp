@@ -1,4 +1,4 @@
-// The models of an SDF file as a tree, includes resolved, and where the frames in them stand. Internal to read_sdf.
+// The models of an SDF file as a tree, with includes resolved, and the poses of their frames. Internal to read_sdf.
 #pragma once
 
 #include <map>
@@ -16,7 +16,7 @@ struct SdfModel;
 /// Something that poses may be relative to: a link, a joint, a frame or a nested model.
 struct SdfFrame {
   Element pose, element;
-  std::string base;              // what the pose is relative to when it does not say; empty: the model
+  std::string base;              // what the pose is relative to by default; empty: the model
   SdfModel* nested = nullptr;    // a model, whose own `placing` then says where
   std::optional<Pose> in_model;  // once known
   bool being_asked = false;
@@ -27,7 +27,7 @@ struct SdfModel {
   Element element;         // <model> or <world>
   SdfModel* parent = nullptr;
   bool is_world = false, is_static = false, merged = false;
-  SdfFrame placing;  // in the parent
+  SdfFrame placing;  // pose in the parent
   std::string placement_frame;
   std::map<std::string, SdfFrame, std::less<>> frames;
   std::vector<std::unique_ptr<SdfModel>> nested;

@@ -1,4 +1,4 @@
-// An imported world as the text of a scene of ours, with comments on where things came from and what was left out.
+// An imported world as the text of a scene of ours, with comments that say where things came from and what was left out.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// An XML file as the importers see it: elements that know where they stand, and one place where complaints are kept. The only
-// door to tinyxml2; sizes are bounded here, so that the readers behind it need not fear any text.
+// An XML file as the importers see it: elements that know their position, and one list of complaints. Only this file uses
+// tinyxml2; it bounds all sizes, so that the readers can accept any text.
 #pragma once
 
 #include <cstddef>
@@ -42,7 +42,7 @@ class Element {
   std::string_view text() const;                          // trimmed
   std::string_view attribute(const char* name) const;     // trimmed
   Element child(const char* name) const;                  // the first of that name
-  std::vector<Element> children(const char* name) const;  // of that name
+  std::vector<Element> children(const char* name) const;  // the children of that name
   std::vector<Element> children() const;                  // all
   Place place() const;
   const XmlFile* file() const { return file_; }

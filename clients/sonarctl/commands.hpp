@@ -74,7 +74,7 @@ struct PoseOptions {
   bool json = false;                                          // JSON lines instead of protobuf
   bool confirm = false;                                       // over the TCP control stream, each pose answered by the daemon
   std::filesystem::path token_file;                           // for a control stream that requires one
-  control::Frame frame = control::Frame::enu_flu;             // of the positions and angles below, and of what is sent
+  control::Frame frame = control::Frame::enu_flu;             // frame of the positions and angles below, and of what is sent
   std::string vehicle, object;                                // at most one; empty = the only vehicle. Objects use TCP
   double rate_hz = 20, seconds = 0;                           // 0 = one turn, or one line
   std::vector<double> position_m{0, 0, 0}, rpy_deg{0, 0, 0};  // once

@@ -117,7 +117,7 @@ class Listener {
 
   const ListenOptions& options_;
   std::optional<PingStream> stream_;
-  std::optional<protocol::Host::Counts> before_;  // of connections that are lost
+  std::optional<protocol::Host::Counts> before_;  // counts of connections that are lost
   bool received_ = false, asked_ = false;
   Outage outage_;
   PingLog log_;

@@ -1,5 +1,5 @@
-// Blocking sockets with deadlines, for the client side. IPv4 only, as the devices.
-// Used by listen (TCP in, UDP discovery) and pose (UDP out).
+// Blocking sockets with deadlines, for the client side. They use only IPv4, as the devices do. Used by listen (TCP in, UDP
+// discovery) and pose (UDP out).
 #pragma once
 
 #include <chrono>

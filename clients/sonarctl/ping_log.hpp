@@ -1,4 +1,4 @@
-// Statistics of a stream of pings: number, regularity, faults, and whether the settings took effect. Without I/O: listen feeds
+// Statistics of a stream of pings: number, regularity, faults, and whether the settings took effect. It has no I/O: listen feeds
 // it, prints its lines and derives its exit code from it.
 #pragma once
 
@@ -29,7 +29,7 @@ struct PingSummary {
 class PingLog {
  public:
   void add(const HostPing& ping, Seconds at);
-  const PingSummary& counts() const { return summary_; }  // so far, without rate and intervals
+  const PingSummary& counts() const { return summary_; }  // counts so far, without rate and intervals
   PingSummary summary(const std::optional<protocol::Host::Counts>& of_wire) const;
 
  private:

@@ -41,11 +41,11 @@ class PingStream {
   struct Item {
     Wait what = Wait::timed_out;
     std::optional<HostPing> ping;      // with Wait::data; without one: another message
-    std::vector<std::string> notices;  // of the host
+    std::vector<std::string> notices;  // notices that the host gave
     /// All that was sent and received up to this ping, if that is kept.
     std::vector<recording::RecordedMessage> messages = {};
     std::string error;
-    ErrorKind kind = ErrorKind::io;  // of the error
+    ErrorKind kind = ErrorKind::io;  // kind of the error
   };
   /// The next ping or message, or the event that replaced it within `patience`. A sonar that sends pings on request is asked.
   Item next(std::chrono::milliseconds patience);
@@ -84,14 +84,14 @@ class PingStream {
   std::vector<std::optional<Socket>> sockets_;  // by port; none of kind http
   std::uint32_t device_ip_ = 0;                 // in network order
   std::chrono::milliseconds answer_patience_{};
-  std::deque<Item> items_;                           // to be handed out
+  std::deque<Item> items_;                           // items to be handed out
   std::optional<Error> ended_;                       // the conversation is over; empty text: the sonar closed it
   bool interrupted_ = false, has_answered_ = false;  // has_answered_: at the first port
   bool is_started_ = false;                          // the sonar is to hear that we leave
   std::ofstream record_;
   bool keeps_ = false;
-  std::vector<recording::RecordedMessage> kept_;        // since the last item
-  std::optional<recording::MessageSplitter> splitter_;  // of the first port, while messages are kept
+  std::vector<recording::RecordedMessage> kept_;        // messages since the last item
+  std::optional<recording::MessageSplitter> splitter_;  // splits the bytes of the first port, while messages are kept
   Time last_kept_{};                                    // UNIX time, which never decreases
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };

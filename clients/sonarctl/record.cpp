@@ -146,7 +146,7 @@ class Recorder {
   RecordFiles& files_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double last_heard_s_ = 0;
-  Time last_ = unix_now();  // of what was recorded last
+  Time last_ = unix_now();  // time of the latest recorded message
 };
 
 void report(const RecordFiles& files, double seconds) {

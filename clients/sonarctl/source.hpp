@@ -22,8 +22,8 @@ struct OpenedStream {
   std::chrono::steady_clock::time_point connected_at;
   bool observes = false;  // no settings sent: pings as requested by the sonar's clients
 };
-/// As an observer when source.observe is set, or when the sonar has no free client slot and its sonard reports an address for
-/// observers; then with a note on standard error.
+/// Connects as an observer if source.observe is set, or when the sonar has no free client slot and its sonard reports an address
+/// for observers; then with a note on standard error.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
 /// When the pings stopped. A connection without pings is no return of the device: by UDP one can always be opened.
@@ -47,7 +47,7 @@ class Outage {
 Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, Outage& outage, const Error& why,
                                 const std::function<void(const std::string&)>& say);
 
-/// To standard error.
+/// Writes to standard error.
 void print_notices(const std::vector<std::string>& notices);
 
 /// Error: `what` did not arrive within source.silence_limit_s, or no message of the make arrived at all (`received` false).

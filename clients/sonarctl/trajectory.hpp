@@ -13,7 +13,7 @@ struct Moment {
 struct Circle {
   Vec3d centre_m;
   double radius_m = 5, period_s = 60, pitch_rad = 0;  // pitch: bow up positive; negative period = clockwise
-  bool look_inwards = true;                           // else along the path
+  bool look_inwards = true;                           // if false: along the path
 };
 /// Anticlockwise seen from above, starting east of the centre.
 Moment on_circle(const Circle& circle, double time_s);

@@ -1,4 +1,4 @@
-// Vectors of floats that begin on a cache line, as loops over whole vector registers like them.
+// Vectors of floats that begin on a cache line, as loops over whole vector registers need.
 #pragma once
 
 #include <cstddef>

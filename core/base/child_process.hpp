@@ -1,4 +1,5 @@
-// Runs a program of ours on work that may end it: with files in memory as its standard streams, and nothing else of this process.
+// Runs one of our programs for work that may crash it. Its standard streams are files in memory; it gets nothing else of this
+// process.
 #pragma once
 
 #include <filesystem>
@@ -25,7 +26,7 @@ class MemoryFile {
 };
 
 struct ChildEnd {
-  int signal = 0;     // that ended it; 0 = it exited
+  int signal = 0;     // signal that ended it; 0 = it exited
   int exit_code = 0;  // -1: not known, because this process ignores its children
 };
 

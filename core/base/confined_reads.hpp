@@ -1,4 +1,5 @@
-// For programs that load files of unknown origin: names in them cannot lead to other files of this machine.
+// Confines the reads of programs that load files of unknown origin, so that names in them cannot lead to other files of this
+// computer.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// Latitudes and longitudes as places: WGS84, through earth-centred coordinates to the plane that touches the ground at an origin.
-// Senders with satellite positions are brought into the world by it; all in double, exact to micrometres near the origin.
+// Converts latitudes and longitudes (WGS84), by way of earth-centred coordinates, to the plane that is tangent to the ground at
+// an origin. It is used for senders with satellite positions. All is in double, exact to micrometres near the origin.
 #pragma once
 
 #include <cmath>

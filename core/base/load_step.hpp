@@ -1,4 +1,4 @@
-// The step that a long load is at: the readers and builders of scenes set it, a console reads it. One for the process.
+// The present step of a long load. The readers and builders of scenes set it, a console reads it. The process has one.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@ namespace sonar {
 
 struct LoadStep {
   std::string what;  // "reading wreck.ply"; empty before the first, and while a step is short
-  double part = 0;   // of it that is done, 0 to 1; 0 = not known
+  double part = 0;   // share that is done, 0 to 1; 0 = not known
 };
 
 /// From any thread. `triangles`: about how many it is for; a step for fewer than 300,000 is short, and leaves `what` empty.

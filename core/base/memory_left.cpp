@@ -29,7 +29,7 @@ std::uint64_t number_after(const path& file, const std::string& word) {
   return 0;
 }
 
-struct Names {  // of the files of one version
+struct Names {  // names of the files of one version
   const char *limit, *used, *cache;
 };
 constexpr Names version_1{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file "};

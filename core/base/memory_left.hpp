@@ -1,5 +1,5 @@
-// How much memory this process may still take before the system ends it: what the computer has left, and what the control groups
-// it runs in leave of their limits. A load that would go beyond is refused while that costs nothing else.
+// How much memory this process may still take before the system ends it: what is free in the computer, and in the limits of the
+// control groups of the process. A load that needs more is refused before it harms anything else.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// A fixed pool of compute threads for the loops inside the stages of a ping. The only threads core/ ever has.
-// Items are handed out from an atomic counter; results must not depend on who takes which.
+// A fixed pool of compute threads for the loops inside the stages of a ping. core/ has no other threads. Items are handed out
+// from an atomic counter; results must not depend on which thread takes which item.
 #pragma once
 
 #include <cstddef>

@@ -49,8 +49,8 @@ enum class Domain : std::uint32_t {
   fixed_fan = 0x66616eu,        // a hit of the fixed fan
   paper_speckle = 0x50323521u,  // a hit of the modes paper and raster
   other_sonar = 0x6f746872u,  // phase and carrier offset of another sonar; with the key's words exchanged, of each of its pulses
-  range_speckle = 0x72736b6cu,    // of range images: a ray's, by the place that it met
-  range_noise = 0x726e6f69u,      // of range images: a pixel's
+  range_speckle = 0x72736b6cu,    // speckle of a ray in range images, by the place that the ray met
+  range_noise = 0x726e6f69u,      // noise of a pixel in range images
   relief_value = 0x76616c75u,     // seabed and rocks: the key's high word, combined with the stream
   relief_gradient = 0x67726164u,  // the same, as it is
 };

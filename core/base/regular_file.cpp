@@ -47,7 +47,7 @@ const std::filesystem::path& readable_folder() { return folder_to_read(); }
 Result<OpenFile> open_regular(const std::filesystem::path& file) {
   if (!is_readable(file))
     return failure(ErrorKind::missing_file, file.string() + ": is outside of " + readable_folder().string() +
-                                                ", and this program reads no other files; put a copy there");
+                                                ", the only folder whose files this program reads; put a copy there");
   struct stat status {};
   const auto is_other = [&] {
     return failure(ErrorKind::missing_file,

@@ -1,5 +1,5 @@
-// Opening files that configurations, scenes and people name: regular ones only. A FIFO would be waited for without end, a device
-// read without end or set off. Every reader of such files opens them here.
+// Opens the files that configurations, scenes and users name, only if they are regular files. A FIFO could block for ever; a
+// device could be read without end, or act when it is read. Every reader of such files opens them here.
 #pragma once
 
 #include <cstddef>

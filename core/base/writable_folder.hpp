@@ -1,4 +1,4 @@
-// Checks that files can be made in a folder that a user named, without making one.
+// Checks that files can be made in a folder that a user named; makes none.
 #pragma once
 
 #include <filesystem>

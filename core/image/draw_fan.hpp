@@ -12,7 +12,7 @@
 
 namespace sonar {
 
-inline constexpr Rgb outside_colour{13, 17, 23}, ring_colour{150, 160, 170}, label_colour{190, 198, 206};  // of all pictures
+inline constexpr Rgb outside_colour{13, 17, 23}, ring_colour{150, 160, 170}, label_colour{190, 198, 206};  // used in all pictures
 
 struct FanStyle {
   int width_px = 1000;  // 64..8000
@@ -39,7 +39,7 @@ class FanPainter {
   Result<Raster> draw(const PolarImage& image);
 
  private:
-  /// In rows and beams, cell i being [i, i + 1).
+  /// Units are rows and beams; cell i is [i, i + 1).
   struct Footprint {
     double row_low = 0, row_high = -1, beam_low = 0, beam_high = 0;
     bool is_outside() const { return row_high < row_low; }
@@ -50,7 +50,7 @@ class FanPainter {
   static float mean(const PolarImage& image, const Footprint& of);
 
   FanStyle style_;
-  PolarImage shape_;  // of the images that footprints_ are for; without samples
+  PolarImage shape_;  // shape of the images for which footprints_ were made; without samples
   FanLayout layout_;
   std::vector<Footprint> footprints_;  // [height][width]
 };

@@ -1,4 +1,4 @@
-// Draws what people look at of a sonar (sonar_picture.hpp), whichever kind of picture it is.
+// Draws the picture of a sonar for people (sonar_picture.hpp), of any kind.
 #pragma once
 
 #include <utility>

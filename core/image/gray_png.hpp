@@ -1,4 +1,4 @@
-// Grey PNG files of whole numbers, 8 or 16 bits: samples and labels as they are, without a colour map.
+// Grey PNG files of integers of 8 or 16 bits: samples and labels as they are, without a colour map.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// A ping as a picture before it is a fan: samples by range row and beam, with where each beam looks.
-// Made from any vendor's decoded ping; drawn by draw_fan, measured by image_statistics.
+// A ping as a picture before it is drawn as a fan: samples by range row and beam, with the direction of each beam. Made from any
+// vendor's decoded ping; drawn by draw_fan, measured by image_statistics.
 #pragma once
 
 #include <algorithm>

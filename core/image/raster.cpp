@@ -48,7 +48,7 @@ int open_alone(const std::filesystem::path& file) {
     const int why = errno;
     ::close(descriptor);
     errno = why;
-    if (is_named) return -1;  // else another has given it its final name
+    if (is_named) return -1;  // otherwise another process or thread has renamed the file to its final name: try again
   }
 }
 

@@ -1,5 +1,5 @@
-// A picture in memory: RGB pixels, row 0 at the top, and the little drawing a fan image needs on top of its samples.
-// Filled by draw_fan, written by write_png, whole or not at all as every file that is made for others to read.
+// A picture in memory: RGB pixels, row 0 at the top, and the drawing that a fan image needs on top of its samples. Filled by
+// draw_fan; write_png writes a whole file or none.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,6 @@
-// The picture of a sonar for people: for most products a fan of the last ping, for others what their pings add up to. Made by
-// protocol/<vendor>/host.cpp, drawn by PicturePainter (draw_picture.hpp) for `sonarctl view`, the page and other viewers alike.
+// The picture of a sonar for people: for most products a fan of the last ping, for others a picture that several pings add up to.
+// Made by protocol/<vendor>/host.cpp, drawn by PicturePainter (draw_picture.hpp) for `sonarctl view`, the page and other viewers
+// alike.
 #pragma once
 
 #include <array>

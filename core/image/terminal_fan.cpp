@@ -10,13 +10,13 @@ namespace sonar {
 namespace {
 
 constexpr int label_columns = 7;  // " 100 m" and a gap
-constexpr int dots = 4;           // of the drawn picture across a cell; a cell is twice as high as wide
+constexpr int dots = 4;           // pixels of the drawn picture across a cell; a cell is twice as high as wide
 constexpr int fewest_columns = 24, fewest_lines = 8;
 
 struct Cell {
   Rgb upper, lower;
-  bool outside = false;  // of the fan, wholly
-  char letter = 0;       // of a label, instead of the picture
+  bool outside = false;  // the whole cell lies outside the fan
+  char letter = 0;       // if not 0: a character of a label, shown instead of the picture
 };
 struct Grid {
   int columns = 0, lines = 0;
@@ -39,7 +39,7 @@ Rgb mean_colour(const Raster& raster, int left, int top) {
   return {static_cast<std::uint8_t>(r / count), static_cast<std::uint8_t>(g / count), static_cast<std::uint8_t>(b / count)};
 }
 
-/// The corner of the picture lies outside every fan.
+/// The cells of the drawn picture. Its corner lies outside every fan, so cells of that colour are outside.
 Grid grid_from(const Raster& raster, int columns) {
   Grid grid;
   grid.columns = columns;

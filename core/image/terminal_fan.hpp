@@ -20,7 +20,7 @@ enum class TerminalColours {
 struct TerminalStyle {
   int columns = 80, lines = 24;  // room for the picture; it keeps its shape and may take less
   TerminalColours colours = TerminalColours::none;
-  ColourMap map;       // not used without colours
+  ColourMap map;       // unused without colours
   bool labels = true;  // metres at the starboard edge
 };
 

@@ -11,8 +11,9 @@
 namespace sonar::motion {
 namespace {
 
-constexpr double norm_allowed = 0.01;  // of a quaternion, or of a row of a matrix; a smaller error is rounding, which is repaired
-constexpr double farthest = 1e8;       // m, m/s, rad/s
+// Allowed error of the norm of a quaternion or of a row of a matrix; a smaller error is rounding, which is repaired.
+constexpr double norm_allowed = 0.01;
+constexpr double farthest = 1e8;  // m, m/s, rad/s
 constexpr std::size_t longest_quoted = 40, longest_name = 64;
 
 /// The error in a line; empty for a valid line.

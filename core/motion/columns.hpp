@@ -16,12 +16,12 @@ namespace sonar::motion {
 
 using Words = std::vector<std::string_view>;
 
-/// As written: in the frame of the file.
+/// Values as written, in the frame of the file.
 struct Row {
   std::int64_t stamp_ns = 0;
   Pose pose;
   Vec3d velocity_mps, angular_velocity_radps;
-  std::string_view body;  // of a body column
+  std::string_view body;  // from the column "body"
 };
 
 /// A word of a file made printable and short enough for an error text.
@@ -29,10 +29,10 @@ std::string in_quotes(std::string_view word);
 
 class Columns {
  public:
-  /// Errors are what the sentence says after file and line.
+  /// An error is the part of the message that follows "file:line: ".
   static std::optional<std::string> refuse_header(const Words& header, Columns& out);
   static Columns tum();
-  /// 8, 11 or 17 words: without velocity, with it, with the biases of an IMU, which say nothing of poses.
+  /// 8 words: without velocity; 11: with velocity; 17: with velocity and the biases of an IMU, which are ignored.
   static Columns euroc(std::size_t words);
   /// Twelve numbers, the first three rows of the matrix that takes points of the body to the world; no time.
   static Columns kitti();
@@ -41,7 +41,7 @@ class Columns {
   bool has_body() const { return has(body); }
   bool has_velocity() const { return has(vx); }
   bool has_angular_velocity() const { return has(wx); }
-  /// Reads a line, or returns its fault. `words` are count() many.
+  /// Reads a line, or returns what is wrong with it. `words` must have count() elements.
   std::optional<std::string> refuse(const Words& words, Row& out) const;
 
  private:

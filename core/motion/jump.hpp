@@ -1,5 +1,5 @@
-// Detects jumps: pose changes too fast to be motion, which must not carry a sonar and shift its
-// echoes. The one rule for what is played, what is sent (daemon/world), and what is rendered.
+// Detects jumps: pose changes too fast to be motion, which must not carry a sonar and shift its echoes. This one rule is used for
+// poses that are played, sent (daemon/world) and rendered.
 #pragma once
 
 #include "core/base/geometry.hpp"

@@ -1,5 +1,5 @@
-// Which moment of a trajectory is shown when: start, speed, loop, pause and seek against a clock that is passed in.
-// In whole nanoseconds and millionths, so that a stepped run gives the same moments every time; daemon/world has one per body.
+// Computes which moment of a trajectory is shown at a time of a clock, with start, speed, loop, pause and seek. It uses integer
+// nanoseconds and millionths, so that a stepped run gives the same moments every time; daemon/world has one per body.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct Speed {
 struct PlaybackRules {
   Speed speed;
   bool loop = false;
-  Ns start{0};  // of the trajectory, where playing begins; before 0: so long it waits at the first pose
+  Ns start{0};  // time in the trajectory at which playing begins; if it is negative, playing waits so long at the first pose
   bool operator==(const PlaybackRules&) const = default;
 };
 
@@ -33,7 +33,7 @@ struct PlaybackRules {
 struct Plan {
   std::shared_ptr<const Trajectory> trajectory = {};  // null = nothing
   PlaybackRules rules = {};
-  std::string file = {};   // as it was named
+  std::string file = {};   // the file, as it was named
   std::string about = {};  // format, frame, length, for people
   explicit operator bool() const { return trajectory != nullptr; }
 };
@@ -47,7 +47,7 @@ class Playback {
       : duration_(duration), rules_(rules), clock_at_(begun), place_at_(rules.start) {}
 
   struct Place {
-    Ns at{0};         // of the trajectory, 0 to its duration
+    Ns at{0};         // time in the trajectory, 0 to its duration
     double rate = 0;  // seconds of the trajectory for one of the clock: 0 while paused, before the start, after the end
   };
   /// A loop takes as long as the file: its last moment is the first one of the next round, not one beside it.

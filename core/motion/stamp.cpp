@@ -5,8 +5,8 @@
 namespace sonar::motion {
 namespace {
 
-constexpr int most_digits = 18;  // of a number that 64 bits hold for sure
-constexpr int second = 9;        // digits of it in nanoseconds
+constexpr int most_digits = 18;  // every number of so many decimal digits fits a signed 64-bit integer
+constexpr int second = 9;        // a second is 10^9 ns
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -28,7 +28,8 @@ struct Digits {
       exponent -= fraction;
       return;
     }
-    // Nineteen digits always fit 64 bits; of later ones their number counts before the point.
+    // Nineteen digits always fit an unsigned 64-bit integer. Later digits are dropped; each one before the decimal point raises
+    // the exponent by one.
     if (count <= most_digits) {
       number = number * 10 + static_cast<std::uint64_t>(digit - '0');
       ++count;

@@ -1,5 +1,5 @@
-// Time stamps of text, exact to the nanosecond: a double would round UNIX times to a quarter of a microsecond.
-// Used by the readers of trajectory files.
+// Reads time stamps from text, exact to the nanosecond; a double would round UNIX times to a quarter of a microsecond. Used by
+// the readers of trajectory files.
 #pragma once
 
 #include <cstdint>

@@ -25,8 +25,8 @@ struct Moment {
 /// Poses in the order of time, with velocities where the file had them. `times` count from the start of the file, which may
 /// lie before the first pose of this body, as its end may lie after the last one: bodies of one file share both.
 struct Points {
-  std::vector<Ns> times;                        // not negative, rising
-  std::vector<Pose> poses;                      // as many
+  std::vector<Ns> times;                        // times, not negative, in increasing order
+  std::vector<Pose> poses;                      // as many poses as times
   std::vector<Vec3d> velocities_mps;            // world axes; as many, or none
   std::vector<Vec3d> angular_velocities_radps;  // body axes; as many, or none
 
@@ -35,10 +35,10 @@ struct Points {
 
 class Trajectory {
  public:
-  /// At least one point. `duration` of the whole file: at least the last time.
+  /// Needs at least one point. `duration` is that of the whole file, at least the last time.
   explicit Trajectory(Points points, Ns duration = Ns{0});
 
-  /// Between points straight on (lerp) and evenly turning (slerp); before the first and after the last point held there.
+  /// Between points the pose moves in a straight line (lerp) and turns evenly (slerp); outside of them it is held.
   /// The motion is what the file says, interpolated, else that of the way between the two points; at a point that of what
   /// follows, at the last one of what went before. Where the pose is held it is rest.
   Moment at(Ns time) const;

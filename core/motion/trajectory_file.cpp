@@ -14,7 +14,7 @@
 namespace sonar::motion {
 namespace {
 
-// Limits for files that are not trajectories.
+// Limits that stop the reader early if a file is not a trajectory.
 constexpr std::size_t most_bodies = 256;
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
 constexpr std::uint64_t memory_of_a_line = 200;  // bytes: a stamp, a pose and two velocities, and a copy while a vector grows
@@ -94,7 +94,7 @@ class Reader {
     if (columns_) {
       split(line, commas_, words_);
     } else {
-      // The first line decides the separator, and in begin_table() format and columns.
+      // The first line decides the separator and, through begin_table(), the format and the columns.
       commas_ = line.find(',') != std::string_view::npos;
       split(line, commas_, words_);
       if (begin_table()) return;
@@ -158,14 +158,14 @@ class Reader {
 
   void take_comment(std::string_view line) {
     const std::size_t word = line.find("frame:");
-    // Other comments are free.
+    // Other comments are ignored.
     if (word == std::string_view::npos) return;
     Words words;
     split(line.substr(word + 6), false, words);
     const auto frame = words.empty() ? std::nullopt : frame_called(words.front());
     if (!frame) return complain("the frame must be ENU_FLU or NED_FRD");
     // Frames that contradict each other are an error, because the frame of the file must not be ignored silently.
-    if (frame_.value_or(*frame) != *frame) return complain("the frame was another one before");
+    if (frame_.value_or(*frame) != *frame) return complain("an earlier comment names another frame; a file has one frame");
     if (asked_.frame.value_or(*frame) != *frame)
       return complain("the file says " + std::string(name_of(*frame)) + ", but it was to be read as " +
                       std::string(name_of(*asked_.frame)));
@@ -177,8 +177,9 @@ class Reader {
     if (track == nullptr) return complain("more than " + std::to_string(most_bodies) + " bodies");
     Points& p = track->points;
     if (!p.times.empty() && Ns(row.stamp_ns) < p.times.back())
-      return complain("the time falls" + (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
-    if (!p.times.empty() && Ns(row.stamp_ns) == p.times.back()) {  // as with live poses; intervals have a length
+      return complain("the time is earlier than before" + (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
+    // As with live poses, a pose replaces an earlier one of the same time. So no interval between poses has length 0.
+    if (!p.times.empty() && Ns(row.stamp_ns) == p.times.back()) {
       ++replaced_;
       p.times.pop_back(), p.poses.pop_back();
       if (columns_->has_velocity()) p.velocities_mps.pop_back();
@@ -201,10 +202,10 @@ class Reader {
 
   void look_at_the_whole() {
     if (tracks_.empty()) {
-      wrong_ = name_ + ": no poses; write one a line, see docs/poses.md";
+      wrong_ = name_ + ": the file has no poses; write one pose per line (docs/poses.md)";
     } else if (!frame_ && !asked_.frame) {
       wrong_ = name_ +
-               ": in which frame the poses are is not said; begin the file with a line \"# frame: ENU_FLU\" or \"# frame: "
+               ": the file does not say in which frame its poses are; begin it with a line \"# frame: ENU_FLU\" or \"# frame: "
                "NED_FRD\", or give the frame with the file's name (docs/poses.md)";
     }
   }
@@ -224,7 +225,7 @@ class Reader {
     file.replaced = replaced_;
     for (Track& t : tracks_) {
       for (Ns& at : t.points.times) at -= first;
-      // The file's frame ends here: inside, all is ENU and FLU (docs/glossary.md).
+      // Converts to ENU and FLU, which all other code uses (docs/glossary.md).
       if (file.frame == Frame::ned_frd) turn_to_enu_flu(t.points);
       file.bodies.push_back({std::move(t.body), std::make_shared<const Trajectory>(std::move(t.points), file.duration)});
     }
@@ -281,10 +282,10 @@ Result<std::shared_ptr<const Trajectory>> trajectory_of(const TrajectoryFile& fi
     names.push_back(b.name);
   }
   if (names.front().empty())
-    return failure(ErrorKind::bad_data, name + ": the file has one body, without a name; leave out body");
+    return failure(ErrorKind::bad_data, name + ": the file has one body, which has no name; remove the key \"body\"");
   if (body.empty())
-    return failure(ErrorKind::bad_data,
-                   name + ": the file has several bodies; choose one with body" + text::suggestion("", names, "there are"));
+    return failure(ErrorKind::bad_data, name + ": the file has several bodies; choose one with the key \"body\"" +
+                                            text::suggestion("", names, "there are"));
   return failure(ErrorKind::bad_data,
                  name + ": no body is called " + in_quotes(body) + text::suggestion(body, names, "there are"));
 }

@@ -1,5 +1,5 @@
-// Files of trajectories: own CSV with a header, TUM, EuRoC CSV, KITTI matrices; what each looks like is in docs/poses.md.
-// Read by `sonard run` for what it plays and by `sonard render`; the result is in our frames, its times from the file's start.
+// Reads files of trajectories: our CSV with a header, TUM, EuRoC CSV and KITTI matrices (docs/poses.md). Used by `sonard run` and
+// `sonard render`. The result is in our frames, with times from the start of the file.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +15,7 @@
 namespace sonar::motion {
 
 enum class Format { automatic, csv, tum, euroc, kitti };
-enum class Frame { enu_flu, ned_frd };  // of the world and of the body
+enum class Frame { enu_flu, ned_frd };  // axes of the world and of the body
 std::string_view name_of(Format format);
 std::string_view name_of(Frame frame);
 
@@ -31,11 +31,11 @@ struct TrajectoryFile {
     std::string name;  // empty when the file names none
     std::shared_ptr<const Trajectory> trajectory;
   };
-  std::vector<Body> bodies;  // as they appear; at least one
+  std::vector<Body> bodies;  // bodies in the order of the file; at least one
   Format format = Format::csv;
   Frame frame = Frame::enu_flu;
   Ns begins_at{0};           // the earliest stamp: what the trajectories call 0
-  Ns duration{0};            // to the latest
+  Ns duration{0};            // time to the latest stamp
   std::size_t replaced = 0;  // poses that a later line of the same stamp took the place of
 };
 

@@ -1,4 +1,4 @@
-// Turns from one orientation to another, and part of the way. Used where poses are interpolated: trajectories here, and in
+// Rotations from one orientation to another, and interpolation between the two. Trajectories use them, and so does
 // daemon/emulator/world/pose_history.
 #pragma once
 

@@ -108,7 +108,7 @@ class ModeRouter final : public PingEngine {
   std::function<std::unique_ptr<ComparisonEngine>()> make_comparison_;
   std::unique_ptr<ComparisonEngine> comparison_;  // made for its first ping, because it needs a ray scene of its own
   std::deque<bool> passed_on_;                    // for each submitted ping: whether the canonical engine has it
-  std::vector<PingStatistics> each_;              // of the last run
+  std::vector<PingStatistics> each_;              // statistics of the last run
   bool last_was_canonical_ = true;
 };
 

@@ -45,7 +45,7 @@ struct PaperHit {
   int column = 0, row = 0;
   double range_m = 0;
   double elevation_rad = 0;
-  double cosine = 0;  // of incidence, with the triangle's own normal
+  double cosine = 0;  // cosine of the incidence, with the triangle's own normal
   double solid_angle_sr = 0;
   std::uint32_t object = 0, triangle = 0;
 };

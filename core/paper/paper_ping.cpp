@@ -12,7 +12,7 @@
 namespace sonar::paper {
 namespace {
 
-constexpr int sum_width = 8;              // of the fast sum: relative error 1e-7
+constexpr int sum_width = 8;              // width of the fast sum, for a relative error of 1e-7
 constexpr double width_constant = 0.884;  // P25's code, for sinc patterns: -3 dB width times aperture
 
 /// The comparison modes have no motion within the ping.

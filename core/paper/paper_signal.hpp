@@ -1,4 +1,4 @@
-// From hits to beams as Choi 2025 (Sensors 25(5):1516, "P25") prints it: eq. (1)-(4) per column, the reference code's beam
+// Computes beams from hits as Choi 2025 (Sensors 25(5):1516, "P25") prints it: eq. (1)-(4) per column, the reference code's beam
 // beamforming, an inverse transform. Second stage of core/paper; what differs from the canonical model: docs/acoustics.md,
 // section 8.
 #pragma once
@@ -46,9 +46,9 @@ struct SumScratch {
 /// The frequencies of eq. (4), f_m = f_min + m df with df = 1 / T and M = b T, and the spectrum of eq. (3) at them. S_0 is set so
 /// that a lone echo on a sample peaks at its own amplitude.
 struct PaperSpectrum {
-  int samples = 0;             // of the record T
+  int samples = 0;             // samples in the record T
   int count = 0;               // M
-  double sample_offset = 0.5;  // of sample 0 from the record's beginning, which is the picture's near edge
+  double sample_offset = 0.5;  // offset of sample 0 from the beginning of the record, which is the near edge of the picture
   double first_frequency = 0;  // f_1 - f_c in units of df
   std::vector<double> weight;  // [M] |S(f_m)| df, sum 1
 };

@@ -1,5 +1,5 @@
-// Beams that hear more than their own direction: near the sonar because the array is focused for broadside only, everywhere by a
-// fitted share of their neighbours (docs/acoustics.md, section 6). A function of the plan alone.
+// Mixes neighbouring beams: near the sonar because the array is focused only for broadside, and everywhere by a fitted share
+// (docs/acoustics.md, section 6). A function of the plan alone.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,7 @@ class BeamMix {
   const std::vector<float>& share() const { return share_; }
   BeamMixView view() const;
   std::size_t bytes() const;
-  /// In place; `scratch` keeps its memory. Nothing where blurs() or blends() is false.
+  /// Works in place; `scratch` keeps its memory. Does nothing if blurs() or blends() is false.
   void blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector<float>& scratch) const;
   void blend(BeamSignals& beams, std::vector<float>& scratch) const;
 

@@ -1,4 +1,4 @@
-// The CPU's engine for those who make pings of many scenes that are alike, such as data sets.
+// The CPU's engine for pings of many similar scenes, as in data sets.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@ class ChangingEngine : public PingEngine {
   virtual void change_scene(const std::shared_ptr<const Scene>& scene) = 0;
 };
 
-/// As make_cpu_engine().
+/// The same as make_cpu_engine().
 std::unique_ptr<ChangingEngine> make_changing_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
                                                      const EngineOptions& options = {});
 

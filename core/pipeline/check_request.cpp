@@ -11,11 +11,11 @@ namespace {
 
 constexpr double longest_pulse_in_samples = 1000;
 constexpr double shortest_exact_pulse_in_samples = 0.25;  // by way of the spectrum; tabulated ones may be as short as they like
-constexpr double most_column_samples = 1 << 29;           // of all columns, 4 GiB
-constexpr double most_frequencies = 1 << 20;              // of a column by way of the spectrum
+constexpr double most_column_samples = 1 << 29;           // limit for all columns, 4 GiB
+constexpr double most_frequencies = 1 << 20;              // limit for a column by way of the spectrum
 constexpr double tone_band_in_pulses = 20, other_band_in_pulses = 3;  // in 1 / width, at least Pulse::band_hz
 constexpr int most_fixed_rays = 100000, most_interleaved_pings = 64;
-constexpr double sector_slack_rad = 1e-6;  // of azimuths in double beside an aperture in float
+constexpr double sector_slack_rad = 1e-6;  // slack between azimuths in double and an aperture in float
 constexpr double widest_beam_rad = 1.5, narrowest_width_rad = 1e-4;
 constexpr float widest_level_db = 300;
 

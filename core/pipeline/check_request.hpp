@@ -1,4 +1,4 @@
-// Which requests can be simulated. Every engine checks before a ping.
+// Checks whether a request can be simulated. Every engine does so before a ping.
 #pragma once
 
 #include <string>

@@ -108,8 +108,8 @@ class CpuEngine final : public ChangingEngine, private Interruption {
   EngineOptions options_;
   const simd::Kernels& kernels_;
   std::shared_ptr<SurfaceCells> cells_;
-  std::array<Workspace, 2> work_;     // of the ping under way, and of one let in
-  std::vector<PingStatistics> each_;  // of the last run
+  std::array<Workspace, 2> work_;     // workspaces of the ping under way and of the next one
+  std::vector<PingStatistics> each_;  // statistics of the last run
   Interruption* interruption_ = nullptr;
   struct UnderWay {
     const PingRequest* request = nullptr;

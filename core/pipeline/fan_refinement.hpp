@@ -1,5 +1,5 @@
 // How fans of rays are refined: a column's interval between two directions is halved until both ends see one surface that
-// interpolates, or an edge. One rule for what is seen directly (trace_fan) and via mirrors (multipath_trace).
+// interpolates, or an edge. This one rule is used for direct views (trace_fan) and for views by way of mirrors (multipath_trace).
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace sonar {
 struct SurfaceHit {
   std::uint32_t object = RayPacket::miss;
   float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = nothing met
-  Vec3 normal;                       // of the facet, any length, world axes as seen along the last path of the path
+  Vec3 normal;                       // normal of the facet, of any length, in world axes as seen along the last leg of the path
   float offset = 0;                  // the facet's plane is normal . p = offset, p from the sonar's last image
   Vec3 direction;                    // unit, of that last path, in the same axes
 
@@ -98,7 +98,7 @@ class FanRefinement {
   // happens to lie on the line proves nothing: the rays may fall in step with ripples.
   static constexpr float slope_tolerance_in_pulses = 2;
   static constexpr float golden_turn = 0.61803399f;  // its multiples fill a turn evenly
-  static constexpr float widest_skew = 0.15f;        // of an interval, to either side of its middle
+  static constexpr float widest_skew = 0.15f;        // share of an interval, to either side of its middle
 
   Sample& at(std::int32_t i) { return samples_[static_cast<std::size_t>(i)]; }
 

@@ -9,9 +9,9 @@
 namespace sonar {
 namespace {
 
-constexpr int weightings = 3;  // of a half: rising, as in the later half of a group; falling; constant
+constexpr int weightings = 3;  // weightings of a half: rising, as in the later half of a group; falling; constant
 constexpr double most_radians = 3.5, interpolation_error = 4e-6;
-constexpr std::size_t most_beams = 128;  // of a segment
+constexpr std::size_t most_beams = 128;  // limit for a segment
 
 /// Adding and subtracting it leaves a whole number.
 constexpr float whole = 12582912;

@@ -13,8 +13,8 @@ namespace sonar {
 /// point at a range and sine u. Parts: groups, which overlap by half and whose w^2 add to 1 in every channel; last, all channels
 /// alike.
 ///
-/// A half of a group is short: but for the delay of its middle, its sum hardly changes with the sine. It is summed at few sines
-/// of a segment of beams, Chebyshev's, and interpolated: to 1e-5 of the loudest, as the rounding of the phases.
+/// A half of a group is short: except for the delay of its middle, its sum hardly changes with the sine. It is summed at few
+/// sines of a segment of beams, Chebyshev's, and interpolated: to 1e-5 of the loudest, as the rounding of the phases.
 class FocusedArray {
  public:
   FocusedArray(const std::vector<double>& beam_sines, const SharedNoise& law);

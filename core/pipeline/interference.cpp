@@ -14,9 +14,9 @@ namespace sonar {
 namespace {
 
 constexpr double no_crosstalk_db = -150;
-constexpr int most_pulses = 64;        // of one other sonar in one ping
+constexpr int most_pulses = 64;        // limit for one other sonar in one ping
 constexpr double edge_widths = 3;      // erf is 1 to 2e-5 there
-constexpr double widest_offset = 0.2;  // of b: how far off our carrier another sonar's tone may be and still pass
+constexpr double widest_offset = 0.2;  // how far off our carrier another sonar's tone may be and still pass, as a share of b
 
 double unit_uniform(std::uint32_t bits) { return static_cast<double>(bits) / 4294967296.0; }
 

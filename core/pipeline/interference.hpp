@@ -1,6 +1,6 @@
 // Signals besides the ping's own echoes: leakage of the transmitter into the first rows, pulses of other sonars, and crosstalk
-// between the channels. Three small stages of a ping, each nothing when its data are absent
-// (docs/acoustics.md, sections 5 and 6).
+// between the channels. They are three small stages of a ping, each of which does nothing without its data (docs/acoustics.md,
+// sections 5 and 6).
 #pragma once
 
 #include <complex>
@@ -37,7 +37,7 @@ class Leak {
   Leak() = default;
   Leak(const PingPlan& plan, const Switches& switches);
   bool is_audible() const { return !rms_upa_.empty(); }
-  const std::vector<float>& rms_upa() const { return rms_upa_; }  // of a column, per sample
+  const std::vector<float>& rms_upa() const { return rms_upa_; }  // rms of a column, for each sample
   float steady() const { return steady_; }                        // amplitude of the part that the columns receive in every ping
   /// Adds it to columns [first, last). The table of `noise` must be prepared with the request's seed and the plan's filter;
   /// unused in expected power.
@@ -50,7 +50,7 @@ class Leak {
 
 /// A pulse of another sonar while we listen: a tone through our receiver, somewhere on the sample grid.
 struct ReceivedPulse {
-  double sine = 0;  // where it comes from, y / r at its arrival
+  double sine = 0;  // direction from which it comes, y / r at its arrival
   double from_sample = 0, to_sample = 0;
   double amplitude_upa = 0;     // in a beam that looks at it
   double phase_turns = 0;       // at from_sample
@@ -80,7 +80,7 @@ class Crosstalk {
 
  private:
   double amplitude_ = 0;
-  double share_ = 1;         // of the sum over beams that is one lone echo: beams overlap
+  double share_ = 1;         // share of the sum over beams that belongs to one echo, because beams overlap
   double own_in_power_ = 0;  // expected power: 2 sum W / sum W^2, how a beam adds up with its own leakage
 };
 

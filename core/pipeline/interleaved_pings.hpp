@@ -1,5 +1,5 @@
-// Pictures whose neighbouring beams are of successive pings (docs/acoustics.md, section 6): their pings as requests of their own,
-// and the picture that these make.
+// Pictures whose neighbouring beams come from successive pings (docs/acoustics.md, section 6): the requests of these pings, and
+// the picture that they make.
 #pragma once
 
 #include <span>

@@ -216,7 +216,7 @@ void LabelWork::spread(Part& part, const std::vector<float>& by_sample) const {
     const float transmit = plan.columns.transmit[static_cast<std::size_t>(part.first_column + k)];
     const float factor = transmit * transmit / static_cast<float>(per_row);
     float* rows = part.power.data() + static_cast<std::ptrdiff_t>(k) * part.rows;
-    const int first = part.first_sample - half;  // of `line`
+    const int first = part.first_sample - half;  // index in `line`
     for (int n = std::max(0, -first); n < static_cast<int>(line.size()); ++n) {
       const int row = (first + n) / per_row - part.first_row;
       if (row >= part.rows) break;

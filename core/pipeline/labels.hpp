@@ -1,5 +1,5 @@
-// Which object's echo each sample holds: expected energy per object, from the cells, columns, pulse and beams that the picture is
-// made of (docs/datasets.md). Multipath, crosstalk and defocus are not followed; what the water sends counts for nothing.
+// Finds out which object's echo each sample holds: expected energy per object, from the cells, columns, pulse and beams that the
+// picture is made of (docs/datasets.md). Multipath, crosstalk, defocus and echoes of the water have no labels.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace sonar {
 
 /// Why the samples of such pings have no labels; empty = they have.
 std::string why_unlabelled(const PingRequest& request, const Scene& scene);
-/// Those of a ping that receives nothing.
+/// Labels of a ping that receives nothing.
 PingLabels no_labels(const PingRequest& request, const Scene& scene);
 
 /// The labels of one ping while it is made. Kept from ping to ping for its buffers.
@@ -41,7 +41,7 @@ class LabelWork {
     int first_sample = 0, last_sample = 0;     // half-open
     int first_row = 0, rows = 0;               // multiples of `window`
     std::vector<float> power = {};             // [columns][rows], the pulse's length included
-    std::vector<double> seen = {}, open = {};  // by column: energy, of objects with a label; open: were nothing in the way
+    std::vector<double> seen = {}, open = {};  // energy of objects with a label, by column; `open`: as if nothing were in the way
   };
   struct Gap {  // samples of a column that lie in an object's shadow, where nothing else is
     float from = 0, to = 0;
@@ -67,14 +67,14 @@ class LabelWork {
   const std::vector<PreparedTile>* tiles_ = nullptr;
   const std::vector<std::vector<std::uint32_t>>* by_group_ = nullptr;
   int group_columns_ = 1;
-  BeamWeights weights_;  // of powers, for these columns and beams
+  BeamWeights weights_;  // weights of powers, for these columns and beams
   std::vector<double> beam_sine_;
   std::vector<std::pair<Taper, double>> beam_widths_;  // taper and aperture of each
   double first_sine_ = 0, spacing_ = 0;
   std::vector<float> pulse_;  // |p|^2 at whole samples, the peak in the middle
   struct Group {
     std::vector<Part> parts;                    // the first `used` are of this ping; all keep their memory
-    std::vector<std::vector<float>> by_sample;  // of each part: [columns][samples], before the pulse
+    std::vector<std::vector<float>> by_sample;  // values of each part: [columns][samples], before the pulse
     std::size_t used = 0;
     std::span<const Part> of_this_ping() const { return std::span(parts).first(used); }
   };

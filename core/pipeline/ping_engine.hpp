@@ -91,7 +91,7 @@ class PingEngine {
   virtual std::vector<PingStatistics> statistics_of_each() const { return {statistics()}; }
 
  private:
-  std::deque<std::vector<PingRequest>> submitted_;  // of engines that compute when they are collected from
+  std::deque<std::vector<PingRequest>> submitted_;  // requests to engines that compute only when their results are collected
 };
 
 /// Builds the acceleration structures; the pool must outlive the engine.

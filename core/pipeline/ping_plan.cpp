@@ -17,12 +17,12 @@ namespace {
 
 constexpr double widest_column_in_beams = 0.35;  // docs/acoustics.md, section 2
 constexpr double margin_in_beams = 3.0;          // columns beyond the sector, or its edge beams would be dim
-constexpr double flat_margin_in_beams = 1.5;     // of which the transmitter lights this much fully
+constexpr double flat_margin_in_beams = 1.5;     // part of it that the transmitter lights fully
 constexpr int base_elevations = 48;              // docs/acoustics.md, section 2
 constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
 constexpr double side_lobe_two_way = 5.62e-3;    // -45 dB: lower side lobes are left out
 constexpr double side_step_rad = 0.19;           // between rays in them; a plane is exact between any two
-constexpr int side_bins = 64;                    // of the depth map on either side
+constexpr int side_bins = 64;                    // bins of the depth map on either side
 constexpr double unit_fan_over_width = 2.3;      // where there is no pattern to end it
 constexpr double widest_fan_rad = 1.4;
 
@@ -43,7 +43,8 @@ BeamWidths beam_width_sines(const FrequencyMode& mode) {
   return widths;
 }
 
-/// Where the peaks of the two-way pattern, 1 / (pi x)^2 at x = L_v / lambda sin psi, have fallen below what is audible.
+/// The angle at which the peaks of the two-way pattern, 1 / (pi x)^2 at x = L_v / lambda sin psi, have fallen below what is
+/// audible.
 double side_lobe_reach_rad(const BeamPattern& pattern) {
   const double sine = 1 / (pi * std::sqrt(side_lobe_two_way) * elevation_aperture_in_wavelengths(pattern));
   return sine < 1 ? std::min(std::asin(sine), widest_fan_rad) : widest_fan_rad;
@@ -116,7 +117,7 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
   return {power.begin(), power.end()};
 }
 
-/// To a millionth: settings whose rows differ only by rounding have the same filter, and share the draws of noise.
+/// Rounded to a millionth: settings whose rows differ only by rounding have the same filter, and share the draws of noise.
 std::vector<float> rounded(std::vector<float> filter) {
   constexpr float steps = 1 << 20;
   for (float& tap : filter) tap = std::round(tap * steps) / steps;
@@ -186,7 +187,7 @@ void lay_out_noise_profile(PingPlan& p) {
     p.noise_profile.far.push_back(static_cast<float>(far));
     p.noise_profile.near_less_far.push_back(static_cast<float>(near - far));
   }
-  constexpr double least = 1e-3;  // of near - far, at most some 10 dB: less than 0.05 dB
+  constexpr double least = 1e-3;  // least difference near - far, which is at most some 10 dB; this is less than 0.05 dB
   for (int n = 0; n < p.samples && !profile.near_noise_db.empty(); ++n) {
     const double decay = std::exp(-(n + p.sample_offset) * p.sample_spacing_m / static_cast<double>(profile.near_m));
     if (decay < least) break;
@@ -337,7 +338,7 @@ void set_gain(PingPlan& plan, float gain_db) {
 }
 
 bool serves(const PingPlan& plan, const PingRequest& r) {
-  PingSettings asked = r.settings;  // as the plan's, but for what no table depends on
+  PingSettings asked = r.settings;  // the plan's settings, except those on which no table depends
   asked.rate_hz = plan.settings.rate_hz;
   asked.gain_db = plan.settings.gain_db;
   asked.gain_assist = plan.settings.gain_assist;

@@ -24,20 +24,20 @@ namespace sonar {
 
 /// Directions of the rays: angles about the array axis, and the tangent axis of the depth map.
 struct Fan {
-  double half_angle_rad = 0;  // of the main part; the fixed fan and paths by mirrors cover no more
+  double half_angle_rad = 0;  // half of the main part; the fixed fan and paths by mirrors cover no more
   double reach_rad = 0;       // with the side lobes
   TangentAxis axis{};
   int bins = 0;
-  std::vector<float> tangent;        // of every bin's lower edge, and of the end: bins + 1
+  std::vector<float> tangent;        // tangents of the lower edge of every bin, and of the end: bins + 1
   std::vector<float> elevation_rad;  // the base fan, from below to above
-  int side_elevations = 0;           // so many at either end of them lie in side lobes: not refined, shared by some columns
+  int side_elevations = 0;           // number at either end that lie in side lobes: not refined, shared by some columns
   bool is_side(int interval) const {
     return interval < side_elevations || interval + 1 >= static_cast<int>(elevation_rad.size()) - side_elevations;
   }
 };
 
-/// A ray of the fixed fan: its elevation about the array axis, and pattern times root of the solid angle, of flat beams but for
-/// what depends on the column.
+/// A ray of the fixed fan: its elevation about the array axis, and pattern times root of the solid angle, of flat beams except
+/// for what depends on the column.
 struct FixedFanRay {
   float elevation_rad = 0, cosine = 1, sine = 0, weight = 0;
 };
@@ -50,7 +50,7 @@ struct BeamPanel {
 };
 /// How beams are made of columns.
 struct BeamWeightOptions {
-  double dropped_energy = 1e-4;  // of the band: -40 dB
+  double dropped_energy = 1e-4;  // share of the energy outside the band: -40 dB
   bool transform = true;         // instead of a band that is wider than a transform is long, where beams allow it
 };
 struct BeamWeights {
@@ -82,7 +82,7 @@ struct PingPlan {
   BeamWeights beam_weights;
   double bearing_scale = 1;                  // bearing_scale_of() the request
   std::vector<float> beam_azimuth_rad;       // reported
-  std::vector<double> beam_sine;             // where the beams look, as all sines here but those of tables by reported sine
+  std::vector<double> beam_sine;             // where the beams point, as all sines here except those of tables by reported sine
   std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
@@ -139,7 +139,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
 /// The client's gain alone, which may change with every ping.
 void set_gain(PingPlan& plan, float gain_db);
-/// Whether the plan still serves this request, but for its gain.
+/// Whether the plan still serves this request, except for its gain.
 bool serves(const PingPlan& plan, const PingRequest& request);
 
 // The parts of a plan, callable alone.

@@ -11,7 +11,7 @@ namespace sonar {
 /// direction is measured in the sonar's axes at reception.
 struct EchoGeometry {
   Vec3d from_sonar_m;  // sonar axes at reception
-  Vec3d moved_m;       // by how far the sonar had moved by then, in the axes of PingScalars::seen_from
+  Vec3d moved_m;       // how far the sonar had moved by then, in the axes of PingScalars::seen_from
   Rotation turn;       // from those axes to the ones at reception
 };
 
@@ -38,7 +38,7 @@ struct PingScalars {
   EchoGeometry echo_geometry(Vec3d from_sonar_m) const;
   /// How many columns may lie between where a place was looked for and where its echo is received.
   int columns_turned(const PingPlan& plan) const;
-  /// By how many samples the Doppler shift of a sweep delays the echo from a place in the sonar's axes.
+  /// The number of samples by which the Doppler shift of a sweep delays the echo from a place in the sonar's axes.
   double doppler_samples(Vec3d from_sonar_m) const;
   double sample_of(double range_m) const { return range_m * samples_per_m - sample_offset; }
 };

@@ -1,5 +1,5 @@
-// The ping of a sonar that reports ranges (core/sonar/range_image.hpp): rays through the cell of each beam, the power of all
-// within a beam's pattern by range cell, and of its cells the strongest or the nearest that is detected.
+// The ping of a sonar that reports ranges (core/sonar/range_image.hpp): traces rays through the cell of each beam, sums the power
+// within a beam's pattern by range cell, and reports the strongest or the nearest cell that is detected.
 #pragma once
 
 #include "core/base/parallel.hpp"

@@ -12,8 +12,8 @@ namespace sonar {
 namespace {
 
 constexpr double speckle_cell_m = 0.02;  // surfaces keep their speckle as long as a beam's centre stays within such a cell
-constexpr std::uint32_t draws = 4096;    // that the range cells of all returns share
-constexpr double least_blur = 0.5;       // of a range cell: half the length of the shortest echo
+constexpr std::uint32_t draws = 4096;    // number of draws, which the range cells of all returns share
+constexpr double least_blur = 0.5;       // least blur as a share of a range cell: half the length of the shortest echo
 
 // Rays round the middle of a cell: what the middle ray passes by is heard by the share of the cell that it fills.
 constexpr int rays_across = 2, rays_up = 2, rays_around = rays_across * rays_up;
@@ -25,9 +25,9 @@ constexpr double thin_share = 0.4;
 constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15;
 constexpr std::size_t most_thin_cells = 512, most_probed_cells = 2048;  // when a net covers the view, the few usual rays must do
 
-/// Where in a cell a ray is, -0.5 to 0.5, along an axis in one of `of` strata: multiples of the golden ratio shift it from line
-/// to line through the grid, so that level and upright edges meet every part of a cell; where the lines begin is random, so that
-/// no oblique edge stays between the rays.
+/// The place of a ray in a cell, -0.5 to 0.5, along an axis in one of `of` strata: multiples of the golden ratio shift it from
+/// line to line through the grid, so that level and upright edges meet every part of a cell; where the lines begin is random, so
+/// that no oblique edge stays between the rays.
 float place_in_cell(int stratum, int of, int line, int across_lines) {
   const auto n = static_cast<std::uint32_t>(across_lines),
              shift = static_cast<std::uint32_t>(line) * 0x9E3779B9u + n * n * 0x85EBCA6Bu;
@@ -138,7 +138,7 @@ void RangeReturns::trace_middles(int row, std::vector<RangeReturn>& middles) con
 
 /// Aims rays of a cell's lattice, from `first_ray` on, by lanes of a packet.
 void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ray, int rays, RayPacket& p, int first_lane) const {
-  // In the plane across the middle ray, which the few tenths of a degree allow.
+  // Computed in the plane across the middle ray, which is good enough for a few tenths of a degree.
   const auto [ca, sa] = azimuth_[static_cast<std::size_t>(column)];
   const Vec3d ahead = direction(column, row), to_port{-sa, ca, 0};
   const double width = column_step_rad_ * elevation_[static_cast<std::size_t>(row)].cosine;

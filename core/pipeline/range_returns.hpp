@@ -1,5 +1,5 @@
-// The hits of the rays of a range image (core/pipeline/range_image.hpp): each cell of the grid of beams is seen by one ray along
-// its middle and a few round it, and by many where things are thinner than it.
+// The hits of the rays of a range image (core/pipeline/range_image.hpp): one ray passes through the middle of each cell of the
+// beam grid and a few around it; if things are thinner than the cell, many rays do.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ namespace sonar {
 struct RangeReturn {
   double range_m = 0, half_m = 0, power = 0;  // power [uPa^2] in a beam that looks there; 0 = nothing
   ComplexNormal speckle{1, 0};
-  std::uint32_t draw = 0;  // of the speckle of each of its range cells, see RangeReturns::speckle_in()
+  std::uint32_t draw = 0;  // draw for the speckle of its range cells, see RangeReturns::speckle_in()
   std::uint32_t object = BeamTruth::nothing;
   // The same by range cells: from `first` to `last`, the power in the first, in each between, and in the last when it is another.
   std::int32_t first = 0, last = 0;
@@ -38,7 +38,8 @@ struct PointReturn : RangeReturn {
   double azimuth_rad = 0, elevation_rad = 0;
 };
 
-constexpr double longest_return_half_m = 0.5;  // of the ranges of one ray's patch, at grazing incidence
+// Half of the longest interval of ranges in the patch of one ray, at grazing incidence.
+constexpr double longest_return_half_m = 0.5;
 
 class RangeReturns {
  public:
@@ -69,7 +70,7 @@ class RangeReturns {
   /// A row of the grid: the returns of its cells, side by side.
   struct Row {
     std::vector<RangeReturn> returns;
-    std::vector<std::size_t> begin;  // of each column, and the end
+    std::vector<std::size_t> begin;  // begin of each column, and the end
   };
   struct Cell {
     int column = 0, row = 0;
@@ -91,7 +92,7 @@ class RangeReturns {
   void look_closer(Parallel& pool);
   std::vector<Cell> thin_cells(std::vector<std::uint8_t>& is_thin) const;  // by object
   std::vector<Cell> crossed_cells(Parallel& pool) const;
-  Vec3d direction(int column, int row) const;  // of a beam, sonar axes
+  Vec3d direction(int column, int row) const;  // direction of a beam in sonar axes
   std::size_t index(Cell cell) const {
     return static_cast<std::size_t>(cell.row) * static_cast<std::size_t>(grid_.columns) + static_cast<std::size_t>(cell.column);
   }
@@ -109,9 +110,9 @@ class RangeReturns {
   Vec3 origin_;
   double device_per_true_ = 1, absorption_np_ = 0, source_ = 1;
   std::vector<LawTable> laws_;
-  std::vector<Angle> azimuth_, elevation_;  // of the columns and rows
+  std::vector<Angle> azimuth_, elevation_;  // angles of the columns and rows
   std::vector<Row> rows_;
-  std::vector<ComplexNormal> draws_;  // of speckle_in()
+  std::vector<ComplexNormal> draws_;  // draws made by speckle_in()
 };
 
 }  // namespace sonar

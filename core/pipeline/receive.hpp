@@ -12,7 +12,7 @@ namespace sonar {
 /// Buffers of receive, one per worker.
 struct ReceiveScratch {
   std::vector<float> power;  // [rows][beams rounded up]
-  std::vector<float> codes;  // of a row, and where they are
+  std::vector<float> codes;  // codes of a row
   std::vector<std::uint8_t> bytes;
 };
 

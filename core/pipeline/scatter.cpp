@@ -14,7 +14,7 @@ namespace {
 /// 1 / length of a ramp [1/m]; a ramp without length becomes a step.
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
-/// Which columns the box round a tile's cells can reach: u = y / r (y / h for flat beams) over it, to second order.
+/// The columns that the box around a tile's cells can reach: u = y / r (y / h for flat beams) over it, to second order.
 void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotation& sonar_from_object, const PingPlan& plan,
                   PreparedTile& out) {
   // All columns, unless the box is small compared with its distance; then u is nearly linear over the box.
@@ -49,7 +49,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   const Rotation sonar_from_object = s.moves ? at.turn * seen_from_object : seen_from_object;
   const Vec3d from_sonar_object_m =
       s.moves ? t.from_sonar_object_m - transposed(seen_from_object) * at.moved_m : t.from_sonar_object_m;
-  // In double; cells add a float difference to it (section 1).
+  // Computed in double; cells add a float difference to it (section 1).
   const double range = length(at.from_sonar_m);
   seen.tile = &tile;
   const Vec3 q = to_float(from_sonar_object_m), p = to_float(at.from_sonar_m);

@@ -1,5 +1,5 @@
-// Stage two: the surface cells in view, as far as the rays saw them, become echoes: where on the sample grid, in which column,
-// how strong, with which carrier phase. Their speckle is the surface's own. Also the fixed fan and analytic point targets.
+// Stage two: the surface cells in view, as far as the rays saw them, become echoes, each with its place on the sample grid,
+// column, amplitude and carrier phase. Their speckle is the surface's own. Also the fixed fan and analytic point targets.
 #pragma once
 
 #include <complex>

@@ -1,4 +1,4 @@
-// Tables of settings, kept from ping to ping: several sonars take turns, and clients come back to settings they had before.
+// Tables of settings that are kept from ping to ping, because several sonars take turns and clients return to earlier settings.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ namespace sonar {
 struct PreparedSettings {
   std::shared_ptr<const SonarModel> model;
   PingPlan plan;
-  NoiseTable noise, grains;  // of the receiver; of the pulse's correlation, where that is another
+  NoiseTable noise, grains;  // noise of the receiver; noise with the pulse's correlation, if that is different
   std::uint64_t last_used = 0;
 
   bool one_table() const { return plan.noise_filter == plan.pulse_filter; }
@@ -30,7 +30,7 @@ class SettingsCache {
   static constexpr std::size_t usual_bytes = std::size_t{64} << 20;
   explicit SettingsCache(std::size_t most_bytes = usual_bytes) : most_bytes_(most_bytes) {}
 
-  /// Makes what is missing, and forgets what was used least recently until all fit, but for these. Valid until the next call.
+  /// Makes what is missing, and forgets what was used least recently until all fit, except for these. Valid until the next call.
   PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Parallel& pool);
   /// About, of all that are kept.
   std::size_t bytes() const;

@@ -17,8 +17,9 @@ namespace {
 
 constexpr double none_db = -150;
 /// The part of the whole array leaves the sector at some range. The noise is followed up to `margin` times that range, and fades
-/// from `fades_from` times on. Without the fade, noise of groups would stay in the outer beams; the recording has none at 1.75 m,
-/// 3.7 times that range.
+/// from `fades_from` times on. Without the fade, noise of groups would stay in the outer beams at all ranges. In the M1200d's
+/// high mode the range is 0.47 m (sine 0.5) and the fade ends at 1.41 m; the recording has no such noise at 1.75 m, and from 0.6
+/// m to there its bed hides it.
 constexpr double margin = 3, fades_from = 2;
 
 /// A beam's blocks of samples of a part are left out if nowhere louder than this share of the channels' own noise (30),
@@ -44,7 +45,7 @@ double focus_m(const SharedNoise& law, const PingSettings& settings) {
 /// The noise is followed to `end_m`. Over the last `fade_m` its power falls to 0.
 struct Reach {
   double end_m = 0, fade_m = 1;
-  double share(double range_m) const { return std::clamp((end_m - range_m) / fade_m, 0.0, 1.0); }  // of its power
+  double share(double range_m) const { return std::clamp((end_m - range_m) / fade_m, 0.0, 1.0); }  // share of its power
 };
 /// In a sector of beams of sines up to `widest`. Where the whole array's part never leaves it, the noise has no end.
 Reach reach_of(const FrequencyMode& mode, const PingSettings& settings, double widest) {

@@ -1,5 +1,5 @@
-// Signals that receive channels share, with opposite signs in neighbours: noise, and of some receivers the transmitter's
-// leak. The array, focused at every range, makes wide grains and fringes of them (docs/acoustics.md, section 5).
+// Signals that receive channels share, with opposite signs in neighbours: noise, and in some receivers the transmitter's leak. An
+// array that is focused at every range turns them into wide grains and fringes (docs/acoustics.md, section 5).
 #pragma once
 
 #include <cstdint>

@@ -64,7 +64,7 @@ struct PointEcho {
   double sine = 0;  // y / r
   double sample = 0;
   std::complex<double> amplitude;  // [uPa]
-  std::uint32_t instance = 0;      // of what sent it, in labels (core/pipeline/labels.hpp); 0 = of nothing that has one
+  std::uint32_t instance = 0;      // instance that sent it, in labels (core/pipeline/labels.hpp); 0 = none
 };
 
 /// A pulse on the sample grid: complex values of samples from first_sample on.
@@ -78,7 +78,7 @@ struct ColumnSignals {
   int columns = 0, samples = 0;
   int lead = 0;               // samples of room before sample 0, for pulses that begin earlier
   std::ptrdiff_t stride = 0;  // floats from column to column
-  AlignedFloats data;         // so is every column, on a cache line
+  AlignedFloats data;         // every column is aligned to a cache line, too
 
   void shape(int column_count, int sample_count, int taps);
   float* column(int k) { return data.data() + k * stride; }

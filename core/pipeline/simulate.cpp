@@ -162,8 +162,8 @@ class PingSimulation {
   std::vector<float> shared_noise_;  // noise that the channels share in this ping
 };
 
-/// How many columns a worker takes at once. Tiles that reach into several groups are looked at by each, so the more the better,
-/// as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
+/// The number of columns that a worker takes at once. Each group looks at the tiles that reach into it, so larger groups are
+/// better, as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
 int PingSimulation::group_columns() const {
   const int traced = traced_columns();
   // Small groups: the other sonar's ping runs between them.
@@ -301,7 +301,7 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
   if (labels_) w_.labels.add_cells(group, mine.echoes);
 }
 
-/// In time where the pulse is real and tabulated, else by way of the spectrum.
+/// Computed in time if the pulse is real-valued and tabulated, otherwise by way of the spectrum.
 void PingSimulation::sum_pulses(int first, Workspace::Buffers::PerWorker& mine) {
   if (plan_.spectral)
     plan_.spectral->add(mine.echoes, first, mine.spectral);

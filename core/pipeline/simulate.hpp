@@ -21,7 +21,7 @@ class Workspace {
 
   /// Asked between groups of columns; null = never. Not while a ping is under way.
   void set_between(Interruption* between);
-  const PingStatistics& statistics() const;  // of the last ping
+  const PingStatistics& statistics() const;  // statistics of the last ping
   /// The next ping is of another scene.
   void change_scene();
 

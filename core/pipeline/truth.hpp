@@ -1,4 +1,4 @@
-// Ground truth beside the picture: what each beam meets first. Taken from the rays that have been traced anyway.
+// Ground truth for a picture: what each beam meets first, taken from rays that are traced anyway.
 #pragma once
 
 #include <span>

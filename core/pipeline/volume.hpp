@@ -1,5 +1,5 @@
-// Reverberation of the water itself: what floats in it scatters a little everywhere, as far as nothing solid stands in the way.
-// Added to the column signals between synthesis and beamforming (docs/acoustics.md, section 3).
+// Reverberation of the water itself: particles in it scatter a little everywhere, up to the first solid surface. Added to the
+// column signals between synthesis and beamforming (docs/acoustics.md, section 3).
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace sonar {
 
 /// Buffers of Volume::add that are kept from ping to ping; one per worker.
 struct VolumeScratch {
-  std::vector<double> blocked;     // by sample: how much of the fan ends there
+  std::vector<double> blocked;     // how much of the fan ends at each sample
   std::vector<float> rms, grains;  // by sample; grains are complex
 };
 

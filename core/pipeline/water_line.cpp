@@ -5,7 +5,7 @@
 namespace sonar {
 namespace {
 
-/// How far the sonar rises [m] until the moment at which the scene is computed, PingScalars::seen_at_s.
+/// The height [m] by which the sonar rises until the moment at which the scene is computed, PingScalars::seen_at_s.
 double rise_m(const PingRequest& r) {
   // Vertical speed times range / c, the time until half of the ping.
   return std::max(0.0, r.sonar_moves.velocity_mps.z) * r.settings.range_m /

@@ -1,5 +1,5 @@
-// Which side of the sea surface a sonar is on. Engines ask before they compute, so that a sonar that floats sees what one just
-// below the surface sees, and one in the air receives noise only.
+// Finds the side of the sea surface on which a sonar is. Engines call it before they compute, so that a sonar that floats sees
+// what one just below the surface sees, and one in the air receives noise only.
 #pragma once
 
 #include <span>

@@ -72,7 +72,7 @@ Skin skin_of(const Mesh& mesh) {
   Skin skin;
   if (mesh.triangles.empty()) return skin;
   skin.low = skin.high = to_double(mesh.vertices[mesh.triangles[0][0]]);
-  Vec3d twice_area;  // as a vector; it is 0 for a closed mesh and not for terrain, whose edges then need no sorting
+  Vec3d twice_area;  // twice the area as a vector; 0 for a closed mesh and not for terrain, whose edges then need no sorting
   for (const auto& t : mesh.triangles) {
     const Vec3d a = to_double(mesh.vertices[t[0]]), b = to_double(mesh.vertices[t[1]]), c = to_double(mesh.vertices[t[2]]);
     const Vec3d twice = cross(b - a, c - a);

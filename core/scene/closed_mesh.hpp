@@ -1,4 +1,4 @@
-// Whether a mesh is the closed skin of a body: then nothing is seen of the faces that look away.
+// Finds out whether a mesh is the closed skin of a body; then faces that look away are not visible.
 #pragma once
 
 #include "core/base/geometry.hpp"

@@ -89,7 +89,7 @@ struct RayScene::Impl {
   std::vector<Pose> placed;      // the bodies, as last placed
   std::vector<Rotation> turned;  // their rotations, for normals
   RTCScene traced = nullptr;
-  std::vector<std::unique_ptr<ChangingGroup>> changing;  // of change(); the last used comes first
+  std::vector<std::unique_ptr<ChangingGroup>> changing;  // groups made by change(); the last used comes first
 
   Impl(std::shared_ptr<const Scene> s, int threads)
       : scene(std::move(s)),

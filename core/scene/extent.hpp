@@ -1,5 +1,5 @@
-// The box that things fill along some axes, and what its size may give away. Used to judge scenes and poses: `sonarctl scene`,
-// daemon/emulator/world/plausibility.
+// The box that things fill along some axes, and mistakes that its size may reveal. Used to judge scenes and poses: `sonarctl
+// scene`, daemon/emulator/world/plausibility.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,7 @@ struct Extent {
     const Vec3d size = size_m();
     return std::max({size.x, size.y, size.z});
   }
-  /// From the nearest point of the box; 0 inside.
+  /// Distance from the nearest point of the box; 0 inside.
   double distance_m(Vec3d p) const {
     const auto outside = [](double low, double at, double high) { return std::max({low - at, 0.0, at - high}); };
     return length(Vec3d{outside(low_m.x, p.x, high_m.x), outside(low_m.y, p.y, high_m.y), outside(low_m.z, p.z, high_m.z)});

@@ -1,4 +1,4 @@
-// Instances of labels (core/sonar/ping_labels.hpp) by what the scene calls them.
+// Instances of labels (core/sonar/ping_labels.hpp) by their names in the scene.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// The world position that the rays' float coordinates are relative to. Beside RayScene, for those who change a scene and want
-// everything that was not changed to meet the very same floats.
+// The world position that the rays' float coordinates are relative to. It is separate from RayScene, so that code that changes a
+// scene can keep exactly the same floats for everything that does not change.
 #pragma once
 
 #include <algorithm>

@@ -40,7 +40,7 @@ struct Material {
   ScatteringLaw law = ScatteringLaw::lambert;
   float lambert_db = -27;         // 10 log10 mu, Mackenzie coefficient; at most largest_lambert_db
   GsabLaw gsab = {};              // when law is gsab
-  float trend_db_per_decade = 0;  // of the scattering strength with frequency, re trend_reference_hz
+  float trend_db_per_decade = 0;  // change of the scattering strength with frequency, re trend_reference_hz
   float trend_reference_hz = 1e6f;
   float roughness_m = 1e-3f;  // rms; decides how much mirrors and how much scatters
   float reflection = 0.5f;    // pressure reflection coefficient at normal incidence, water-referenced, -1..1
@@ -78,7 +78,7 @@ struct Object {
   bool visible = true;
   Primitive primitive = {};
   std::string label = {};  // its class in labels of samples; empty: an instance of no class, shown by its material's
-  bool operator==(const Object&) const = default;  // of the same mesh, not of one that is equal
+  bool operator==(const Object&) const = default;  // true for the same mesh, not for an equal one
 };
 
 /// An analytic echo without a surface.
@@ -127,7 +127,7 @@ struct Scene {
   SeaSurface sea_surface;               // its mesh, if present, is one of the objects
   WaterColumn water_column;
   std::vector<OtherSonar> other_sonars;
-  std::optional<Vec3d> ray_origin;  // of a scene changed while it ran: as before (core/scene/ray_origin.hpp)
+  std::optional<Vec3d> ray_origin;  // for a scene that was changed while it ran: as before (core/scene/ray_origin.hpp)
   std::vector<std::string> notes;   // what the loader did that its user should know, one sentence each
 
   /// Where an object sits in its body; in the world for a static one.

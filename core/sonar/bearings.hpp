@@ -1,4 +1,5 @@
-// Where beams look whose delays were made for another sound speed than the water's (docs/acoustics.md, section 6).
+// The directions of beams whose delays were computed for another sound speed than that of the water (docs/acoustics.md, section
+// 6).
 #pragma once
 
 #include <algorithm>

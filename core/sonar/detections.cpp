@@ -53,7 +53,7 @@ class Levels {
   const SampleFormat& format_;
 };
 
-/// Where a parabola through three levels has its top, from the middle one, within half a step.
+/// The place of the top of a parabola through three levels, relative to the middle one, within half a step.
 double top_of(double before, double middle, double after) {
   const double curve = before - 2 * middle + after;
   return curve < 0 ? std::clamp(0.5 * (before - after) / curve, -0.5, 0.5) : 0;
@@ -63,7 +63,7 @@ double top_of(double before, double middle, double after) {
 struct Fan {
   const Ping& ping;
   int directions;
-  double width_sine;         // of a beam, -3 dB
+  double width_sine;         // -3 dB width of a beam
   double port_rad, end_rad;  // edges of the sector
 
   Fan(const Ping& of, int count, double beam_width_rad)

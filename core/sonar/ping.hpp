@@ -93,7 +93,7 @@ inline constexpr std::array<NamedSwitch, 19> named_switches{{
 
 /// How the sonar moves while a ping is under way.
 struct Twist {
-  Vec3d velocity_mps;        // of the sonar, world axes
+  Vec3d velocity_mps;        // velocity of the sonar in world axes
   Vec3d angular_rate_radps;  // sonar axes
 };
 

@@ -1,4 +1,4 @@
-// Which object's echo each sample of a ping holds (docs/datasets.md); filled by core/pipeline/labels.hpp.
+// For each sample of a ping, the object whose echo it holds (docs/datasets.md); filled by core/pipeline/labels.hpp.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,8 @@ namespace sonar {
 /// Arrays are [rows][beams], as Ping::samples. Instance i + 1 is Scene::objects[i]; the point targets follow them.
 struct PingLabels {
   int rows = 0, beams = 0;
-  std::vector<std::uint16_t> instance;  // whose energy is largest, and above the receiver's noise; 0 = none
-  std::vector<std::uint8_t> share;      // of that instance in the sample's energy, noise included, 255 = all
+  std::vector<std::uint16_t> instance;  // instance whose energy is largest, if above the receiver's noise; 0 = none
+  std::vector<std::uint8_t> share;      // share of that instance in the sample's energy, noise included; 255 = all
   /// Where no instance is: the object, of several the nearest, that blocks the line of sight over all of the beam's -3 dB width;
   /// 0 = no shadow. What the beam receives there through its side lobes is ignored.
   std::vector<std::uint16_t> caster;

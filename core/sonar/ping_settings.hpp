@@ -24,7 +24,7 @@ struct SampleFormat {
 };
 
 /// Rows in the device's metres (with its believed sound speed): row i covers range_start_m + [i, i + 1) range_bin_m. The picture
-/// ends at range_start_m + range_bin_count range_bin_m, which is range_m but for the vendor's rounding to whole rows.
+/// ends at range_start_m + range_bin_count range_bin_m, which is range_m except for the vendor's rounding to whole rows.
 struct PingSettings {
   int mode = 0;  // index into SonarModel::modes
   int beam_count = 512;
@@ -40,7 +40,7 @@ struct PingSettings {
   float gain_db = 0;
   bool gain_assist = false;              // the device turns the gain itself, from gain_db on (core/sonar/gain_assist.hpp)
   bool tvg = true;                       // false: no time-varied gain, G0 only (Oculus 32-bit "scientific" data)
-  float device_sound_speed_mps = 1500;   // what the device believes
+  float device_sound_speed_mps = 1500;   // sound speed that the device assumes
   float device_absorption_db_per_m = 0;  // one way, what its TVG believes
   bool triggered = false;                // one ping per request of the client
   bool transmit = true;                  // false: it receives noise only

@@ -1,5 +1,5 @@
 // Range images: one transmission lights the whole field of view, and each direction of a grid of beams reports one return, its
-// range and its strength. Such a ping's settings and samples. No vendor's format.
+// range and its strength. These are the settings and samples of such a ping, in no vendor's format.
 #pragma once
 
 #include <cmath>
@@ -17,10 +17,10 @@ namespace sonar {
 /// on its edges; pattern.azimuth_width_rad is the two-way -3 dB width of a beam.
 struct RangeImageSettings : VendorSettings {
   double beam_height_rad = 0;        // two-way -3 dB width of a beam in elevation
-  double range_unit_m = 0;           // of the ranges in samples; 65535 of them must reach range_m
+  double range_unit_m = 0;           // unit of the ranges in samples; 65535 of them must reach range_m
   std::uint32_t least_strength = 1;  // weaker returns are none
   double detection = 16;             // returns below so many times the noise power are none
-  bool nearest = false;              // of a direction's returns the nearest, not the strongest
+  bool nearest = false;              // use the nearest return of a direction, not the strongest
   bool chosen_as_heard = false;      // the strongest by its speckle, which each range cell has of its own
   double range_sample_m = 0;         // ranges are whole multiples of it, 0 = any
   // The device's filters, in this order; the pixels round one are the eight beside it, as far as they are of its block of rows.

@@ -38,7 +38,7 @@ struct BeamProfile {
 
 /// Noise that receive channels share, with opposite signs in neighbours (docs/acoustics.md, section 5).
 struct SharedNoise {
-  float level_db = -200;  // of a channel, re the channel's own noise; below -150 = none
+  float level_db = -200;  // level of a channel, re the channel's own noise; below -150 = none
   int channels = 128;     // even
   int group = 32;         // so many neighbours share it, less towards both ends; even; the channels a multiple of its half
   float sine = 0.56f;     // from where the beams hear it, far away: half a wavelength over the channels' spacing
@@ -62,7 +62,7 @@ struct ReceiverModel {
   std::vector<float>
       leak_ring_db;  // of a ringing leak: re leak_upa at 0, 1, 2 .. leak_ring_step_m, then over; takes the decay's place
   float leak_ring_step_m = 0.003f;
-  bool leak_is_shared = false;  // by the channels, as shared_noise is; else its phases are random from column to column
+  bool leak_is_shared = false;  // shared by the channels, as shared_noise is; else its phases are random from column to column
   BeamProfile profile;
   /// Gains of the receive channels, each of which serves as many neighbouring beams, from port; empty = no difference.
   std::vector<float> channel_gain_db;

@@ -1,6 +1,6 @@
-// The water: what it is, how fast sound goes in it and how much it absorbs. Used by the physics and by devices that compute
-// their believed sound speed. Formulae and their sources: at the functions; oracles 27-29: tests/core/sonar.
-// C++17-clean, standard library only.
+// Properties of the water, its sound speed and its absorption. Used by the physics, and by devices that compute the sound speed
+// that they assume. The functions state their formulae and sources; oracles 27-29 are in tests/core/sonar. C++17-clean, standard
+// library only.
 #pragma once
 
 namespace sonar {

@@ -81,7 +81,7 @@ std::string error_of_unknown(const UnknownWord& unknown) {
   return "unexpected argument " + in_quotes(unknown.word);
 }
 
-/// CLI11's own text, but for what is missing: it names neither the commands nor the meaning of an argument.
+/// CLI11's own text, except for what is missing: it names neither the commands nor the meaning of an argument.
 std::string error_of_parser(const CLI::App& asked, const CLI::ParseError& error) {
   if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::RequiredError)) return error.what();
   if (asked.get_require_subcommand_min() > 0) return "a command is required: " + joined(command_names(asked), ", ");

@@ -5,7 +5,7 @@
 
 namespace sonar::text {
 
-/// As std::printf, of any length.
+/// Formats as std::printf does, with any length.
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
 
 /// Three significant digits: "750 kHz", "2.1 MHz".

@@ -1,4 +1,5 @@
-// Text from outside on a terminal: bytes that would move its cursor, change its state or are no UTF-8 are shown as \xNN.
+// Makes text from outside printable on a terminal: bytes that would move the cursor, change the terminal's state or are no UTF-8
+// are shown as \xNN.
 #pragma once
 
 #include <string>

@@ -116,7 +116,7 @@ class Node {
 
   YamlTree* tree_ = nullptr;
   YamlNode* node_ = nullptr;    // null = absent
-  YamlNode* parent_ = nullptr;  // of an absent one, with key_
+  YamlNode* parent_ = nullptr;  // parent of an absent node, with key_
   std::string key_;
 };
 
@@ -158,7 +158,8 @@ class Document {
 };
 
 struct YamlLimits {
-  ErrorKind error_kind = ErrorKind::config;  // of every error of the document; a file that cannot be opened is missing_file
+  // Kind of every error in the document, except for a file that cannot be opened (missing_file).
+  ErrorKind error_kind = ErrorKind::config;
   std::size_t max_bytes = std::size_t{4} << 20;
   std::size_t max_nodes = 400000;
   int max_depth = 24;

@@ -17,8 +17,8 @@ enum class YamlKind { null, scalar, sequence, map };
 
 struct YamlNode {
   YamlKind kind = YamlKind::null;
-  int line = 1, column = 1;          // of the value, counted from 1
-  int key_line = 0, key_column = 0;  // of its key, when the parent is a map
+  int line = 1, column = 1;          // position of the value, counted from 1
+  int key_line = 0, key_column = 0;  // position of its key, if the parent is a map
   bool quoted = false;
   const YamlNode* parent = nullptr;
   std::string key;        // when the parent is a map

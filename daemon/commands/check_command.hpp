@@ -1,4 +1,4 @@
-// `sonard check`: validates a configuration and its scene, and prints what it contains and what was probably not meant.
+// `sonard check`: validates a configuration and its scene, and prints its content and probable mistakes.
 #pragma once
 
 #include "daemon/commands/command_line.hpp"

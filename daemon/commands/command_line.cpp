@@ -244,7 +244,8 @@ Command parse_command_line(int argc, char** argv) {
         "Commands: run [CONFIG] (the default), check CONFIG, render CONFIG --out DIR, dataset JOB --out DIR, worker --out DIR, "
         "farm, "
         "replay FILE; each has --help.\n"
-        "Sonars are wire-compatible, but for those that sonard opens by a library of its own, as it prints when it starts. Not "
+        "Sonars are wire-compatible, except for those that sonard opens by a library of its own, as it prints when it starts. "
+        "Not "
         "affiliated with any vendor.");
   } else {
     app.require_subcommand(1);

@@ -19,7 +19,7 @@ struct RunCommand {
   std::string config;  // empty = search
   bool demo = false;
   std::string demo_of;  // whose sonar the demo has, as "blueview"; empty = its own
-  std::string profile;  // of the demo's sonar; empty = its own
+  std::string profile;  // profile of the demo's sonar; empty = the default
   std::uint64_t exit_after_pings = 0;
   bool digest = false;
   // Empty = as the configuration says.
@@ -36,7 +36,7 @@ struct RenderCommand {
   std::uint64_t first = 1;             // number of the first ping
   std::optional<std::uint64_t> pings;  // nothing: one, or one for every line of a file of poses
   std::vector<std::string> formats{"npy", "png"};
-  std::optional<double> pose_rate_hz;  // of a KITTI file, which has no times
+  std::optional<double> pose_rate_hz;  // rate of a KITTI file, which has no times
   std::string sonar, poses, pose_frame, report;
   std::string image_rings = "on";
   std::optional<double> rate_hz;

@@ -1,5 +1,5 @@
-// Options of the engine and of the model's parts, the same for every command that pings: run, render and bench. What is given
-// on the command line, or stands for it in the environment, wins over the file.
+// Options of the engine and of the model's parts, the same for every command that pings: run, render and bench. Values from the
+// command line or the environment override the file.
 #pragma once
 
 #include <array>

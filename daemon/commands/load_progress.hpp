@@ -19,7 +19,7 @@ class LoadProgress {
   LoadProgress(const LoadProgress&) = delete;
   LoadProgress& operator=(const LoadProgress&) = delete;
 
-  /// To standard error, as commands speak.
+  /// Reports to standard error, as commands do.
   static void to_console(const std::string& line);
 
  private:

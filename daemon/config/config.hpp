@@ -37,7 +37,7 @@ inline constexpr std::array<std::string_view, 2> overload_names = {"slow", "coun
 
 struct VehicleConfig {
   std::string name;
-  Pose initial_pose;  // in world
+  Pose initial_pose;  // pose in the world
   bool orbits = false;
   motion::Plan plan{};            // instead
   bool has_initial_pose = false;  // from the file, not the default
@@ -94,7 +94,7 @@ struct PoseConfig {
 /// A site whose pages may open the live view (docs/live-view.md), exactly as browsers name it: "https://example.com".
 struct ViewOrigin {
   std::string origin;
-  bool steer = false;  // else its pages only look
+  bool steer = false;  // if false, its pages may only look
   bool operator==(const ViewOrigin&) const = default;
 };
 /// The control interfaces (docs/control.md).
@@ -110,12 +110,12 @@ struct ControlConfig {
 };
 /// Resource limits for clients.
 struct LimitConfig {
-  int clients = 256;                             // of all sonars together; 16 of one: SonarConfig::max_clients
-  int control_clients = 32;                      // of the stream, and of HTTP
-  int viewers = 8;                               // of HTTP's, those of the live view
-  std::size_t input_bytes_per_s = 1u << 20;      // of one client; reading slows down above it
-  std::size_t pose_bytes_per_s = 2u << 20;       // of all pose connections together
-  std::size_t control_message_bytes = 1u << 20;  // of one message of the stream, one body of HTTP
+  int clients = 256;                         // limit for all sonars together; that of one sonar is SonarConfig::max_clients (16)
+  int control_clients = 32;                  // limit for the stream, and for HTTP
+  int viewers = 8;                           // limit for the viewers of the live view among the clients of HTTP
+  std::size_t input_bytes_per_s = 1u << 20;  // limit for one client; above it reading slows down
+  std::size_t pose_bytes_per_s = 2u << 20;   // limit for all pose connections together
+  std::size_t control_message_bytes = 1u << 20;  // limit for one message of the stream or one body of HTTP
   std::chrono::milliseconds stall{10000};        // a client that reads no byte for so long is reset
   std::chrono::milliseconds dead_peer{15000};    // a client whose computer does not answer is reset
   int spare_descriptors = 32;                    // file descriptors reserved for the daemon
@@ -128,7 +128,7 @@ struct RecordingConfig {
 };
 /// Faults on purpose (docs/faults.md).
 struct FaultConfig {
-  bool armed = false;             // else every request for a fault is refused
+  bool armed = false;             // if false, every request for a fault is refused
   std::filesystem::path journal;  // JSON lines are appended to it; empty = none
   std::vector<FaultRecord> plan;  // checked
   std::string plan_place;         // file:line:col: faults.plan, for errors found with the command line
@@ -151,7 +151,7 @@ struct Config {
   std::string source;  // the file, or "demo"
   SceneFile scene;     // as found
   std::uint64_t seed = 1;
-  std::optional<Geodetic> origin;  // of latitudes and longitudes
+  std::optional<Geodetic> origin;  // origin of latitudes and longitudes
   Water water;
   bool allow_hot = false;  // accepts water of 30 C or more
   std::vector<VehicleConfig> vehicles;
@@ -165,7 +165,7 @@ struct Config {
   EngineConfig engine;
   ClockMode clock = ClockMode::realtime;
   std::string clock_place;  // file:line:col: clock, for errors found with the command line
-  bool previews = false;    // of the demo: a viewer sees pings while no driver is connected (docs/live-view.md)
+  bool previews = false;    // in the demo a viewer sees pings while no driver is connected (docs/live-view.md)
   LogOptions log;
 };
 

@@ -1,6 +1,6 @@
-// Which parts of the model take effect together: the comparison modes and the fixed fan leave some out whatever their switches
-// say (docs/acoustics.md, section 8). Used by every reader of switches, and by the sidecar, which
-// records the parameters of a ping.
+// Finds out which parts of the model have an effect together: the comparison modes and the fixed fan leave some out whatever
+// their switches say (docs/acoustics.md, section 8). Used by every reader of switches, and by the sidecar, which records the
+// parameters of a ping.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Which configuration `sonard run` uses: the file it was given, else the first in the usual places, else the demo.
+// Finds the configuration that `sonard run` uses: the file it was given, else the first in the usual places, else the demo.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// Where the listeners of a configuration are: none in another's way, nor in that of a second daemon on the same computer,
-// `--offset N`.
+// Moves the listeners of a configuration (`--offset N`), so that they do not conflict with each other or with a second daemon on
+// the same computer.
 #pragma once
 
 #include "daemon/config/config.hpp"

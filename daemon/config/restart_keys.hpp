@@ -1,4 +1,4 @@
-// Which keys of a configuration that was read again take effect at the next restart only. Pure; used when App reloads.
+// Finds the keys of a reloaded configuration that have an effect only after the next restart. Pure; used when App reloads.
 #pragma once
 
 #include <string>

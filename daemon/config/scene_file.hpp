@@ -17,7 +17,7 @@ struct SceneFile {
   std::string name() const { return (built_in ? "built-in " : "") + path.string(); }
 };
 
-/// In `directory`, then among the shipped scenes on disk, then among the built-in ones.
+/// Searches `directory`, then the shipped scenes on disk, then the built-in ones.
 std::optional<SceneFile> find_scene(const std::filesystem::path& given, const std::filesystem::path& directory);
 /// The folders that find_scene() looks in, for its caller's error: "., A and B".
 std::string scene_folders(const std::filesystem::path& directory);

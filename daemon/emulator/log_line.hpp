@@ -1,4 +1,4 @@
-// One line of the log as data: who writes it need not know where it goes.
+// One line of the log as data, so that its author does not need to know where it is written.
 #pragma once
 
 #include <string>

@@ -56,9 +56,9 @@ class App {
   Result<void> open();
   /// Serves until stopped; returns 0, or an exit code when the engine failed.
   int run();
-  /// From any thread.
+  /// May be called from any thread.
   void request_stop();
-  /// From any thread: `work` is done on the I/O thread.
+  /// May be called from any thread: `work` is done on the I/O thread.
   void post(std::function<void()> work) { asio::post(io_, std::move(work)); }
 
   const Config& config() const { return config_; }
@@ -75,7 +75,7 @@ class App {
   Events& events() { return events_; }
   const ViewFeed& view() const { return view_; }
   const Admission& admission() const { return admission_; }
-  /// After run().
+  /// Call it after run().
   const World& world() const { return world_; }
 
  private:
@@ -87,7 +87,7 @@ class App {
   void log_new_notes();
   void wait_for_signal();
   Reload::Steps reload_steps();
-  void take_over(Config next);  // of a reload
+  void take_over(Config next);  // takes over a reloaded configuration
   std::string status_line() const;
   asio::awaitable<void> housekeeping();
 

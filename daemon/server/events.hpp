@@ -12,7 +12,7 @@
 
 namespace sonar {
 
-namespace v1 {  // of control.pb.h
+namespace v1 {  // from control.pb.h
 class Event;
 }  // namespace v1
 
@@ -22,7 +22,7 @@ class Events {
   using Listener = std::function<void(const v1::Event&)>;
   using Token = std::shared_ptr<void>;  // the listener is called as long as its token lives
   [[nodiscard]] Token listen(Listener listener);
-  bool has_listeners() const { return !listeners_.empty(); }  // else no event needs to be made
+  bool has_listeners() const { return !listeners_.empty(); }  // if false, no event needs to be made
 
   void publish(const v1::Event& event);
   // The same, of an event that is made here when there are listeners.

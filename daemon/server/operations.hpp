@@ -11,7 +11,7 @@
 
 namespace sonar {
 
-namespace v1 {  // of control.pb.h
+namespace v1 {  // from control.pb.h
 class DaemonStatus;
 class FaultReport;
 class Stepped;
@@ -21,9 +21,9 @@ struct OperationResult {
   enum class Code { done, refused, failed };  // refused: the request is wrong; failed: right, but it could not be done
   Code code = Code::done;
   std::string text = {};                                // one sentence when it was not done
-  std::shared_ptr<const v1::DaemonStatus> status = {};  // of GetStatus that was done
-  std::shared_ptr<const v1::Stepped> stepped = {};      // of Step
-  std::shared_ptr<const v1::FaultReport> faults = {};   // of GetFaults
+  std::shared_ptr<const v1::DaemonStatus> status = {};  // answer of a GetStatus that was done
+  std::shared_ptr<const v1::Stepped> stepped = {};      // answer of Step
+  std::shared_ptr<const v1::FaultReport> faults = {};   // answer of GetFaults
 };
 
 class Operations {

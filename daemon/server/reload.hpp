@@ -14,7 +14,7 @@ namespace sonar {
 
 class Reload {
  public:
-  /// From the beginning of one reload to that of the next, however often it is asked for.
+  /// Shortest time from the beginning of one reload to that of the next, however often it is asked for.
   static constexpr std::chrono::milliseconds pause{500};
 
   /// Steps of a reload, in this order.

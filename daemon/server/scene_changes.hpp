@@ -1,6 +1,6 @@
-// Loads and changes the scene while pings go on: one change after the other, made and built into an engine on a thread of its
-// own, then put to use in one moment. Edits that wait together share one engine. Owned by App; everything here is called on the
-// I/O thread, but for Change::make.
+// Loads and changes the scene while pings continue. Changes are made one after the other: on a thread of its own each is made and
+// built into an engine; then the new engine replaces the old one at once. Edits that wait together share one engine. Owned by
+// App; everything here is called on the I/O thread, except for Change::make.
 //
 // Pings are made with the old scene until the new one is ready. Then the simulator gets the new engine and the world the new
 // moving bodies before anything else happens, so that a request's bodies are always those of the scene it meets. In stepped
@@ -30,7 +30,7 @@ class SceneChanges {
   using Make = std::function<Result<ScenePointer>(const ScenePointer& now)>;
   struct Change {
     Make make;  // empty: nothing is to be made, it only waits for those before
-    /// On the I/O thread, when the new scene is in use, or nothing was changed. Never after stop().
+    /// Called on the I/O thread when the new scene is in use, or nothing was changed. Never called after stop().
     std::function<void(const Result<void>& outcome)> done;
     bool shares_engine = false;  // with such Changes beside it; its `done` then meets the scene of all of them
   };
@@ -67,7 +67,7 @@ class SceneChanges {
   struct Built {
     ScenePointer scene;
     std::shared_ptr<std::unique_ptr<PingEngine>> engine;  // empty: the scene stays
-    std::vector<Result<void>> outcomes;                   // of each Change that was made
+    std::vector<Result<void>> outcomes;                   // outcome of each Change that was made
   };
   void begin();
   void build_next();
@@ -84,7 +84,7 @@ class SceneChanges {
   InUse in_use_;
   std::function<void()> on_change_;
   std::deque<Change> waiting_;  // the first ones are under way
-  bool under_way_ = false;      // until its `done` has returned, which may submit another
+  bool under_way_ = false;      // true until its `done` has returned, which may submit another
   bool stopped_ = false, building_ = false;
   std::chrono::steady_clock::time_point building_since_{}, engine_due_{};
   std::function<bool()> drivers_wait_;

@@ -1,5 +1,5 @@
-// Lets time that is not real pass: from one ping, or conversation, to the next as they are due, as far as SteppedTime allows.
-// Owned by App, which calls step() after every change; I/O thread only.
+// Advances stepped time: to the next ping or event of a conversation that is due, as far as SteppedTime allows. Owned by App,
+// which calls step() after every change; I/O thread only.
 #pragma once
 
 #include <functional>

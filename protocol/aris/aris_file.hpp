@@ -1,5 +1,5 @@
 // Recordings of ARIS sonars, .aris: a file header, then header and picture of each frame, headers 1024 bytes each. All frames
-// have the shape of the first, as the format wants it (docs/protocols/aris.md).
+// have as many beams and samples as the first, as the format requires (docs/protocols/aris.md).
 #pragma once
 
 #include <memory>

@@ -35,7 +35,7 @@ class ArisDialogue final : public protocol::Dialogue {
     // All commands of one call become one change of settings, with the result of the last command.
     settings_ = base();
     settings_.streaming |= streaming_;
-    settings_.first_ping = std::min(settings_.first_ping, first_ping_);  // of the controller that connected first
+    settings_.first_ping = std::min(settings_.first_ping, first_ping_);  // that of the controller that connected first
     changed_ = false;
     framer_.append(received);
     while (const auto message = framer_.next()) on_message(*message, now, reaction);

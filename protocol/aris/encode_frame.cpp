@@ -10,9 +10,9 @@
 namespace sonar::aris {
 namespace {
 
-/// Which sixteenth of the beams a channel of the digitiser holds: a fact of the hardware, as the vendor's library has it.
+/// The sixteenth of the beams that a channel of the digitiser holds: a property of the hardware, as in the vendor's library.
 constexpr std::array<std::size_t, channels> sixteenth{10, 2, 14, 6, 8, 0, 12, 4, 11, 3, 15, 7, 9, 1, 13, 5};
-constexpr std::size_t first_part_samples = 620, part_samples = 1370;  // of datagrams of 1400 bytes
+constexpr std::size_t first_part_samples = 620, part_samples = 1370;  // samples in a datagram of 1400 bytes
 constexpr std::size_t largest_picture = std::size_t{most_samples} * 128;
 constexpr double surface_psi = 14.6959, psi_per_m = 1 / 0.702398;
 

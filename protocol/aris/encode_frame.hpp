@@ -1,4 +1,4 @@
-// A Ping as the datagrams of a frame: header, channel order, parts. And the way back, for tools and tests.
+// A Ping as the datagrams of a frame: header, channel order, parts. It also converts back, for tools and tests.
 #pragma once
 
 #include <functional>
@@ -15,8 +15,8 @@ namespace sonar::aris {
 
 inline constexpr std::size_t longest_datagram = 1400;  // an older sample program has a buffer of that size
 
-/// From the picture, [samples][beams] with beam 0 most to starboard, to the order in which the device digitises: by ping, sample
-/// and channel. Sizes: samples x 16 x pings.
+/// Converts from the picture, [samples][beams] with beam 0 most to starboard, to the order in which the device digitises: by
+/// ping, sample and channel. Sizes: samples x 16 x pings.
 Bytes raw_from_picture(BytesView picture, std::size_t samples, int pings);
 Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings);
 

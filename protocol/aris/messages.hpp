@@ -17,7 +17,7 @@ using wire::BytesView;
 
 inline constexpr std::uint16_t beacon_port = 56124, command_port = 56888;
 inline constexpr std::size_t longest_command = 4096;  // chosen: real ones have 4 to 60 bytes
-inline constexpr std::size_t length_prefix = 4;       // of a command: u32, big-endian
+inline constexpr std::size_t length_prefix = 4;       // length in front of a command: u32, big-endian
 
 enum class SystemType : std::uint32_t { aris_1800 = 0, aris_3000 = 1, aris_1200 = 2 };
 enum class Frequency : std::uint32_t { low = 0, high = 1 };

@@ -59,8 +59,8 @@ class Writer {
 struct RawField {
   unsigned number = 0;
   WireType type{};
-  std::uint64_t value = 0;  // of a varint or a fixed number
-  BytesView bytes;          // of a length-delimited field: points into the message
+  std::uint64_t value = 0;  // value of a varint or a fixed number
+  BytesView bytes;          // a length-delimited field; points into the message
 };
 
 /// The fields of a message, one after the other, without an interpretation.

@@ -9,7 +9,7 @@
 namespace sonar::aris {
 namespace {
 
-constexpr std::uint32_t rest_us = 360;                  // of a cycle, after its last sample
+constexpr std::uint32_t rest_us = 360;                  // rest of a cycle after its last sample
 constexpr double lenient_share = 0.05;                  // assumed, for the option cycle
 constexpr auto focus_travel = std::chrono::seconds(1);  // whole way; the device's log has about a second
 

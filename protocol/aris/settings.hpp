@@ -26,7 +26,7 @@ struct Settings {
   Time focus_set_at{};
   bool delays_packets = false;
   std::uint32_t packet_delay_us = 0;
-  std::chrono::nanoseconds clock_offset{0};  // of the device's clock, from SET_DATETIME
+  std::chrono::nanoseconds clock_offset{0};  // offset of the device's clock, from SET_DATETIME
   std::uint32_t first_ping = 0;              // number of the last ping before the controller connected
   bool operator==(const Settings&) const = default;
 };

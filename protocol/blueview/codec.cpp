@@ -41,7 +41,7 @@ constexpr recording::Framing framing{{magic[0], magic[1]}, header_size, length_o
 
 recording::Codec codec() {
   return {.framing = &framing, .sender = sender_of, .message = [](wire::BytesView payload) {
-            return make_frame(FrameType::ping_data, 0, payload);  // of no request
+            return make_frame(FrameType::ping_data, 0, payload);  // id 0: it answers no request
           }};
 }
 

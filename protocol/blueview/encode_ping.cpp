@@ -12,7 +12,7 @@
 namespace sonar::blueview {
 namespace {
 
-/// A whole message but for the samples.
+/// A whole message except for the samples.
 struct PingMessage {
   FrameHeader header;
   PingHead ping;

@@ -1,4 +1,4 @@
-// A Ping as the payload of PING_DATA: beam-major 16-bit samples, near to far, left to right, and where the vehicle was.
+// A Ping as the payload of PING_DATA: beam-major 16-bit samples, near to far, left to right, and the vehicle's navigation data.
 #pragma once
 
 #include "protocol/blueview/frames.hpp"
@@ -39,7 +39,7 @@ struct PingHead {
   std::uint16_t nav_fields = nav_time | nav_depth | nav_pitch | nav_roll | nav_heading;
   double nav_time_s = 0;
   float depth_m = 0, pitch_deg = 0, roll_deg = 0, heading_deg = 0;
-  std::uint32_t raw_length = 0;  // of the samples, uncompressed
+  std::uint32_t raw_length = 0;  // size of the samples, uncompressed
 };
 template <class V, wire::Like<PingHead> M>
 constexpr void fields(V& visit, M& m) {

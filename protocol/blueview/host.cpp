@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 using protocol::HostActions;
 
 constexpr auto silence_of_host = 2s;     // after the last message sent
-constexpr std::uint16_t abi_of_sdk = 4;  // of the SDK; the answers do not depend on it
+constexpr std::uint16_t abi_of_sdk = 4;  // abi of the SDK; the answers do not depend on it
 
 /// "no head 3 (code 2010)"
 std::string text_of_error(wire::BytesView payload) {
@@ -274,7 +274,7 @@ class BlueViewHost final : public protocol::Host {
   protocol::SettingsOverride wanted_;
   Framer framer_{longest_payload};
   Greeting greeting_;
-  std::deque<std::pair<Key, Value>> settings_;  // not sent yet
+  std::deque<std::pair<Key, Value>> settings_;  // settings that are not sent yet
   std::size_t head_;                            // index into greeting_.heads
   std::uint32_t last_id_ = 0;
   bool is_open_ = false, asked_ = false;  // asked_: a requested ping has not arrived yet

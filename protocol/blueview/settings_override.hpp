@@ -1,5 +1,4 @@
-// A SettingsOverride as the settings that a BlueView host would have made.
-// Called by the vendor.
+// Turns a SettingsOverride into the settings that a BlueView host would have made. The Vendor of BlueView calls this.
 #pragma once
 
 #include "protocol/vendor.hpp"

@@ -53,7 +53,7 @@ Result<PoseSample> decode_pose_datagram(BytesView datagram);
 struct RefusedRequest {  // its id is known, for the Response
   std::uint64_t id = 0;
   std::string why;
-  bool pose = false;        // of a malformed pose
+  bool pose = false;        // true for a malformed pose
   bool is_protobuf = true;  // a Request, if a wrong one
 };
 /// One message of the stream, without its length. A message that is not protobuf has id 0.

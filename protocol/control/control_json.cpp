@@ -71,7 +71,7 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
     keys_.pop_back();
     return true;
   }
-  std::vector<std::set<std::string>> keys_;  // of each open object
+  std::vector<std::set<std::string>> keys_;  // keys of each open object
   std::size_t values_ = 0;
 };
 
@@ -94,7 +94,7 @@ std::string sentence_from(const std::string& words) {
   what.erase(0, colon + 2);
   if (const auto space = key.rfind(' '); space != std::string::npos) key.erase(0, space + 1);
   if (key.starts_with('(') && key.ends_with(')')) key = key.substr(1, key.size() - 2);
-  if (key.ends_with(".value")) key.resize(key.size() - 6);  // of wrappers such as DoubleValue
+  if (key.ends_with(".value")) key.resize(key.size() - 6);  // wrappers such as DoubleValue
   if (what == "Cannot find field.") what = "unknown key";
   if (const auto type = what.find(" for type TYPE_"); type != std::string::npos) {
     const std::string expected = kind_of(what.substr(type + std::string(" for type TYPE_").size()));
@@ -122,7 +122,8 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
   const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
   if (field == nullptr || field->containing_oneof() == nullptr) return refused("unknown request");
   if (json.size() > largest_json) return refused("longer than 1 MiB");
-  if (const auto zero = json.find('\0'); zero != std::string_view::npos)  // to the reader the end, to protobuf more to read
+  // For the reader this is the end, for protobuf there is more to read.
+  if (const auto zero = json.find('\0'); zero != std::string_view::npos)
     return refused("not JSON: a zero byte at character " + std::to_string(zero + 1));
   StrictReader reader;
   if (!nlohmann::json::sax_parse(json, &reader)) return refused(reader.why);

@@ -26,7 +26,7 @@ class DelimitedParser {
  private:
   std::size_t most_;
   std::vector<std::byte> buffer_;  // never longer than one message and one read
-  std::size_t start_ = 0;          // of the next message
+  std::size_t start_ = 0;          // start of the next message
 };
 
 /// Length and message, ready to be sent.

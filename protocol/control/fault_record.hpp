@@ -17,7 +17,7 @@ struct FaultRecord {
   std::string client;  // "" or all, newest, oldest, an ordinal counted from 1, an address, a prefix 10.0.0.0/8
   struct At {          // one of them; none = at once
     std::optional<std::uint64_t> ping, every;
-    std::uint64_t phase = 0;  // of every
+    std::uint64_t phase = 0;  // remainder, with `every`
     std::optional<double> time_s, probability;
     std::string on;  // an Occasion
     bool operator==(const At&) const = default;

@@ -1,4 +1,4 @@
-// How deep JSON text nests. Parsers recurse: depth is bounded before they run.
+// Measures how deep JSON text is nested. Parsers are recursive, so the depth is limited before they run.
 #pragma once
 
 #include <string_view>

@@ -45,7 +45,7 @@ class LineParser {
  private:
   bool begin();
   std::string buffer_;     // never longer than one line and one read
-  std::size_t start_ = 0;  // of the next line
+  std::size_t start_ = 0;  // start of the next line
   bool swallowing_ = false;
   bool begun_ = false;  // the stream, after its mark
   bool in_gap_ = false;

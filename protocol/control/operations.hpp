@@ -70,8 +70,8 @@ struct EndFaults {
   std::string name;  // empty = all
 };
 struct GetFaults {
-  bool kinds = false;               // also the catalogue
-  std::uint64_t journal_after = 0;  // also the journal's entries after this one
+  bool kinds = false;               // also lists the catalogue
+  std::uint64_t journal_after = 0;  // also lists the journal's entries after this one
 };
 struct Subscribe {
   bool pings = false, clients = false, poses = false, scene = false, faults = false;

@@ -1,4 +1,4 @@
-// A pose as a sender gave it, checked and turned into the house's frames: world ENU, body FLU, SI units, int64 nanoseconds.
+// A pose as a sender gave it, checked and converted to our frames: world ENU, body FLU, SI units, int64 nanoseconds.
 // protocol/control makes these from protobuf and JSON; daemon/emulator/world/world.hpp keeps them.
 #pragma once
 
@@ -35,7 +35,7 @@ std::string_view name_of(Frame frame);  // "NED/FRD"
 struct PoseSample {
   enum class Of { vehicle, object };
   Of of = Of::vehicle;
-  std::string name;       // of the vehicle or object; empty = the only one there is
+  std::string name;       // name of the vehicle or object; empty = the only one there is
   std::uint64_t seq = 0;  // 0 = the sender does not count
   Stamp stamp;
   Pose pose;                                    // body (FLU) in world (ENU)
@@ -43,7 +43,7 @@ struct PoseSample {
   std::optional<Vec3d> angular_velocity_radps;  // body axes, FLU
   std::uint32_t reset_counter = 0;              // a change means: do not interpolate across
   bool hidden = false;                          // objects only: out of the scene for now
-  double largest_angle_rad = 0;    // of roll, pitch, yaw that can hardly be radians; 0 = they may be, or a quaternion
+  double largest_angle_rad = 0;  // largest roll, pitch or yaw that can hardly be radians; 0 = they may be, or it was a quaternion
   Frame sent_in = Frame::enu_flu;  // for the log
   std::string fields;              // for the log: what the message contained
 };

@@ -1,4 +1,4 @@
-// How readers of the control protocol refuse what they read.
+// The errors with which readers of the control protocol refuse their input.
 #pragma once
 
 #include <string>

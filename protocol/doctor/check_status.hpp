@@ -1,4 +1,4 @@
-// Checks of a status that are the same from outside the daemon and from inside, and the words they share. Pure.
+// Checks of a status that sonarctl and the daemon have in common, and their texts. Pure.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 #include "protocol/doctor/finding.hpp"
 
-namespace sonar::v1 {  // of control.pb.h
+namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;
 }  // namespace sonar::v1
 

@@ -1,5 +1,5 @@
-// A finding of doctor: what is well, or a fault with its cause and its cure. Made by sonarctl doctor from outside, and by the
-// daemon from inside for the live view (judge.hpp).
+// A finding of doctor: something that works, or a fault with its cause and a remedy. Made by sonarctl doctor from outside, and by
+// the daemon from inside for the live view (judge.hpp).
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ struct Finding {
   std::string text;
   std::string cure;         // empty for Level::ok
   std::string sonar = {};   // empty = of none
-  std::string client = {};  // its address; empty = of none
+  std::string client = {};  // address of the client; empty = none
 };
 
 }  // namespace sonar::doctor

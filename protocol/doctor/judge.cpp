@@ -63,7 +63,7 @@ const v1::ClientStatus* find(const v1::SonarStatus* in, const std::string& addre
 
 /// One finding for each fault or trouble that acts; a trouble lists its kinds, which are faults of their own.
 void check_faults(const v1::DaemonStatus& status, std::vector<Finding>& findings) {
-  std::map<std::pair<std::string, std::string>, std::string> codes;  // of what, by sonar and what
+  std::map<std::pair<std::string, std::string>, std::string> codes;  // codes by sonar and check
   std::set<std::pair<std::string, std::string>> ending;
   for (const v1::FaultStatus& fault : status.faults()) {
     if (fault.state() != "active") continue;

@@ -1,5 +1,5 @@
-// Why a driver is silent, as the daemon sees it: a finding per check, from its status alone. sonarctl doctor looks from outside,
-// as a driver does. Pure.
+// Finds out why a driver gets no pings, from the daemon's status alone: one finding per check. sonarctl doctor checks from
+// outside, as a driver would. Pure.
 #pragma once
 
 #include <vector>

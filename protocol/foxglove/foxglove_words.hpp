@@ -16,8 +16,8 @@
 
 namespace sonar::foxglove {
 
-inline constexpr std::size_t longest_word = 64u << 10;  // that a viewer may send
-inline constexpr std::size_t most_parameters = 64;      // of one request
+inline constexpr std::size_t longest_word = 64u << 10;  // longest word that a viewer may send
+inline constexpr std::size_t most_parameters = 64;      // limit for one request
 
 /// How messages are described to viewers: text is base64 where the encoding is "protobuf".
 struct Schema {
@@ -25,7 +25,7 @@ struct Schema {
 };
 struct Channel {
   std::uint32_t id = 0;
-  std::string topic, encoding;  // of its messages: "protobuf", "cdr"
+  std::string topic, encoding;  // topic of a channel; encoding of its messages: "protobuf", "cdr"
   Schema schema;
 };
 struct Service {

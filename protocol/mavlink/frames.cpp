@@ -64,8 +64,8 @@ constexpr void fields(V& visit, M& m) {
 static_assert(wire::wire_size<Header2>() == header_2);
 
 struct FrameReader::Header {
-  Frame frame;                      // but for the payload
-  std::size_t before = 0, end = 0;  // of the payload; of the frame with checksum and signature
+  Frame frame;                      // the frame, except for the payload
+  std::size_t before = 0, end = 0;  // where the payload begins; where the frame ends, with checksum and signature
   bool readable = true;             // no flags that change the payload
 };
 

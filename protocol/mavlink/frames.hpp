@@ -32,7 +32,7 @@ M message_in(const Frame& frame) {
 
 struct FrameCounts {
   std::uint64_t frames = 0;        // good ones
-  std::uint64_t unknown = 0;       // of unsupported messages; skipped whole
+  std::uint64_t unknown = 0;       // unsupported messages, which are skipped whole
   std::uint64_t bad_checksum = 0;  // damaged, or of a dialect that gave the number to another message
   std::uint64_t wrong_size = 0;    // version 1 payload of another length than the message has
   std::uint64_t junk_bytes = 0;    // belong to no frame
@@ -62,7 +62,7 @@ std::uint16_t checksum(BytesView bytes, std::uint16_t crc = 0xFFFF);
 /// System, component and sequence number of a sender.
 struct Identity {
   std::uint8_t system = 1, component = 0;
-  std::uint8_t sequence = 0;  // of the next frame
+  std::uint8_t sequence = 0;  // sequence of the next frame
 };
 /// A frame of version 2 around a payload; counts the sender's sequence up.
 Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Identity& sender);

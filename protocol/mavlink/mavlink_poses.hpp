@@ -23,11 +23,11 @@ inline constexpr std::size_t source_count = 7;
 std::string_view name_of(Source source);
 
 struct Settings {
-  std::string vehicle;                           // of the configuration; empty = the only one
+  std::string vehicle;                           // a vehicle of the configuration; empty = the only one
   std::uint8_t system_id = 0, component_id = 0;  // 0 = the first that sends
   bool request_rates = false;                    // ask the autopilot for its messages
   double rate_hz = 50;
-  std::optional<Geodetic> origin;  // of the world; needed for latitudes and longitudes
+  std::optional<Geodetic> origin;  // origin of the world; needed for latitudes and longitudes
   bool needs_time = false;         // messages without a time stamp are not used
   Vec3d held_m = {};               // x and y in the world, ENU, of a vehicle that sends its depth and no place
 };

@@ -65,7 +65,7 @@ struct AttitudeQuaternion {
   std::uint32_t boot_ms = 0;
   float w = 1, x = 0, y = 0, z = 0;
   float roll_radps = 0, pitch_radps = 0, yaw_radps = 0;
-  std::array<float, 4> offset{};  // of how the autopilot shows attitude; the attitude itself does not include it
+  std::array<float, 4> offset{};  // rotation with which the autopilot shows attitude; the attitude itself does not include it
 };
 template <class V, wire::Like<AttitudeQuaternion> M>
 constexpr void fields(V& visit, M& m) {
@@ -170,7 +170,7 @@ struct CommandAck {
   MavResult result{};
   std::uint8_t progress = 0;
   std::int32_t result_param2 = 0;
-  std::uint8_t target_system = 0, target_component = 0;  // of the sender of the command
+  std::uint8_t target_system = 0, target_component = 0;  // ids of the sender of the command
 };
 template <class V, wire::Like<CommandAck> M>
 constexpr void fields(V& visit, M& m) {
@@ -296,7 +296,7 @@ struct MessageInfo {
   std::uint32_t id = 0;
   std::string_view name;
   std::uint8_t crc_extra = 0;
-  std::size_t size = 0, full_size = 0;  // of the payload without and with extensions
+  std::size_t size = 0, full_size = 0;  // size of the payload without and with extensions
 };
 /// The supported messages, by rising id.
 std::span<const MessageInfo> known_messages();

@@ -99,7 +99,7 @@ RawPose raw_pose(const VisionPositionEstimate& m) {
 }
 
 Result<RawPose> raw_pose(const Odometry& m) {
-  Quatd in_ned = quat_of(m.wxyz);  // of the child's axes
+  Quatd in_ned = quat_of(m.wxyz);  // axes of the child in NED
   Vec3d ned_m{m.x_m, m.y_m, m.z_m};
   switch (m.frame_id) {
     case local_ned:

@@ -58,7 +58,7 @@ constexpr std::array<recording::FileKind, 1> kinds{{{
     .begins =
         [](wire::BytesView front) {
           return recording::begins_with(front, {0x44, 0x33, 0x22, 0x11}) ||
-                 recording::begins_with(front, {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f'});  // of version 2
+                 recording::begins_with(front, {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f'});  // a log of version 2
         },
     .read = recording::read_oculus_log,
     .write = recording::write_oculus_log,

@@ -173,7 +173,7 @@ class OculusDialogue final : public protocol::Dialogue {
   protocol::Bytes last_request_;
   protocol::StoredAddress stored_;  // as of this call: a read may follow its write in the same bytes
   Time dummy_at_{};
-  std::shared_ptr<const VendorSettings> fired_;  // by the last fire message
+  std::shared_ptr<const VendorSettings> fired_;  // settings of the last fire message
   bool is_heard_ = false, requested_ping_ = false;
   std::optional<Time> greeting_at_;
   bool greets_silent_ = false;  // the text is for a client that by then has neither fired nor been sent a ping

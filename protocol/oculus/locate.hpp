@@ -1,4 +1,4 @@
-// Where Oculus messages have the fields and regions of protocol/vendor.hpp; the offsets are those of messages.hpp.
+// Finds the fields and regions of protocol/vendor.hpp in Oculus messages; the offsets are those of messages.hpp.
 #pragma once
 
 #include <optional>

@@ -37,7 +37,7 @@ struct MessageHeader {
   std::uint16_t oculus_id = magic, source = 0, destination = 0;
   MessageType type{};
   std::uint16_t version = 0;
-  std::uint32_t payload_size = 0;  // of clients: unreliable, often 0
+  std::uint32_t payload_size = 0;  // from clients unreliable, often 0
   std::uint16_t part_number = 0;   // 0 but in the status message
 };
 template <class V, wire::Like<MessageHeader> M>
@@ -146,7 +146,7 @@ constexpr void fields(V& visit, M& m) {
   visit("pressure", m.pressure_bar);
 }
 
-/// Last fields of a ping result, the same in both versions but for the spare words between beams and offset.
+/// Last fields of a ping result, the same in both versions except for the spare words between beams and offset.
 struct ImageSizes {
   std::uint32_t image_offset = 0, image_size = 0, message_size = 0;
 };

@@ -9,7 +9,7 @@ namespace sonar::recording {
 namespace {
 
 constexpr std::size_t file_header_bytes = wire::wire_size<OculusLogHeader>(), item_bytes = wire::wire_size<OculusLogItem>();
-constexpr std::size_t most_payload = oculus::reply_limit + 1024;  // of a message item; others are skipped
+constexpr std::size_t most_payload = oculus::reply_limit + 1024;  // limit for an item with a message; other items are skipped
 
 template <class M>
 M read_as(BytesView bytes) {
@@ -107,7 +107,7 @@ class LogReader final : public RecordingReader {
     if (message.bytes.size() < oculus::header_size) return refuse("is shorter than a header");
     const oculus::MessageHeader header = oculus::header_of(message.bytes);
     if (oculus::message_length(header, oculus::Sender::device) != message.bytes.size())
-      return refuse("does not have the length in its header");
+      return refuse("has another length than its header gives");
     if (header.type == oculus::MessageType::status) message.by = Carrier::datagram;
     if (header.type == oculus::MessageType::fire) message.from = Origin::client;
     message.at = exact_time().value_or(time_of(item.at_unix_s));

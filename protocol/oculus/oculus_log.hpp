@@ -1,6 +1,6 @@
-// Log files of the vendor's own kind, .oculus version 1 (docs/recording.md, "Oculus log files"): file header, then items of 40
-// bytes and a payload; type 10 is a whole message, type 1010 the exact time of the one before it. Read and written as the open
-// readers do.
+// Log files of the vendor's own kind, .oculus version 1 (protocol/oculus/README.md, "Oculus log files"): a file header, then
+// items of 40 bytes and a payload. Type 10 is a whole message, type 1010 the exact time of the one before it. They are read and
+// written as the open-source readers do.
 #pragma once
 
 #include <memory>

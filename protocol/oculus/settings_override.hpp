@@ -1,12 +1,13 @@
-// A SettingsOverride as the fire message that a driver would have sent for it.
-// Pings made with it echo that message; called by the vendor.
+// Turns a SettingsOverride into the fire message with which a driver would have requested the same settings. Pings made with
+// these settings carry a copy of that message. The Vendor of Oculus calls this.
 #pragma once
 
 #include "protocol/vendor.hpp"
 
 namespace sonar::oculus {
 
-/// Changes only the fields of the current fire message that are set. Refuses values that the product does not support.
+/// Starts from the current fire message and changes only the fields that are set in `wanted`. Refuses values that the product
+/// does not support.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
 /// The nearest of the rates that a fire message can request, without standby.

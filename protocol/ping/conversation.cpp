@@ -3,7 +3,7 @@
 namespace sonar::ping {
 namespace {
 
-constexpr std::size_t longest_reason = 80;   // of a nack: an answer is little longer than a request
+constexpr std::size_t longest_reason = 80;   // limit for a nack, so that an answer is little longer than a request
 constexpr std::size_t most_beyond = 128;     // bytes by which the answers to a datagram may exceed it before the rest is ignored
 constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hostile host can cause
 

@@ -18,9 +18,9 @@ using protocol::HostPing;
 using text::format;
 
 constexpr double sample_unit_s = 25e-9, sound_mps = 1500;
-constexpr int grads = 400, sector = 201, first_grad = 300;  // of a scan: half a circle, port to starboard
+constexpr int grads = 400, sector = 201, first_grad = 300;  // a scan is half a circle, port to starboard
 constexpr int astern = 200;                                 // where the beams of a turn begin
-constexpr std::size_t point_rows = 300;                     // of a picture of points
+constexpr std::size_t point_rows = 300;                     // rows in a picture of points
 
 Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
   PingParameters p{.end_mm = static_cast<std::int32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
@@ -280,7 +280,7 @@ class Ping360Host final : public PingHost {
 
   bool is_open_ = false;
   Turn turn_;
-  std::uint32_t pings_ = 0;  // which a Ping360 does not number
+  std::uint32_t pings_ = 0;  // a Ping360 does not number its pings
 };
 
 }  // namespace

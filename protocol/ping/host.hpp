@@ -1,4 +1,4 @@
-// Hosts of the ping protocol (docs/protocols/ping.md): of a Ping360 by UDP, of a Surveyor, an Omniscan or a Ping1D by TCP.
+// Hosts of the ping protocol (docs/protocols/ping.md): for a Ping360 by UDP, for a Surveyor, an Omniscan or a Ping1D by TCP.
 #pragma once
 
 #include <array>

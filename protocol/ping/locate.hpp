@@ -1,4 +1,4 @@
-// Where the frames that carry pings have the fields and regions that faults name.
+// Finds the fields and regions that faults name in the frames of pings.
 #pragma once
 
 #include <optional>

@@ -33,7 +33,7 @@ enum class Id : std::uint16_t {
   attitude_report = 504,
   ping1d_set_device_id = 1000,
   ping1d_set_range = 1001,
-  set_sound_speed_before = 1002,  // of a Ping1D, and of older definitions for others
+  set_sound_speed_before = 1002,  // used by a Ping1D, and in older definitions by others
   ping1d_set_mode_auto = 1003,
   ping1d_set_interval = 1004,
   ping1d_set_gain = 1005,
@@ -130,9 +130,9 @@ class Framer {
   std::size_t longest_;
   bool all_is_there_;
   Bytes buffer_;
-  std::vector<std::uint16_t> sums_{0};  // of the bytes before each place, modulo 2^16
-  std::size_t begin_ = 0;               // of what is not searched yet
-  std::size_t last_size_ = 0;           // of the frame that ends there
+  std::vector<std::uint16_t> sums_{0};  // sums of the bytes before each place, modulo 2^16
+  std::size_t begin_ = 0;               // begin of what is not searched yet
+  std::size_t last_size_ = 0;           // size of the frame that ends there
   std::uint64_t erased_ = 0;
 };
 
@@ -172,7 +172,7 @@ struct Transducer {
   std::uint8_t mode = 1, gain = 0;
   std::uint16_t angle = 0;         // grad
   std::uint16_t transmit_us = 32;  // duration of the pulse
-  std::uint16_t period = 80;       // of samples, 25 ns
+  std::uint16_t period = 80;       // period of samples, 25 ns
   std::uint16_t khz = 740;
   std::uint16_t samples = 1024;
   std::uint8_t transmit = 0, reserved = 0;

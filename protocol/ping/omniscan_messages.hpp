@@ -8,7 +8,7 @@ namespace sonar::ping {
 struct OsPingParams {
   std::uint32_t start_mm = 0, length_mm = 5000, period_ms = 0;  // 0: as fast as sound allows
   std::array<float, 2> reserved0{};
-  float pulse_part = 0.002f, filter_part = 0.0015f;  // of the time of a ping
+  float pulse_part = 0.002f, filter_part = 0.0015f;  // shares of the time of a ping
   std::int16_t gain = -1;
   std::uint16_t results = 600;
   std::uint8_t enable = 0, reserved1 = 0;  // two more of newer definitions have no meaning

@@ -12,7 +12,7 @@ std::span<const std::shared_ptr<const SonarModel>> models();
 
 /// The settings that a host has made.
 struct Settings {
-  std::uint8_t id = 0;  // of the device; unknown: its number
+  std::uint8_t id = 0;  // id of the device; unknown: its number
   OsPingParams parameters;
   float speed_mps = 1500;
   bool operator==(const Settings&) const = default;
@@ -22,7 +22,7 @@ struct HeldSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
   Settings settings;
 };
-/// As the device comes, for null.
+/// The settings of a new device, for null.
 Settings settings_from(const VendorSettings* held);
 
 /// Why the device refuses it; empty = it does not.

@@ -201,8 +201,8 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
     }
   }
 
-  Results once_ = no_result, streamed_ = no_result;  // that the host waits for
-  Time due_{};                                       // of the next request for a ping, when none is under way
+  Results once_ = no_result, streamed_ = no_result;  // results that the host waits for
+  Time due_{};                                       // when the next requested ping is due, if none is under way
   std::shared_ptr<const HeldSettings> fired_;        // the ping that is being made
   Time fired_at_{};
   bool has_asked_ = false;

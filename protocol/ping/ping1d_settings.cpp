@@ -165,7 +165,8 @@ Echo find_echo(const Ping& ping) {
 Parameters adjusted(const Parameters& made_with, const Echo& echo) {
   constexpr int sure = 50, loud = 250;  // per cent; a strength that may be cut off
   constexpr double loudest_wanted = 200;
-  constexpr double nearest_part = 0.35, farthest_part = 0.85, wanted_part = 0.6;  // of the range, where the echo is to lie
+  // Shares of the range; the echo is to lie between them.
+  constexpr double nearest_part = 0.35, farthest_part = 0.85, wanted_part = 0.6;
   constexpr std::uint32_t length_step_mm = 500, first_length_mm = 5000;
   Parameters p = made_with;
   p.range.start_mm = 0;

@@ -37,9 +37,9 @@ inline Results results_of(Id id) {
 }
 
 struct Settings {
-  std::uint8_t id = 1;  // of the device
+  std::uint8_t id = 1;  // id of the device
   Parameters parameters;
-  Results results = no_result;  // that the ping is fired for; a ping without a host has its profile
+  Results results = no_result;  // results for which the ping is fired; a ping without a host has its profile
 };
 struct HeldSettings final : VendorSettings {
   explicit HeldSettings(const Settings& s) : settings(s) {}
@@ -47,7 +47,7 @@ struct HeldSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
   Settings settings;
 };
-/// As the device comes, for null.
+/// The settings of a new device, for null.
 Settings settings_from(const VendorSettings* held);
 
 /// Why the device refuses them; empty = it does not.

@@ -154,7 +154,7 @@ class Ping360Dialogue final : public Conversation {
 
   Head head_;
   Task task_ = Task::none;
-  bool back_ = false;  // of a scan that oscillates
+  bool back_ = false;  // a scan that oscillates goes back
   Time due_{};
   std::shared_ptr<const HeldSettings> fired_;  // the ping that is being made
   std::shared_ptr<const HeldSettings> late_;   // one that has not come in time

@@ -10,7 +10,7 @@
 
 namespace sonar::ping::ping360 {
 
-inline constexpr int grads = 400;  // of a turn
+inline constexpr int grads = 400;  // grads in a turn
 
 namespace option_name {
 inline constexpr std::string_view firmware = "firmware", mount_grad = "mount_grad", sector_scan = "sector_scan",
@@ -21,9 +21,9 @@ std::span<const std::shared_ptr<const SonarModel>> models();
 
 /// The settings that a host has made; pings echo them. `ping.angle` is where the head looks.
 struct Settings {
-  std::uint8_t id = 2;  // of the device
+  std::uint8_t id = 2;  // id of the device
   Transducer ping;
-  bool scans = false;  // of 2602, whose other fields follow
+  bool scans = false;  // the request is 2602; its other fields follow
   std::uint16_t start = 0, stop = 399;
   std::uint8_t steps = 1, delay_ms = 0;
 };
@@ -33,7 +33,7 @@ struct HeldSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
   Settings settings;
 };
-/// As the device comes, for null.
+/// The settings of a new device, for null.
 Settings settings_from(const VendorSettings* held);
 
 /// Why the device refuses it; empty = it does not.

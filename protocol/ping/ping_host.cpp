@@ -9,7 +9,7 @@ using protocol::HostPing;
 
 namespace {
 
-constexpr double shown_db = 60;  // of a waterfall, below its strongest echo
+constexpr double shown_db = 60;  // range of levels in a waterfall, below its strongest echo
 
 SonarPicture picture_of(const std::deque<std::shared_ptr<const Line>>& waterfall, double start_m, double row_m) {
   SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};

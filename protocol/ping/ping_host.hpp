@@ -14,7 +14,7 @@ namespace sonar::ping {
 
 inline constexpr double usual_range_m = 10;
 
-using Line = std::vector<float>;  // of one beam
+using Line = std::vector<float>;  // levels of one beam
 
 /// 0: as the device likes.
 double period_ms_of(const protocol::SettingsOverride& wanted);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int beams = 64, directions = 16;  // directions: as many as receive elements
 constexpr double swath_deg = 80;            // recalled, like the width along the track and the number of elements
-constexpr double beam_width_deg = 7;        // of 16 elements half a wavelength apart
+constexpr double beam_width_deg = 7;        // that of 16 elements half a wavelength apart
 constexpr double above_db = 15;             // unknown: assumed
 constexpr double usual_end_m = 20;          // assumed for end 0, which the device sets by the bottom itself
 constexpr double db_per_gain = 0.4;         // unknown: assumed

@@ -13,9 +13,9 @@ std::span<const std::shared_ptr<const SonarModel>> models();
 
 /// The settings that a host has made.
 struct Settings {
-  std::uint8_t id = 0;  // of the device; unknown: its number
+  std::uint8_t id = 0;  // id of the device; unknown: its number
   PingParameters parameters;
-  std::optional<std::chrono::nanoseconds> utc_ahead;  // of the device's clock, once a host has set it
+  std::optional<std::chrono::nanoseconds> utc_ahead;  // offset of the device's clock, once a host has set it
 };
 struct HeldSettings final : VendorSettings {
   explicit HeldSettings(const Settings& s) : settings(s) {}
@@ -23,7 +23,7 @@ struct HeldSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
   Settings settings;
 };
-/// As the device comes, for null.
+/// The settings of a new device, for null.
 Settings settings_from(const VendorSettings* held);
 
 /// Why the device refuses it; empty = it does not.

@@ -24,7 +24,7 @@ inline bool begins_with(BytesView front, std::initializer_list<unsigned> bytes) 
 
 /// A kind of file of a make.
 struct FileKind {
-  std::string_view ending;              // of its names: ".aris"
+  std::string_view ending;              // ending of its names: ".aris"
   std::string_view name;                // ".aris file"
   std::string_view holds;               // "frames of an ARIS"
   bool (*begins)(BytesView) = nullptr;  // whether a file begins so; 16 bytes, fewer of a shorter file
@@ -47,7 +47,7 @@ struct Samples {
 };
 
 struct Codec {
-  const Framing* framing = nullptr;  // of its TCP stream; null: nothing tells messages apart
+  const Framing* framing = nullptr;  // framing of its TCP stream; null: nothing tells messages apart
   std::span<const FileKind> files = {};
   /// Finds the sender of a device's message or datagram; nullopt: it is another make's, or does not name its sender.
   std::optional<Sender> (*sender)(const RecordedMessage&) = nullptr;

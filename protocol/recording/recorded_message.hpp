@@ -17,7 +17,7 @@ enum class Carrier { stream, datagram };  // TCP; UDP (status)
 
 /// A whole message, or bytes between messages that do not form one. Never part of a message.
 struct RecordedMessage {
-  Time at{};  // of its last byte
+  Time at{};  // time of its last byte
   Origin from = Origin::device;
   Carrier by = Carrier::stream;
   wire::Bytes bytes;

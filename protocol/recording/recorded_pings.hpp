@@ -32,7 +32,7 @@ class RecordedPings {
   std::unique_ptr<RecordingReader> reader_;
   SentBy by_;
   std::unique_ptr<protocol::Host> host_;
-  std::deque<RecordedPing> decoded_;  // of the last message, not yet handed out
+  std::deque<RecordedPing> decoded_;  // pings of the last message that are not yet handed out
 };
 
 }  // namespace sonar::recording

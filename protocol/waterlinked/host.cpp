@@ -17,7 +17,7 @@ using Json = nlohmann::json;
 using protocol::HostActions;
 
 constexpr std::size_t picture_rows = 300;
-constexpr double darkest = 0.85;  // of a range image: how much less bright the farthest is than the nearest
+constexpr double darkest = 0.85;  // in a range image: how much less bright the farthest is than the nearest
 constexpr std::size_t most_pixels = 1 << 20;
 constexpr std::string_view title = "a Sonar 3D-15", api = "/api/v1/integration";
 

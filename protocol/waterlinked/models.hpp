@@ -13,7 +13,7 @@ inline constexpr double longest_range_m = 15, least_window_m = 0.1, pixel_scale_
 inline constexpr std::uint32_t full_scale_strength = 400;  // linear; the assisted gain keeps 99 % of the pixels below 80 % of it
 
 /// Traces of filters in the ranges of SMP, fitted to its shots 1 to 3 and the same in 4 to 6 (likeness_test.cpp); 0 = none.
-/// Half of the ranges are equal to the one beside them, but for 1 to 7 % across the edges of four blocks of 16 rows. Of ranges
+/// Half of the ranges are equal to the one beside them, except for 1 to 7 % across the edges of four blocks of 16 rows. Of ranges
 /// with eight others round them 3 % are the largest or least of the nine, and 0.69 their median: 0.45 of independent ranges once
 /// filtered by medians of 3 x 3, 0.70 twice.
 inline constexpr int block_rows = 16, median_passes = 2;

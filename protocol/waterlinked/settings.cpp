@@ -8,8 +8,8 @@
 namespace sonar::waterlinked {
 namespace {
 
-constexpr std::uint32_t least_strength = 31;  // whose pixel is the first that is not 0
-constexpr float first_gain_db = 30;           // until the gain assist has had pictures
+constexpr std::uint32_t least_strength = 31;  // least strength whose pixel is not 0
+constexpr float first_gain_db = 30;           // used until the gain assist has had pictures
 
 }  // namespace
 

@@ -22,7 +22,7 @@ struct Settings {
   std::uint16_t unicast_port = 0;
   bool imu = false;
   std::string ntp_address = "auto";
-  std::chrono::nanoseconds clock_offset{0};  // of a clock that is not synchronised
+  std::chrono::nanoseconds clock_offset{0};  // offset of a clock that is not synchronised
   double rate_hz = 0;                        // 0 = the mode's
   bool operator==(const Settings&) const = default;
 };

@@ -20,7 +20,7 @@ class WaterLinkedVendor final : public protocol::Vendor {
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return waterlinked::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return waterlinked::options(); }
-  int default_max_clients() const override { return 1; }  // of TCP streams; this sonar has none
+  int default_max_clients() const override { return 1; }  // counts TCP streams; this sonar has none
   Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
                                                   const protocol::OptionValues&) const override {
     return model;

@@ -13,7 +13,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double published_reference_ms = 36;  // a frame, P1's size: IOES-Lab/dave, issue 44; on a device of its author's
-constexpr double most_warm_up_s = 1, most_rounds_s = 3;  // of one size of a batch; less for few pings
+constexpr double most_warm_up_s = 1, most_rounds_s = 3;  // limits for one size of a batch; less for few pings
 constexpr std::size_t rounds = 5;
 
 Result<std::unique_ptr<PingEngine>> engine_of(const ScenePointer& scene, Parallel& pool, const BenchOptions& options, int batch,

@@ -179,7 +179,8 @@ int run(BenchOptions options) {
   const std::string note = note_of_parts_left_out(options.engine.switches);
   if (!note.empty()) std::printf("%s\n", note.c_str());
   json report{{"processor", processor()}, {"results", json::array()}};
-  if (double load[1]; ::getloadavg(load, 1) == 1) report["load_average"] = load[0];  // of others: what lengthens wall times
+  // Load of other programs, which lengthens wall times.
+  if (double load[1]; ::getloadavg(load, 1) == 1) report["load_average"] = load[0];
   std::printf("%s\n", processor().c_str());
   if (options.engine.device != EngineDevice::cpu) std::printf("%s\n", cuda_status().c_str());
   bool first = true, all_hold = true;

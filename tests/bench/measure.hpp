@@ -17,8 +17,8 @@
 namespace sonar::bench {
 
 double now_s();           // steady
-double processor_s();     // of all threads of this process
-double this_thread_s();   // of the calling thread
+double processor_s();     // processor time of all threads of this process
+double this_thread_s();   // processor time of the calling thread
 std::string processor();  // its name and number
 
 /// Sorted at once: what half, nine tenths and all of them were below.
@@ -39,7 +39,7 @@ struct BenchOptions {
   std::uint64_t seed = 1;
   std::string scene_folder;
   std::string json_file;
-  double reference_ms = 0;  // of P11: a frame of the public reference code on this device; 0 = not measured
+  double reference_ms = 0;  // time of P11: a frame of the public reference code on this device; 0 = not measured
 };
 
 /// An engine with the pool it runs on.
@@ -79,7 +79,7 @@ struct Figures {
   Switches switches;
   std::vector<std::string> parts_had;
   int threads = 0, pings = 0;
-  double cold_ms = 0, processor_ms = 0;  // of the first ping; median of the others, all threads together
+  double cold_ms = 0, processor_ms = 0;  // time of the first ping; median of the others, all threads together
   Times wall{{}};
   std::array<double, static_cast<std::size_t>(Stage::stages)> stage_ms{};  // mean a ping, summed over threads
   double frame_ms = 0;

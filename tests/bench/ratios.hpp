@@ -27,7 +27,7 @@ struct Ratio {
   std::string name;  // "synthesis: complex exponentials / pulses in time"
   double slow_ms = 0, fast_ms = 0;
   double least = 0;           // what must hold; 0 = none
-  double share_measured = 1;  // of the slow side, whose time is scaled up
+  double share_measured = 1;  // share of the slow side that was measured; its time is scaled up
   double difference = 0;      // relative, in the least squares, of the two results where they mean the same; 0 = not compared
   double ratio() const { return fast_ms > 0 ? slow_ms / fast_ms : 0; }
   bool holds() const { return ratio() >= least; }

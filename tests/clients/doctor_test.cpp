@@ -491,7 +491,7 @@ TEST(Doctor, FailsWhileADriverGetsNoPing) {
          "127.0.0.1:40122 is connected to front and has not asked for pings: it has sent 17 bytes, no valid request among them",
          "send set_ping_parameters (3023)");
   v1::ClientStatus& client = *status.mutable_sonars(0)->mutable_clients(0);
-  client.set_requests(1);  // of standby
+  client.set_requests(1);  // a client in standby
   status.mutable_sonars(0)->set_rate_hz(0);
   status.mutable_sonars(0)->set_asked_by("127.0.0.1:40122");
   report(facts);

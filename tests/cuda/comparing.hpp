@@ -52,8 +52,8 @@ class BothEngines {
 };
 
 struct Apart {
-  double relative_l2 = 0;       // of the beams' signals, or of pressures where those are not kept
-  std::uint32_t most_lsb = 0;   // of the samples
+  double relative_l2 = 0;       // difference of the beams' signals, or of pressures if those are not kept
+  std::uint32_t most_lsb = 0;   // largest difference of the samples
   std::size_t samples_off = 0;  // that differ at all
   bool shape = true, truth = true;
 };

@@ -109,7 +109,7 @@ class DeferringMachine final : public PassingMachine {
   }
   std::array<Lane, lanes> lanes_;
   std::map<std::byte*, std::size_t> host_bytes_;
-  bool early_release_ = false;  // of memory that a copy still needed
+  bool early_release_ = false;  // releases memory that a copy still needs
 };
 
 /// A step's indices dealt to four threads: for the thread sanitizer, which sees two that write one place, also where the sum does

@@ -18,7 +18,7 @@ using protocol::Bytes;
 using protocol::Make;
 
 inline constexpr Time start = Time{} + std::chrono::hours(24 * 365 * 50);
-inline constexpr std::chrono::milliseconds step = 50ms, patience = 3s;  // of a driver: then it connects again
+inline constexpr std::chrono::milliseconds step = 50ms, patience = 3s;  // patience of a driver, which then connects again
 
 inline Config surroundings() {
   Config config;

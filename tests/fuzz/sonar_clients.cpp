@@ -16,7 +16,7 @@ using protocol::Bytes;
 using protocol::BytesView;
 
 constexpr std::size_t largest_framed = 8u << 10;  // bytes of a BlueView ping that is really framed: a thousand runs a second
-constexpr int most_rows = 2;                      // of an Oculus ping, for the same reason
+constexpr int most_rows = 2;                      // rows of an Oculus ping, for the same reason
 constexpr auto longest_silence = 1h;              // until the next tick
 constexpr Time start = Time{} + std::chrono::hours(24 * 365 * 50);
 

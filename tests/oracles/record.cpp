@@ -43,7 +43,7 @@ void append(int number, const std::string& line) {
   if (folder == nullptr || *folder == 0) return;
   std::string name = running_test();
   for (char& c : name) {
-    if (c == '/') c = '_';  // of parametrised tests
+    if (c == '/') c = '_';  // names of parametrised tests have it
   }
   std::ostringstream file;
   file << std::setw(2) << std::setfill('0') << number << '-' << name << ".jsonl";

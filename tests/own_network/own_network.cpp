@@ -67,7 +67,7 @@ bool may_isolate() {
 /// The lock is held until this process ends and, where it becomes another program, until that one ends.
 void wait_for_turn() {
   const std::string path = std::filesystem::temp_directory_path() / "sonard-tests.lock";
-  int fd = open(path.c_str(), O_RDONLY);  // of another user, perhaps
+  int fd = open(path.c_str(), O_RDONLY);  // it may belong to another user
   if (fd < 0) fd = open(path.c_str(), O_RDONLY | O_CREAT, 0644);
   while (fd >= 0 && flock(fd, LOCK_EX) != 0 && errno == EINTR) {
   }

@@ -96,7 +96,7 @@ class Talk {
   std::vector<std::pair<std::size_t, Bytes>> sent;  // by the device, with the host's port
   std::optional<Error> error;
   bool only_port = false;  // echoes are in the quarter of the beams that is most to port, in some rows
-  double head_rad = 0;     // of the request before
+  double head_rad = 0;     // head angle of the request before
 
  private:
   void react(const Reaction& reaction) {
@@ -284,7 +284,7 @@ TEST_P(Hosts, SurviveWhatIsCutOffOrDamaged) {
     other.run(2);
     const std::size_t before = other.pings.size();
     Bytes bytes(last.begin(), last.begin() + static_cast<std::ptrdiff_t>(i < 100 ? random() % last.size() : last.size()));
-    bool hits_length = false;  // of any make: such a message may take all bytes that follow
+    bool hits_length = false;  // true for any make: such a message may take all bytes that follow
     for (std::size_t k = 0; i >= 100 && k < 4; ++k) {
       const std::size_t at = random() % std::min<std::size_t>(bytes.size(), 64);
       hits_length = hits_length || at < 16;

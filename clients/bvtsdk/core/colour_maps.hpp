@@ -1,4 +1,4 @@
-// From magnitudes to colours: the maps, their files, the mapping, and pictures on disk.
+// Converts magnitudes to colours: the maps, their files, the mapping, and pictures on disk.
 #pragma once
 
 #include <array>

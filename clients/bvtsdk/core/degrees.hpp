@@ -3,6 +3,6 @@
 
 namespace sonar::bvt {
 
-inline constexpr double degrees = 57.29577951308232;  // of a radian
+inline constexpr double degrees = 57.29577951308232;  // degrees in a radian
 
 }  // namespace sonar::bvt

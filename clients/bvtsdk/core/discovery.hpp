@@ -1,5 +1,5 @@
-// Finding sonars: "BVE?" datagrams out, "BVE!" datagrams back (docs/protocols/blueview-link.md, "Discovery").
-// Needs no thread: answers wait in the socket until they are read.
+// Finds sonars: sends "BVE?" datagrams and receives "BVE!" datagrams (docs/protocols/blueview-link.md, "Discovery"). Needs no
+// thread: answers wait in the socket until they are read.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Names and texts of the return codes (BVTError_GetName, BVTError_GetString), for any number.
+// Names and texts of the return codes (BVTError_GetName, BVTError_GetString). Numbers that are no return code have them, too.
 // The names are those of the constants; the texts are sonard's.
 #pragma once
 

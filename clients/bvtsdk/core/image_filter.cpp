@@ -14,7 +14,7 @@ void mean_over(const Window& window, MagImage& image) {
   const auto width = static_cast<std::size_t>(image.width);
   const auto margin = static_cast<std::size_t>(window.left + window.right);
   std::vector<std::uint16_t> out(image.pixels.size());
-  std::vector<std::uint32_t> sums(width + margin, 0);  // of the rows in the window, with zeros on both sides
+  std::vector<std::uint32_t> sums(width + margin, 0);  // sums over the rows in the window, with zeros on both sides
   std::vector<float> columns(width, 0);                // how many columns of the window lie inside
   for (int col = 0; col < image.width; ++col)
     columns[static_cast<std::size_t>(col)] =

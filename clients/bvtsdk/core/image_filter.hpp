@@ -1,4 +1,4 @@
-// Smoothing of a finished image, as the filter flags ask for it.
+// Smooths a finished image as the filter flags request.
 #pragma once
 
 #include "clients/bvtsdk/core/imaging.hpp"

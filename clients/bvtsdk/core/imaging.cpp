@@ -14,7 +14,7 @@
 namespace sonar::bvt {
 namespace {
 
-constexpr double most_pixels = 32e6;   // of any image
+constexpr double most_pixels = 32e6;   // limit for any image
 constexpr double polite_pixels = 1e6;  // default size limit: clients keep 4 bytes per pixel on an 8 MB stack (verified)
 
 int to_int(double x) {
@@ -73,7 +73,7 @@ void plan_xy(const Extent& extent, const ImageSettings& settings, ImageGeometry&
     g.height = std::max(1, to_int(std::min(settings.requested_width * shown_m / (2 * half_width_m), most_pixels)));
   else
     g.height = rows_by_resolution(extent, settings, shown_m, 2 * half_width_m / shown_m, 0);
-  constexpr double rounding = 1e-9;  // of these divisions
+  constexpr double rounding = 1e-9;  // rounding error of these divisions
   g.range_resolution_m = shown_m / g.height;
   g.width = 2 * std::max(1, to_int(std::min(std::ceil(half_width_m / g.range_resolution_m - rounding), most_pixels)));
   g.origin_row = to_int(g.height + std::floor(bottom_m / g.range_resolution_m + rounding));

@@ -1,6 +1,6 @@
-// Images from polar pings: the library forms them, not the sonar, exactly as with the real SDK. Geometry first, then pixels.
-// Marks in this folder: verified = seen in public client code; inferred = concluded from it; chosen = ours, nothing to be
-// faithful to.
+// Forms images from polar pings. As with the real SDK, the library does this, not the sonar. It computes the geometry first, then
+// the pixels. Marks in this folder: verified = seen in public client code; inferred = concluded from it; chosen = our choice, as
+// nothing is known.
 #pragma once
 
 #include <array>
@@ -50,7 +50,7 @@ struct ImageGeometry {
   double bearing_resolution_deg = 0;   // per column; 0 in XY
   int origin_row = 0, origin_col = 0;  // the sonar, usually outside the image
   float fov_min_deg = 0, fov_max_deg = 0;
-  double start_m = 0, stop_m = 0;  // of the shown area, with the sound speed override
+  double start_m = 0, stop_m = 0;  // ends of the shown area, with the sound speed override
 
   /// Any row and column, also outside the image: clients ask one past the end (verified). R-Theta labels a column by its
   /// left edge (verified). XY counts whole pixels from the origin (verified): x = (col - origin_col) * range_resolution_m to

@@ -72,13 +72,13 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
   put(hello, static_cast<std::uint16_t>(abi));
   put_text(hello, "libbvtsdk");
   const int greeted = fresh->ask(FrameType::hello, hello, answer, patience.connect);
-  // Programs retry after connection_timed_out and give up after any other code. So that code is returned for a sonar that is just
-  // starting or shutting down.
   if (greeted == bad_packet_type)
     return refuse(greeted, "what answers at " + there + " is not sonard's BlueView link; check the port");
   if (greeted == bad_packet_version)
     return refuse(greeted,
                   "sonard at " + there + " uses another version of the link; use the library and sonard of the same release");
+  // Programs retry after connection_timed_out and give up after any other code. Therefore a sonar that is just starting or
+  // shutting down has this code.
   if (greeted != success)
     return refuse(connection_timed_out,
                   there +

@@ -1,5 +1,5 @@
-// The SDK's log: one line a message, filtered by level, to stdout, stderr, a file or nowhere (BVTLogger_*).
-// One log for the whole process, as the interface has it; any thread may write.
+// The SDK's log: one line a message, filtered by level, to stdout, stderr, a file or nowhere (BVTLogger_*). As in the SDK, the
+// process has one log; any thread may write.
 #pragma once
 
 #include <string>

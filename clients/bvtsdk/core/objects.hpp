@@ -45,7 +45,7 @@ struct HeadImaging {
 
 struct PingObject : Object {
   PolarPing polar;
-  HeadDescription settings;  // of the head, when this ping was made
+  HeadDescription settings;  // settings of the head when this ping was made
   HeadImaging imaging;
   std::shared_ptr<Imager> imager;  // shared with the head, so that its tables are used again
   void* range_data = nullptr;      // 3.x: belongs to the ping and dies with it

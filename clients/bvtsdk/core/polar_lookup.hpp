@@ -1,5 +1,5 @@
-// Which samples make which pixel of an XY image: worked out once a geometry, used for every ping of it. The costly half of
-// imaging (angles, square roots) happens here.
+// Tables of the samples that make each pixel of an XY image. They are computed once for a geometry and used for every ping with
+// it. The slow part of imaging (angles, square roots) is done here.
 #pragma once
 
 #include <cstdint>

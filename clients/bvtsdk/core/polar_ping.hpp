@@ -29,7 +29,7 @@ enum NavField : std::uint16_t {
 /// A field is valid only when its bit of `present` is set.
 struct NavData {
   std::uint16_t present = 0;
-  double time_s = 0;  // since 1970 UTC
+  double time_s = 0;  // seconds since 1970 UTC
   double latitude_deg = 0, longitude_deg = 0;
   float depth_m = 0, altitude_m = 0;
   float pitch_deg = 0;    // bow up
@@ -49,7 +49,7 @@ struct NavData {
 struct PolarPing {
   std::int32_t head = 0;
   std::uint32_t number = 0;
-  double time_s = 0;  // since 1970 UTC
+  double time_s = 0;  // seconds since 1970 UTC
   std::int32_t time_zone_s = 0;
   float start_m = 0, stop_m = 0;
   std::int32_t sound_speed_mps = 1500;

@@ -1,4 +1,4 @@
-// One range a bearing: the range profile of 4.x and the range data of 3.x are both this list.
+// A list with one range for each bearing. The range profile of 4.x and the range data of 3.x are both such a list.
 #pragma once
 
 #include <cstdint>

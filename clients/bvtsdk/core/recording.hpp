@@ -20,7 +20,7 @@
 namespace sonar::bvt {
 
 struct EventMark {
-  double time_s = 0;  // since 1970 UTC
+  double time_s = 0;  // seconds since 1970 UTC
   std::string key, text;
 };
 

@@ -1,5 +1,5 @@
-// A ping's samples made ready for imaging: thresholds applied, bins pooled, at least two beams of two bins.
-// Where nothing of that is needed they are read in place.
+// A ping's samples made ready for imaging: thresholds applied, bins pooled, at least two beams of two bins. If none of this is
+// needed, the samples are read in place.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// A TCP stream with deadlines, as plain POSIX has it. The link stands on this.
+// A TCP stream with deadlines, on plain POSIX sockets. The link uses it.
 #pragma once
 
 #include <chrono>

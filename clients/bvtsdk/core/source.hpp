@@ -46,9 +46,9 @@ class Source {
   virtual int put_ping(int /*head*/, const PolarPing&, const HeadDescription& /*settings*/) { return read_only_file; }
   virtual int put_event(const EventMark&) { return read_only_file; }
   virtual int ping_count(int /*head*/) const { return 1; }
-  virtual int ping_count() const { return 0; }  // of a recording, all heads
+  virtual int ping_count() const { return 0; }  // pings of all heads in a recording
   virtual int nav_count() const { return 0; }
-  virtual int kilobytes() const { return 0; }  // of a recording
+  virtual int kilobytes() const { return 0; }  // size of a recording
   virtual void close() {}
 
  private:

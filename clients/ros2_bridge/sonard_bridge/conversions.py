@@ -52,7 +52,7 @@ def flu_from_frd(v: Sequence[float]) -> Vector3:
 
 
 def enu_flu_from_ned_frd(q: Quaternion) -> Quaternion:
-    """Body to world, of a sender that keeps to aircraft's axes; and back: it is its own inverse but for the sign of all four."""
+    """Body to world, of a sender that keeps to aircraft's axes; and back: its own inverse, except for the sign of all four."""
     w, x, y, z = q
     s = math.sqrt(0.5)
     return s * (w + z), s * (x + y), s * (x - y), s * (w - z)

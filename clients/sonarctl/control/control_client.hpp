@@ -1,5 +1,5 @@
-// Client of a daemon's control stream: Hello, requests and their answers, events. Blocking, with a limit on every wait. Used by
-// pose, status, events, set, load, object and doctor.
+// Client of a daemon's control stream: Hello, requests and their answers, events. Calls block, with a limit on every wait. Used
+// by pose, status, events, set, load, object and doctor.
 #pragma once
 
 #include <deque>
@@ -11,7 +11,7 @@
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 
-namespace sonar::v1 {  // of control.pb.h
+namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;
 class Event;
 }  // namespace sonar::v1

@@ -57,7 +57,7 @@ Result<void> print_journal(const FaultArguments& a) {
     if (entry.seq() <= last) return true;
     last = entry.seq();
     std::puts(a.json ? control::json_of(entry).c_str() : text_from(entry).c_str());
-    return std::fflush(stdout) == 0;  // else the output is closed
+    return std::fflush(stdout) == 0;  // if not, the output is closed
   };
   bool open = true;
   for (const v1::FaultEntry& entry : (*report)->journal()) open = open && print(entry);

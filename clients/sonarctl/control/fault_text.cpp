@@ -51,7 +51,7 @@ std::string text_from(const v1::FaultEntry& e) {
 std::string fault_list_text(const v1::FaultReport& report) {
   if (!report.armed()) return "faults are not armed: sonard run --faults, or faults: {armed: true}\n";
   if (report.faults().empty()) return "no faults\n";
-  std::vector<const v1::FaultStatus*> faults;  // those that act, then those that wait, then those that are over
+  std::vector<const v1::FaultStatus*> faults;  // first those that act, then those that wait, then those that are over
   int name_width = 16, asked_width = 16;
   for (const v1::FaultStatus& f : report.faults()) {
     faults.push_back(&f);

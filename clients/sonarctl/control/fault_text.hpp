@@ -1,4 +1,5 @@
-// Faults of a daemon as text, and the arguments of `fault add` as a record. No I/O; fault and events print it.
+// Faults of a daemon as text, and the arguments of `fault add` as a record. This has no I/O; the commands fault and events print
+// it.
 #pragma once
 
 #include <string>
@@ -7,7 +8,7 @@
 #include "core/base/result.hpp"
 #include "protocol/control/fault_record.hpp"
 
-namespace sonar::v1 {  // of control.pb.h
+namespace sonar::v1 {  // from control.pb.h
 class FaultEntry;
 class FaultReport;
 }  // namespace sonar::v1

@@ -1,11 +1,11 @@
-// Status and events of a daemon as text. No I/O; status and events print it.
+// Status and events of a daemon as text. This has no I/O; the commands status and events print it.
 #pragma once
 
 #include <string>
 
 #include "core/base/geometry.hpp"
 
-namespace sonar::v1 {  // of control.pb.h
+namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;
 class Event;
 class ObjectStatus;

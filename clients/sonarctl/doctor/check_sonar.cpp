@@ -170,7 +170,7 @@ class SonarChecks {
     const StreamFacts& s = sonar_.stream;
     const std::string waited = " within " + format("%.1f", s.waited_s) + " s";
     if (s.refuses) return add(Level::fail, "ping", s.error, "sonarctl status shows its settings; see sonard's log");
-    if (!s.error.empty())  // not the greeting of sonard
+    if (!s.error.empty())  // the greeting is not sonard's
       return add(Level::fail, "ping", s.error, "another program has the port; stop it, or give the sonar's own address");
     if (s.junk_bytes > 0 && s.others == 0) {
       std::string who;

@@ -1,4 +1,4 @@
-// Interprets the facts: one finding per check, with cause and cure of a fault. Pure functions, tested without a network.
+// Interprets the facts: one finding per check, with the cause of a fault and a remedy. Pure functions, tested without a network.
 #pragma once
 
 #include <string>

@@ -10,7 +10,7 @@
 #include "clients/sonarctl/net.hpp"
 #include "protocol/host.hpp"
 
-namespace sonar::v1 {  // of control.pb.h
+namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;
 class SonarStatus;
 }  // namespace sonar::v1
@@ -35,14 +35,14 @@ struct ReceivedStatus {
 struct StatusFacts {
   Endpoint on{"0.0.0.0", 52102};
   std::string error;                     // why listening failed; empty = it did not
-  std::vector<PortHolder> holders;       // of the port, when listening failed
+  std::vector<PortHolder> holders;       // programs that have the port, if listening failed
   std::vector<ReceivedStatus> received;  // one for each pair of addresses
   double waited_s = 0;
 };
 
 struct StreamFacts {
   enum class Outcome { not_tried, refused, unreachable, closed_without_a_byte, no_ping, pings } outcome = Outcome::not_tried;
-  std::string error;                         // of the connection, or of the greeting
+  std::string error;                         // why the connection or the greeting failed
   bool refuses = false;                      // `error` is what the sonar answered to a request
   std::string own;                           // our end of the connection; empty = there was none
   bool asked = false;                        // settings were sent, since no other client was connected
@@ -50,13 +50,13 @@ struct StreamFacts {
   double first_ping_ms = 0, waited_s = 0;
   unsigned beams = 0, rows = 0, bits = 0;
   std::uint64_t pings = 0, missing = 0, broken = 0;
-  std::string first_complaint;  // of the broken ones
+  std::string first_complaint;  // complaint about the first broken ping
   double asked_hz = 0, rate_hz = 0;
   // Spread of the delays by the stamps in the pings: lateness relative to the earliest.
   std::optional<double> spread_p99_ms;
-  // From transmission to the last byte received, by the events of the control stream.
+  // Time from transmission to the last byte received, by the events of the control stream.
   std::optional<double> latency_p50_ms, latency_p99_ms;
-  std::optional<double> computing_ms;  // of one ping, the median, from the same events
+  std::optional<double> computing_ms;  // median time to compute a ping, from the same events
 };
 struct SonarFacts {
   Endpoint at;
@@ -67,14 +67,14 @@ struct SonarFacts {
   bool in_our_network = true;                       // at an address that an interface reaches without a router
   bool out_of_time = false;                         // not examined, for lack of time
   std::vector<std::string> clients;                 // connected already, before us
-  std::vector<PortHolder> listeners;                // of its port, on this computer
+  std::vector<PortHolder> listeners;                // programs on this computer that listen on its port
   std::shared_ptr<const v1::SonarStatus> reported;  // after the pings; null = the daemon does not know it
   StreamFacts stream;
 };
 
 struct ControlFacts {
   Endpoint at;
-  bool given = false;                              // by the user: then no answer is an error
+  bool given = false;                              // given by the user: then no answer is an error
   std::string error;                               // why there is no status
   bool token_required = false;                     // the reason, and none was given
   std::shared_ptr<const v1::DaemonStatus> status;  // null = there is none

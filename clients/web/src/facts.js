@@ -35,7 +35,7 @@ export class Facts {
     this.received = new Counter();
     this.receivedBytes = 0;
     this.missed = 0;
-    this.lastNumber = Infinity;  // of the ping before
+    this.lastNumber = Infinity;  // number of the ping before
     this.history = [];  // {time_s, rate} of pings made, the last minute
     this.droppedAt = new Map();  // client -> when its drops last rose, now_s
     this.drops = new Map();

@@ -2,10 +2,10 @@
 import { fixed, short } from './numbers.js';
 
 const stands_after_s = 2;
-const preview_begins_s = 5;  // where it begins by itself
+const preview_begins_s = 5;  // a daemon that previews by itself (the demo) has this long before the page reports that no driver is connected
 const now_s = () => performance.now() / 1000;
 
-/// The first address at which the sonar waits for a driver: "udp 127.0.0.2:12345"; of older daemons the host.
+/// The first address at which the sonar waits for a driver, such as "udp 127.0.0.2:12345". Older daemons send only the host.
 function whereToConnect(sonar) {
   const found = sonar.addresses?.find((a) => !a.sonar_speaks_first);
   return found ? `${found.protocol} ${found.address}` : host(sonar.listens) || sonar.advertised;

@@ -16,7 +16,7 @@ struct BeamMixView {
   const std::int32_t* reach;                    // [sets]: how many on either side are not 0
   const float *own, *share;                     // [beams]: of the beam, of either neighbour
   std::int32_t beams, sets, widest, step;       // widest: reach of the table; step: beams to the neighbour
-  float sets_per_rad, first_range_m, sample_m;  // of sample 0; spacing
+  float sets_per_rad, first_range_m, sample_m;  // range of sample 0; spacing
 };
 
 /// Which set of taps serves this beam and sample; 0 leaves it as it is.

@@ -57,7 +57,7 @@ SONAR_HD inline FresnelPair fresnel_fraction(double x) {
   return {0.5 * (1 - er + ei), 0.5 * (1 - er - ei)};
 }
 
-/// To 1e-9 for every x, infinities included.
+/// Accurate to 1e-9 for every x, infinities included.
 SONAR_HD inline FresnelPair fresnel(double x) {
   const double a = std::fabs(x), sign = x < 0 ? -1.0 : 1.0;
   if (a > 1e8) return {0.5 * sign, 0.5 * sign};

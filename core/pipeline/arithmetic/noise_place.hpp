@@ -1,5 +1,5 @@
-// Where in the table of shaped noise a column of a ping begins to read, and turned by which quarter: the draw that receiver
-// noise, the leak and the water's grains share. C++17-clean, standard library only.
+// The place in the table of shaped noise at which a column of a ping begins to read, and the quarter turn of what it reads: the
+// draw that receiver noise, the leak and the water's grains share. C++17-clean, standard library only.
 #pragma once
 
 #include <cstdint>

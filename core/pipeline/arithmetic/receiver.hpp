@@ -1,5 +1,5 @@
-// From beam pressure to samples: thermal noise level, time-varied gain, row gains, quantisation (docs/acoustics.md, section 7).
-// The last stage of a ping uses it, and vendors that state a gain per row. C++17-clean, standard library only.
+// Converts beam pressure to samples: thermal noise level, time-varied gain, row gains, quantisation (docs/acoustics.md, section
+// 7). Used by the last stage of a ping, and by vendors that state a gain per row. C++17-clean, standard library only.
 #pragma once
 
 #include <cmath>

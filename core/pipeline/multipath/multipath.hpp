@@ -1,5 +1,5 @@
-// Multipath, opt-in (Switches::multipath): everything that comes back via flat mirrors, as signals of their own columns
-// that are added to the direct ones. Runs once per ping before the columns are simulated (docs/acoustics.md, section 3).
+// Multipath, opt-in (Switches::multipath): all echoes by way of flat mirrors, as column signals that are added to the direct
+// ones. Runs once per ping before the columns are simulated (docs/acoustics.md, section 3).
 #pragma once
 
 #include <vector>

@@ -35,7 +35,7 @@ struct Path {
   int first = -1, second = -1;  // indices of mirrors in the order of the path out; -1 = none
   Rotation turn;                // improper for one bounce
   Vec3d shift_m;
-  Vec3d second_normal;       // of the second mirror, as seen in the first
+  Vec3d second_normal;       // normal of the second mirror, as seen in the first
   bool beyond_front = true;  // places lie on the sonar's side of the last mirror, or on the other
 
   Vec3d image_of(Vec3d p) const { return turn * p + shift_m; }

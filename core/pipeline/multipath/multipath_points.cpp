@@ -32,7 +32,7 @@ class PointMultipath {
         if (a != b) paths_.push_back(path_by(image_paths.mirrors, a, b));
   }
 
-  /// Eq. 10 for a point: every pair of arrivals, one out and one back, but for the direct pair.
+  /// Eq. 10 for a point: every pair of arrivals, one out and one back, except for the direct pair.
   void add(Vec3d place, double strength_m, std::vector<PointEcho>& points) const {
     // In the order of the paths; [0] is the straight one if it arrives.
     std::vector<PointArrival> arrivals;

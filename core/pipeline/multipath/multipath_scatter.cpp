@@ -228,7 +228,7 @@ bool MultipathScatterer::is_visible(const Path& path, int column, float bin, flo
   };
   if (!belongs(nearest)) return false;
   const int stage = path.first < 0 ? 0 : path.second < 0 ? 1 : 2;
-  const float share = up ? 1 - part : part;  // of the other node
+  const float share = up ? 1 - part : part;  // share of the other node
   const float at_nearest = nearest.inverse_x[stage];
   const float seen = belongs(other) ? at_nearest + share * (other.inverse_x[stage] - at_nearest) : at_nearest;
   return nearness >= seen;

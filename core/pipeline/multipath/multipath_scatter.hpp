@@ -14,7 +14,7 @@ namespace sonar {
 /// Inputs of one ping's echoes via mirrors.
 struct ImagePaths {
   std::vector<FlatMirror> mirrors;
-  std::vector<Path> paths;  // those that own a part of the map; [0] is the straight one
+  std::vector<Path> paths;  // paths that own a part of the map; [0] is the straight one
   BounceMap map;
   BubbleLayer bubbles;
 };
@@ -33,7 +33,7 @@ class PathReach {
   };
   const PingPlan& plan_;
   double longest_m_;         // out and back together
-  std::vector<Span> spans_;  // of the path's windows, per block of columns
+  std::vector<Span> spans_;  // spans of the path's windows, for each block of columns
 };
 
 /// Amplitude of one pattern, transmitter's or receiver's, at an elevation.
@@ -58,7 +58,7 @@ class MultipathScatterer {
  private:
   struct TilePath {  // a path as it looks at one tile
     const Path* path;
-    float from_sonar_object[3], from_sonar[3], turn[9];  // of the tile's image, as in simd::TileSeen
+    float from_sonar_object[3], from_sonar[3], turn[9];  // geometry of the tile's image, as in simd::TileSeen
     float range_m, sample_shift, half_turns, amplitude;
     float reflection, rough_normal[2][3];  // product of the mirrors' Rc; their normals times sqrt(2) k h, sonar axes
     float lit_normal[3], lit_height;       // object axes; places with dot + height above 0 are lit by the last mirror
@@ -95,7 +95,7 @@ class MultipathScatterer {
   OneWayPattern pattern_;
   float first_edge_sine_, columns_per_sine_, tolerance_m_, absorption_np_per_m_, half_turns_per_m_;
   const std::vector<float>& turned_away_;
-  float away_ = 0;     // of the tile's object
+  float away_ = 0;     // that of the tile's object
   Vec3d tile_middle_;  // one of its cells, in the axes of PingScalars::seen_from
   std::vector<TilePath> tile_paths_;
   std::vector<Arrival> arrivals_;

@@ -86,7 +86,7 @@ class ChainTracer {
   Vec3 origin_;
   float turn_[9], far_[RayPacket::size] = {};
   std::vector<std::uint8_t> mirror_of_face_;
-  std::vector<Vec3> normals_;  // of the mirrors, world axes
+  std::vector<Vec3> normals_;  // normals of the mirrors, in world axes
   int count_ = 0;
 };
 
@@ -222,7 +222,7 @@ class ColumnsTracer {
   std::vector<FanInterval> open_, halves_;
 };
 
-/// Which part of a block of columns each path owns.
+/// The part of a block of columns that each path owns.
 void find_windows(std::size_t block, BounceMap& map) {
   auto& windows = map.windows[block];
   windows.fill({});

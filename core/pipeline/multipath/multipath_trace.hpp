@@ -34,7 +34,7 @@ struct BounceMap {
   static constexpr std::uint8_t no_mirror = 0xFF;
   struct Node {
     float inverse_x[3];      // after 0, 1, 2 bounces: 1 / x of the surface met, x along the unfolded path (DepthMap), 0 = none
-    std::uint8_t mirror[2];  // which the first and the second of them are, or no_mirror
+    std::uint8_t mirror[2];  // index of the first and the second mirror, or no_mirror
   };
   BounceFan fan;
   int columns = 0;

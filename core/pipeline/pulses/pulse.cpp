@@ -17,10 +17,10 @@ constexpr double gaussian_band_over_b = 2.5;    // P falls to 2e-7 at half of th
 constexpr double band_of_tone = 32;             // in 1 / length: what is cut off holds 4e-4 of P's peak, 1e-3 of p in L2
 constexpr double band_of_sweep = 1.5;           // in bandwidths: its fade lets a trace out
 constexpr std::size_t most_samples = 65536;
-constexpr double worth_keeping = 1e-4;       // of a measured pulse's peak, in time and in frequency
+constexpr double worth_keeping = 1e-4;       // least share of a measured pulse's peak, in time and in frequency
 constexpr double finest_rate_per_row = 256;  // samples of a measured pulse to a sample of the grid
 constexpr double longest_in_rows = 8192;     // sample times of the grid that a measured pulse may last
-constexpr int neighbours = 32;               // of a measured pulse, for a value between its samples
+constexpr int neighbours = 32;               // samples of a measured pulse that give a value between them
 constexpr double window_sharpness = 8.6;     // ripple 1e-4 up to 0.8 of the band
 
 double interpolation_weight(double x) {  // x in samples
@@ -159,7 +159,7 @@ void Pulse::integrate() {
 
 std::complex<double> Pulse::correlation(double time_s) const {
   if (shape_ == Shape::gaussian) return noise_correlation(scale_hz_, time_s);
-  if (shape_ == Shape::cw) {  // of a triangle: a cubic spline
+  if (shape_ == Shape::cw) {  // a triangle: interpolated by a cubic spline
     const double x = std::fabs(time_s) * scale_hz_;
     return x < 1 ? 1 - 1.5 * x * x + 0.75 * x * x * x : x < 2 ? 0.25 * (2 - x) * (2 - x) * (2 - x) : 0.0;
   }

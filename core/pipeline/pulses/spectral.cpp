@@ -12,8 +12,8 @@ namespace {
 // (26): 2.3 per point of width on a grid twice as fine; errors by width: FrequencySums.
 constexpr int oversampling = 2;
 constexpr double sharpness_per_width = 2.3;
-constexpr int small_padding = 8, large_padding = 16;  // of widths, so that loops over them are whole vectors
-constexpr int extra_terms = 4;                        // of the polynomials, beyond the width
+constexpr int small_padding = 8, large_padding = 16;  // widths are padded, so that loops over them are whole vectors
+constexpr int extra_terms = 4;                        // terms of the polynomials beyond the width
 constexpr int restart_every = 256;                    // a phase turned on step by step forgets itself slowly
 
 double kernel(double x) {  // |x| <= 1 over its half width, times the width: see sharpness_per_width

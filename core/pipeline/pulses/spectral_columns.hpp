@@ -10,7 +10,7 @@ namespace sonar {
 
 /// One worker's sums, a group of columns at a time.
 struct SpectralScratch {
-  std::vector<spectral::Complex> grids;  // of the columns of a group
+  std::vector<spectral::Complex> grids;  // grids of the columns of a group
   std::vector<spectral::Complex> sums, folded;
 };
 

@@ -1,6 +1,5 @@
-// The hot loops of a ping, compiled once per instruction set from kernels.inl and picked at run time.
-// Plain arrays in, plain arrays out: what they compute is explained where they are called (scatter, synthesize, form_beams,
-// receive).
+// The hot loops of a ping, compiled once per instruction set from kernels.inl and picked at run time. They read and write plain
+// arrays. What they compute is explained where they are called (scatter, synthesize, form_beams, receive).
 #pragma once
 
 #include <cstddef>
@@ -20,7 +19,7 @@ struct TileSeen {
   float from_sonar_object[3];  // tile centre minus sonar, object axes [m]
   float from_sonar[3];         // the same, sonar axes [m]
   float turn[9];               // object to sonar axes, row-major
-  float range_m;               // of the tile centre
+  float range_m;               // range of the tile's centre
   float sample_shift;          // echoes appear so much later (Doppler)
   float phase_turns;           // carrier phase of the tile centre, in [0, 1)
   float amplitude;             // everything that is constant over the tile, times weight_unit
@@ -30,7 +29,7 @@ struct TileSeen {
   // Which tangents its cells count at, from 0: those of the fan's main part, or those of the side lobes, where cells are coarser.
   float from_tangent, to_tangent;
   bool in_side_lobes;
-  float tolerance_share;  // of the range, beside GroupView::depth_tolerance_m
+  float tolerance_share;  // share of the range, in addition to GroupView::depth_tolerance_m
   float turned_away;  // the side of its facets that scatters nothing: cells with normal * direction * turned_away > 0; 0: none
   std::int32_t mark;  // surface_mark of its object
   bool moves;  // while the ping is under way: the depth map is looked up with the cells' place in the axes it was traced in
@@ -47,10 +46,10 @@ struct GroupView {
   bool conical;  // cones about the array: u = y / r, t = z / x; else flat beams: u = y / h, t = z / h, h^2 = x^2 + y^2
   float first_edge_sine, columns_per_sine;  // column = (first_edge_sine - u) * columns_per_sine
   int first_column, last_column;            // half-open
-  TangentAxis axis;                         // of the depth map, t
+  TangentAxis axis;                         // axis t of the depth map
   int bins;                                 // values per column of the depth map; the map has bins + 1
   int map_first_column, fan_columns;        // first of the depth map; of the whole fan
-  int columns_beside;                       // so far from its own column a cell is looked up, where the sonar moves
+  int columns_beside;                       // how far from its own column a cell is looked up while the sonar moves
   const float* inverse_depth;               // DepthMap::inverse_x
   const float* depth_slope;                 // DepthMap::per_column
   bool has_upper_marks;                     // in depth_slope
@@ -80,7 +79,7 @@ struct HitsToScatter {
   static constexpr int most = 256;  // at once
   HitDraw draw;
   const float* range_m;
-  const float* weight;  // amplitude but for the absorption of the water
+  const float* weight;  // amplitude except for the absorption of the water
   float decay_per_m;    // 2 alpha [Np/m]
   double turns_per_m;   // 2 f / c
 };

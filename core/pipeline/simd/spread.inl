@@ -1,6 +1,6 @@
 // The spreading of the non-uniform transform (core/pipeline/pulses/spectral.hpp), in double. Included by kernels.inl.
 
-inline double sine_of_turns_exact(double turns) {  // to 1e-11
+inline double sine_of_turns_exact(double turns) {  // accurate to 1e-11
   double x = turns - std::floor(turns + 0.5);
   x = (x > 0.25 ? 0.5 - x : x < -0.25 ? -0.5 - x : x) * 6.283185307179586;
   const double y = x * x;

@@ -11,7 +11,7 @@ namespace sonar {
 namespace {
 
 constexpr double least_reflection = 0.01;
-constexpr double least_factor = 0.01;   // of eq. 7's K_vis
+constexpr double least_factor = 0.01;   // least K_vis in eq. 7
 constexpr double sight_slack_m = 5e-3;  // facets stand off the true surface, touching things overlap
 constexpr double bent_slack = 0.1;      // the same, in radii of curvature
 constexpr double most_bent_slack_m = 0.2;

@@ -31,7 +31,7 @@ Direction direction_of(const SpecularPoint& p, std::size_t k, double wavelength_
   return {1 / fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]), bending(p.range_m, p.curvature[k]) < 0};
 }
 
-/// Where the surface begins and ends along a line of constant y: pairs.
+/// Pairs of places where the surface begins and ends along a line of constant y.
 void crossings(const SpecularPoint& p, double y, std::vector<double>& x) {
   x.clear();
   if (p.outline.empty()) {

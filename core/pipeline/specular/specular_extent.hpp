@@ -1,5 +1,5 @@
-// How much of a mirror's echo reaches the sonar when only a part of the surface is there to be seen: Fresnel integrals over the
-// visible part (docs/acoustics.md, section 3). Used by specular.
+// The share of a mirror's echo that reaches the sonar if only a part of the surface exists and is visible: Fresnel integrals over
+// the visible part (docs/acoustics.md, section 3). Used by specular.
 #pragma once
 
 #include <array>

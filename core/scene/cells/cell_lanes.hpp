@@ -9,7 +9,7 @@
 
 namespace sonar::cell_lanes {
 
-constexpr int side = 16, points = side * side;  // of a tile
+constexpr int side = 16, points = side * side;  // sides and points of a tile
 constexpr int block = 16, blocks = points / block;
 
 /// Inputs of a tile's draws, beside the cells' indices along u and v.

@@ -15,7 +15,7 @@
 namespace sonar {
 namespace {
 
-constexpr double fewest_cells = 3000;  // of an object, with CellView::exact_small
+constexpr double fewest_cells = 3000;  // least number for an object, with CellView::exact_small
 
 bool is_empty(const TileInView& t) { return t.tile->count == 0; }
 
@@ -34,7 +34,7 @@ struct SurfaceCells::Known {
   std::map<const Mesh*, SkinOf> skins;
   struct Patch {
     std::unique_ptr<SurfacePatch> patch;
-    std::size_t bytes = 0;  // of mesh and roots, which cached_bytes_ leaves out
+    std::size_t bytes = 0;  // bytes of mesh and roots, which cached_bytes_ leaves out
   };
   std::vector<Patch> patches;  // the last used come last
   std::size_t bytes = 0;
@@ -216,7 +216,7 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
 void SurfaceCells::raise_roots(const CellView& view) {
   for (; raised_ > coarsest_wanted(view); --raised_)
     for (auto& patch : patches_) {
-      patch->raise(raised_ - 1);  // of a scene before, it may have them
+      patch->raise(raised_ - 1);  // a patch of an earlier scene may have them already
       for (auto& root : patch->roots)
         if (root->alone && root->address.level == raised_ - 1) roots_.push_back({patch.get(), root.get()});
     }

@@ -27,7 +27,7 @@ namespace sonar {
 struct CellTile {
   int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
   Vec3d centre_m;                                     // object coordinates
-  float half_edge_m = 0;                              // of the cube
+  float half_edge_m = 0;                              // half an edge of the cube
   Vec3 box_middle_m, box_half_m;                      // the box round its cells, from the centre, object axes
   float position_unit_m = 0;
   float weight_unit = 0;  // xi * sqrt(cell area) [m] per count
@@ -87,7 +87,7 @@ struct TileInView {
 /// Cells of a view. Valid until the next call of in_view() or in_views().
 struct CellsInView {
   std::vector<TileInView> tiles;
-  std::vector<Rotation> sonar_from_object;  // to the sonar's axes, per object
+  std::vector<Rotation> sonar_from_object;  // rotations to the sonar's axes, per object
   std::size_t built = 0;                    // tiles that were missing, also where another view of the call wanted them too
 };
 
@@ -142,7 +142,7 @@ class SurfaceCells {
   };
   struct Found {  // by those who look through some of the roots
     std::vector<TileInView> in_view;
-    std::vector<Node*> missing;  // those of them without a tile
+    std::vector<Node*> missing;  // nodes among them without a tile
     std::size_t new_bytes = 0;
   };
   struct Look {  // a view as the cubes are compared with it
@@ -179,13 +179,13 @@ class SurfaceCells {
   std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
   std::vector<std::unique_ptr<SurfacePatch>> patches_;
   std::unique_ptr<Known> known_;
-  std::vector<Root> roots_;  // of all patches, in order; then, level by level, those of raise_roots()
+  std::vector<Root> roots_;  // roots of all patches, in order; then, level by level, those of raise_roots()
   int raised_;               // down to this level all patches have roots
   std::vector<TileInView> in_view_;
-  Look looked_;                          // of in_view()
-  std::vector<Look> looks_;              // of in_views()
+  Look looked_;                          // used by in_view()
+  std::vector<Look> looks_;              // used by in_views()
   std::vector<Found> found_;             // for each stretch of roots, or for each view
-  std::array<std::mutex, 64> dividing_;  // of a cube that several views want divided
+  std::array<std::mutex, 64> dividing_;  // locked while a cube that several views need is divided
 };
 
 }  // namespace sonar

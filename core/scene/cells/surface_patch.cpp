@@ -90,7 +90,7 @@ std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
     a.k = a.k * 2 + (c >> 2 & 1);
     cubes[static_cast<std::size_t>(c)] = cube_of(a);
   }
-  std::vector<std::uint8_t> touched(node.triangles.size());  // which cubes, as bits
+  std::vector<std::uint8_t> touched(node.triangles.size());  // cubes that it touches, as bits
   std::array<std::size_t, 8> how_many{};
   for (std::size_t n = 0; n < touched.size(); ++n) {
     const lattice::FacetBounds f = lattice::bounds_of(lattice::facet_of(*mesh, node.triangles[n], axis));

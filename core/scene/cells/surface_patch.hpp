@@ -41,12 +41,12 @@ class SurfaceCells::SurfacePatch {
  public:
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
-  Texture texture, grain;  // of the material, with its seed: what the tiles are made with
+  Texture texture, grain;  // texture and grain of the material, with its seed, for the tiles
   std::uint32_t texture_seed = 0;
   int coarsest = 0;  // level that gives the object its fewest cells, where asked for
   std::shared_ptr<const Mesh> mesh;
   std::vector<std::unique_ptr<Node>> roots;
-  std::size_t first_coarsest = 0;  // of the roots, from where on they have the coarsest level
+  std::size_t first_coarsest = 0;  // index of the first root with the coarsest level
 
   void set_material(const Material& m) { texture = m.texture, grain = m.grain, texture_seed = m.texture_seed; }
   bool has_tiles_of(const Material& m) const {

@@ -58,7 +58,7 @@ void on_error(const char*, const char* pattern, va_list arguments) {
 
 Tiff open(const std::filesystem::path& file) {
   TIFFSetErrorHandler(on_error);
-  TIFFSetWarningHandler(nullptr);  // of every tag that it does not know
+  TIFFSetWarningHandler(nullptr);  // libtiff would warn of every tag that it does not know
   last_error.clear();
 #if TIFFLIB_VERSION >= 20221213
   const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(), TIFFOpenOptionsFree);

@@ -34,7 +34,7 @@ class HeightValues {
 /// Coordinates and heights as a file describes them.
 struct CoordinateSystem {
   std::optional<bool> geographic = {};  // coordinates in degrees
-  double unit_m = 1;                    // of coordinates that are no degrees
+  double unit_m = 1;                    // unit of coordinates that are not degrees
   double height_unit_m = 1;
   bool web_mercator = false;  // its metres are longer than metres on the ground
 };
@@ -53,9 +53,9 @@ struct RawHeights {
 /// Scale, holes, and the origin of degrees. Errors lack the file's name.
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 
-/// By the .prj file beside the heights: WKT of version 1 or 2, or the lines that Arc/Info writes.
+/// Read from the .prj file beside the heights: WKT of version 1 or 2, or the lines that Arc/Info writes.
 CoordinateSystem system_by_prj(const std::filesystem::path& heights);
-/// By WKT; units that it does not name are metres.
+/// From WKT; units that it does not name are metres.
 CoordinateSystem system_of_wkt(std::string_view text);
 
 }  // namespace sonar

@@ -111,7 +111,8 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
     }
   opened->reset();
   if (auto room = check_import_memory(request, bytes); !room) return tl::make_unexpected(room.error());
-  begin_load_step("reading " + request.file.filename().string(), bytes / 20);  // of PLY; others are longer
+  // Bytes of a triangle in PLY; other formats take more.
+  begin_load_step("reading " + request.file.filename().string(), bytes / 20);
   return import_in_a_child(request);
 }
 

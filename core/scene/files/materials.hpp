@@ -23,7 +23,7 @@ class MaterialTable {
   void read(text::Map materials);
   /// Index into Scene::materials, where the material is put at its first use.
   std::optional<std::uint16_t> find(std::string_view name);
-  /// As find(); an unknown name is an error at the node.
+  /// The same as find(), but an unknown name is an error at the node.
   std::uint16_t named(const text::Node& node);
   std::uint16_t add(Material material);
 

@@ -1,5 +1,5 @@
-// Messages between the daemon and the program that imports meshes: the request as arguments and standard input, the answer as
-// a file. Neither believes the other's lengths.
+// Messages between the daemon and the program that imports meshes: the request as arguments and standard input, the answer as a
+// file. Neither side trusts the lengths that the other sends.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ struct ImportRequest {
   MeshFile mesh;  // `in_memory` is the standard input
   bool on_disk = true;
   int parent = 0;                  // the process that waits for the answer
-  std::filesystem::path readable;  // of confine_reads(); empty: all
+  std::filesystem::path readable;  // folder of confine_reads(); empty: all
   std::filesystem::path memory_root;
 };
 

@@ -5,7 +5,7 @@
 
 namespace sonar {
 
-constexpr std::uintmax_t max_mesh_bytes = std::uintmax_t{2} << 30;  // of a file and those it names, together
+constexpr std::uintmax_t max_mesh_bytes = std::uintmax_t{2} << 30;  // limit for a file and those that it refers to, together
 
 /// ".obj", in small letters.
 std::string mesh_extension(const std::filesystem::path& file);

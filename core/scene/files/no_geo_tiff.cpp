@@ -1,4 +1,4 @@
-// In place of geo_tiff.cpp where libtiff was not found.
+// Replaces geo_tiff.cpp if libtiff was not found.
 #include "core/scene/shapes/terrain.hpp"
 
 namespace sonar {

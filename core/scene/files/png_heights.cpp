@@ -31,7 +31,7 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
   if (columns < 2 || rows < 2) png_error(png, "smaller than 2 x 2 pixels");
   if (columns * rows > max_mesh_triangles / 2) png_error(png, "more than 10 million pixels; use a coarser image");
   if (grey && png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
-  if (!grey) png_set_palette_to_rgb(png);  // of palettes only
+  if (!grey) png_set_palette_to_rgb(png);  // only palettes need this
   png_set_strip_alpha(png);
   const int passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);

@@ -122,7 +122,7 @@ class ObjectsReader {
   std::set<std::string> names_;
   std::size_t triangles_ = 0;
   int unnamed_ = 0;
-  std::string label_;  // of the entry that is being read
+  std::string label_;  // label of the entry that is being read
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Meshes of shapes that were made before, for those who read many scenes that are alike: equal shapes share one mesh, so that
-// all that is made of meshes can be kept too. One thread at a time.
+// Meshes of shapes that were made before, for readers of many similar scenes. Equal shapes share one mesh, so that everything
+// that is computed from meshes can be kept too. Used by one thread at a time.
 #pragma once
 
 #include <algorithm>
@@ -15,13 +15,14 @@ namespace sonar {
 
 struct Shape {
   std::shared_ptr<const Mesh> mesh;  // null after an error
-  Vec3d centre_m;                    // where the mesh's own zero lies in the object's frame
+  Vec3d centre_m;                    // the mesh's own zero in the object's frame
   Primitive primitive = {};          // the true surface, of shapes that have one
 };
 
 class ShapeCache {
  public:
-  static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;  // of shapes that were not among the last used
+  // Limits for shapes that were not among the last used.
+  static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;
 
   /// The shape of that key, made with make() when it is not known. A shape without a mesh is not kept.
   template <class Make>

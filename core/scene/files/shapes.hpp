@@ -1,4 +1,5 @@
-// From an object's keys to its mesh: primitives, made ground, height files and mesh files. Internal to the scene loader.
+// Makes the mesh of an object from its keys: primitives, generated ground, height files and mesh files. Internal to the scene
+// loader.
 #pragma once
 
 #include <filesystem>
@@ -22,10 +23,10 @@ struct ShapeReader {
   Scene& scene;
   MaterialTable& materials;
   std::filesystem::path folder;                   // paths in the scene are relative to it
-  std::span<const BuiltInFile> in_memory = {};    // of a built-in scene: its mesh files, which are then not looked for on disk
-  ShapeCache* cache = nullptr;                    // of scenes before
+  std::span<const BuiltInFile> in_memory = {};    // mesh files of a built-in scene, which are then not looked for on disk
+  ShapeCache* cache = nullptr;                    // shapes of earlier scenes
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
-  std::set<std::string> noted = {};               // whose losses the scene's notes have
+  std::set<std::string> noted = {};               // meshes whose losses are in the scene's notes
   std::map<std::string, Shape> files = {};        // the same with their materials: objects that agree share one
 
   /// Names that `type` may have here, without "point".

@@ -58,7 +58,7 @@ std::vector<double> even_axis(std::vector<double> given) {
   return even ? axis : std::vector<double>();
 }
 
-/// By the whole length: one step alone is rounded where coordinates are large.
+/// Computed from the whole length, because one step alone is rounded if coordinates are large.
 std::size_t index_on(const std::vector<double>& axis, double v) {
   const double last = static_cast<double>(axis.size() - 1);
   return static_cast<std::size_t>(std::clamp(std::round((v - axis.front()) / (axis.back() - axis.front()) * last), 0.0, last));

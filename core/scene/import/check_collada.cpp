@@ -43,7 +43,7 @@ Element parse_element(std::string_view tag) {
   return element;
 }
 
-/// Where the tag that begins at `at` ends: its ">" outside of quotes.
+/// The end of the tag that begins at `at`: its ">" outside of quotes.
 std::size_t end_of_tag(std::string_view text, std::size_t at) {
   for (char quote = 0; at < text.size(); ++at) {
     const char c = text[at];
@@ -130,7 +130,7 @@ class Geometries {
       at = end;
     }
   }
-  std::map<std::string_view, std::uint64_t> triangles_;   // of geometries
+  std::map<std::string_view, std::uint64_t> triangles_;   // triangles of each geometry
   std::map<std::string_view, std::string_view> skin_of_;  // geometry or controller that a controller moves
   std::string_view geometry_, controller_, kind_;         // that are being read
   std::uint64_t values_a_corner_ = 1;

@@ -18,15 +18,15 @@ using Json = nlohmann::json;
 class GltfWalk final : public Json::json_sax_t {
  public:
   MeshFault fault;
-  std::map<std::string, std::vector<std::string>> children;  // of nodes
+  std::map<std::string, std::vector<std::string>> children;  // children of each node
   std::vector<std::vector<std::string>> scenes;              // the nodes of each
   std::size_t scene = 0;                                     // the one that is shown
   struct Primitive {
     std::string positions, indices;  // accessors
     std::uint64_t mode = 4;          // triangles
   };
-  std::map<std::string, std::vector<Primitive>> primitives;  // of meshes
-  std::map<std::string, std::string> mesh_of;                // of nodes
+  std::map<std::string, std::vector<Primitive>> primitives;  // primitives of each mesh
+  std::map<std::string, std::string> mesh_of;                // mesh of each node
   struct Accessor {
     std::uint64_t count = 0, type = 0;
   };

@@ -1,6 +1,6 @@
-// Cheap checks of mesh files before an importer reads them: numbers that the file cannot hold, and what contains itself, is
-// nested too deep or multiplies. Each takes a time linear in the text, and the memory of its nodes. They refuse what would cost
-// much; the importer finds the other faults.
+// Cheap checks of mesh files before an importer reads them: numbers that the file cannot hold, and nodes that contain themselves,
+// are nested too deep or multiply. Each takes a time linear in the text, and the memory of its nodes. They refuse what would take
+// much time or memory; the importer finds the other faults.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ using MeshFault = std::optional<std::string>;
 /// Triangles by the text of a file that names its parts.
 struct ListedFaces {
   std::uint64_t shown = 0;   // in the file's scene, each as often as the scene shows it
-  std::uint64_t hidden = 0;  // of parts that the scene does not name
+  std::uint64_t hidden = 0;  // triangles of parts that the scene does not refer to
 };
 
 /// `head`: the header at least, of a file of `file_bytes`.

@@ -5,7 +5,8 @@
 namespace sonar {
 namespace {
 
-struct Below {              // of a node, itself included
+/// The subtree of a node, including the node itself.
+struct Below {
   std::uint64_t nodes = 0;  // 0: not known yet
   std::uint32_t depth = 0;
   bool open = false;
@@ -26,7 +27,8 @@ std::optional<std::string> NodeGraph::fault(const std::vector<std::size_t>& root
       const Node& node = nodes_[way.back().node];
       if (way.back().next < node.children.size()) {
         const std::size_t child = node.children[way.back().next++];
-        if (below[child].open) return "node \"" + nodes_[child].name.substr(0, 64) + "\" contains itself; take it out there";
+        if (below[child].open)
+          return "node \"" + nodes_[child].name.substr(0, 64) + "\" contains itself; remove the reference that closes the loop";
         if (below[child].nodes == 0) way.push_back({child}), below[child].open = true;
         continue;
       }
@@ -36,7 +38,7 @@ std::optional<std::string> NodeGraph::fault(const std::vector<std::size_t>& root
         here.depth = std::max(here.depth, below[child].depth + 1);
       }
       if (here.depth > deepest)
-        return "has nodes deeper than " + std::to_string(deepest) + " levels; flatten them, or export it again";
+        return "has nodes deeper than " + std::to_string(deepest) + " levels; flatten the hierarchy, then export it again";
       below[way.back().node] = here;
       way.pop_back();
     }
@@ -44,13 +46,13 @@ std::optional<std::string> NodeGraph::fault(const std::vector<std::size_t>& root
   std::uint64_t total = 0;
   for (const std::size_t root : roots) total = std::min(total + below[root].nodes, most + 1);
   if (total > most)
-    return "repeats its nodes to more than " + std::to_string(most_repeated) + "; export it without instances of instances";
+    return "repeats its nodes more than " + std::to_string(most_repeated) + " times; export it without instances of instances";
   return std::nullopt;
 }
 
 std::vector<std::size_t> NodeGraph::shown(std::vector<std::size_t> roots) const {
   std::vector<std::size_t> nodes = std::move(roots);
-  for (std::size_t k = 0; k < nodes.size(); ++k)  // grows within
+  for (std::size_t k = 0; k < nodes.size(); ++k)  // the loop appends to `nodes`
     nodes.insert(nodes.end(), nodes_[nodes[k]].children.begin(), nodes_[nodes[k]].children.end());
   return nodes;
 }

@@ -1,4 +1,5 @@
-// The nodes of a mesh file and which of them contain which, to find what an importer would make of them before it does.
+// The nodes of a mesh file and which of them contain which, to find out how large they would become before an importer reads
+// them.
 #pragma once
 
 #include <cstddef>

@@ -45,7 +45,7 @@ Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double si
 struct HeightOptions {
   double z_scale = 1;                   // -1 for depths
   std::optional<bool> geographic = {};  // coordinates in degrees; unset: as the file says or shows
-  std::optional<Geodetic> origin = {};  // of geographic ones; unset: the middle of the grid
+  std::optional<Geodetic> origin = {};  // origin of a geographic grid; unset: the middle of the grid
 };
 /// ESRI ASCII grid (.asc).
 Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const HeightOptions& options);
@@ -67,7 +67,7 @@ struct SeabedShape {
   double spacing_x_m = 0.2, spacing_y_m = 0.2;
   std::uint32_t seed = 1;
   double relief_m = 0.1;    // amplitude of the longest octave
-  double wavelength_m = 4;  // of the longest octave
+  double wavelength_m = 4;  // wavelength of the longest octave
   int octaves = 5;
   double persistence = 0.5;  // amplitude ratio of one octave to the one before
   Ripples ripples = {};

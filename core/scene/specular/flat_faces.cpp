@@ -15,7 +15,7 @@ constexpr double least_area_m2 = 0.05;
 constexpr double least_width_m = 0.1;        // area / greatest extent: a mirror is many Fresnel zones wide
 constexpr double same_plane_m = 2e-4;        // an eighth of a wavelength at 1 MHz
 constexpr double same_normal = 1 - 1e-6;     // cosine
-constexpr double most_gentle_border = 0.25;  // of a face's border
+constexpr double most_gentle_border = 0.25;  // share of a face's border
 
 using Triangles = std::vector<std::uint32_t>;
 
@@ -40,7 +40,7 @@ Vec3d one_sided(Vec3d n) {
 }
 
 struct Candidate {
-  Plane plane;  // of the largest triangle
+  Plane plane;  // plane of the largest triangle
   double largest_m2 = 0, area_m2 = 0;
   std::uint16_t material = 0;
   Triangles triangles;
@@ -112,7 +112,7 @@ bool is_narrow(const Mesh& mesh, const Candidate& c) {
   return c.area_m2 < least_width_m * length(high - low);
 }
 
-/// Which triangles share each edge of a mesh.
+/// The triangles that share each edge of a mesh.
 class Edges {
  public:
   explicit Edges(const Mesh& mesh) {
@@ -138,7 +138,7 @@ bool curves_on(const Mesh& mesh, const Edges& edges, const Candidate& c) {
   for (const std::uint32_t t : c.triangles)
     for (std::size_t i = 0; i < 3; ++i) {
       const Vec3d from = corner(mesh, t, i), to = corner(mesh, t, (i + 1) % 3);
-      double cosine = -1;  // of the least bend to another triangle at this edge
+      double cosine = -1;  // cosine of the least bend to another triangle at this edge
       for (const std::uint32_t other : edges.at(mesh, t, i)) {
         if (other == t) continue;
         const Vec3d n = area_vector(mesh, other);

@@ -7,7 +7,7 @@ namespace sonar {
 namespace {
 
 constexpr double bary_slack = 1e-6;     // normals are continuous across edges: a point must not fall between two triangles
-constexpr double edge_units = 4;        // of a curved surface's edge, in Fresnel units: how far beside it its echo is looked for
+constexpr double edge_units = 4;        // how far beside the edge of a curved surface its echo is looked for, in Fresnel units
 constexpr double twins_in_units = 0.5;  // mirror points nearer to each other than this are one
 constexpr double walk_units = 16;       // an edge beyond this does not change the echo
 constexpr double trusted_units = 2;     // where the surface leaves its osculating arc farther out than this, no_owner notices

@@ -53,9 +53,9 @@ class SpecularMesh {
   };
   /// Where a triangle's interpolated normal meets the sonar.
   struct Foot {
-    std::array<double, 3> weight{};  // of the vertices; negative beside the triangle
+    std::array<double, 3> weight{};  // weights of the vertices; negative beside the triangle
     Vec3d normal;                    // the mesh's side
-    double height_m = 0;             // of the sonar along it
+    double height_m = 0;             // height of the sonar along it
   };
   class Maker;
 

@@ -190,7 +190,7 @@ void SpecularMesh::Maker::add_curved(const std::vector<std::uint32_t>& patch) {
     triangle.material = facets_[f].material;
     for (std::size_t k = 0; k < 3; ++k) {
       std::uint32_t& v = vertex_now_[facets_[f].vertex[k]];
-      if (v == no_owner || v < first_vertex) {  // of another patch: every patch has its own normals
+      if (v == no_owner || v < first_vertex) {  // the vertex belongs to another patch, and every patch has its own normals
         v = static_cast<std::uint32_t>(out_.vertices_.size());
         out_.vertices_.push_back({to_float(place_[facets_[f].vertex[k]]), {}, {}});
       }

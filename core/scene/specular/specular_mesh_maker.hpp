@@ -1,4 +1,4 @@
-// The workshop in which a SpecularMesh is made. Internal to specular_mesh.
+// Makes a SpecularMesh. Internal to specular_mesh.
 #pragma once
 
 #include <vector>
@@ -36,9 +36,9 @@ class SpecularMesh::Maker {
   SpecularMesh& out_;
   std::vector<Vec3d> place_;  // welded vertices
   std::vector<Facet> facets_;
-  std::vector<std::uint32_t> vertex_now_;   // of place_: the vertex made of it last
-  std::vector<std::int32_t> triangle_now_;  // of facets_: the curved triangle made of it
-  std::vector<Vec3> middle_;                // of the curved triangles, times three
+  std::vector<std::uint32_t> vertex_now_;   // by index in place_: the vertex that was made last
+  std::vector<std::int32_t> triangle_now_;  // by index in facets_: the curved triangle that was made
+  std::vector<Vec3> middle_;                // middles of the curved triangles, times three
 };
 
 }  // namespace sonar

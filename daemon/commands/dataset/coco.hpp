@@ -20,11 +20,11 @@ void count_instances(const nlohmann::json& part, Instances& instances);
 
 struct CocoFile {
   std::filesystem::path file;
-  const Instances& instances;  // of the whole set: its categories have the same numbers in every split
+  const Instances& instances;  // instances of the whole set, so that categories have the same numbers in every split
   std::function<std::string(std::uint64_t ping)> name_of;
   std::function<bool(const nlohmann::json& image)> is_in;  // images of the parts
 };
-/// From the notes of the set's shards, one in memory at a time; twice through them.
+/// Made from the notes of the set's shards, which are read twice, one in memory at a time.
 Result<void> write_coco(const DatasetJob& job, const std::filesystem::path& set, const CocoFile& coco);
 
 }  // namespace sonar::dataset

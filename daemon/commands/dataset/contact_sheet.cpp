@@ -76,7 +76,7 @@ Result<std::optional<Raster>> contact_cell(const Ping& ping, const Scene& scene,
   const FanStyle style{.width_px = sheet_width_px, .colours = *copper, .rings = false};
   PolarImage polar = polar_image_of(ping);
   const SampleFormat& format = ping.request.settings.format;
-  if (format.bits > 8 && format.scale == SampleFormat::Scale::linear)  // of pressure: the root shows a wall and the bed before it
+  if (format.bits > 8 && format.scale == SampleFormat::Scale::linear)  // pressure: the root shows a wall and the bed before it
     for (float& sample : polar.samples) sample = std::sqrt(sample * polar.full_scale);
   const auto picture = draw_fan(polar, style);
   if (!picture) return tl::make_unexpected(picture.error());

@@ -36,9 +36,9 @@ struct DatasetJob {
   std::uint64_t pings = 0, shard_pings = 1024;
   double negatives = 0;              // share of the pings without targets
   std::vector<std::string> targets;  // names or labels
-  bool fan = false;                  // also a picture of each ping
+  bool fan = false;                  // also writes a picture of each ping
   std::vector<Variation> variations;
-  std::vector<std::pair<std::string, std::string>> formulas;  // of let, as written
+  std::vector<std::pair<std::string, std::string>> formulas;  // formulas of `let`, as written
   Constraints constraints;
 
   std::uint64_t shards() const { return (pings + shard_pings - 1) / shard_pings; }

@@ -21,7 +21,7 @@ inline constexpr std::array<std::string_view, 2> export_form_names{"folder", "co
 inline constexpr std::array<std::string_view, 3> split_names{"train", "val", "test"};
 
 struct Split {
-  std::array<double, 3> shares{80, 10, 10};  // of the scenes, in the order of split_names; any sum
+  std::array<double, 3> shares{80, 10, 10};  // shares of the scenes, in the order of split_names; with any sum
   std::vector<std::string> by;               // draws whose values say what a scene is; empty: the scene itself
 };
 /// "80,10,10" and "bed_seed,coat". usage: what is wrong with them.

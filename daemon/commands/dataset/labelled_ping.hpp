@@ -21,13 +21,13 @@ namespace sonar::dataset {
 
 struct LabelledPing {
   std::vector<std::pair<std::string, std::vector<std::byte>>> files;  // ending and contents
-  nlohmann::json annotations;                                         // of render::annotations_of
+  nlohmann::json annotations;                                         // made by render::annotations_of
   nlohmann::json pixels;                                              // samples by class
   int width = 0, height = 0;                                          // beams, rows
   bool negative = false;
   std::string scene;           // digest of scene_key
   nlohmann::json draws;        // words
-  std::optional<Raster> cell;  // of a ping on the contact sheet
+  std::optional<Raster> cell;  // picture of a ping on the contact sheet
 };
 
 /// Makes pings one after the other on one thread; keeps the engine while the scene stays the same.
@@ -37,7 +37,7 @@ class PingMaker {
   PingMaker(const DatasetJob& job, std::string inputs, std::optional<SimdLevel> simd)
       : job_(job), inputs_(std::move(inputs)), simd_(simd) {}
   Result<LabelledPing> make(std::uint64_t number);
-  /// As contact_cell().
+  /// The same as contact_cell().
   Result<std::optional<Raster>> cell(std::uint64_t number);
 
  private:

@@ -26,7 +26,7 @@ namespace {
 using nlohmann::json;
 using std::filesystem::path;
 
-constexpr std::uint64_t pings_a_thread = 4;  // of a batch: they wait in memory until they are written in order
+constexpr std::uint64_t pings_a_thread = 4;  // pings of a batch, which wait in memory until they are written in order
 
 constexpr std::array<std::string_view, 5> own_names{"job.json", "README.md", "manifest.json", "coco.json", "contact.png"};
 
@@ -282,7 +282,7 @@ class Folder final : public DatasetFolder {
         cells.push_back(kept->second);
         continue;
       }
-      auto cell = makers_.front()->cell(number);  // of another run
+      auto cell = makers_.front()->cell(number);  // cell of a ping that another run made
       if (!cell) return tl::make_unexpected(cell.error());
       if (*cell) cells.push_back(**std::move(cell));
     }
@@ -300,7 +300,7 @@ class Folder final : public DatasetFolder {
   Parallel pool_;
   std::string inputs_, instruction_set_;
   std::vector<std::unique_ptr<PingMaker>> makers_;  // one a thread
-  std::map<std::uint64_t, Raster> cells_;           // of the contact sheet, as far as this run has made them
+  std::map<std::uint64_t, Raster> cells_;           // cells of the contact sheet that this run has made so far
   DatasetProgress progress_;
   bool differs_ = false;
 };

@@ -17,7 +17,7 @@ namespace sonar::dataset {
 
 struct DatasetOptions {
   std::filesystem::path out;
-  std::uint64_t part = 0, parts = 1;   // of the shards: those whose number leaves `part` when divided by `parts`
+  std::uint64_t part = 0, parts = 1;   // the part has the shards whose number leaves `part` when divided by `parts`
   int threads = 1;                     // pings side by side
   std::optional<SimdLevel> simd = {};  // instead of the job's
   // When it becomes true, the pings under way are finished, and the shard's are set aside for the next run.
@@ -25,10 +25,10 @@ struct DatasetOptions {
 };
 
 struct DatasetProgress {
-  std::uint64_t shards = 0, all_shards = 0, kept_shards = 0;  // of this part
+  std::uint64_t shards = 0, all_shards = 0, kept_shards = 0;  // shards of this part
   std::uint64_t pings = 0, all_pings = 0;                     // made by this run, to be made by it
-  std::uint64_t bytes = 0;                                    // of finished shards
-  std::uint64_t set_aside = 0;                                // of a shard that is not complete, when stopped
+  std::uint64_t bytes = 0;                                    // bytes of finished shards
+  std::uint64_t set_aside = 0;                                // pings of an incomplete shard, when stopped
   bool stopped = false;                                       // before all were made
   bool whole = false;                                         // the manifest has been written
   std::optional<std::uint64_t> missing = {};                  // the first shard that another part has not made yet
@@ -41,7 +41,7 @@ class DatasetFolder {
  public:
   virtual ~DatasetFolder() = default;
   virtual const std::string& inputs() const = 0;           // digest of all that the bytes depend on
-  virtual const std::string& instruction_set() const = 0;  // of simd_level_names
+  virtual const std::string& instruction_set() const = 0;  // a name of simd_level_names
   /// Whether the shard is there, and as it was written. bad_data: it differs from its digest.
   virtual Result<bool> holds(std::uint64_t shard) = 0;
   /// A shard of that name that has come meanwhile stays. bad_data: its bytes differ. Others: io; config as draw_ping().

@@ -1,4 +1,5 @@
-// `sonarctl farm`, which runs `sonard farm`: jobs into the farm's queue, how they stand, and the data set of finished shards.
+// `sonarctl farm`, which runs `sonard farm`: puts jobs into the farm's queue, shows their progress, and makes the data set of
+// finished shards.
 #pragma once
 
 #include "daemon/commands/command_line.hpp"

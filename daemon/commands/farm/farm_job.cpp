@@ -23,7 +23,7 @@ constexpr std::size_t piece_bytes = std::size_t{512} << 10;  // less than the 1 
 
 constexpr std::chrono::milliseconds least_patience{100}, most_patience = std::chrono::hours(24);
 
-/// Reads a whole number of a record and checks its bounds. json::get() would silently convert other values.
+/// Reads an integer field of a record and checks that it is within its bounds. json::get() would silently convert other values.
 Result<std::uint64_t> count_in(const json& words, const char* name, std::uint64_t least, std::uint64_t most) {
   const json& value = words.at(name);
   if (value.is_number_unsigned() && value.get<std::uint64_t>() >= least && value.get<std::uint64_t>() <= most)
@@ -199,7 +199,7 @@ Result<path> receive_files(const FarmJob& record, const path& files, Queue& queu
                      (files / f.name).string() + " is missing, or differs from the submitted file" +
                          (record.in_bucket ? ", and the queue does not have it; submit the job again"
                                            : "; the files of this job are 8 MiB or more in all, so the queue does not carry "
-                                             "them: give --out the folder of the submission"));
+                                             "them: start the worker with the --out of `sonarctl farm submit`"));
     if (const auto done = write_below(files, f.name, contents); !done) return tl::make_unexpected(done.error());
   }
   return files / record.file;

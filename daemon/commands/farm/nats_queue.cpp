@@ -274,7 +274,7 @@ class NatsQueue final : public Queue {
   Owned<natsConnection, natsConnection_Destroy> connection_;
   Owned<jsCtx, jsCtx_Destroy> jetstream_;
   std::map<std::string, Owned<kvStore, kvStore_Destroy>> stores_;
-  Subscription subscription_;  // of the job that was last taken from
+  Subscription subscription_;  // subscription to the job that was used last
   std::string subscribed_;
 };
 

@@ -29,7 +29,7 @@ struct QueueOptions {
 /// A bucket of keys and values; `name` is its name on the server.
 struct Table {
   const char* name;
-  std::chrono::seconds lifetime;  // of a value
+  std::chrono::seconds lifetime;  // lifetime of a value
 };
 inline constexpr std::chrono::hours a_month{30 * 24};
 inline constexpr Table job_table{"FARM_JOBS", a_month};    // key JOB: its FarmJob; JOB.stopped: why it was stopped

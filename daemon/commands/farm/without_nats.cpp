@@ -1,4 +1,4 @@
-// In place of nats_queue.cpp where libnats was not found.
+// Replaces nats_queue.cpp if libnats was not found.
 #include "daemon/commands/farm/queue.hpp"
 
 namespace sonar::farm {

@@ -16,10 +16,10 @@ namespace sonar::render {
 namespace {
 
 constexpr double least_pattern = 0.1;     // -20 dB
-constexpr double level_tolerance = 1e-6;  // of a sine or cosine, for the bed and the sonar
+constexpr double level_tolerance = 1e-6;  // tolerance of a sine or cosine, for the bed and the sonar
 
 struct Bed {
-  double height_m = 0;  // of the sonar above the bed
+  double height_m = 0;  // height of the sonar above the bed
   const Material* material = nullptr;
 };
 

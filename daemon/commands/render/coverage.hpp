@@ -14,7 +14,7 @@ struct Coverage {
   std::size_t bins = 0, good = 0;  // good: within 1 dB
   std::size_t empty = 0;           // 10 dB or more below: no energy to speak of
   double worst_db = 0;             // signed, of the bin farthest off
-  double mean_db = 0;              // of all bins' powers over their closed form
+  double mean_db = 0;              // mean of the powers of all bins over their closed form
   double percent() const { return bins == 0 ? 0 : 100.0 * static_cast<double>(good) / static_cast<double>(bins); }
 };
 

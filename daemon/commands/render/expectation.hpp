@@ -21,12 +21,12 @@ struct Window {
 };
 
 enum class Measure {
-  peak_level_db,     // of the loudest sample, between the rows by a log-parabola [dB re 1 uPa]
+  peak_level_db,     // level of the loudest sample, interpolated between the rows by a log-parabola [dB re 1 uPa]
   peak_range_m,      // device range of that peak
-  peak_bearing_deg,  // its azimuth, between the beams by a log-parabola, positive to port
+  peak_bearing_deg,  // azimuth of the peak, interpolated between the beams by a log-parabola, positive to port
   mean_level_db,     // 10 log10 of the mean power
-  energy_db,         // of a beam's power summed over time, mean over the beams [dB re 1 uPa^2 s]
-  strength_db,       // of sum sigma_i / r_i^4 behind the picture [dB re 1 / m^2]; beams uniform in the sine only
+  energy_db,         // power of a beam summed over time, mean over the beams [dB re 1 uPa^2 s]
+  strength_db,       // sum of sigma_i / r_i^4 behind the picture [dB re 1 / m^2]; only for beams uniform in the sine
   coverage_percent,  // bins within 1 dB of the closed form on a plane bed
   coverage_worst_db,
 };

@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int beams_a_side = 4;  // of a polygon: along arcs its corners lie no farther apart
+constexpr int beams_a_side = 4;  // corners of a polygon along an arc are no farther apart
 
 bool is_thing(const Scene& scene, std::size_t i) {
   const std::size_t objects = scene.objects.size();

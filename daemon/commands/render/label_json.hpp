@@ -9,7 +9,7 @@
 
 namespace sonar::render {
 
-inline constexpr int cartesian_width_px = 1000;  // of the fan that `cartesian` is about, as of render's pictures
+inline constexpr int cartesian_width_px = 1000;  // width of the fan to which `cartesian` refers, as in render's pictures
 
 /// By instance from 1: name, class, and whether it is a thing, which has boxes and polygons: an object with a label of its own.
 nlohmann::json instances_of(const Scene& scene);

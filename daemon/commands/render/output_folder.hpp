@@ -20,7 +20,7 @@ struct OutputOptions {
   int batch = 1;                       // pings that are made before they are written, by all threads at once
   bool overwrite = false;              // pings of other inputs in the folder are removed
   std::uint64_t first = 1;             // number of the first ping; those before it are left out
-  std::optional<std::uint64_t> pings;  // of each job; nothing: one, or one for every pose of the file
+  std::optional<std::uint64_t> pings;  // pings of each job; empty: one, or one for every pose of the file
   std::optional<double> rate_hz;       // nothing: as the settings say, or at every pose
 };
 

@@ -130,7 +130,7 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   read_sonar(root.optional("sonar"), job);
   root.optional("sweep").map().entries();
   root.optional("let").map().entries();
-  for (const char* key : {"dataset", "vary", "constraints", "counts"}) root.optional(key);  // of a data set's job
+  for (const char* key : {"dataset", "vary", "constraints", "counts"}) root.optional(key);  // these are keys of a data set's job
   job.expectations = read_expectations(root.optional("expect"));
   if (auto error = document->finish()) return tl::make_unexpected(*error);
   auto scene = read_scene_of(scene_node, folder, job.name, *document, known);
@@ -162,7 +162,7 @@ Result<std::vector<Values>> read_steps(const text::Document& document) {
 }
 
 Result<std::string> text_of_file(const std::filesystem::path& file) {
-  auto text = read_regular(file, text::YamlLimits{}.max_bytes);  // of one that is too long, enough to be refused as such
+  auto text = read_regular(file, text::YamlLimits{}.max_bytes);  // if the file is too long, reads enough to refuse it
   if (text && text->empty()) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": it is empty");
   return text;
 }

@@ -59,7 +59,7 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   ReplayDevice device;
   std::optional<std::uint16_t> id;
   std::uint64_t looked_at = 0;
-  const protocol::Make* unserved = nullptr;  // whose pings depend on the requests of its host
+  const protocol::Make* unserved = nullptr;  // make whose pings depend on the requests of its host
   while (auto message = reader.next()) {
     looked_at += message->bytes.size();
     if (looked_at > most_looked_at_bytes || (id && device.recorded_status)) break;

@@ -1,4 +1,4 @@
-// The sonar that a recording comes from, as its status datagram shows it: taken from the recording, with the addresses of here.
+// The sonar that a recording comes from, as its status datagram shows it: taken from the recording, with the local addresses.
 #pragma once
 
 #include <memory>
@@ -12,10 +12,10 @@ namespace sonar {
 /// An Oculus, which sends by itself, or a sonar that hosts ask for pings: an ARIS, a Sonar 3D-15, a sonar of the ping protocol.
 struct ReplayDevice {
   oculus::StatusMessage status;
-  bool recorded_status = false;              // else made up from the device id
-  const protocol::Vendor* vendor = nullptr;  // of one that is asked, else null; and what it is like
+  bool recorded_status = false;              // if false, it is made up from the device id
+  const protocol::Vendor* vendor = nullptr;  // the vendor of a device that answers requests, else null; and its state
   std::shared_ptr<protocol::DeviceState> state;
-  std::uint32_t serial = 0;  // of an ARIS
+  std::uint32_t serial = 0;  // serial number of an ARIS
   std::string is_only_seen;  // why no driver can be served; empty = one can
 
   /// Null: it listens by TCP for connections that last.

@@ -1,4 +1,5 @@
-// When the next message of a recording is due: at the pace it was recorded with, faster or slower. Pure; the replay server waits.
+// Computes when the next message of a recording is due: at the pace of the recording, faster or slower. Pure; the replay server
+// waits.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The page of `sonard replay`: the recording's pictures, with a time line of each viewer's own. What the driver gets is not
-// touched.
+// The page of `sonard replay`: the recording's pictures, with a time line for each viewer. It does not change what the driver
+// gets.
 #pragma once
 
 #include "daemon/server/connections/connection_listener.hpp"

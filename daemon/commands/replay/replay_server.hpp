@@ -1,7 +1,7 @@
-// Serves a recording as the sonar it came from would: TCP, one client at a time, its messages byte for byte; status datagrams.
-// A sonar that is asked for pings answers its host, and sends them from when on the host wants them: an ARIS by datagrams, to the
-// receivers that its controller sets; a Sonar 3D-15 likewise, to those set over HTTP, as of one client that does not leave.
-// The whole of `sonard replay` but its command line; one thread, no scene, no engine.
+// Serves a recording as the recorded sonar would: over TCP, to one client at a time, its messages byte for byte; and status
+// datagrams. A sonar that sends pings on request answers its host, and sends them once the host wants them: an ARIS as datagrams
+// to the receivers that its controller sets; a Sonar 3D-15 in the same way, to the receivers set over HTTP, as for one client
+// that does not leave. This is all of `sonard replay` except its command line; it has one thread, no scene and no engine.
 #pragma once
 
 #include <functional>
@@ -18,7 +18,7 @@ namespace sonar {
 struct ReplayOptions {
   Endpoint at{{127, 0, 0, 2}, 0};   // port 0: any
   std::vector<Endpoint> status_to;  // empty = the broadcast address of `at`'s network, the device's port
-  double speed = 1;                 // of the recorded pace
+  double speed = 1;                 // multiple of the recorded pace
   bool stepped = false;             // no pace: the next message when the client has taken the last
   bool loop = false;                // from the front again and again
   double rate_hz = 10;              // messages a second of recordings that know no times
@@ -43,7 +43,7 @@ class ReplayServer {
   void stop();
 
   const Figures& figures() const { return figures_; }
-  /// After io.run(). bug, when an exception in one of its parts ended it.
+  /// Call it after io.run(). The error is `bug` if an exception in one of its parts ended it.
   const Result<void>& outcome() const { return outcome_; }
   Endpoint at() const { return at_; }
 
@@ -58,7 +58,7 @@ class ReplayServer {
     bool gone = false;
     // For a sonar that sends pings on request:
     std::unique_ptr<protocol::Dialogue> dialogue;
-    protocol::Bytes replies;  // not yet sent
+    protocol::Bytes replies;  // replies that are not sent yet
     std::vector<udp::endpoint> receivers;
     bool wants_frames = false;
     std::int64_t frames = 0;
@@ -100,7 +100,7 @@ class ReplayServer {
   asio::signal_set signals_;
   LimitConfig limits_;
   Admission admission_{limits_, log_};
-  std::unique_ptr<SonarHttp> http_;  // of a device with settings over HTTP; then nothing else listens
+  std::unique_ptr<SonarHttp> http_;  // for a device with settings over HTTP; then nothing else listens
   ClientPointer client_;
   LogLimiter refused_limit_, unsent_limit_;
   Figures figures_;

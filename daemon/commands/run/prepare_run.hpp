@@ -1,5 +1,5 @@
-// All of a run that comes before its first socket: what `sonard run` starts from and `sonard check` judges, so that both refuse
-// the same with the same sentence.
+// All steps of a run before its first socket. `sonard run` starts with them and `sonard check` does only them, so that both
+// refuse the same with the same sentence.
 #pragma once
 
 #include <functional>
@@ -17,10 +17,10 @@ namespace sonar {
 struct PreparedRun {
   FoundConfig found;
   std::shared_ptr<const Scene> scene;
-  std::unique_ptr<Parallel> pool;  // of the engines
+  std::unique_ptr<Parallel> pool;  // pool of the engines
   EngineFactory make_engine;
-  std::unique_ptr<PingEngine> engine;  // of the scene
-  std::string token_warning;           // of Token::read(); empty = the file is safe
+  std::unique_ptr<PingEngine> engine;  // engine of the scene
+  std::string token_warning;           // warning of Token::read(); empty = the file is safe
 };
 
 /// The configuration as the command line changes it, its token, journal, scene and engine. `json`: how errors are to be written

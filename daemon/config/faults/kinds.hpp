@@ -107,7 +107,7 @@ enum class FaultEffect {
 struct FaultParameter {
   std::string_view name;
   std::string_view value;          // default
-  double lowest = 0, highest = 0;  // of a number, inclusive
+  double lowest = 0, highest = 0;  // limits of a number, inclusive
   std::string_view words = {};     // "a b c": one of these words instead of a number
 };
 

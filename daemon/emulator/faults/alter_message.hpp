@@ -23,9 +23,9 @@ struct MessageEdit {
 struct MessageContext {
   const protocol::Vendor& vendor;
   FaultDraws draws;
-  std::uint32_t first_number = 0;           // of renumber: the first ping that met the fault
-  std::uint32_t number = 0;                 // of this ping
-  const protocol::Bytes* before = nullptr;  // of splice: the message before; may be null
+  std::uint32_t first_number = 0;           // for renumber: the first ping that had the fault
+  std::uint32_t number = 0;                 // number of this ping
+  const protocol::Bytes* before = nullptr;  // for splice: the message before; may be null
 };
 
 /// Returns where the message was touched, if that is not where its bytes first differ (a pause, an end); false in `.second`: the

@@ -10,7 +10,7 @@ namespace sonar {
 
 struct FaultDraws {
   Seed seed{};
-  std::uint32_t fault = 0;  // of its name
+  std::uint32_t fault = 0;  // made from its name
   std::uint32_t sonar = 0, ping = 0, client = 0;
 
   /// The draw of that index, any of 2^32.
@@ -22,7 +22,7 @@ struct FaultDraws {
   }
   /// Below `end`, which is above 0.
   std::size_t below(std::size_t end, std::uint32_t index) const { return static_cast<std::size_t>(bits(index)) % end; }
-  /// In (0, 1).
+  /// A value in (0, 1).
   double uniform(std::uint32_t index) const { return static_cast<double>(uniform_open(bits(index))); }
 };
 

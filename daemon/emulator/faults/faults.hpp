@@ -1,6 +1,6 @@
-// The faults of one emulated sonar. The Sonar calls it at every place where a fault may act; with no fault each call is a look at
-// an empty list. No sockets, no clock: what has to be done to ports and connections comes back as orders. Everything random is
-// drawn from (seed, fault, sonar, ping, client), so the same plan gives the same bytes.
+// The faults of one emulated sonar. The Sonar calls it at every place where a fault may act; without a fault each call finds an
+// empty list. It has no sockets and no clock: what has to be done to ports and connections is returned as orders. Everything
+// random is drawn from (seed, fault, sonar, ping, client), so the same plan gives the same bytes.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct RestartDevice {
 struct OverrideSettings {
   protocol::SettingsOverride wanted;
 };
-struct ApplyRequest {  // of a client, late
+struct ApplyRequest {  // applies a client's request late
   protocol::ChangeSettings change;
   std::string who;
 };
@@ -47,7 +47,7 @@ struct DropNewestPings {  // for clients that read slowly
   bool on = true;
 };
 struct ReleaseHeld {};
-struct StopShaping {};  // of the message that is being written
+struct StopShaping {};  // ends the shaping of the message that is being written
 struct ServeWaiting {};
 using FaultOrder = std::variant<SetListening, EndClients, ForgetSettings, RestartDevice, OverrideSettings, ApplyRequest,
                                 ChangePace, ReadClients, DropNewestPings, ReleaseHeld, StopShaping, ServeWaiting>;
@@ -129,14 +129,14 @@ class Faults {
     std::uint64_t begun = 0, injections = 0, pings_left = 0;
     std::optional<Time> begins;  // later, by its delay
     Time expires = Time::max(), since{}, until = Time::max(), step = Time::max();
-    bool down = false;               // of a port or link that goes up and down
+    bool down = false;               // state of a port or link that goes up and down
     std::deque<std::uint32_t> hits;  // pings it meets, the latest few
     std::optional<std::uint32_t> first_number;
     std::shared_ptr<const Ping> kept;
     std::optional<Time> kept_time;
-    protocol::Bytes before;                           // of splice, older_part and late_part
-    std::vector<std::pair<Time, ConnectionId>> ends;  // of end_after
-    std::vector<std::pair<Time, ApplyRequest>> late;  // of delay_requests
+    protocol::Bytes before;                           // message before, for splice, older_part and late_part
+    std::vector<std::pair<Time, ConnectionId>> ends;  // when end_after ends connections
+    std::vector<std::pair<Time, ApplyRequest>> late;  // requests that delay_requests holds back
   };
   using Effect = FaultEffect;
 

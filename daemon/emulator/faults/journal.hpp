@@ -12,7 +12,7 @@ namespace sonar {
 
 struct FaultEntry {
   enum class What { began, injected, ended } what{};
-  std::string fault, asked;  // its name; code or trouble as the user wrote it
+  std::string fault, asked;  // name of the fault; code or trouble as the user wrote it
   const FaultKind* kind = nullptr;
   std::string sonar;
   std::string client;               // peer; empty = the device

@@ -66,9 +66,9 @@ struct Reset {
 };
 /// A connection is closed and forgotten.
 struct Closed {
-  std::string peer;  // its name
+  std::string peer;  // name of the peer
   Role role{};
-  bool served = false;  // else it waited for a slot
+  bool served = false;  // if false, it waited for a slot
   std::uint64_t pings_written = 0, pings_dropped = 0;
   std::string why;
   bool by_client = false;  // it left
@@ -79,7 +79,7 @@ struct Announce {};
 struct PingQueued {
   std::shared_ptr<const Ping> ping;
   std::shared_ptr<const protocol::Bytes> bytes;                                // null: not sent over TCP
-  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // of each stream that has receivers
+  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream that has receivers
   double simulation_s = 0;
   bool preview = false;  // for viewers of the live view alone
 };
@@ -102,7 +102,7 @@ struct PingOutcome {
   std::shared_ptr<const Ping> ping = nullptr;  // null on failure
   std::string failure = {};
   bool refused = false;             // only this ping could not be made: it is invalid or there was no memory for it
-  ErrorKind kind = ErrorKind::bug;  // of a failure that is more than that
+  ErrorKind kind = ErrorKind::bug;  // kind of a failure that is more than that
   double seconds = 0;               // wall time of its computation, without pings of other sonars computed in between
 };
 

@@ -33,22 +33,22 @@ struct Connection {
   Role role = Role::client;
   Peer peer;
   State state = State::served;
-  std::uint64_t number = 0;              // of clients: counted from 1
-  const protocol::Port* port = nullptr;  // of the vendor's
+  std::uint64_t number = 0;              // number of a client, counted from 1
+  const protocol::Port* port = nullptr;  // one of the vendor's ports
   std::unique_ptr<protocol::Dialogue> dialogue;
   Outbox outbox;
   /// Receivers that a client requested, one list for each stream it named; for a stream the device's own list, one.
   std::vector<protocol::SetReceivers> receivers;
-  struct Held {  // by a fault
+  struct Held {  // held back by a fault
     Outbox::Message ping;
     Time until{};
-    bool after_next = false;  // until the next ping has overtaken it
+    bool after_next = false;  // held until the next ping has overtaken it
   };
   std::deque<Held> held;
   bool finishing = false;  // no more bytes are taken in, no more pings offered
   Time not_before{};       // earliest next call of dialogue->on_tick, in unskipped time
   std::uint64_t bytes_written = 0, bytes_read = 0;
-  std::uint64_t streamed_pings = 0, streamed_bytes = 0;  // of a client: by a stream's datagrams to its receivers
+  std::uint64_t streamed_pings = 0, streamed_bytes = 0;  // sent to the receivers of this client by a stream's datagrams
   std::uint64_t requests = 0;                            // for settings or a ping
   std::string complaint = {};                            // the last about what it sent
 

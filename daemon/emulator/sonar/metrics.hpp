@@ -38,24 +38,24 @@ class Histogram {
 /// pings = refused + unwanted + those offered to clients; offered = sent + dropped (+ what is in the outboxes now).
 struct DeviceFigures {
   std::uint64_t ticks = 0;
-  std::uint64_t skipped_ticks = 0;                       // of them: no ping came of it
+  std::uint64_t skipped_ticks = 0;                       // ticks of which no ping came
   SkippedTicks skipped;                                  // why
   std::uint64_t skipped_stale = 0;                       // why, too: the vehicle's poses had stopped (poses.on_stale: stop)
   std::uint64_t pings = 0;                               // simulated
-  std::uint64_t refused = 0;                             // of them by the engine: nothing came out
-  std::uint64_t unwanted = 0;                            // of them: their clients had gone or had requested other settings
-  std::uint64_t out_of_water = 0;                        // of them: noise only, since the sonar was above the sea surface
+  std::uint64_t refused = 0;                             // pings that the engine refused
+  std::uint64_t unwanted = 0;                            // pings whose clients had gone or had requested other settings
+  std::uint64_t out_of_water = 0;                        // pings of noise only, because the sonar was above the sea surface
   std::uint64_t served = 0;                              // written whole to at least one client
-  std::uint64_t offered = 0;                             // to clients: a ping counts for each of them
+  std::uint64_t offered = 0;                             // pings offered to clients: a ping counts for each of them
   std::uint64_t sent = 0;                                // written whole to a client
-  std::uint64_t dropped = 0;                             // not written to a client
+  std::uint64_t dropped = 0;                             // pings that were not written to a client
   std::array<std::uint64_t, drop_reasons> dropped_by{};  // why, by DropReason
   std::uint64_t waiting = 0;                             // in outboxes now, not yet begun
   std::uint64_t clients = 0, refused_clients = 0;        // since the start
   std::uint64_t clients_now = 0, clients_queued = 0;
   std::uint64_t bytes_written = 0, bytes_read = 0;
   double simulation_s = 0;  // wall time of all pings
-  Histogram simulation;     // of one ping
+  Histogram simulation;     // time to compute a ping
   Histogram lateness;       // from when a tick was due to when it was taken up
   Histogram jitter;         // how far the time between two pings at a client's socket is off the time between their ticks
   Histogram latency;        // from a ping's tick to its last byte handed to the kernel, for each client

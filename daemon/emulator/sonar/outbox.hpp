@@ -35,15 +35,15 @@ class Outbox {
       std::chrono::nanoseconds length{};  // 0: written separately, without a pause
     };
     std::vector<Pause> pauses;                            // by increasing index
-    enum class End { none, fin, reset } end = End::none;  // of the connection, after the last byte
+    enum class End { none, fin, reset } end = End::none;  // how the connection ends after the last byte
   };
   struct Message {
     std::shared_ptr<const Bytes> bytes;
-    std::uint32_t ping = 0;       // its number; 0 = a reply
-    std::vector<Bytes> prefixes;  // of a ping: it is sent once for each, the prefix first; none = once, as it is
-    Time fired_at{};              // of a ping
-    std::shared_ptr<const std::vector<Bytes>> datagrams = nullptr;  // of a ping, in place of bytes
-    std::shared_ptr<const Shape> shape = nullptr;                   // of a message without prefixes and datagrams; may be empty
+    std::uint32_t ping = 0;       // number of the ping; 0 = a reply
+    std::vector<Bytes> prefixes;  // prefixes of a ping: it is sent once for each, the prefix first; none = once, as it is
+    Time fired_at{};              // when the ping was fired
+    std::shared_ptr<const std::vector<Bytes>> datagrams = nullptr;  // datagrams of a ping, in place of bytes
+    std::shared_ptr<const Shape> shape = nullptr;  // shape of a message without prefixes and datagrams; may be empty
     explicit operator bool() const { return bytes != nullptr || datagrams != nullptr; }
     std::size_t size() const;  // bytes, without prefixes
   };

@@ -1,4 +1,4 @@
-// When the next ping of one sonar is due: a grid computed from its start (never a sum of sleeps), or one ping per trigger.
+// Computes when the next ping of one sonar is due: on a grid from its start (never a sum of sleeps), or one ping per trigger.
 // Pure arithmetic on times passed in; the Sonar asks it and its caller sets the timer.
 #pragma once
 
@@ -44,7 +44,7 @@ class Pacer {
   Time last_tick() const { return last_tick_; }
   bool trigger_waits() const { return trigger_waits_; }
   std::chrono::nanoseconds period() const { return period_; }
-  /// That were due; those skipped, fired, and a trigger that waits add up to it.
+  /// Ticks that were due: those skipped, those fired, and a trigger that waits.
   std::uint64_t ticks() const { return ticks_; }
   const SkippedTicks& skipped() const { return skipped_; }
   std::uint64_t skipped_ticks() const { return skipped_.total(); }
@@ -55,10 +55,10 @@ class Pacer {
 
   bool running_ = false, triggered_ = false, trigger_waits_ = false, has_fired_ = false;
   std::chrono::nanoseconds period_{0}, travel_{0};  // travel: of sound to the range and back
-  Time start_{};                                    // of the grid
-  std::int64_t index_ = 0;                          // of the next tick on it
+  Time start_{};                                    // start of the grid
+  std::int64_t index_ = 0;                          // index of the next tick on the grid
   Time trigger_at_{};
-  Time last_tick_{}, home_at_{};  // of the last ping, and when its sound is back
+  Time last_tick_{}, home_at_{};  // time of the last ping, and when its sound is back
   std::uint64_t ticks_ = 0;
   SkippedTicks skipped_;
 };

@@ -8,7 +8,7 @@ namespace sonar {
 namespace {
 
 constexpr std::uint64_t ticks_a_stretch = 40;
-constexpr double tolerated_share = 0.1;  // of ticks skipped
+constexpr double tolerated_share = 0.1;  // tolerated share of skipped ticks
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Does computing keep a sonar from the rate it was asked for? Looks at stretches of ticks and says so once. Pure: figures in, a
-// sentence out; used by Sonar.
+// Finds out whether the computing time keeps a sonar from the requested rate, and reports it once. Pure: figures in, a sentence
+// out; used by Sonar.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ class RateWatch {
   double rate_hz_ = 0;
   std::uint64_t ticks_before_ = 0, busy_before_ = 0;
   int pings_ = 0;
-  double ping_s_ = 0, longest_s_ = 0;  // of those: summed, and the longest
+  double ping_s_ = 0, longest_s_ = 0;  // time that those took: sum and longest
 };
 
 }  // namespace sonar

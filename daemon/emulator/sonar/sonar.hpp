@@ -28,7 +28,7 @@ class Sonar {
   struct Surroundings {
     const Config& config;
     const World& world;
-    FaultJournal* journal = nullptr;  // of faults; may be null
+    FaultJournal* journal = nullptr;  // journal of faults; may be null
   };
   /// `index` keys its noise; `skipped`: what stepped time has jumped over so far.
   Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time now, std::chrono::nanoseconds skipped = {});
@@ -69,7 +69,7 @@ class Sonar {
   /// The datagrams of a status broadcast, in order; none when the vendor has no beacon.
   std::vector<protocol::Bytes> beacons(Time now);
   struct Answers {
-    std::vector<protocol::Bytes> datagrams;  // to send back, in order
+    std::vector<protocol::Bytes> datagrams;  // datagrams to send back, in order
     Actions actions;
   };
   /// A datagram from a host, at a port of kind udp_answer.
@@ -101,7 +101,7 @@ class Sonar {
 
   // ---- control
 
-  /// As one more client would. Refused with a sentence that says what the product can do, and nothing is changed.
+  /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
   /// Returns whether that was a change.
   bool set_transmit(bool on);

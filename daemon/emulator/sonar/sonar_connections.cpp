@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-constexpr std::size_t most_receivers = 16;  // of one list
+constexpr std::size_t most_receivers = 16;  // limit for one list
 
 /// The next receiver of a stream is not sent pings that were made for the last one.
 void drop_unreceived(Connections& connections) {
@@ -64,7 +64,7 @@ void Sonar::serve(Connection& connection, Time now, Actions& actions) {
   apply_fault_orders(now, actions);
 }
 
-/// After a client came or went.
+/// Called after a client has come or gone.
 void Sonar::on_membership(Time now, Actions& actions) {
   const Connection* const oldest = connections_.oldest_client();
   state_.connected_client = oldest == nullptr ? protocol::Ipv4{} : oldest->peer.ip;

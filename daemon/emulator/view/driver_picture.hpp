@@ -24,7 +24,7 @@ class DriverPicture {
 
  private:
   const protocol::Make& make_;
-  std::unique_ptr<protocol::Host> host_;  // of a make whose picture adds up many pings
+  std::unique_ptr<protocol::Host> host_;  // for a make whose picture adds up many pings
 };
 
 }  // namespace sonar

@@ -12,7 +12,7 @@ namespace {
 constexpr int fan_width_px = 720;
 constexpr std::size_t most_points = 20000;
 constexpr int arc_pieces = 16;
-constexpr std::size_t plan_rows = 256;  // of a range image seen from above
+constexpr std::size_t plan_rows = 256;  // rows of a range image seen from above
 
 ViewPayload::Piece piece(wire::Bytes bytes) { return {"", std::make_shared<const wire::Bytes>(std::move(bytes))}; }
 

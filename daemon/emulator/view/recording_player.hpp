@@ -1,5 +1,5 @@
-// Which ping of a recording is shown when: its length, and the last ping at or before a moment. Pure; the caller chooses how many
-// steps it takes at a time.
+// Finds the ping of a recording that is shown at a moment (the last one at or before it), and the length of the recording. Pure;
+// the caller chooses how many steps it takes at a time.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ class RecordingPlayer {
   /// Reads one ping more to find the length; false: there is none, and the recording is at its front again.
   bool measure();
   Time begin() const { return begin_.value_or(Time{}); }
-  /// From the first ping to the last.
+  /// Time from the first ping to the last.
   Ns length() const { return length_; }
   std::uint64_t count() const { return count_; }
   const recording::SentBy& by() const { return pings_.by(); }

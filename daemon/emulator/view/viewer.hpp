@@ -37,7 +37,7 @@ struct ViewChannel {
 /// A message of a channel: its pieces one after the other, shared by all viewers.
 struct ViewPayload {
   struct Piece {
-    std::string key;  // of a part of the message that a later one replaces
+    std::string key;  // key of a message part that a later one with the same key replaces
     ViewBytes bytes;
   };
   Time at{};
@@ -49,7 +49,7 @@ using ViewPayloadPointer = std::shared_ptr<const ViewPayload>;
 /// One WebSocket message to write.
 struct ViewMessage {
   bool is_text = false;
-  wire::Bytes head;               // all of it, but for channels
+  wire::Bytes head;               // all of it, except for channels
   std::vector<ViewBytes> pieces;  // what follows
 };
 
@@ -85,7 +85,7 @@ class Viewer {
   using Moment = std::chrono::nanoseconds;
   struct Rights {
     bool may_steer = false;
-    double most_hz = 0;  // of pictures; 0 = no bound
+    double most_hz = 0;  // limit for the rate of pictures; 0 = none
   };
   enum class CloseCode : std::uint16_t { none = 0, policy = 1008, try_again_later = 1013 };
   static constexpr const char* may_only_look = "this connection may only look";
@@ -151,7 +151,7 @@ class Viewer {
     Moment interval{0};
     std::size_t deepest = 1;
     std::optional<Moment> sent_at;
-    std::deque<ViewPayloadPointer> waiting;  // one, but for events
+    std::deque<ViewPayloadPointer> waiting;  // one, except for events
     bool is_due(Moment now) const { return !sent_at || now - *sent_at >= interval; }
   };
   static wire::Bytes bytes_of(std::string_view text);

@@ -1,4 +1,4 @@
-// Which axes the poses of a file are in, seen from what a vehicle does: it stays more or less upright.
+// Guesses the axes of the poses in a file from the fact that a vehicle stays more or less upright.
 #pragma once
 
 #include <vector>
@@ -16,7 +16,7 @@ inline double upright(Quatd q) { return 1 - 2 * (q.x * q.x + q.y * q.y); }
 struct OtherAxes {
   const char* text;  // "have the axes of a camera"
   const char* cure;
-  Vec3d up;  // in them
+  Vec3d up;  // upward direction in these axes
 };
 /// Those in which a body that mostly lies on its side would stay upright, more or less; null: none of them.
 const OtherAxes* axes_of(const std::vector<Pose>& poses);

@@ -38,7 +38,7 @@ std::string complaint_about(const Scene& scene, const std::string& name) {
   return {};
 }
 
-/// The shape of the other object, all of one material.
+/// A copy of the mesh in which every triangle has this material.
 std::shared_ptr<const Mesh> mesh_of(const Mesh& mesh, std::size_t material) {
   auto copy = std::make_shared<Mesh>(mesh);
   std::fill(copy->material.begin(), copy->material.end(), static_cast<std::uint16_t>(material));
@@ -152,7 +152,8 @@ Result<ScenePointer> with_object_set(const Scene& scene, const control::SetObjec
 }
 
 bool is_same(const Scene& a, const Scene& b) {
-  // All members, so that a new one does not compile until it is compared here. Name and notes do not change the pings.
+  // All members are named, so that this line does not compile after a member is added: compare the new one here. Name and notes
+  // are not compared, because they do not change the pings.
   const auto& [name, materials, objects, point_targets, body_names, bodies_in_world, sea_surface, water_column, other_sonars,
                ray_origin, notes] = a;
   return ray_origin_of(a) == ray_origin_of(b) && materials == b.materials && point_targets == b.point_targets &&

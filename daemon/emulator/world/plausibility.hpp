@@ -35,8 +35,8 @@ using MeshShapes = std::map<std::shared_ptr<const Mesh>, MeshShape>;
 /// Facts against which poses are judged. The sea surface is not one of them.
 struct Surroundings {
   Extent scene;                // where the scene puts what can be seen
-  std::vector<Extent> ground;  // of each plane, seabed and height map that stands still
-  double longest_range_m = 0;  // of any sonar
+  std::vector<Extent> ground;  // extent of each plane, seabed and height map that stands still
+  double longest_range_m = 0;  // longest range of any sonar
   MeshShapes meshes;           // that can be seen
 };
 /// `known`: of a scene before, whose meshes need no second look.
@@ -52,7 +52,7 @@ std::vector<Carrier> carriers_of(const Config& config);
 std::vector<Note> notes_on_mounts(const Config& config);
 /// `around`: of this scene.
 std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around);
-/// At most one on the place, and one on the attitude.
+/// At most one concerns the place, and one the attitude.
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
 /// `largest_angle_rad`: as in PoseSample.
 std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad);

@@ -1,5 +1,5 @@
-// Where everything is: the poses of vehicles and moving objects, taken from senders by the sequence and time rules of
-// docs/configuration.md, and answered for any moment. Pure: time is passed in; the daemon's I/O thread owns the only one.
+// The poses of vehicles and moving objects. They are taken from senders by the rules of docs/poses.md, "Time and order", and
+// returned for any moment. Pure: time is passed in; the daemon's I/O thread owns the only one.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ struct PoseRules {
 /// A vehicle, or a moving object of the scene.
 struct BodyStart {
   std::string name;
-  Pose initial_pose;    // in world
+  Pose initial_pose;    // pose in the world
   bool orbits = false;  // circles the world's z axis until the first accepted pose
   motion::Plan plan{};  // followed until the first accepted pose
 };
@@ -120,7 +120,7 @@ class World {
   struct Track {
     BodyStart body;
     PoseHistory history;
-    motion::Playback playback{};  // of body.plan
+    motion::Playback playback{};  // playback of body.plan
     std::string sender_id, source;
     std::uint64_t seq = 0;
     std::uint32_t reset_counter = 0;

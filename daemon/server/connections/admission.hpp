@@ -3,8 +3,8 @@
 //
 // The last descriptors below the process's limit are never given to clients: whatever else the daemon needs one for (a log, a
 // scene) finds one. Of these, half are for control alone, so that the cause can be asked for. Some before them are for drivers:
-// pose senders and control get one of these only in exchange for a connection of their own. Should they run out all
-// the same, one kept in reserve lets visitors in to be sent away; without it they would stay in the listener's queue, which would
+// pose senders and control get one of these only in exchange for a connection of their own. If descriptors run out nevertheless,
+// one in reserve is used to accept connections and close them; without it they would stay in the listener's queue, which would
 // report them again and again.
 #pragma once
 

@@ -43,7 +43,7 @@ class ConnectionListener {
   /// Port 0 = not listening.
   Endpoint at() const { return listener_.at(); }
   bool is_open() const { return listener_.is_open(); }
-  /// After stop(): no connection is left.
+  /// True after stop() when no connection is left.
   bool gone() const { return running_ == 0; }
 
  private:

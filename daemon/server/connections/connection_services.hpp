@@ -58,7 +58,7 @@ class Deadline : public std::enable_shared_from_this<Deadline> {
   bool passed() const { return passed_; }
 
  private:
-  tcp::socket& socket_;  // of the connection that owns this
+  tcp::socket& socket_;  // socket of the connection that owns this
   asio::steady_timer timer_;
   bool passed_ = false;
 };

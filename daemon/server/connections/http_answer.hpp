@@ -11,7 +11,7 @@ struct HttpAnswer {
   unsigned status = 200;
   std::string body;
   std::string type = "application/json";
-  std::string allow = {};  // of 405
+  std::string allow = {};  // Allow header of status 405
   std::string why = {};    // for the log, of a refusal worth a line
   std::vector<std::pair<std::string, std::string>> headers = {};
 };

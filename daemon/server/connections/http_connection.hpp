@@ -24,10 +24,10 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   asio::awaitable<void> write();
   void close();
   bool over() const { return !socket_.is_open(); }
-  /// Before read(): no slot is free. Answers 503 and discards input for a moment.
+  /// Call it before read() if no slot is free. Answers 503 and discards input for a moment.
   void reject();
-  /// Before read(): the client is untrusted until it shows the token; `claim_slot` is then called, and is false when no slot is
-  /// free.
+  /// Call it before read(). The client is untrusted until it shows the token; `claim_slot` is then called, and is false when no
+  /// slot is free.
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
   /// Our end of the connection.
@@ -50,7 +50,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   bool proved = false;                           // there was a whole request
 
  private:
-  struct Head {  // of the answer to a request
+  struct Head {  // head of the answer to a request
     bool http_1_0 = false, without_body = false, last = false;
   };
   void hand_over();
@@ -73,7 +73,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   asio::steady_timer wake_reader_, wake_writer_, wake_operation_, rest_;
   HttpReader reader_;
   std::optional<HttpRequest> request_;  // read, not yet answered
-  std::optional<HttpRefusal> refusal_;  // of a request that cannot be parsed
+  std::optional<HttpRefusal> refusal_;  // refusal of a request that cannot be parsed
   std::function<bool()> claim_slot_;    // empty: trusted
   std::shared_ptr<HttpTakeover> takeover_;
   std::size_t unsettled_ = 0;    // work: of the answer

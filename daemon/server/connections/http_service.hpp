@@ -1,5 +1,5 @@
-// Interface between HttpConnection, which moves requests and answers, and the control server or
-// an emulated sonar, which know what they mean.
+// Interface between HttpConnection, which moves requests and answers, and the control server or an emulated sonar, which
+// interpret them.
 #pragma once
 
 #include <functional>

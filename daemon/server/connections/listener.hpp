@@ -1,4 +1,4 @@
-// A listening TCP socket and its accept loop: one for sonars, control and poses. It survives whatever one connection does to it.
+// A listening TCP socket and its accept loop: sonars, control and poses use it. No connection can stop it.
 #pragma once
 
 #include <functional>

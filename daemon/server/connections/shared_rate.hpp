@@ -1,5 +1,5 @@
-// How fast several clients are read together: a bucket of bytes that all draw on. A client within its fair share of the rate does
-// not wait for the bucket, so that only those who send more wait when it is empty. Pure arithmetic, as InputRate.
+// Limits how fast several clients are read together: a bucket of bytes for all of them. A client within its fair share of the
+// rate does not wait for the bucket, so that only those who send more wait when it is empty. Pure arithmetic, as InputRate.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ class SharedRate {
   };
 
   explicit SharedRate(std::size_t bytes_per_s) : bytes_per_s_(bytes_per_s), together_(bytes_per_s) {}
-  /// For one more client; the rate is this from now on.
+  /// Adds a client; the rate is this one from now on.
   Part join(std::size_t bytes_per_s) {
     bytes_per_s_ = bytes_per_s;
     together_.use(bytes_per_s);
@@ -46,7 +46,7 @@ class SharedRate {
   }
 
  private:
-  static constexpr std::size_t at_once = 4096;  // of a new sender; more would reward reconnecting again and again
+  static constexpr std::size_t at_once = 4096;  // limit for a new sender; a larger one would reward connecting again and again
   std::size_t bytes_per_s_;
   InputRate together_;
   std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // by us and by each Part

@@ -20,7 +20,7 @@ class Token {
   static Result<Token> read(const std::filesystem::path& file, std::string& warning);
 
   bool needed() const { return !secret_.empty(); }
-  /// Also true when no token is required. Constant time.
+  /// Takes constant time. Also true if no token is required.
   bool matches(std::string_view shown) const;
 
  private:

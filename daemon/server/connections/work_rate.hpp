@@ -11,7 +11,8 @@
 
 namespace sonar {
 
-/// In bytes; measured: a byte may cost 50 ns of the I/O thread, which leaves it 95 % of its time at the default rate.
+/// Work is counted in bytes; measured: a byte may cost 50 ns of the I/O thread, which leaves it 95 % of its time at the default
+/// rate.
 namespace work {
 inline constexpr std::size_t of_connection = 1024, of_request = 512, of_upgrade = 32768;  // HTTP
 inline constexpr std::size_t of_frame = 64, of_control_frame = 512;                       // WebSocket

@@ -12,7 +12,7 @@ struct ControlTargets {
   Operations& operations;
   Events& events;
   PoseIntake& poses;
-  SharedRate pose_rate;  // of poses without an answer (request id 0)
+  SharedRate pose_rate;  // limit for poses without an answer (request id 0)
 };
 
 }  // namespace sonar

@@ -42,7 +42,7 @@ using HttpAction = std::variant<HttpAnswer, HelpAction, HealthAction, MetricsAct
 
 struct RoutedRequest {
   HttpAction action;
-  std::string pose_refusal = {};  // of a malformed pose: counted
+  std::string pose_refusal = {};  // why a malformed pose is refused; it is counted
 };
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy);
 

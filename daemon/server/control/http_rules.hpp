@@ -50,8 +50,8 @@ struct Route {
   enum class Kind { unknown, help, health, metrics, status, events, operation, faults, end_fault, ticket };
   Kind kind = Kind::unknown;
   std::string_view method;  // the allowed one
-  std::string op;           // of an operation: the member of Request.op; of faults: "faults", "kinds" or "journal"
-  std::string name = {};    // of the sonar, object or fault, when the path has it
+  std::string op;           // operation: the member of Request.op; for faults "faults", "kinds" or "journal"
+  std::string name = {};    // name of the sonar, object or fault, if the path has it
 };
 Route route_of(const Target& target, std::string_view method);
 

@@ -36,12 +36,12 @@ struct DaemonFigures {
   double uptime_s = 0;
   std::vector<std::pair<std::string, DeviceFigures>> sonars;  // by name
   PoseCounters poses;
-  std::uint64_t clients_now = 0, refused_for_places = 0, refused_for_descriptors = 0;  // of all sonars
-  std::vector<ViewerFigures> viewers;                                                  // of the live view
+  std::uint64_t clients_now = 0, refused_for_places = 0, refused_for_descriptors = 0;  // of all sonars together
+  std::vector<ViewerFigures> viewers;                                                  // viewers of the live view
   ProcessFigures process;
   std::vector<std::pair<std::string, std::uint64_t>> active_faults;          // by sonar
   std::vector<std::pair<std::string_view, std::uint64_t>> fault_injections;  // by code, since the start
-  std::uint64_t fault_entries_lost = 0;                                      // not in the journal's file
+  std::uint64_t fault_entries_lost = 0;                                      // entries that are not in the journal's file
 };
 std::string metrics_text(const DaemonFigures& figures);
 

@@ -30,10 +30,10 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   asio::awaitable<void> write();
   void close();
   bool over() const { return !socket_.is_open(); }
-  /// Before read(): no slot is free.
+  /// Call it before read() if no slot is free.
   void reject() { ending_ = true; }
-  /// Before read(): the client is untrusted until it shows the token; `claim_slot` is then called, and is false when no slot is
-  /// free.
+  /// Call it before read(). The client is untrusted until it shows the token; `claim_slot` is then called, and is false when no
+  /// slot is free.
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
 
@@ -65,7 +65,7 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   control::DelimitedParser parser_;
   InputRate rate_;
   std::optional<SharedRate::Part> pose_rate_;  // from the first pose without an answer
-  std::optional<control::Bytes> newest_pose_;  // of those beyond the rate
+  std::optional<control::Bytes> newest_pose_;  // newest of the poses beyond the rate
   std::deque<control::Bytes> answers_;         // framed
   std::size_t unsettled_ = 0;                  // work: answers
   std::size_t in_progress_ = 0;                // requests whose answer is not in answers_ yet

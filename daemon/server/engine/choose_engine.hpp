@@ -1,5 +1,5 @@
-// Which engine computes the pings: the CPU's, a device's, or the device's where there is one (docs/cuda.md). For `sonard run` and
-// `sonard render`.
+// Chooses the engine that computes the pings: the CPU's, a device's, or the device's if there is one (docs/cuda.md). Used by
+// `sonard run` and `sonard render`.
 #pragma once
 
 #include <functional>

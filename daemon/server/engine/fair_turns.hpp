@@ -1,5 +1,5 @@
-// Chooses the next ping when several sonars share one engine: of the sonar that had least of its time; and whether a ping may
-// come before one under way is finished. Pure: times are passed in; owned by the Simulator.
+// Chooses the next ping when several sonars share one engine: that of the sonar that has used the least time; and decides whether
+// a ping may start before the one under way is finished. Pure: times are passed in; owned by the Simulator.
 #pragma once
 
 #include <algorithm>

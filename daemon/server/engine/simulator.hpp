@@ -45,7 +45,7 @@ class Simulator : private Interruption {
   struct Job {
     PingRequest request;
     Done done;
-    std::shared_ptr<PingEngine> engine;  // of a job that changes the engine
+    std::shared_ptr<PingEngine> engine;  // engine of a job that changes the engine
     Retired retired;
     asio::executor_work_guard<asio::io_context::executor_type> io_stays;
   };
@@ -73,7 +73,7 @@ class Simulator : private Interruption {
   bool working_ = false;
   int under_way_ = 0;          // pings, one let in by another included
   double let_in_s_ = 0;        // time of pings let in by the one under way
-  std::uint32_t running_ = 0;  // whose ping is under way
+  std::uint32_t running_ = 0;  // sonar whose ping is under way
   std::chrono::steady_clock::time_point running_since_{};
 
   asio::io_context queue_{1};

@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint64_t memory_of_a_triangle = 250, memory_of_a_compact_triangle = 150;
 
 std::uint64_t memory_of_rays(const Scene& scene) {
-  std::map<int, std::uint64_t> triangles;  // of each body, and of what stands still
+  std::map<int, std::uint64_t> triangles;  // triangles of each body, and of what stands still
   for (const Object& object : scene.objects) triangles[object.body] += object.visible ? object.mesh->triangles.size() : 0;
   std::uint64_t bytes = 0;
   for (const auto& [body, n] : triangles)

@@ -1,5 +1,5 @@
-// Builds the ping engine, which is where a ray tracer that does not like this machine or this scene says so, by exception.
-// `sonard run` and `sonard_bench` start theirs here, so that such a failure is one sentence and not "a bug".
+// Builds the ping engine. A ray tracer that does not work on this computer or with this scene throws here. `sonard run` and
+// `sonard_bench` use this, so that such a failure is one sentence and not "a bug".
 #pragma once
 
 #include <functional>

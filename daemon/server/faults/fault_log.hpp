@@ -45,7 +45,7 @@ class FaultLog final : public FaultJournal {
   const std::map<std::string_view, std::uint64_t>& injections() const { return injections_; }
   /// Entries that are not in the file.
   std::uint64_t lost() const { return lost_; }
-  /// For the status: that some are lost, and why.
+  /// Text for the status: that entries are lost, and why.
   std::vector<Note> notes() const;
 
  private:

@@ -23,7 +23,7 @@ class JournalFile {
 
   struct Written {
     std::uint64_t lines = 0;
-    std::string why;  // not all; empty = all
+    std::string why;  // why entries are missing; empty = all are there
   };
   /// Stops at the first line that fails; a later call tries again.
   Written append(std::string_view lines);

@@ -1,5 +1,5 @@
-// The sockets of poses by MAVLink: one a link, listening (udpin) or dialling (udpout), each with a MavlinkPoses behind it.
-// Owned by App, beside PoseServer; what comes goes into the same PoseIntake.
+// The sockets of poses by MAVLink: one for each link, listening (udpin) or sending first (udpout), with a MavlinkPoses each.
+// Owned by App, as PoseServer is; poses go into the same PoseIntake.
 #pragma once
 
 #include <list>
@@ -21,7 +21,8 @@ class MavlinkServer {
   /// Links and origin are those of `config` as it is now; who may send follows it.
   MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log);
 
-  /// Before open(): what the command to inject a failure does, on every link. Without it the command is answered as unsupported.
+  /// Call it before open(). Sets what the command to inject a failure does, on every link. Without it the command is answered as
+  /// unsupported.
   void inject_failures_with(mavlink::InjectFailure inject) { inject_ = std::move(inject); }
   Result<void> open();
   void start();

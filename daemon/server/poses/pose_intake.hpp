@@ -1,6 +1,6 @@
-// Where all that moves bodies enters, whatever way it came: poses, and requests to place objects and to steer trajectories. Wall
-// time is mapped to ours, the world judges, refusals are logged. PoseServer's datagrams and lines end here, and what clients of
-// the control servers send.
+// Receives all that moves bodies, from every source: poses, and requests to place objects and to steer trajectories. It maps wall
+// time to ours, lets the world accept or refuse, and logs refusals. PoseServer's datagrams and lines end here, and what clients
+// of the control servers send.
 #pragma once
 
 #include <chrono>
@@ -41,7 +41,7 @@ class PoseIntake {
   Events* events_;
   Plausibility* plausibility_;
   LogLimiter refusals_, notices_;
-  std::uint32_t placements_ = 0;            // of moving objects: none is a movement from the one before
+  std::uint32_t placements_ = 0;            // placements of moving objects; each begins a new history
   std::chrono::nanoseconds wall_shift_{0};  // our time = WALL stamp + shift
 };
 

@@ -1,7 +1,7 @@
 // Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. Owned by App; the control stream is a server of its own
-// (daemon/server/control/). A malformed message costs its sender a counted refusal and, now and then, a log line; a connection
-// that does not speak JSON is closed. What connections send is worked on in turns of bounded work, and no faster than limits
-// allow: of what waits beyond them only the newest is kept, so that no pose acts long after it was sent.
+// (daemon/server/control/). A malformed message is refused and counted, and from time to time logged; a connection that does not
+// speak JSON is closed. Connections are served in turns of bounded work, and no faster than the limits allow. Of what exceeds
+// them only the newest is kept, so that no pose takes effect long after it was sent.
 #pragma once
 
 #include <list>
@@ -43,7 +43,7 @@ class PoseServer {
         : encoding(e), datagrams(std::move(s)), lines(io, admission, Admission::Purpose::client) {}
     Encoding encoding;
     udp::socket datagrams;
-    Listener lines;  // of JSON only
+    Listener lines;  // for JSON only
   };
   /// One TCP sender; closed by stop(), or when its place is needed and it has sent no pose, or too much, for longest. One that
   /// has hung up has no place any more.
@@ -56,7 +56,7 @@ class PoseServer {
           of_all(std::move(part)) {}
     tcp::socket socket;
     Sender sender;
-    asio::steady_timer turn;  // until more of what it sent is worked on
+    asio::steady_timer turn;  // waits until more of what it sent is worked on
     InputRate rate;
     SharedRate::Part of_all;
     control::LineParser lines;
@@ -100,7 +100,7 @@ class PoseServer {
   LogLimiter notices_, faults_;
   std::list<Port> ports_;
   ConnectionSlots<Connection> connections_;
-  SharedRate together_;  // of all connections
+  SharedRate together_;  // limit for all connections together
   InputRate dropping_;   // likewise, of bytes that are read away
   Endpoint protobuf_at_, json_at_;
   bool stopping_ = false;

@@ -1,5 +1,5 @@
 // One file of a recording inside the daemon: what a sonar sends, and in MCAP also pictures, true poses and what each beam meets.
-// Made and written on the recording thread (recordings.hpp); knows no queue, no clock and no log.
+// Made and written on the recording thread (recordings.hpp); it has no queue, no clock and no log.
 #pragma once
 
 #include <cstdint>
@@ -25,11 +25,11 @@ struct RecordedPing {
   Time at{};  // when it was made
   std::shared_ptr<const Ping> ping;
   std::shared_ptr<const protocol::Bytes> bytes;  // the vendor's, as clients get them; null = not sent over TCP
-  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // of each stream, as receivers get them
-  protocol::Bytes status;                   // what the sonar announced of itself then; empty = nothing
-  std::shared_ptr<const SceneNames> names;  // of the scene that it was made in
+  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream, as receivers get them
+  protocol::Bytes status;                   // status that the sonar announced then; empty = none
+  std::shared_ptr<const SceneNames> names;  // names of the scene in which it was made
 
-  /// That it keeps in memory while it waits.
+  /// Bytes that it keeps in memory while it waits.
   std::size_t size() const;
 };
 
@@ -37,7 +37,7 @@ struct RecordedPing {
 struct RecordedSonar {
   std::string name, vendor;
   recording::PcapConversation ends;  // for the headers of a capture
-  bool has_range_images = false;     // which have no labels
+  bool has_range_images = false;     // range images have no labels
 };
 
 class RecordingFile {

@@ -25,7 +25,7 @@ std::string why_without_labels(RecordingFile::Kind kind, const RecordedSonar& so
 
 struct Recordings::Recording {
   enum class State { opening, running, ending, ended } state = State::opening;
-  std::string name;  // in the folder
+  std::string name;  // file name in the folder
   RecordingFile::Kind kind{};
   bool labels = false;
   v1::RecordingStatus status;
@@ -235,7 +235,7 @@ bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
   std::size_t waiting = 0;
   Pointer most = recording;
   for (const Pointer& r : recordings_) {
-    waiting += r->waiting_bytes;  // of one that ends, too: it is still in memory
+    waiting += r->waiting_bytes;  // a recording that ends counts too: its data are still in memory
     if (is_running(r) && r->waiting_bytes > most->waiting_bytes) most = r;
   }
   if (waiting > 0 && waiting + bytes > most_waiting_bytes_)

@@ -21,14 +21,14 @@
 
 namespace sonar {
 
-namespace v1 {  // of control.pb.h
+namespace v1 {  // from control.pb.h
 class RecordingStatus;
 }  // namespace v1
 
 class Recordings {
  public:
   static constexpr std::size_t most_at_once = 4, most_remembered = 8;
-  static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // of all recordings together
+  static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // limit for all recordings together
   /// Called once, when it was begun or has ended, before this returns or later; never after finish().
   using Done = std::function<void(const Result<void>&)>;
 
@@ -59,12 +59,12 @@ class Recordings {
   /// An entry of the journal of faults, in JSON; kept in MCAP only.
   void take_fault(const std::string& sonar, Time at, const std::string& json);
 
-  /// Before anything is taken, and whenever another scene is put to use.
+  /// Call it before anything is recorded, and whenever another scene is used.
   void use_scene(const Scene& scene);
   /// Names of the scene that pings are made in from now on.
   const std::shared_ptr<const SceneNames>& names() const { return names_; }
 
-  /// Those that run, and the last that have ended, oldest first.
+  /// Recordings that run, and the last ones that have ended, oldest first.
   std::vector<v1::RecordingStatus> status() const;
   /// Whether no recording is open.
   bool idle() const { return running() == 0; }

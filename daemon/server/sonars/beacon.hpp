@@ -1,5 +1,4 @@
-// The status broadcast of an emulated sonar (Port::Kind::udp_beacon): sent again and again from a port of its own. Owned by
-// Device.
+// The status broadcast of an emulated sonar (Port::Kind::udp_beacon): sent periodically from a port of its own. Owned by Device.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +23,7 @@ class Beacon {
 
   Result<void> open(const SonarConfig& sonar, const protocol::Port& port);
   void start();
-  /// Without waiting for the period to pass, but not more often than every `shortest_pause`.
+  /// Sends without waiting for the period to pass, but not more often than every `shortest_pause`.
   void send_now() { timer_.expires_at(std::max(std::chrono::steady_clock::now(), sent_at_ + shortest_pause)); }
   void stop();
   const std::vector<udp::endpoint>& destinations() const { return to_; }

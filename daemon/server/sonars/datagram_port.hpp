@@ -1,6 +1,6 @@
-// A UDP port of an emulated sonar: datagrams of hosts are answered (Port::Kind::udp_answer), also those sent to the broadcast
-// address of its network, or belong to a dialogue (Port::Kind::udp_dialogue), and pings are sent from it. Owned by Device; the
-// bytes are the vendor's.
+// A UDP port of an emulated sonar. It answers the datagrams of hosts, also those sent to the broadcast address of its network
+// (Port::Kind::udp_answer), or passes them to a dialogue (Port::Kind::udp_dialogue). Pings are sent from it, too. Device owns it;
+// the vendor makes and reads the bytes.
 #pragma once
 
 #include <array>
@@ -21,12 +21,13 @@ class DatagramPort {
 
   explicit DatagramPort(asio::io_context& io) : io_(io) {}
 
-  /// On the sonar's own address; port 0: any. `shared`: hosts on this computer may have the same port at all its addresses, as
-  /// they may when the device is elsewhere. Errors name the address and the next step.
+  /// Binds the port at the sonar's own address; port 0: any free one. `shared`: host programs on this computer may bind the same
+  /// port at all addresses, as they can with a real device. Errors name the address and the next step.
   Result<void> open(const SonarConfig& sonar, std::uint16_t port, bool shared);
-  /// From start() on, what arrives is answered.
+  /// Sets what answers the datagrams that arrive after start().
   void answer_with(Answer answer) { answer_ = std::move(answer); }
-  /// A host whose port is closed is named when its computer says so, to what was sent there. Before start().
+  /// Sets the function that is called with the address of a host when its computer answers a datagram with "port unreachable"
+  /// (ICMP). Call this before start().
   void on_port_unreachable(std::function<void(Endpoint host)> tell) { closed_ = std::move(tell); }
   /// Receives broadcasts, too. An address that cannot be bound is left out.
   void receive_broadcasts(const SonarConfig& sonar);
@@ -50,7 +51,7 @@ class DatagramPort {
   Answer answer_;
   std::function<void(Endpoint host)> closed_;
   std::list<Socket> sockets_;
-  std::uint16_t number_ = 0;  // as asked for
+  std::uint16_t number_ = 0;  // number that was requested
   bool stopping_ = false;
 };
 

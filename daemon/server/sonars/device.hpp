@@ -30,7 +30,7 @@
 
 namespace sonar {
 
-namespace v1 {  // of control.pb.h
+namespace v1 {  // from control.pb.h
 class PingEvent;
 class SonarStatus;
 }  // namespace v1
@@ -109,11 +109,11 @@ class Device final : public SessionParent {
   // Control (device_control.cpp).
   v1::SonarStatus status(Time now) const;
   v1::PingEvent event_of(const PingQueued& queued) const;
-  /// As recordings name it.
+  /// The name that recordings use.
   RecordedSonar recorded() const;
   /// Empty when all is well.
   std::string problem() const;
-  /// As one more client would; nothing is changed when it is refused, with a sentence that says what the product can do.
+  /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
   Result<void> ask(const control::SetSonar& asked, const std::string& who);
   /// Vehicle and mount, of a configuration that is otherwise the same.
   void use_place(const SonarConfig& config) { sonar_.move(config, network_.clock.now()); }

@@ -1,6 +1,6 @@
-// The daemon's sonars: a Device each, and those that are on their way out after the configuration was read again. Owned by App.
-// A sonar that a new configuration does not touch lives on with its clients; it keeps its index, which keys its noise. What comes
-// of the sonars goes from here to the simulator, to recordings and to subscribers of events.
+// The daemon's sonars: a Device for each, and the Devices that are closing after the configuration was read again. Owned by App.
+// A sonar that a new configuration does not change continues with its clients; it keeps its index, which keys its noise.
+// Requests, pings and events of the sonars go from here to the simulator, to recordings and to subscribers.
 #pragma once
 
 #include <functional>
@@ -78,7 +78,7 @@ class Fleet final : public DeviceParent {
     std::uint32_t index = 0;
     std::list<Device>::iterator before;  // the one it replaces, or end()
   };
-  /// By the name of a sonar: the word of the summary for what the reload did to it.
+  /// For each sonar, by name: the word of the summary for what the reload did to it.
   using Outcomes = std::map<std::string, std::string>;
   bool is_held(Ipv4 ip) const;
   std::vector<Opening> sort_out(const Config& now, const Config& next, Outcomes& outcomes);

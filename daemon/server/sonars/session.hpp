@@ -1,6 +1,6 @@
-// One connection of a sonar: its socket, read and written by two coroutines, and a timer that watches for peers that stopped.
-// What the bytes mean, and which messages wait, is the emulated sonar's business (daemon/emulator/sonar). Owned by its Device and
-// by its own coroutines; it reports to the Device once when it is over.
+// One connection of a sonar: its socket, read and written by two coroutines, and a timer that watches for peers that stopped. The
+// emulated sonar (daemon/emulator/sonar) interprets the bytes and keeps the messages that wait. Owned by its Device and by its
+// own coroutines; it reports to the Device once when it is over.
 #pragma once
 
 #include <array>
@@ -54,7 +54,7 @@ class Session : public std::enable_shared_from_this<Session> {
   struct Setup {
     ConnectionId id = 0;
     bool digest = false;                // SHA-256 of what is sent
-    LimitConfig limits;                 // of one client
+    LimitConfig limits;                 // limits for one client
     std::shared_ptr<const void> place;  // kept as long as the session lives
   };
   /// Longest time a client may take for its last message after finish(); then it is reset. One whose computer has all of it, and
@@ -122,7 +122,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Steady::time_point received_at_ = connected_at_;  // a byte came in
   Steady::time_point progress_at_{};                // a byte went out, while writing; in a pause its end
   Steady::time_point finish_by_{}, fin_at_{};
-  std::uint32_t ping_ = 0;  // that is written now or was last; 0 = a reply
+  std::uint32_t ping_ = 0;  // number of the ping that is or was written last; 0 = a reply
   bool reading_ = true, writing_ = false, hurries_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
   bool fin_by_fault_ = false;
   std::string why_;

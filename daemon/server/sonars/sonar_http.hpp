@@ -1,5 +1,5 @@
-// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor, but for those of web pages, which Host and
-// Origin tell. Owned by Device.
+// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor, except for those of web pages, which are
+// recognised by Host and Origin. Owned by Device.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@ class SonarHttp final : public HttpService {
  public:
   using Answer = std::function<protocol::ResourceReply(const protocol::ResourceRequest&)>;
 
-  /// By which names it may be called, beside its own address: of now.
+  /// The names by which it may be called at present, beside its own address.
   using Names = std::function<std::vector<std::string>()>;
 
   /// `limits`, `admission` and `log` outlive it. `sonar`: its name, for the log.

@@ -1,5 +1,5 @@
-// Log lines on clients that connect and leave: a line each, and for frequent visits one line now and then that states
-// how many did. Used by Device, for what any visitor can cause again and again. I/O thread only.
+// Log lines on clients that connect and leave: one line for each, and for frequent visits one line from time to time with their
+// number. Used by Device, because any client can cause such lines again and again. I/O thread only.
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ class VisitLog {
   asio::steady_timer timer_;
   bool in_spell_ = false, ended_ = false;
   bool crowded_ = false;  // the spell before had more than its lines: this one is summed up as a whole
-  int visits_ = 0;        // in this spell
+  int visits_ = 0;        // visits in this spell
   std::array<std::uint64_t, static_cast<std::size_t>(Kind::kinds)> unsaid_{};
   std::string last_unsaid_;
 };

@@ -1,4 +1,4 @@
-// One line per event: a short phrase, then key=value, or an object of JSON. The only way the daemon speaks; spdlog is behind it.
+// One line per event: a short phrase, then key=value, or an object of JSON. The daemon reports only through it; it uses spdlog.
 #pragma once
 
 #include <chrono>

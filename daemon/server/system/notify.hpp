@@ -1,5 +1,5 @@
-// Tells a service manager (systemd's sd_notify protocol, spoken by ourselves) when we serve, reload, stop, and that we are alive.
-// Owned by App; without a manager every call does nothing. I/O thread only.
+// Informs a service manager (by systemd's sd_notify protocol, implemented here) that the daemon serves, reloads, stops, or is
+// alive. Owned by App; without a manager every call does nothing. I/O thread only.
 //
 // Alive means two things: the I/O loop turns, because the message is sent by a timer of that loop; and the simulation thread is
 // not stuck, because no ping has been under way for longer than the watchdog's period. A daemon without clients computes no
@@ -20,7 +20,7 @@ struct NotifyTarget {
   std::string socket;                     // a path, or @name in the abstract namespace; empty = no service manager
   std::chrono::microseconds watchdog{0};  // 0 = none
 };
-/// From NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID; a watchdog meant for another process is none.
+/// Read from NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID; a watchdog meant for another process is none.
 NotifyTarget notify_target_from_environment();
 
 class Notify {

@@ -1,4 +1,5 @@
-// Scheduling of the daemon's threads: the I/O thread first, by wish in real time, and whatever computes after it.
+// Scheduling of the daemon's threads: the I/O thread comes first, on request with real-time priority, and computing threads after
+// it.
 #pragma once
 
 #include <functional>

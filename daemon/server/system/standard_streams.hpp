@@ -1,4 +1,4 @@
-// Standard input, output and error as the daemon needs them, whatever it was started with. Called first in main().
+// Standard input, output and error made usable for the daemon, even if it was started without them. Called first in main().
 #pragma once
 
 namespace sonar {

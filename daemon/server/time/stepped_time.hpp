@@ -1,5 +1,6 @@
-// How far time that is not real may pass, and who waits for it to get there: nothing bounds it (stepped), control requests do
-// (lockstep), or the stamps of the vehicles' poses (follow). Used by Stepper and by control requests; I/O thread only.
+// Computes how far stepped time may advance, and keeps the requests that wait for it: nothing bounds it (stepped), control
+// requests do (lockstep), or the stamps of the vehicles' poses do (follow). Used by Stepper and by control requests; I/O thread
+// only.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// Who may open the live view's socket, and whether they may steer: the rules of docs/live-view.md, each in its place. Pure.
+// Decides who may open the live view's socket, and who may steer, by the rules of docs/live-view.md. Pure.
 #pragma once
 
 #include <chrono>
@@ -42,7 +42,7 @@ class ViewSecrets {
 struct ViewWelcome {
   std::string protocol;  // the one agreed upon
   bool may_steer = false;
-  double most_hz = 0;     // of pictures, as the viewer asked; 0 = no bound
+  double most_hz = 0;     // limit for the rate of pictures that the viewer set; 0 = none
   std::string playback;   // the vehicle whose trajectory it looks at, as it asked; empty = none
   std::string recording;  // the file that it looks at, as it asked; empty = the sonars
 };

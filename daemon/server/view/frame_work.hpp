@@ -1,5 +1,5 @@
-// The cost of a viewer's bytes beside their number: WebSocket frames. The library reads empty fragments and control frames
-// (RFC 6455, 5.2) without reporting them. Looks at the heads of frames only, at any split of the stream.
+// Counts the WebSocket frames of a viewer, which cost time in addition to their bytes. The library reads empty fragments and
+// control frames (RFC 6455, 5.2) without reporting them. Looks at the heads of frames only, at any split of the stream.
 #pragma once
 
 #include <cstddef>

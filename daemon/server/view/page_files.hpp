@@ -1,4 +1,5 @@
-// The files of the page, compressed, as the build embeds them (clients/web/bundle.py). None where it was built without the page.
+// The files of the page, compressed, as the build embeds them (clients/web/bundle.py). There are none if it was built without the
+// page.
 #pragma once
 
 #include <span>

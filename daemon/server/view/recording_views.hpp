@@ -1,6 +1,6 @@
-// Recordings on the page: a viewer that asks for one gets a socket of its own (?recording=NAME), with the recording's pictures,
-// and a time line that it alone moves. Files are read and pictures drawn in short slices on one thread for all such viewers, so
-// that neither drivers nor other viewers wait. I/O thread only. Owned by ViewFeed and by `sonard replay`.
+// Recordings on the page: a viewer that asks for one gets a socket of its own (?recording=NAME), with the recording's pictures
+// and a time line of its own. Files are read and pictures drawn in short slices on one thread for all such viewers, so that
+// neither drivers nor other viewers wait. I/O thread only. Owned by ViewFeed and by `sonard replay`.
 #pragma once
 
 #include <filesystem>
@@ -17,7 +17,7 @@ namespace sonar {
 struct PlayedRecording {
   std::filesystem::path file;
   std::string sonar = {};  // one of several in it, as --sonar of `sonard replay`
-  double rate_hz = 10;     // of files that store no times
+  double rate_hz = 10;     // rate of files that store no times
 };
 
 class RecordingViews {

@@ -1,5 +1,5 @@
 // The objects of the scene as viewers get them, each with its mesh: made once on the thread of the live view, again when an
-// object changes. Called on the I/O thread, but for make().
+// object changes. Called on the I/O thread, except for make().
 #pragma once
 
 #include <map>
@@ -18,7 +18,7 @@ class SceneShapes {
 
   struct Job {
     std::shared_ptr<const Scene> scene;
-    std::vector<std::size_t> objects;  // of it, to be made
+    std::vector<std::size_t> objects;  // objects of the scene that are still to be made
     Time at{};
   };
   struct Made {

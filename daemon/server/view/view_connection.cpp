@@ -23,13 +23,15 @@ namespace {
 namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 
-constexpr std::chrono::seconds handshake_limit{10}, silence_limit{30};  // a ping is sent at half of it
+// A WebSocket ping is sent after half of silence_limit without traffic.
+constexpr std::chrono::seconds handshake_limit{10}, silence_limit{30};
 // Old pictures wait in this program, where newer ones replace them, and not in the kernel.
 constexpr int most_unsent = 128 << 10;
 
 }  // namespace
 
-/// A socket that reports when bytes leave it, and that is read at the allowed rate. Beast finds the friends by its type.
+/// A socket that reports when bytes leave it, and that is read at the allowed rate. Beast finds the friend functions below by
+/// argument-dependent lookup.
 struct ViewConnection::Watched {
   HttpConnection& from;
   Steady::time_point& moved_at;
@@ -59,7 +61,7 @@ struct ViewConnection::Watched {
     watched.from.socket().close(ec);
   }
 
-  /// Reads, then waits for as long as the limit is exceeded before the bytes are looked at.
+  /// Reads bytes. If they exceed the allowed rate, waits until the rate permits them; only then Beast gets them.
   template <class Buffers>
   struct Read {
     Watched& watched;
@@ -69,7 +71,7 @@ struct ViewConnection::Watched {
     template <class Self>
     void operator()(Self& self) {
       auto& socket = watched.from.socket();
-      const Buffers own = buffers;  // `self` holds the others
+      const Buffers own = buffers;  // a copy, as the member belongs to `self`, which is moved
       socket.async_read_some(own, std::move(self));
     }
     template <class Self>

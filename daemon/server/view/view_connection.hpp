@@ -1,6 +1,6 @@
-// The WebSocket of one viewer: takes an HTTP connection over after the handshake was judged. Moves messages between the socket
-// and a Viewer, which decides everything; closes when the viewer takes no byte for limits.stall_s. It is read no faster than
-// HTTP is. I/O thread only.
+// The WebSocket of one viewer: takes over an HTTP connection after the handshake was accepted. It moves messages between the
+// socket and a Viewer, which makes all decisions, and closes when the viewer takes no byte for limits.stall_s. It is read no
+// faster than HTTP is. I/O thread only.
 #pragma once
 
 #include <functional>

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double longest_gap_s = 10;  // between two statuses that are compared; none are taken without viewers
 constexpr auto failures_told = std::chrono::seconds(8);
-constexpr std::size_t most_bytes = 256 << 10;  // of a table of the kernel: reading it takes a millisecond
+constexpr std::size_t most_bytes = 256 << 10;  // limit for a table of the kernel: reading it takes a millisecond
 
 /// Empty when it cannot be read.
 std::string content_of(const char* file) {

@@ -1,5 +1,5 @@
-// The channel `/doctor` of the live view: what keeps drivers from their pings (protocol/doctor/judge.hpp), looked at every two
-// seconds while a viewer has subscribed, and sent when it changes. Owned by ViewFeed. I/O thread only.
+// The channel `/doctor` of the live view: the causes that keep drivers from getting pings (protocol/doctor/judge.hpp). They are
+// checked every two seconds while a viewer has subscribed, and sent when they change. Owned by ViewFeed. I/O thread only.
 #pragma once
 
 #include <chrono>

@@ -1,6 +1,6 @@
-// The live view inside the daemon: who looks, the channels, and what is offered on them (docs/live-view.md). Pings reach it where
-// recordings tap them; with no viewer there is no tap. What takes long is made on a thread of its own, and skipped when that is
-// busy. Looking changes nothing: no driver waits for a viewer. I/O thread only. Owned by App.
+// The live view inside the daemon: its viewers, its channels, and the messages on them (docs/live-view.md). It gets pings at the
+// same place as recordings, and none without viewers. Slow work is done on a thread of its own, and skipped when that thread is
+// busy. No driver waits for a viewer. I/O thread only. Owned by App.
 #pragma once
 
 #include <deque>
@@ -44,7 +44,7 @@ struct Viewed {
 class ViewFeed final : public ViewerHost {
  public:
   static constexpr std::size_t lines_kept = 100;
-  static constexpr double usual_threshold = 0.35;  // of a cloud, part of the full scale
+  static constexpr double usual_threshold = 0.35;  // default threshold of a cloud, as a share of the full scale
 
   explicit ViewFeed(const Viewed& of);
   /// Waits for the picture being made.
@@ -89,12 +89,12 @@ class ViewFeed final : public ViewerHost {
     Slow drawn{}, points{};            // fan and about; cloud
     const protocol::Make* make = nullptr;
     std::shared_ptr<const Ping> last = nullptr;
-    ViewPayloadPointer picture = nullptr;               // of last, once it was wanted
-    wire::Bytes shape = {};                             // of last, without its number
+    ViewPayloadPointer picture = nullptr;               // picture of `last`, once it was requested
+    wire::Bytes shape = {};                             // shape of `last`, without its number
     std::string volume = {};                            // what the swath depends on
     std::shared_ptr<PicturePainter> painter = nullptr;  // for the view thread alone
     std::unique_ptr<DriverPicture> driver = nullptr;
-    DriverPicture::Drawing drawing = nullptr;  // of last
+    DriverPicture::Drawing drawing = nullptr;  // drawing of `last`
 
     /// All that pings have left.
     void forget();

@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-namespace v1 {  // of control.pb.h
+namespace v1 {  // from control.pb.h
 class DaemonStatus;
 class FaultReport;
 }  // namespace v1

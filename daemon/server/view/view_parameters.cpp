@@ -25,7 +25,7 @@ std::string fault_parameter(std::string_view trouble, const std::string& sonar, 
   for (const char c : trouble) name += c == '-' ? '_' : c;
   return name;
 }
-/// How long a trouble that a viewer began still lasts; 0 = it does not.
+/// The remaining time of a trouble that a viewer began; 0 = none.
 double seconds_left(const Device& device, const std::string& fault, Time now) {
   double left = 0;
   for (const Faults::Listed& listed : device.sonar().faults().list())

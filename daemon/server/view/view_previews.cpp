@@ -4,7 +4,7 @@
 namespace sonar {
 namespace {
 
-constexpr std::chrono::seconds rest_after_failure{30};  // of previews that begin by themselves
+constexpr std::chrono::seconds rest_after_failure{30};  // pause of previews that start by themselves
 
 }  // namespace
 

@@ -8,7 +8,7 @@ namespace sonar::recording::mcap {
 namespace {
 
 constexpr std::size_t most_channels = 4096;
-constexpr std::uint64_t most_described_bytes = 16 << 20;  // of all schemas and channels that are kept
+constexpr std::uint64_t most_described_bytes = 16 << 20;  // limit for all schemas and channels that are kept
 
 std::string at_byte(std::uint64_t at) { return " at byte " + std::to_string(at); }
 

@@ -11,7 +11,7 @@ namespace sonar::recording::mcap {
 class Writer {
  public:
   static constexpr std::size_t chunk_bytes = 1 << 20;           // a chunk ends behind the message that fills it
-  static constexpr std::chrono::seconds longest_chunk_time{2};  // so that little is lost with the program
+  static constexpr std::chrono::seconds longest_chunk_time{2};  // short, so that little is lost with the program
 
   explicit Writer(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
 
@@ -29,7 +29,7 @@ class Writer {
     std::uint64_t offset = 0, length = 0, index_length = 0, size = 0;
     std::map<std::uint16_t, std::uint64_t> index_offsets;
   };
-  using Entries = std::vector<std::pair<Time, std::uint64_t>>;  // of a channel: time, place in the chunk
+  using Entries = std::vector<std::pair<Time, std::uint64_t>>;  // entries of a channel: time, place in the chunk
 
   Result<void> begin();
   Result<void> put(const Bytes& bytes);
@@ -49,7 +49,7 @@ class Writer {
   Time chunk_first_{}, chunk_last_{};
   std::map<std::uint16_t, Entries> entries_;
   std::vector<ChunkPlace> chunks_;
-  std::map<std::uint16_t, std::uint64_t> counts_;  // of messages in whole chunks
+  std::map<std::uint16_t, std::uint64_t> counts_;  // numbers of messages in whole chunks
   std::uint64_t position_ = 0;
   std::uint32_t data_crc_ = 0;
   bool begun_ = false;

@@ -22,7 +22,7 @@ inline constexpr std::uint8_t fin = 0x01, syn = 0x02, rst = 0x04, psh = 0x08, ac
 }
 
 struct Segment {
-  bool tcp = true;  // else UDP
+  bool tcp = true;  // if false: UDP
   IpEnd source, target;
   std::uint32_t sequence = 0;
   std::uint8_t flags = 0;

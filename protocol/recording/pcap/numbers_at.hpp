@@ -1,5 +1,5 @@
-// Whole numbers somewhere in a block of bytes, 0 where they are not all there. For the headers of packets and of capture files,
-// which are looked at here and there rather than read from front to back.
+// Integers at any place in a block of bytes; 0 if the block is too short. Used for the headers of packets and of capture files,
+// which are not read from front to back.
 #pragma once
 
 #include <algorithm>

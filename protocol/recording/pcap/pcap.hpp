@@ -13,7 +13,7 @@
 namespace sonar::recording {
 
 struct PcapReading {
-  std::optional<std::uint32_t> device;  // its address, when the capture holds several sonars; else the one that sent most
+  std::optional<std::uint32_t> device;  // address of the device, if the capture has several sonars; else the one that sent most
 };
 /// All connections of one sonar, one after the other, and its status datagrams; of one that sends its pings by UDP all its
 /// datagrams. Reads the file once to find the sonar: of those that send messages of a make the one at that make's port, else the

@@ -13,7 +13,7 @@ namespace sonar::recording {
 namespace {
 
 constexpr std::size_t most_senders = 4096, most_connections = 64;
-constexpr std::size_t most_held_bytes = 64u << 20;  // of all connections: early segments and messages under way
+constexpr std::size_t most_held_bytes = 64u << 20;  // limit for all connections: early segments and messages under way
 
 // ---- first pass: find the sonar
 
@@ -26,7 +26,7 @@ struct SenderEnd {
 };
 struct Sent {
   std::uint64_t bytes = 0;
-  const Make* make = nullptr;  // whose messages it sends; null: no sonar's
+  const Make* make = nullptr;  // make whose messages it sends; null: not a sonar
 };
 struct Found {
   SenderEnd device;

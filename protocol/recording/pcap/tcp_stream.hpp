@@ -44,8 +44,8 @@ class TcpStream {
   void skip_to_first_waiting();
 
   bool begun_ = false, saw_syn_ = false, from_middle_ = false;
-  std::uint32_t first_ = 0;     // of the first byte
-  std::uint64_t position_ = 0;  // of the next byte, from the first on
+  std::uint32_t first_ = 0;     // sequence number of the first byte
+  std::uint64_t position_ = 0;  // position of the next byte, counted from the first
   std::uint64_t missing_ = 0;
   std::map<std::uint64_t, Early> waiting_;
   std::size_t waiting_bytes_ = 0;

@@ -84,7 +84,7 @@ void put_u16(Bytes& bytes, std::size_t at, std::uint16_t value) {
 /// One end of the connection, as the other end sees it.
 struct End {
   IpEnd place;
-  std::uint32_t sequence = 0;  // of its next byte
+  std::uint32_t sequence = 0;  // sequence number of its next byte
 };
 
 class PcapWriter final : public RecordingWriter {

@@ -246,7 +246,7 @@ TEST(Image, AnswersForPixelsOutsideItself) {
 
 TEST(Image, ScalesItsRangesWithTheSoundSpeed) {
   ImageSettings settings;
-  settings.sound_speed_override_mps = 1650;  // of 1500: 1.1 times as far
+  settings.sound_speed_override_mps = 1650;  // 1.1 times the ping's 1500, so 1.1 times as far
   for (const ImageType type : {ImageType::xy, ImageType::r_theta}) {
     const MagImage image = image_of(make_ping_with_target(5, 10), type, settings);
     EXPECT_NEAR(image.start_m, 1.1, 1e-6);

@@ -54,7 +54,7 @@ TEST(Random, ComplexNormalIsCircularWithUnitPower) {
       last = z;
     }
   }
-  const double sd = 1 / std::sqrt(static_cast<double>(n));  // of a mean of n unit-variance terms
+  const double sd = 1 / std::sqrt(static_cast<double>(n));  // standard deviation of a mean of n unit-variance terms
   EXPECT_NEAR(power / n, 1, 5 * sd);
   EXPECT_NEAR(fourth / n, 2, 5 * std::sqrt(20.0) * sd);  // exponential intensity: scintillation index 1
   EXPECT_NEAR(re / n, 0, 5 * sd);
@@ -67,7 +67,7 @@ TEST(Random, ComplexNormalIsCircularWithUnitPower) {
 // Kolmogorov-Smirnov at 1 %: |z| is Rayleigh.
 TEST(Random, ComplexNormalMagnitudeIsRayleigh) {
   const int n = 20000;
-  std::vector<int> bins(2000);  // of the cumulative probability 1 - exp(-|z|^2)
+  std::vector<int> bins(2000);  // bins of the cumulative probability 1 - exp(-|z|^2)
   for (int i = 0; i < n; ++i) {
     const Random4 r = philox(static_cast<std::uint32_t>(i), 0, 0, 0, 3, 5);
     const ComplexNormal z = complex_normal(r.v[0], r.v[1]);

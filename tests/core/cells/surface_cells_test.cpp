@@ -363,7 +363,8 @@ TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
       for (int i = 0; i < t.tile->count; ++i) count += real(*t.tile, i);
     return count;
   };
-  const double shadows = 6 * 4 * std::asin(1 / std::sqrt(3)) / std::sqrt(2);  // of the six patches on their lattices, about [m^2]
+  // Area of the six patches on their lattices, about [m^2].
+  const double shadows = 6 * 4 * std::asin(1 / std::sqrt(3)) / std::sqrt(2);
   const int coarse = counted(from_coarse, whole_scene(0));
   for (int level = 6; level >= 1; --level) {
     const double expected = shadows * std::ldexp(1.0, 2 * level);

@@ -112,11 +112,12 @@ TEST(TrajectoryFile, TakesTheFrameFromTheFileOrFromWhoAsks) {
     expect_near(ahead(points(file).poses[0]), {1, 0, 0});
   }
   EXPECT_THAT(refusal(line, {}),
-              HasSubstr("p.csv: in which frame the poses are is not said; begin the file with a line \"# frame: "
+              HasSubstr("p.csv: the file does not say in which frame its poses are; begin it with a line \"# frame: "
                         "ENU_FLU\" or \"# frame: NED_FRD\""));
   EXPECT_THAT(refusal("# frame: ENU_FLU\n" + line, {.frame = Frame::ned_frd}),
               "p.csv:1: the file says ENU_FLU, but it was to be read as NED_FRD");
-  EXPECT_THAT(refusal("# frame: ENU_FLU\n# frame: NED_FRD\n" + line, {}), "p.csv:2: the frame was another one before");
+  EXPECT_THAT(refusal("# frame: ENU_FLU\n# frame: NED_FRD\n" + line, {}),
+              "p.csv:2: an earlier comment names another frame; a file has one frame");
   EXPECT_THAT(refusal("# frame: NWU\n"), StartsWith("p.csv:1: the frame must be"));
 }
 
@@ -139,11 +140,12 @@ TEST(TrajectoryFile, HoldsSeveralBodiesOnOneClock) {
   EXPECT_EQ(trajectory_of(file, "p.csv", "buoy").value(), file.bodies[1].trajectory);
   EXPECT_THAT(trajectory_of(file, "p.csv", "bouy").error().text, HasSubstr("did you mean \"buoy\""));
   EXPECT_THAT(trajectory_of(file, "p.csv", "").error().text,
-              HasSubstr("the file has several bodies; choose one with body; there are: rov, buoy"));
+              HasSubstr("the file has several bodies; choose one with the key \"body\"; there are: rov, buoy"));
   const TrajectoryFile nameless = parsed("t,x,y,z\n0,1,2,3\n");
   EXPECT_TRUE(trajectory_of(nameless, "p.csv", ""));
-  EXPECT_THAT(trajectory_of(nameless, "p.csv", "rov").error().text, HasSubstr("leave out body"));
-  EXPECT_THAT(refusal("body,t,x,y,z\nrov,1,0,0,0\nbuoy,0,0,0,0\nrov,0.5,0,0,0\n"), "p.csv:4: the time falls for \"rov\"");
+  EXPECT_THAT(trajectory_of(nameless, "p.csv", "rov").error().text, HasSubstr("remove the key \"body\""));
+  EXPECT_THAT(refusal("body,t,x,y,z\nrov,1,0,0,0\nbuoy,0,0,0,0\nrov,0.5,0,0,0\n"),
+              "p.csv:4: the time is earlier than before for \"rov\"");
   EXPECT_THAT(refusal("body,t,x,y,z\n,1,0,0,0\n"), "p.csv:2: a body's name must have 1 to 64 printable characters");
 }
 
@@ -151,10 +153,10 @@ TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
   const struct {
     const char *text, *says;
   } mistakes[] = {
-      {"", "p.csv: no poses"},
-      {"t,x,y,z\n", "p.csv: no poses"},
+      {"", "p.csv: the file has no poses"},
+      {"t,x,y,z\n", "p.csv: the file has no poses"},
       {"t,x,y,z\n0,1,2\n", "p.csv:2: 3 values instead of 4"},
-      {"t,x,y,z\n1,1,2,3\n0,1,2,3\n", "p.csv:3: the time falls"},
+      {"t,x,y,z\n1,1,2,3\n0,1,2,3\n", "p.csv:3: the time is earlier than before"},
       {"t,x,y,z\n0,1,two,3\n", "p.csv:2: \"two\" is not a number"},
       {"t,x,y,z\n0,1,nan,3\n", "p.csv:2: \"nan\" is not a number"},
       {"t,x,y,z\n0,1,-inf,3\n", "p.csv:2: \"-inf\" is not a number"},

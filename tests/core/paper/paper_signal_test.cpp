@@ -206,7 +206,8 @@ TEST(PaperFan, GridIsUniformOnAnImagePlaneAndCoversItsSolidAngle) {
   double sum = 0;
   for (int column = 0; column < fine.columns(); ++column)
     for (int row = 0; row < fine.rows; ++row) sum += fine.solid_angle_sr(column, row);
-  const double side = std::tan(rad_from_deg(45)), top = std::tan(rad_from_deg(20));  // of a rectangle: 4 asin(...)
+  // Half sides of a rectangle, whose solid angle is 4 asin(...).
+  const double side = std::tan(rad_from_deg(45)), top = std::tan(rad_from_deg(20));
   EXPECT_NEAR(sum, 4 * std::atan(side * top / std::sqrt(1 + side * side + top * top)), 1e-4);
 }
 

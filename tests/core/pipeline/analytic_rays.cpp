@@ -16,7 +16,7 @@ constexpr double face_tolerance_m = 1e-5;
 struct Hit {
   double distance_m = HUGE_VAL;
   Vec3d normal;       // object axes
-  int axis = 0;       // of a flat face
+  int axis = 0;       // normal of a flat face
   double at_m = NAN;  // where that face lies on its axis; NaN on what is curved
 };
 

@@ -32,7 +32,7 @@ objects:
 struct Seen {
   std::string object;
   float far_m = 0;
-  double cosine = 0;  // of the angle to the normal
+  double cosine = 0;  // cosine of the angle to the normal
 };
 Seen look(const RayScene& rays, Vec3d direction) {
   RayPacket p{};

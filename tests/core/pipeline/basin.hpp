@@ -128,7 +128,7 @@ inline std::vector<std::pair<std::string, PingRequest>> turns() {
     r.bodies_in_world = {{{2.8, -0.3, -0.9}, quat_from_rpy({0, 0.4, 0})}};
     r.settings.gain_db = 6;
   });
-  for (std::size_t i = 0; i < named_switches.size(); ++i) {  // of one sonar and the other in turn
+  for (std::size_t i = 0; i < named_switches.size(); ++i) {  // switches of one sonar and the other in turn
     const NamedSwitch& part = named_switches[i];
     PingRequest r = i % 2 == 0 ? high() : low();
     r.switches.*part.is_on = !(r.switches.*part.is_on);

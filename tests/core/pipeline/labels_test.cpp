@@ -266,7 +266,7 @@ TEST(Labels, CostLessThanTwoAndAHalfPings) {
   double without_s = HUGE_VAL, with_s = HUGE_VAL;
   const auto time = [&](bool labels, double& fastest_s) {
     l.s.request.switches.keep_labels = labels;
-    const std::clock_t begin = std::clock();  // of this process: other programs do not count
+    const std::clock_t begin = std::clock();  // time of this process, so that other programs do not count
     (void)l.engine->run({&l.s.request, 1});
     fastest_s = std::min(fastest_s, static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
   };

@@ -65,7 +65,7 @@ TEST(ListedBeams, PutATargetInTheBeamThatLooksAtIt) {
     Mesh ball = sphere(0.05, 2);
     const Vec3d at{3 * std::cos(azimuths[j]), 3 * std::sin(azimuths[j]), 0};
     Sounding s(SceneMaker().add(std::move(ball), -10, at).make(), with_list(p900(), azimuths), settings());
-    s.request.switches.expected_power = true;  // of the draws of a ball wider than a beam a neighbour's may be stronger
+    s.request.switches.expected_power = true;  // the draws of a neighbour may be stronger if the ball is wider than a beam
     s.ping();
     int best = 0;
     double most = 0;

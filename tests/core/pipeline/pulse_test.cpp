@@ -16,7 +16,7 @@ namespace {
 using Shape = Waveform::Shape;
 using Complex = std::complex<double>;
 
-constexpr double width_s = 2 * 0.0254 / 1500;  // of the shapes that may choose
+constexpr double width_s = 2 * 0.0254 / 1500;  // width for the shapes that have a choice
 
 class EveryPulse : public ::testing::TestWithParam<Shape> {
  protected:

@@ -123,14 +123,13 @@ TEST(RangeImage, SphereIsWhereItIs) {
   EXPECT_NEAR(s.range_m(static_cast<int>(std::lround(column)), static_cast<int>(std::lround(row))), length(centre) - 0.5, 0.02);
 }
 
-/// The power that all beams receive of an upright, level or oblique pole straight ahead, from 16 places of the sonar within a
-/// beam's cell of the grid, against Lambert's law summed over the pole's surface.
+/// A pole straight ahead; `turn_rad` makes it upright, level or oblique.
 struct Pole {
   double radius_m = 0, length_m = 0, turn_rad = 0, range_m = 0;
 };
 constexpr double pole_lambert_db = -8;
 
-/// [uPa^2], on the axis of a beam.
+/// The power [uPa^2] by Lambert's law that a beam receives from the pole when its axis points at the pole.
 double power_of(const Pole& pole, const PingRequest& request) {
   constexpr int along = 200, around = 200;
   const double alpha_db = absorption_db_per_m(request.water, 0, 1.2e6);
@@ -138,7 +137,8 @@ double power_of(const Pole& pole, const PingRequest& request) {
   for (int i = 0; i < along; ++i)
     for (int j = 0; j < around; ++j) {
       const double t = ((i + 0.5) / along - 0.5) * pole.length_m, angle = ((j + 0.5) / around - 0.5) * std::numbers::pi;
-      // The normal turns from the sonar's side; in the plane across the range `t` is along the pole.
+      // `angle` is that of the surface normal, 0 where the surface faces the sonar. `t` is the position along the pole, which is
+      // perpendicular to the direction of the sonar.
       const Vec3d place{pole.range_m - pole.radius_m * std::cos(angle), pole.radius_m * std::sin(angle), t};
       const double r = length(place), cosine = dot(Vec3d{std::cos(angle), -std::sin(angle), 0}, place) / r;
       if (cosine > 0) sum += cosine * cosine * std::pow(r, -4) * std::pow(10, -2 * alpha_db * r / 10);
@@ -147,8 +147,11 @@ double power_of(const Pole& pole, const PingRequest& request) {
   return std::pow(10, (200 + pole_lambert_db) / 10) * area_m2 * sum;
 }
 
+/// Compares the power that all beams receive from the pole with Lambert's law summed over its surface, for 16 positions of the
+/// sonar within one cell of the beam grid.
 TEST(RangeImage, HearsThinPolesWhereverTheyAre) {
-  const auto weights = [](double step_rad) {  // of the beams about a place, each -3 dB at half of 1.5 degrees
+  // The sum of the weights of the beams around a point; each beam is at -3 dB 0.75 degrees off its axis.
+  const auto weights = [](double step_rad) {
     double sum = 0;
     for (int n = -20; n <= 20; ++n) {
       const double x = n * step_rad / rad_from_deg(1.5);
@@ -156,7 +159,7 @@ TEST(RangeImage, HearsThinPolesWhereverTheyAre) {
     }
     return sum;
   };
-  for (const double range_m : {2.5, 4.5, 8.5, 12.5})  // the middles of cells
+  for (const double range_m : {2.5, 4.5, 8.5, 12.5})  // the centres of range cells
     for (const double diameter_m : {0.005, 0.02, 0.1})
       for (const double turn_rad : {0.0, std::numbers::pi / 2, 0.6}) {
         const Pole pole{diameter_m / 2, std::min(2.0, 0.4 * range_m), turn_rad, range_m};
@@ -246,7 +249,7 @@ TEST(RangeImage, StrengthIsProportionalToAmplitude) {
   EXPECT_NEAR(s.at(127, 32).strength / before, 2, 0.02);
 }
 
-/// An even, extended target: speckle has a mean power of 1 re the expected one, and neighbours within a beam share it.
+/// On a uniform, extended target the mean power with speckle equals the expected power.
 TEST(RangeImage, SpeckleHasTheExpectedPower) {
   RangeImageSounding s(plane_ahead(5));
   s.request().settings.gain_db = 40;
@@ -272,7 +275,9 @@ TEST(RangeImage, NoiseAloneHasFewFalseAlarms) {
   int alarms = 0;
   for (int i = 0; i < 16384; ++i) alarms += range_pixel(s.last(), static_cast<std::size_t>(i)).range != 0;
   EXPECT_LT(alarms, 16);
-  s.wanted->detection = 8;  // 16384 pixels of about 776 cells, each above 8 times the mean with e^-8: a quarter of the pixels
+  // A pixel has the loudest of about 777 range cells. In each, noise exceeds 8 times its mean with probability e^-8: about a
+  // quarter of the pixels report a false alarm.
+  s.wanted->detection = 8;
   s.ping();
   for (int i = alarms = 0; i < 16384; ++i) alarms += range_pixel(s.last(), static_cast<std::size_t>(i)).range != 0;
   EXPECT_NEAR(alarms / 16384.0, 1 - std::pow(1 - std::exp(-8), 777), 0.02);
@@ -329,7 +334,8 @@ TEST(RangeImage, FiltersAndSpeckleLeaveAPlaneWhereItIs) {
   s.wanted->block_rows = 16, s.wanted->least_confirming = 2, s.wanted->confirming_m = 0.1, s.wanted->median_passes = 2;
   s.ping();
   double squares = 0, n = 0;
-  for (int row = 20; row < 44; ++row)  // farther off the middle a beam hears ranges as far apart as it is wide
+  // Farther from the middle the plane is oblique, and a beam covers a wide interval of ranges.
+  for (int row = 20; row < 44; ++row)
     for (int column = 112; column < 144; ++column)
       if (s.at(column, row).range != 0) squares += std::pow(s.place(column, row).x - 5, 2), ++n;
   EXPECT_GT(n, 0.95 * 24 * 32);

@@ -17,7 +17,8 @@ namespace sonar::test::ripples_test {
 namespace {
 
 constexpr double height = 2, tilt = 0.25, lambert_db = -20, from_m = 4.8, to_m = 7.6;
-constexpr double half_sector = 0.1745, half_mean = 0.9 * half_sector;  // of the sonar; of the mean
+// Half of the sonar's sector; half of the interval of the mean.
+constexpr double half_sector = 0.1745, half_mean = 0.9 * half_sector;
 
 struct Ripples {
   double wavelength, phase, heading;

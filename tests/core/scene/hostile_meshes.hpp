@@ -9,7 +9,7 @@ namespace sonar::tests {
 
 struct HostileMesh {
   std::string name, bytes;
-  std::string words;  // of the refusal
+  std::string words;  // words of the refusal
 };
 
 inline std::string repeated(const std::string& text, int times) {

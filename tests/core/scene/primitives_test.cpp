@@ -47,7 +47,7 @@ TEST(Primitives, RoundSolidsAreClosedOutwardAndNearlyTheirVolume) {
 TEST(Primitives, ChordsStayWithinAMillimetre) {
   for (const double r : {0.02, 0.0508, 0.3, 2.0}) {
     const Mesh sphere = make_sphere(r, segments_for(r));
-    double worst = 0;  // of the middles of edges, where a chord is deepest
+    double worst = 0;  // error at the middles of edges, where a chord is deepest
     for (const auto& t : sphere.triangles) {
       for (std::size_t k = 0; k < 3; ++k) {
         const Vec3d middle = 0.5 * (to_double(sphere.vertices[t[k]]) + to_double(sphere.vertices[t[(k + 1) % 3]]));

@@ -96,7 +96,7 @@ TEST(GainAssist, FollowsAGrowingSceneWithoutSteps) {
       const auto gain = static_cast<double>(assist.gain_db(settings, at));
       if (i > 50) largest_step = std::max(largest_step, std::abs(gain - before));
       before = gain;
-      const double level_db = gain - 40 - 10 + 0.3 * i;  // of the loud part, over full scale
+      const double level_db = gain - 40 - 10 + 0.3 * i;  // level of the loud part, over full scale
       const double v = std::min(1.0, std::pow(std::pow(10, level_db / 20), gamma));
       Ping ping = picture(0.02, static_cast<std::uint32_t>(std::lround(v * 65535)), 16, 65535);
       ping.request.settings.format.gamma = settings.format.gamma;

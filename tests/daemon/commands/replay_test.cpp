@@ -539,7 +539,7 @@ class Host {
     datagram.resize(images_.receive_from(asio::buffer(datagram), from));
     return datagram;
   }
-  udp::endpoint from;  // of the last datagram
+  udp::endpoint from;  // sender of the last datagram
 
  private:
   asio::io_context io_;

@@ -21,7 +21,7 @@ using ::testing::StartsWith;
 /// A folder with files of every kind.
 std::string directory() {
   static const std::string made = [] {
-    std::string d = ::testing::TempDir() + "trajectoriesXXXXXX";  // of this process: others run beside it
+    std::string d = ::testing::TempDir() + "trajectoriesXXXXXX";  // a folder of this process, because others run beside it
     EXPECT_NE(mkdtemp(d.data()), nullptr);
     std::filesystem::create_directories(d + "/missions");
     std::ofstream(d + "/scene.yaml") << "name: test\n";
@@ -104,8 +104,8 @@ TEST(TrajectoryConfig, MistakesAreToldWithTheirPlace) {
   EXPECT_THAT(why("orbti"), AllOf(StartsWith("sonard.yaml:4:17: vehicles[0].trajectory: "), HasSubstr("\"orbit\"")));
   EXPECT_THAT(why("dive.tum"), AllOf(StartsWith("sonard.yaml:4:17: vehicles[0].trajectory: "),
                                      HasSubstr("no such file: \"dive.tum\"; looked in /")));
-  EXPECT_THAT(why("missions/broken.csv"), HasSubstr("broken.csv:4: the time falls"));
-  EXPECT_THAT(why("missions/no-frame.tum"), HasSubstr("in which frame the poses are is not said"));
+  EXPECT_THAT(why("missions/broken.csv"), HasSubstr("broken.csv:4: the time is earlier than before"));
+  EXPECT_THAT(why("missions/no-frame.tum"), HasSubstr("does not say in which frame its poses are"));
   EXPECT_THAT(why("{file: missions/dive.tum, frame: NED_FRD}"), HasSubstr("the file says ENU_FLU"));
   EXPECT_THAT(why("{file: missions/dive.tum, frame: NWU}"), StartsWith("sonard.yaml:4:50: vehicles[0].trajectory.frame: "));
   EXPECT_THAT(why("{file: missions/dive.tum, speed: 0}"), HasSubstr("vehicles[0].trajectory.speed"));
@@ -114,7 +114,7 @@ TEST(TrajectoryConfig, MistakesAreToldWithTheirPlace) {
   EXPECT_THAT(why("{file: missions/dive.tum, format: csv}"), HasSubstr("dive.tum:2: a CSV file begins with"));
   EXPECT_THAT(why("{file: missions/dive.tum, rate_hz: 10}"), HasSubstr("need no rate_hz"));
   EXPECT_THAT(why("{file: kitti.txt, frame: ENU_FLU}"), HasSubstr("rate_hz"));
-  EXPECT_THAT(why("{file: missions/dive.tum, body: rov}"), HasSubstr("leave out body"));
+  EXPECT_THAT(why("{file: missions/dive.tum, body: rov}"), HasSubstr("remove the key \"body\""));
   EXPECT_THAT(why("{file: fleet.csv, body: avu}"), HasSubstr("did you mean \"auv\""));
   EXPECT_THAT(why("{speed: 2}"), HasSubstr("vehicles[0].trajectory.file"));
   EXPECT_THAT(why("[1]"), StartsWith("sonard.yaml:4:17: vehicles[0].trajectory: "));

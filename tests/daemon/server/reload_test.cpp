@@ -248,7 +248,7 @@ TEST(Reload, ASonarThatCannotBeOpenedStaysAsItWas) {
   client.fire(fire_at(PingRate::hz40));
   ASSERT_TRUE(client.next_ping());
   DaemonSetup elsewhere = setup;
-  elsewhere.address = "192.0.2.17";  // of no computer
+  elsewhere.address = "192.0.2.17";  // an address of no computer
   elsewhere.sonar_lines = "    status_to: ['127.0.0.1:9']\n" + sonar("left", "192.0.2.18", 7002);
   elsewhere.more = "poses: {protobuf: off, json: off}\n";
   daemon.write_config(yaml_of(elsewhere));
@@ -266,7 +266,7 @@ TEST(Reload, ASonarThatCannotBeOpenedStaysAsItWas) {
 TEST(Reload, AnOptionOfAnotherVendorTouchesNothing) {
   DaemonSetup setup = with_file();
   Daemon daemon(setup);
-  setup.sonar_lines = "    options: {heads_base: strict}\n";  // of BlueView
+  setup.sonar_lines = "    options: {heads_base: strict}\n";  // options of BlueView
   daemon.write_config(yaml_of(setup));
   EXPECT_TRUE(reload(daemon, "reloaded: front untouched"));
   setup.sonar_lines = "    options: {dummy_period_ms: 600}\n";

@@ -85,7 +85,7 @@ void expect_like_recording(const Statistics& s) {
   EXPECT_GT(test::correlation(s.stripes_db, table), 0.95);
   double error = 0;
   for (std::size_t c = 0; c < table.size(); ++c) error += std::pow(s.stripes_db[c] - table[c], 2);
-  EXPECT_LT(std::sqrt(error / static_cast<double>(table.size())), 0.35);  // of 1.2 dB rms
+  EXPECT_LT(std::sqrt(error / static_cast<double>(table.size())), 0.35);  // the table itself has 1.2 dB rms
 }
 
 /// A frame at the recording's settings, of a bed 2 m below, which the sonar passes over at 0.5 m/s; beside it, frames of which

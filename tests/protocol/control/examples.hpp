@@ -48,7 +48,8 @@ inline std::vector<Request> every_request() {
 }
 
 inline v1::DaemonStatus full_status() {
-  const std::string tilted = " position { x: 1.5 y: -2.25 z: 3 } orientation { w: 0.6 y: 0.8 } ";  // of norm 1 to the last bit
+  // The norm is 1 to the last bit.
+  const std::string tilted = " position { x: 1.5 y: -2.25 z: 3 } orientation { w: 0.6 y: 0.8 } ";
   return message_from<v1::DaemonStatus>(
       R"(version: "0.1" config: "lab.yaml" scene: "harbour" clock: "realtime" engine: "fake" seed: 0xffffffffffffffff
          uptime_s: 1.5 resident_mb: 80 control: "127.0.0.4:14770" http: "127.0.0.5:8088" now_ns: 1234567890123456780

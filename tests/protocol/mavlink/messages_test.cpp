@@ -14,7 +14,7 @@ namespace {
 struct Listed : wire::Visitor<Listed> {
   struct Row {
     std::string type, name;
-    std::size_t size = 0, count = 0;  // of one element; 0 = no array
+    std::size_t size = 0, count = 0;  // size of one element; 0 = no array
   };
   std::vector<Row> rows;
 

@@ -90,7 +90,7 @@ TEST(OculusLog, SaysWhichItemsItCannotRead) {
   wrong_length.pop_back();
   broken[20] ^= std::byte{0xFF};
   for (const auto& [bad, why] : std::initializer_list<std::pair<Bytes, const char*>>{
-           {item(10, wrong_length), "the message at byte 48 does not have the length in its header"},
+           {item(10, wrong_length), "the message at byte 48 has another length than its header gives"},
            {item(10, broken, 1), "the message at byte 48 does not decompress"},
            {item(10, ping_message(1), 7), "the message at byte 48 is compressed in a way that is not known: 7"},
            {item(10, bytes_of("SO")), "the message at byte 48 is shorter than a header"},

@@ -49,7 +49,7 @@ ReadBack read_back(Bytes file) {
 }
 
 TEST(SonarFile, IsItsDatagramsWithTheTimesInThem) {
-  const Bytes other = waterlinked::rip_packet(Bytes(5, std::byte{0xFF}));  // of no kind that is known
+  const Bytes other = waterlinked::rip_packet(Bytes(5, std::byte{0xFF}));  // a message of an unknown kind
   const Bytes file = joined({images(1), other, images(2)});
   const ReadBack read = read_back(file);
   EXPECT_EQ(read.damage, "");
@@ -76,7 +76,7 @@ TEST(SonarFile, DamagedSaysWhereAndGoesOn) {
   EXPECT_EQ(read.packets.size(), 5u);
   EXPECT_EQ(read.damage, "f: the packet at byte " + second + " is damaged: wrong CRC or compression");
   file = whole;
-  file[shots[0].size() + 5] = std::byte{0xFF};  // of its length
+  file[shots[0].size() + 5] = std::byte{0xFF};  // a byte of its length
   read = read_back(file);
   EXPECT_EQ(read.packets.size(), 5u) << "the next one is found, whatever length this one states";
   read = read_back(joined({shots[0], Bytes(100, std::byte{'R'}), shots[1], Bytes(3, std::byte{0})}));

@@ -50,7 +50,7 @@ function rowsOf(facts) {
 export function drawConnections(facts) {
   const rows = rowsOf(facts);
   const drivers = (facts.status?.sonars ?? []).reduce((sum, sonar) => sum + sonar.clients.length, 0);
-  const viewers = facts.status?.viewers?.length ?? 0;  // of daemons that tell
+  const viewers = facts.status?.viewers?.length ?? 0;  // older daemons do not list viewers
   setText($('connection-count'), facts.status ? many(drivers, 'driver') + (viewers ? `, ${many(viewers, 'viewer')}` : '') : dash);
   const body = $('clients');
   showList(body, rows.map((r) => r.key), () =>

@@ -13,7 +13,7 @@ export class Camera {
     this.camera.up.set(0, 0, 1);
     this.target = new Vector3(0, 0, -3);
     this.mode = 'orbit';
-    this.azimuth = -2.4;  // of the camera, seen from the target; east = 0, counter-clockwise
+    this.azimuth = -2.4;  // azimuth of the camera, seen from the target; east = 0, counter-clockwise
     this.elevation = 0.42;
     this.distance = 11;
     this.moved = true;

@@ -1,5 +1,6 @@
 // Decodes protobuf messages by the descriptors that the daemon advertises with each channel. Fields are found by name; those that
-// are not on the wire have protobuf's defaults. 64-bit numbers become doubles: exact below 2^53, times to a quarter of a microsecond.
+// are not on the wire have protobuf's defaults. 64-bit numbers become doubles: they are
+// exact below 2^53, and time stamps in nanoseconds are rounded to a quarter of a microsecond.
 
 const utf8 = new TextDecoder();
 
@@ -64,7 +65,7 @@ const kinds = {
   18: [0, (r) => zigzag(r.varint()), 0],
 };
 
-/// A field of a message type. `type`: the name of a message's type, with its dots.
+/// A field of a message type. `type`: for a message, the full name of its type, such as sonar.v1.Event.
 const field = (name, kind, repeated = false, type = '') => ({ name, kind, repeated, type });
 
 // The part of descriptors that is needed to read descriptors themselves (google/protobuf/descriptor.proto).
@@ -88,7 +89,7 @@ export function readDescriptors(bytes) {
   return types;
 }
 
-// google.protobuf.DoubleValue and its kin hold one field and say by their absence that nothing was given: null.
+// Wrapper types such as google.protobuf.DoubleValue hold one value. A field that is absent is decoded as null: no value was given.
 const isWrapper = (type) => /^google\.protobuf\.(Double|Float|U?Int(32|64)|Bool|String)Value$/.test(type);
 
 /// `bytes` as an object of the type. Messages that are not there are null, lists empty.

@@ -49,7 +49,7 @@ class TableInMemory final : public Queue {
   }
   std::map<std::string, std::string> all;
   std::vector<std::uint64_t> shards;
-  std::vector<std::string> ends;  // of tasks
+  std::vector<std::string> ends;  // ends of tasks
 
  private:
   class TaskInMemory final : public Task {

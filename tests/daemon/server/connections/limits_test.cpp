@@ -196,7 +196,7 @@ TEST(Threads, ThatComputeAreNiceAndSoAreThoseTheyStart) {
 }
 
 TEST(Threads, RealTimeIsTakenOrTheRefusalSaysWhatToDo) {
-  std::thread([] {  // of its own: the test's stays as it is
+  std::thread([] {  // a thread of its own, so that the test's stays as it is
     const std::string why = schedule_in_real_time(1);
     if (why.empty()) {
       EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_FIFO);

@@ -17,7 +17,7 @@ constexpr std::uint16_t udp_port = 15003;      // UDP: commands; datagrams of pi
 constexpr std::uint16_t group_port = 15004;    // UDP: the ping's number alone, to group_ip
 constexpr std::uint16_t http_port = 15080;     // GET and PUT /range; PUT /receivers
 constexpr protocol::Ipv4 group_ip{239, 255, 42, 1};
-constexpr std::size_t part_bytes = 1000;  // of samples in a datagram, behind "PING number part parts\n"
+constexpr std::size_t part_bytes = 1000;  // bytes of samples in a datagram, behind "PING number part parts\n"
 
 /// Starts to ping at 20 Hz when a client or a receiver is there.
 const protocol::Vendor& made_up_vendor();

@@ -79,7 +79,7 @@ class UdpSocket {
   }
   std::uint16_t port() const { return port_; }
   std::string at() const { return "127.0.0.1:" + std::to_string(port_); }
-  std::string sender;  // of the last datagram
+  std::string sender;  // sender of the last datagram
 
  private:
   static sockaddr_in address_of(const std::string& address, std::uint16_t port) {
