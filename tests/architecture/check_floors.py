@@ -10,7 +10,7 @@ import sys
 
 # What a make of sonar may include beside its own folder.
 DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/dialogue.hpp", "protocol/host.hpp",
-          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/recording/byte_source.hpp", "protocol/recording/codec.hpp", "protocol/recording/message_splitter.hpp",
+          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/waterfall.hpp", "protocol/wire/", "protocol/recording/byte_source.hpp", "protocol/recording/codec.hpp", "protocol/recording/message_splitter.hpp",
           "protocol/recording/raw_dump.hpp", "protocol/recording/recorded_message.hpp", "protocol/recording/zlib.hpp"]
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
