@@ -27,7 +27,7 @@ struct Settings {
   int lowest_mode = 0, highest_mode = range_mode_count - 1;  // that range_mode allows
   bool is_triggered = false;                                 // a client has requested a ping while acoustics are off
 
-  int mode = range_mode_count - 1;  // where the device is
+  int mode = 2;  // where the device is
   Reckoning reckoning;
 
   /// The values that clients set.

@@ -57,7 +57,7 @@ std::shared_ptr<const Scene> bed(double z_m, double lambert_db = -25) {
 }
 
 TEST(DvlAcoustics, FindsTheGroundAtEveryAltitude) {
-  const std::pair<double, int> altitudes[]{{0.2, 0}, {0.5, 0}, {1, 1}, {2.5, 1}, {8, 2}, {25, 4}, {45, 4}};
+  const std::pair<double, int> altitudes[]{{0.2, 0}, {0.5, 0}, {1, 1}, {2.5, 2}, {8, 2}, {25, 3}, {45, 4}};
   for (const auto& [altitude_m, mode] : altitudes) {
     SCOPED_TRACE(altitude_m);
     Dvl dvl(bed(-altitude_m));
