@@ -38,7 +38,8 @@ install(FILES ${made}/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-
 install(FILES docs/bvtsdk.md docs/blueview.png DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
 install(FILES docs/protocols/blueview-link.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk/protocols COMPONENT bvtsdk)
 install(FILES scenes/sonard.yaml scenes/sonard-blueview.yaml scenes/sonard-aris.yaml scenes/sonard-3d15.yaml scenes/sonard-ping360.yaml
-  scenes/sonard-surveyor.yaml scenes/sonard-omniscan.yaml scenes/sonard-ping1d.yaml DESTINATION ${documents}/examples COMPONENT sonard)
+  scenes/sonard-surveyor.yaml scenes/sonard-omniscan.yaml scenes/sonard-ping1d.yaml
+  scenes/sonard-dvl.yaml DESTINATION ${documents}/examples COMPONENT sonard)
 install(FILES README.md CONTRIBUTING.md LICENSE DESTINATION ${documents} COMPONENT sonard)
 install(DIRECTORY tests/judge DESTINATION ${documents}/tests COMPONENT sonard PATTERN "__pycache__" EXCLUDE)  # examples of docs/judge.md
 install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT sonard PATTERN "man" EXCLUDE PATTERN "__pycache__" EXCLUDE)
@@ -103,8 +104,8 @@ set(CPACK_DEBIAN_SONARD_PACKAGE_CONTROL_EXTRA
 set(CPACK_COMPONENT_SONARD_DESCRIPTION "emulates imaging sonars on the network, from a 3D scene
 sonard holds a 3D scene, takes the pose of a vehicle, computes what a
 multibeam sonar would hear, and serves it as an Oculus, a BlueView sonar, an
-ARIS, a Sonar 3D-15, a Ping360, a Surveyor, an Omniscan or a Ping1D: drivers
-written for the real device connect unchanged, those of BlueView with
+ARIS, a Sonar 3D-15, a Ping360, a Surveyor, an Omniscan, a Ping1D or a DVL:
+drivers written for the real device connect unchanged, those of BlueView with
 libraries of sonard's. With sonarctl, which listens to, looks at and steers
 sonars, and with a systemd unit, which is not started by the installation.")
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_NAME sonard-bvtsdk)

@@ -2,6 +2,8 @@
 #include "protocol/aris/host.hpp"
 #include "protocol/blueview/blueview.hpp"
 #include "protocol/blueview/host.hpp"
+#include "protocol/dvl/dvl.hpp"
+#include "protocol/dvl/host.hpp"
 #include "protocol/host.hpp"
 #include "protocol/oculus/host.hpp"
 #include "protocol/oculus/oculus.hpp"
@@ -98,6 +100,16 @@ std::vector<Make> product_makes() {
        .host = ping::ping1d::make_host,
        .codec = ping::ping1d::codec(),
        .usual_settings = "--rate 10",
+       .own_numbers = true,
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
+       .picture = PictureKind::waterfall},
+      {.device = &dvl::vendor(),
+       .title = "a DVL",
+       .request = "command",
+       .remedy = "send the command set_config with acoustic_enabled true",
+       .ports = dvl::host_ports,
+       .host = dvl::make_host,
+       .codec = dvl::codec(),
        .own_numbers = true,
        .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
        .picture = PictureKind::waterfall},

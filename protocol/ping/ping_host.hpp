@@ -2,19 +2,20 @@
 #pragma once
 
 #include <algorithm>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "protocol/host.hpp"
 #include "protocol/ping/messages.hpp"
+#include "protocol/waterfall.hpp"
 
 namespace sonar::ping {
 
-inline constexpr double usual_range_m = 10;
+using protocol::Line;
+using protocol::Waterfall;
 
-using Line = std::vector<float>;  // levels of one beam
+inline constexpr double usual_range_m = 10;
 
 /// 0: as the device likes.
 double period_ms_of(const protocol::SettingsOverride& wanted);
@@ -27,17 +28,6 @@ std::optional<BytesView> read_front(const Frame& frame, M& message) {
   if (!reader.ok()) return std::nullopt;
   return BytesView(frame.payload).subspan(wire::wire_size<M>());
 }
-
-/// The lines of one beam, ping by ping, the newest first, each [dB].
-class Waterfall {
- public:
-  /// Begins anew where the rows are others. `ping` gets the drawing.
-  void add(Line line, double start_m, double row_m, protocol::HostPing& ping);
-
- private:
-  std::deque<std::shared_ptr<const Line>> lines_;
-  double start_m_ = 0, row_m_ = 0;
-};
 
 class PingHost : public protocol::Host {
  public:

@@ -9,10 +9,20 @@ bool begins_with(wire::BytesView bytes, const std::array<std::uint8_t, 2>& magic
   return !bytes.empty() && bytes[0] == std::byte{magic[0]} && (bytes.size() < 2 || bytes[1] == std::byte{magic[1]});
 }
 
+constexpr std::size_t longest_line = 1 << 16;
+
+/// Up to and with the line end; 0: it has not come yet.
+std::optional<std::size_t> length_of_line(wire::BytesView waiting) {
+  const auto end = std::find(waiting.begin(), waiting.end(), std::byte{'\n'});
+  if (end != waiting.end()) return static_cast<std::size_t>(end - waiting.begin()) + 1;
+  return waiting.size() < longest_line ? std::optional<std::size_t>(0) : std::nullopt;
+}
+
 }  // namespace
 
 bool Framing::begins_message(wire::BytesView bytes, Origin from) const {
-  return bytes.size() >= header_size && begins_with(bytes, magic) && length(bytes.first(header_size), from, true);
+  if (bytes.size() < header_size || !begins_with(bytes, magic)) return false;
+  return length == nullptr || length(bytes.first(header_size), from, true);
 }
 
 bool MessageSplitter::starts_like_header(wire::BytesView bytes) const { return begins_with(bytes, framing_->magic); }
@@ -47,6 +57,7 @@ void MessageSplitter::break_off() {
 std::optional<std::size_t> MessageSplitter::length_at_front(wire::BytesView waiting) const {
   if (!starts_like_header(waiting)) return std::nullopt;
   if (waiting.size() < framing_->header_size) return 0;
+  if (framing_->length == nullptr) return length_of_line(waiting);
   return framing_->length(waiting.first(framing_->header_size), from_, strict_);
 }
 

@@ -28,7 +28,8 @@ MAKES = {"oculus-m1200d": (52100, "--range", 3, "--gain", 60, "--rate", 5, "--mo
          "ping360": (12345, "--range", 3, "--gain", 60),
          "surveyor-240": (62312, "--range", 3, "--gain", 60, "--rate", 5),
          "omniscan-450": (51200, "--range", 3, "--gain", 60, "--rate", 5),
-         "ping1d": (9090, "--range", 3, "--gain", 60, "--rate", 5)}
+         "ping1d": (9090, "--range", 3, "--gain", 60, "--rate", 5),
+         "dvl-a50": (16171, "--as-it-is")}  # it pings before settings come
 PINGS = 4
 LONGEST_BEACON = 142  # bytes; beacons hold the address, which differs from run to run
 PATIENCE = ("--wait", 120)
@@ -86,7 +87,7 @@ class Observed:
 
     def view(self, daemon, device, _):
         png = pathlib.Path(daemon.folder.name) / "view.png"
-        result = self.ctl("view", device, "--range", 8, "--png", png, *PATIENCE, fails=True)
+        result = self.ctl("view", device, *(self.settings if self.settings == ["--as-it-is"] else ("--range", 8)), "--png", png, *PATIENCE, fails=True)
         self.seen["view"] = pixels_of(png) if png.exists() else result.stderr
 
     def examine(self, daemon, device, control):

@@ -10,7 +10,7 @@ import sys
 
 # What a make of sonar may include beside its own folder.
 DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/dialogue.hpp", "protocol/host.hpp",
-          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/wire/", "protocol/recording/byte_source.hpp", "protocol/recording/codec.hpp", "protocol/recording/message_splitter.hpp",
+          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/waterfall.hpp", "protocol/wire/", "protocol/recording/byte_source.hpp", "protocol/recording/codec.hpp", "protocol/recording/message_splitter.hpp",
           "protocol/recording/raw_dump.hpp", "protocol/recording/recorded_message.hpp", "protocol/recording/zlib.hpp"]
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
@@ -33,6 +33,7 @@ FLOORS = {
     "protocol/aris": [*DEVICE, "protocol/aris/"],
     "protocol/waterlinked": [*DEVICE, "protocol/waterlinked/"],
     "protocol/ping": [*DEVICE, "protocol/ping/"],
+    "protocol/dvl": [*DEVICE, "protocol/dvl/"],
     "protocol/blueview": [*DEVICE, "protocol/blueview/"],
     "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/wire/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
@@ -77,7 +78,7 @@ DEPENDENCIES = {
         "clients/sonarctl/record.cpp", "clients/sonarctl/source.cpp"],
     r"nats": ["daemon/commands/farm/nats_queue.cpp"],
     r"snappy\.h": ["protocol/waterlinked/rip.cpp"],
-    r"nlohmann/": ["core/scene/import/", "protocol/control/", "protocol/foxglove/", "protocol/waterlinked/host.cpp", "protocol/waterlinked/http.cpp", "protocol/recording/mcap/", "daemon/", "clients/"],
+    r"nlohmann/": ["core/scene/import/", "protocol/control/", "protocol/dvl/", "protocol/foxglove/", "protocol/waterlinked/host.cpp", "protocol/waterlinked/http.cpp", "protocol/recording/mcap/", "daemon/", "clients/"],
     r"CLI/": ["core/text/arguments.cpp", "daemon/", "clients/"],
     r"cuda|nv[a-z]+\.h": ["cuda/"],
     r"ignition/": ["clients/gazebo_bridge/"],
@@ -113,8 +114,8 @@ FORBIDDEN = [
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]
 # A make of sonar is its folder and a line of makes.cpp; these files still name one. The list only gets shorter.
-MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|surveyor|omniscan|3d-?15|protocol/ping/|\bping::", re.I)
-MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
+MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|surveyor|omniscan|3d-?15|protocol/ping/|\bping::|dvl-a|protocol/dvl/|\bdvl::", re.I)
+MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
 NAME_MAKES = {
     "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py",
     "clients/python/sonard_client/daemon.py", "clients/python/sonard_client/judge/__main__.py",

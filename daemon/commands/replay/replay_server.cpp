@@ -163,6 +163,7 @@ asio::awaitable<void> ReplayServer::accept() {
       device_.state->connected_client = client->ip;
       device_.state->settings.reset();
       client->dialogue = device_.vendor->converse(*device_.vendor->port(protocol::Port::Kind::tcp_stream), *device_.state, {});
+      client->wants_frames = !device_.by_datagrams() && device_.vendor->pings_before_first_request(*device_.state);
       status_timer_.cancel();  // says so at once
     }
     ++figures_.clients;

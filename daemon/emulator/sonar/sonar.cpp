@@ -1,6 +1,7 @@
 #include "daemon/emulator/sonar/sonar.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "daemon/emulator/sonar/ping_request.hpp"
 
@@ -54,8 +55,8 @@ bool Sonar::wants_pings() const {
 
 void Sonar::change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions) {
   // Some drivers repeat their settings at ping rate: only a change is worth a line.
-  if (!asked_ || !change.vendor_settings->equals(*state_.settings)) {
-    state_.settings = change.vendor_settings;
+  const auto before = std::exchange(state_.settings, change.vendor_settings);  // equal ones may hold another state of the device
+  if (!asked_ || !change.vendor_settings->equals(*before)) {
     if (!who.empty()) asked_by_ = who;  // empty: the device itself, perhaps with every ping
     report(Report::Topic::settings, who.empty() ? LogLevel::debug : LogLevel::info, "settings: " + change.summary,
            {{"client", who.empty() ? "the sonar itself" : who}}, actions);

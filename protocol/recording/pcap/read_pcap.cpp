@@ -45,7 +45,9 @@ const Make* make_of(const Segment& segment) {
   for (const Make& make : protocol::makes()) {
     const Framing* const framing = make.codec.framing;
     if (framing == nullptr || !framing->begins_message(segment.payload, Origin::device)) continue;
-    if (found == nullptr || make.ports.front().number == segment.source.port) found = &make;
+    const std::uint16_t usual = make.ports.front().number;
+    if (framing->length == nullptr && usual != segment.source.port && usual != segment.target.port) continue;  // many send lines
+    if (found == nullptr || usual == segment.source.port) found = &make;
   }
   return found;
 }

@@ -325,7 +325,8 @@ TEST(Config, TheShippedExampleIsValid) {
   for (const auto& [file, profile] : {std::pair{"sonard-ping360.yaml", "ping360"},
                                       {"sonard-surveyor.yaml", "surveyor-240"},
                                       {"sonard-omniscan.yaml", "omniscan-450"},
-                                      {"sonard-ping1d.yaml", "ping1d"}}) {
+                                      {"sonard-ping1d.yaml", "ping1d"},
+                                      {"sonard-dvl.yaml", "dvl-a50"}}) {
     const auto ping = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/" + file);
     ASSERT_TRUE(ping) << ping.error().text;
     EXPECT_EQ(ping->sonars.at(0).profile.model->profile, profile);

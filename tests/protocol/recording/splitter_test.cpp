@@ -34,6 +34,24 @@ TEST(MessageSplitter, FindsMessagesHoweverTheStreamIsCut) {
   }
 }
 
+TEST(MessageSplitter, LinesEndAtTheirLineEnd) {
+  constexpr Framing lines{.magic = {'{', '"'}, .header_size = 2};
+  const std::vector<Bytes> sent{bytes_of("xx"), bytes_of("{\"a\":1}\r\n"), bytes_of("{\"b\":2}\n")};
+  const Bytes stream = joined(sent);
+  for (std::size_t cut = 0; cut <= stream.size(); ++cut) {
+    MessageSplitter splitter(Origin::device, lines);
+    splitter.append(after_ms(1), BytesView(stream).first(cut));
+    std::vector<Bytes> found = drain(splitter);
+    splitter.append(after_ms(2), BytesView(stream).subspan(cut));
+    for (Bytes& part : drain(splitter)) found.push_back(std::move(part));
+    EXPECT_EQ(joined(found), stream) << cut;
+    EXPECT_THAT(found, ::testing::IsSupersetOf({sent[1], sent[2]})) << cut;
+  }
+  MessageSplitter endless(Origin::device, lines);
+  endless.append(after_ms(1), bytes_of("{\"" + std::string(70'000, 'a')));
+  EXPECT_TRUE(endless.next()) << "given up, as bytes that are no message";
+}
+
 TEST(MessageSplitter, TimeIsThatOfTheLastByte) {
   const Bytes ping = ping_message(1);
   MessageSplitter splitter(Origin::device, oculus::framing);

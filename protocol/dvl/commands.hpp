@@ -1,0 +1,22 @@
+// The commands of clients, but for trigger_ping.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "protocol/dvl/settings.hpp"
+
+namespace sonar::dvl {
+
+using Json = nlohmann::ordered_json;
+
+/// An outcome without an error is a success.
+struct Outcome {
+  Json result = nullptr;
+  std::string error = {};
+};
+/// Carries out a command; the settings that it changes. Nothing: there is no such command.
+std::optional<Outcome> carry_out(const std::string& command, const Json& parameters, const protocol::DeviceState& device,
+                                 Time now, Settings& settings);
+protocol::Bytes response_line(const std::string& to, const Outcome& outcome);
+
+}  // namespace sonar::dvl

@@ -1,0 +1,116 @@
+#include "protocol/dvl/host.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/text/format.hpp"
+#include "protocol/dvl/reports.hpp"
+#include "protocol/waterfall.hpp"
+
+namespace sonar::dvl {
+namespace {
+
+using protocol::HostActions;
+using protocol::HostPing;
+
+constexpr std::string_view title = "a DVL";
+constexpr std::size_t points = 200;  // of a line of the waterfall
+constexpr float silent_db = -2000;   // below every echo, so that lines without one are dark
+
+Bytes request(const protocol::SettingsOverride& wanted, const Product& product) {
+  const bool enable = wanted.rate_hz.value_or(1) > 0;
+  const nlohmann::ordered_json message{
+      {"command", "set_config"},
+      {"parameters",
+       {{"acoustic_enabled", enable}, {"range_mode", wanted.range_m ? range_mode_for(*wanted.range_m, product) : "auto"}}}};
+  return line_of(message.dump());
+}
+
+/// The distance to which a range mode reaches: the least one that covers the distance.
+double window_m(double distance_m) {
+  double far_m = 0;
+  for (const auto& model : models())  // reports do not have the model
+    for (int mode = 0; mode < range_mode_count; ++mode) {
+      far_m = range_mode(mode, product_of(*model)).highest_m / altitude_per_distance;
+      if (distance_m <= far_m) return far_m;
+    }
+  return far_m;
+}
+
+class DvlHost final : public protocol::Host {
+ public:
+  explicit DvlHost(const protocol::Wanted& wanted) {
+    if (!wanted.as_it_is) request_ = request(wanted.settings, product_);
+    if (wanted.settings.range_m) window_m_ = window_m(*wanted.settings.range_m / altitude_per_distance);
+  }
+  HostActions on_open(std::span<const std::uint16_t>, Time) override {
+    if (!request_) return {};
+    return {protocol::HostSend{0, *request_}};
+  }
+  HostActions on_bytes(std::size_t, BytesView received, Time) override {
+    HostActions actions;
+    for (const std::byte b : received) {
+      line_.push_back(b);
+      if (b == std::byte{'\n'}) {
+        on_line(actions);
+        line_.clear();
+      } else if (line_.size() > longest_line) {
+        line_.clear();
+      }
+    }
+    return actions;
+  }
+  std::string about() const override { return std::string(title); }
+
+ private:
+  void on_line(HostActions& actions) {
+    const Line line = read_line(line_);
+    if (line.velocity) actions.emplace_back(ping_from(*line.velocity));
+    if (line.response && !line.response->success)
+      actions.emplace_back(Error{ErrorKind::usage, "refuses " + line.response->to + ": " + line.response->error});
+  }
+
+  HostPing ping_from(const VelocityReport& report) {
+    double farthest_m = 0;
+    for (const auto& beam : report.transducers)
+      if (beam.is_valid) farthest_m = std::max(farthest_m, beam.distance_m);
+    const double range_m = std::max(window_m(farthest_m), window_m_), row_m = range_m / points;
+    HostPing ping;
+    ping.facts = {++number_, beam_count, 1, 32, range_m, range_m, product_.centre_hz, line_.size()};
+    ping.facts.note = report.is_valid ? text::format("velocity %.3f %.3f %.3f m/s, altitude %.2f m", report.velocity_mps.x,
+                                                     report.velocity_mps.y, report.velocity_mps.z, report.altitude_m)
+                                      : "no velocity";
+    if (report.reflected_s > 0) ping.fired_s = report.reflected_s;
+    ping.picture = []() -> Result<PolarImage> {
+      return failure(ErrorKind::usage, "the report of a DVL is no picture: sonarctl listen prints its velocities");
+    };
+    std::vector<float> echoes(points, silent_db);
+    for (const auto& beam : report.transducers) {
+      if (!beam.is_valid || !(beam.distance_m >= 0 && beam.distance_m < range_m)) continue;
+      float& point = echoes[static_cast<std::size_t>(beam.distance_m / row_m)];
+      point = std::max(point, static_cast<float>(std::clamp(beam.rssi_dbm, -200.0, 200.0)));
+    }
+    waterfall_.add(std::move(echoes), 0, row_m, ping);
+    return ping;
+  }
+
+  const Product& product_ = product_of(*models().front());  // reports do not have the model
+  std::optional<Bytes> request_;
+  double window_m_ = 0;  // the least one, where a range is wanted
+  Bytes line_;
+  std::uint32_t number_ = 0;
+  protocol::Waterfall waterfall_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
+  if (auto accepted = protocol::accept_settings(wanted, title, {"range", "rate", "mode"}); !accepted)
+    return tl::unexpected(accepted.error());
+  if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, "a DVL has one mode only");
+  if (wanted.settings.rate_hz.value_or(0) > 0)
+    return failure(ErrorKind::usage, "a DVL sets its rate by altitude: leave --rate out, or --rate standby");
+  return std::make_unique<DvlHost>(wanted);
+}
+
+}  // namespace sonar::dvl

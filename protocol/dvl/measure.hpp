@@ -1,0 +1,47 @@
+// The measurement in a ping: four beams and the velocity that they make, and dead reckoning from one to the next. Pure functions.
+#pragma once
+
+#include "protocol/dvl/settings.hpp"
+
+namespace sonar::dvl {
+
+struct Beam {
+  bool is_valid = false;
+  double velocity_mps = 0;  // of the device along the beam, positive towards the ground
+  double sigma_mps = 0;     // of its noise
+  double distance_m = -1;   // in the device's metres
+  double rssi_dbm = 0;
+};
+
+using Covariance = std::array<std::array<double, 3>, 3>;
+
+/// In the vehicle's frame: that of the device, turned by the mounting rotation.
+struct Measurement {
+  std::array<Beam, beam_count> beams;
+  bool is_valid = false;
+  Vec3d velocity_mps;
+  Covariance covariance{};
+  double fom = 0, altitude_m = -1;
+  Time reflected_at{}, heard_at{};  // the middle of the ping at the ground; the end of the last echo
+};
+
+/// The velocity of the ground along the beams comes from PingRequest::sonar_moves, which World derives from the poses of the
+/// vehicle: senders give poses, not velocities.
+Measurement measure(const Ping& ping);
+
+/// The range mode of the next ping.
+int next_mode(const Measurement& measured, const Settings& settings, const Product& product);
+
+Reckoning reckoned(const Reckoning& before, const Measurement& measured, const PingRequest& request, const Settings& settings);
+/// Where the vehicle is by its last velocity, some time after the last ping.
+Reckoning extrapolated(const Reckoning& last, Time now);
+
+/// Weighted least squares of the velocities of the valid beams, at least three, in the device's frame.
+struct Estimate {
+  Vec3d velocity_mps;
+  Covariance covariance{};
+};
+Estimate estimate(const std::array<Beam, beam_count>& beams);
+double largest_eigenvalue(const Covariance& m);
+
+}  // namespace sonar::dvl

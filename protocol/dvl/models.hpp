@@ -1,0 +1,47 @@
+// The products: beams, limits, range modes. Sources: docs/protocols/dvl.md.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "core/base/geometry.hpp"
+#include "core/sonar/sonar_model.hpp"
+
+namespace sonar::dvl {
+
+inline constexpr std::size_t beam_count = 4;
+inline constexpr double tilt_rad = rad_from_deg(22.5);  // of a beam, off the axis
+/// A distance along a beam, and the altitude above level ground that it belongs to.
+inline const double altitude_per_distance = std::cos(tilt_rad);
+
+struct Product {
+  const char *profile, *name;
+  std::uint16_t part_number;
+  double centre_hz, beam_deg, source_level_db, highest_m, fastest_mps;
+  double range_unit_m;  // of the pixels of its pings
+};
+const Product& product_of(const SonarModel& model);
+std::span<const std::shared_ptr<const SonarModel>> models();
+
+struct RangeMode {
+  double lowest_m, highest_m;  // altitudes
+  float rate_hz;
+  double pulse_m;  // unknown: assumed
+};
+inline constexpr int range_mode_count = 5;
+RangeMode range_mode(int index, const Product& product);
+
+/// Unit vector of a beam in the device's frame: x forward, y to starboard, z down.
+Vec3d beam_direction(std::size_t beam);
+
+/// The beams lie in a grid that a ping traces as a range image, `grid_size` by `grid_size` directions about the device's axis.
+inline constexpr int grid_size = 27;
+/// Index of a beam's pixel in Ping::samples.
+std::size_t pixel_of(std::size_t beam);
+
+/// A vector in the axes of the sonar, which looks along x with z "up", in the device's frame; and back, by the same formula.
+constexpr Vec3d device_from_sonar(Vec3d v) { return {v.z, -v.y, v.x}; }
+
+}  // namespace sonar::dvl

@@ -1,0 +1,121 @@
+#include "protocol/dvl/reports.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace sonar::dvl {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double nsd_dbm = -90;  // DOC: -88 to -97 in its example; unknown: assumed the same for all
+
+std::int64_t microseconds(Time at) {
+  return std::chrono::duration_cast<std::chrono::microseconds>(at.time_since_epoch()).count();
+}
+
+Bytes line_of(const Json& message) { return dvl::line_of(message.dump()); }
+
+/// A member that is a finite number.
+std::optional<double> number(const Json& from, const char* name) {
+  const auto found = from.find(name);
+  if (found == from.end() || !found->is_number()) return std::nullopt;
+  const auto value = found->get<double>();
+  return std::isfinite(value) && std::abs(value) < 1e18 ? std::optional(value) : std::nullopt;
+}
+std::optional<bool> truth(const Json& from, const char* name) {
+  const auto found = from.find(name);
+  return found != from.end() && found->is_boolean() ? std::optional(found->get<bool>()) : std::nullopt;
+}
+std::string text(const Json& from, const char* name) {
+  const auto found = from.find(name);
+  return found != from.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+std::optional<VelocityReport> velocity_from(const Json& message) {
+  const auto vx = number(message, "vx"), vy = number(message, "vy"), vz = number(message, "vz");
+  const auto altitude = number(message, "altitude"), at_us = number(message, "time_of_validity");
+  const auto valid = truth(message, "velocity_valid");
+  const auto transducers = message.find("transducers");
+  if (!vx || !vy || !vz || !altitude || !valid || transducers == message.end() || !transducers->is_array() ||
+      transducers->size() != beam_count)
+    return std::nullopt;
+  VelocityReport report{.velocity_mps = {*vx, *vy, *vz}, .altitude_m = *altitude, .is_valid = *valid, .transducers = {}};
+  report.reflected_s = 1e-6 * at_us.value_or(0);
+  for (std::size_t i = 0; i < beam_count; ++i) {
+    const Json& beam = (*transducers)[i];
+    if (!beam.is_object()) return std::nullopt;
+    const auto distance = number(beam, "distance"), rssi = number(beam, "rssi");
+    const auto beam_valid = truth(beam, "beam_valid");
+    if (!distance || !rssi || !beam_valid) return std::nullopt;
+    report.transducers[i] = {*distance, *rssi, *beam_valid};
+  }
+  return report;
+}
+
+}  // namespace
+
+Bytes line_of(std::string text) {
+  text += line_end;
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+Bytes velocity_line(const Measurement& m, std::chrono::nanoseconds since_last, Time sent_at) {
+  Json covariance = Json::array(), transducers = Json::array();
+  for (const auto& row : m.covariance) covariance.push_back(row);
+  for (std::size_t i = 0; i < beam_count; ++i) {
+    const Beam& beam = m.beams[i];
+    transducers.push_back({{"id", i},
+                           {"velocity", beam.velocity_mps},
+                           {"distance", beam.distance_m},
+                           {"rssi", beam.rssi_dbm},
+                           {"nsd", nsd_dbm},
+                           {"beam_valid", beam.is_valid}});
+  }
+  return line_of({{"time", 1e3 * seconds(since_last)},
+                  {"vx", m.velocity_mps.x},
+                  {"vy", m.velocity_mps.y},
+                  {"vz", m.velocity_mps.z},
+                  {"fom", m.fom},
+                  {"covariance", std::move(covariance)},
+                  {"altitude", m.altitude_m},
+                  {"transducers", std::move(transducers)},
+                  {"velocity_valid", m.is_valid},
+                  {"status", 0},
+                  {"format", format_name},
+                  {"type", "velocity"},
+                  {"time_of_validity", microseconds(m.reflected_at)},
+                  {"time_of_transmission", microseconds(sent_at)}});
+}
+
+Bytes position_line(const Reckoning& r, Time at) {
+  const RollPitchYaw angles = rpy_from_quat(conjugate(r.first) * r.last);
+  return line_of({{"ts", 1e-6 * static_cast<double>(microseconds(at))},
+                  {"x", r.position_m.x},
+                  {"y", r.position_m.y},
+                  {"z", r.position_m.z},
+                  {"std", r.std_m},
+                  {"roll", deg_from_rad(angles.roll_rad)},
+                  {"pitch", deg_from_rad(angles.pitch_rad)},
+                  {"yaw", deg_from_rad(angles.yaw_rad)},
+                  {"type", "position_local"},
+                  {"status", 0},
+                  {"format", format_name}});
+}
+
+Line read_line(BytesView line) {
+  std::string received;
+  for (const std::byte b : line) received.push_back(static_cast<char>(b));
+  const Json message = Json::parse(received, nullptr, false);
+  if (!message.is_object()) return {};
+  const std::string type = text(message, "type");
+  if (type == "velocity") return {.velocity = velocity_from(message), .response = {}};
+  if (type == "response")
+    return {.velocity = {},
+            .response = Response{text(message, "response_to"), text(message, "error_message"),
+                                 truth(message, "success").value_or(false)}};
+  return {};
+}
+
+}  // namespace sonar::dvl

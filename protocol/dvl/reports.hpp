@@ -1,0 +1,44 @@
+// The lines that the device sends, written and read. JSON, one object a line.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "protocol/dvl/measure.hpp"
+
+namespace sonar::dvl {
+
+using protocol::Bytes;
+using protocol::BytesView;
+
+inline constexpr std::string_view format_name = "json_v3.3", line_end = "\r\n";
+inline constexpr std::size_t longest_line = 16384;
+
+/// The text as bytes, with the end of a line.
+Bytes line_of(std::string text);
+Bytes velocity_line(const Measurement& measured, std::chrono::nanoseconds since_last, Time sent_at);
+Bytes position_line(const Reckoning& reckoning, Time at);
+
+struct VelocityReport {
+  Vec3d velocity_mps;
+  double altitude_m = -1;
+  bool is_valid = false;
+  double reflected_s = 0;  // time_of_validity
+  struct Transducer {
+    double distance_m = -1, rssi_dbm = 0;
+    bool is_valid = false;
+  };
+  std::array<Transducer, beam_count> transducers;
+};
+struct Response {
+  std::string to, error;
+  bool success = false;
+};
+/// A line of the device: one of these, or neither for other lines and for what is no JSON.
+struct Line {
+  std::optional<VelocityReport> velocity;
+  std::optional<Response> response;
+};
+Line read_line(BytesView line);
+
+}  // namespace sonar::dvl

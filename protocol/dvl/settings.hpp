@@ -1,0 +1,56 @@
+// The configuration that clients set, and the state that the device keeps from ping to ping.
+#pragma once
+
+#include <string>
+#include <tuple>
+
+#include "core/sonar/range_image.hpp"
+#include "protocol/dvl/models.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::dvl {
+
+/// Dead reckoning, in the axes of the vehicle (x forward, y to starboard, z down) as they were at its start.
+struct Reckoning {
+  bool is_started = false;
+  Time at{};                  // of the last ping
+  Quatd first, last;          // vehicle in the world: at the start, and at the last ping
+  Vec3d position_m;           // at the last ping
+  Vec3d velocity_mps;         // from then on, in those axes
+  double std_m = 0, fom = 0;  // fom: by which std_m grows [m/s]
+};
+
+struct Settings {
+  double speed_of_sound_mps = 1475, mounting_rotation_deg = 0;
+  bool acoustics = true, dark = false, cycles = true;
+  std::string range_mode = "auto", ntp_address = "auto";
+  int lowest_mode = 0, highest_mode = range_mode_count - 1;  // that range_mode allows
+  bool is_triggered = false;                                 // a client has requested a ping while acoustics are off
+
+  int mode = 2;  // where the device is
+  Reckoning reckoning;
+
+  /// The values that clients set.
+  auto configured() const {
+    return std::tuple(speed_of_sound_mps, mounting_rotation_deg, acoustics, dark, cycles, range_mode, ntp_address, is_triggered);
+  }
+};
+/// Pings with these settings are range images.
+struct HeldSettings final : RangeImageSettings {
+  HeldSettings(const Settings& s, const Product& product);
+  bool equals(const VendorSettings& other) const override;
+  Settings settings;
+};
+/// As the device comes, for null.
+Settings settings_from(const VendorSettings* held);
+
+/// Allows the modes of "auto", "=a" or "a<=b". False: the text is none of these.
+bool allow_modes(std::string_view text, Settings& settings);
+/// The text that allows the modes up to the one that reaches this altitude.
+std::string range_mode_for(double range_m, const Product& product);
+
+PingSettings ping_settings(const Settings& settings, const Product& product);
+protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+}  // namespace sonar::dvl

@@ -1,0 +1,179 @@
+"""An emulated DVL A50 as its drivers meet it: lines of JSON over TCP."""
+import json
+import math
+import re
+import socket
+import struct
+import sys
+import threading
+import time
+import unittest
+
+from oculus_reader import fire_message
+from running_sonard import ROOT, SONARD, Daemon, Sonard, eventually
+
+sys.path.insert(0, str(ROOT / "clients/python"))
+from sonard_client import Control  # noqa: E402
+
+PORT, PATIENCE_S = 16171, 120
+DOWN = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}"
+ORBIT_MPS, RADIUS_M = 0.5, 7
+IDS = {(-1, 1): 0, (-1, -1): 1, (1, -1): 2, (1, 1): 3}  # of beams, by the signs of forward and starboard
+
+
+class Driver:
+    def __init__(self, address):
+        self.link = socket.create_connection((address, PORT), PATIENCE_S)
+        self.lines = self.link.makefile("rb")
+        self.velocities = 0  # reports that came
+
+    def close(self):
+        self.lines.close()
+        self.link.close()
+
+    def next(self, kind, wanted=lambda report: True):
+        end = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end:
+            line = self.lines.readline()
+            assert line.endswith(b"\r\n"), line
+            report = json.loads(line)
+            self.velocities += report["type"] == "velocity"
+            if report["type"] == kind and wanted(report):
+                return report
+        raise AssertionError(f"no such {kind} within {PATIENCE_S} s")
+
+    def command(self, name, **parameters):
+        self.link.sendall(json.dumps({"command": name, **({"parameters": parameters} if parameters else {})}).encode())  # no line end
+        response = self.next("response")
+        assert response["response_to"] == name, response
+        return response
+
+    def set(self, **parameters):
+        response = self.command("set_config", **parameters)
+        assert response["success"], response
+
+    def velocity(self):
+        return self.next("velocity", lambda report: report["velocity_valid"])
+
+
+class Velocity(unittest.TestCase):
+    """A vehicle that circles through the harbour and faces its middle: it moves to its own starboard."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Sonard(profile="dvl-a50", mount=DOWN, pose="{frame: ENU_FLU, xyz_m: [-7, 0, -3]}", trajectory="orbit").__enter__()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.daemon.__exit__()
+
+    def setUp(self):
+        self.driver = Driver(self.daemon.address)
+        self.addCleanup(self.driver.close)
+        self.driver.set(acoustic_enabled=True, range_mode="auto", mounting_rotation_offset=0, speed_of_sound=1475)
+
+    def test_starboard_is_starboard_in_velocities_and_beams(self):
+        reports = [self.driver.velocity() for _ in range(20)]
+        for report in reports:
+            self.assertAlmostEqual(report["vx"], 0, delta=0.03)
+            self.assertAlmostEqual(report["vy"], ORBIT_MPS, delta=0.04)  # 1475 m/s are 1 % less than sound has in this water
+            self.assertAlmostEqual(report["vz"], 0, delta=0.02)
+            self.assertAlmostEqual(report["altitude"], 2, delta=1.2)  # ripples, relief and bodies of the harbour
+            self.assertTrue(0 < report["fom"] < 0.05, report["fom"])
+            for (_, starboard), number in IDS.items():
+                beam = report["transducers"][number]
+                self.assertEqual(beam["id"], number)
+                if beam["beam_valid"]:
+                    self.assertAlmostEqual(beam["velocity"], starboard * 0.2706 * report["vy"], delta=0.03)
+        self.assertLess(reports[0]["time_of_validity"], reports[0]["time_of_transmission"])
+
+    def test_a_mounting_rotation_turns_them(self):
+        self.driver.set(mounting_rotation_offset=90)
+        report = self.driver.next("velocity", lambda r: r["velocity_valid"] and abs(r["vx"]) > 0.3)
+        self.assertAlmostEqual(report["vx"], -ORBIT_MPS, delta=0.04)
+        self.assertAlmostEqual(report["vy"], 0, delta=0.04)
+
+    def test_dead_reckoning_follows_the_circle(self):
+        self.driver.velocity()
+        self.assertTrue(self.driver.command("reset_dead_reckoning")["success"])
+        first = self.driver.next("position_local", lambda r: math.hypot(r["x"], r["y"]) > 0.01)
+        last = self.driver.next("position_local", lambda r: r["ts"] > first["ts"] + 4)
+        turned = ORBIT_MPS / RADIUS_M * (last["ts"] - first["ts"])
+        way = math.hypot(last["x"] - first["x"], last["y"] - first["y"])
+        self.assertAlmostEqual(way, 2 * RADIUS_M * math.sin(turned / 2), delta=0.2)
+        self.assertGreater(last["y"], first["y"] + 1)
+        self.assertAlmostEqual((last["yaw"] - first["yaw"] + math.degrees(turned) + 180) % 360, 180, delta=3, msg="it turns to port")
+
+    def test_pings_are_triggered_while_acoustics_are_disabled(self):
+        self.driver.set(acoustic_enabled=False)
+        self.driver.next("position_local")  # a ping that was under way is over
+        before = self.driver.velocities
+        for _ in range(3):
+            self.assertTrue(self.driver.command("trigger_ping")["success"])
+        while self.driver.velocities < before + 3:
+            self.driver.next("velocity")
+        self.assertFalse(self.driver.command("get_config")["result"]["acoustic_enabled"])
+
+
+SUITE = """\
+world: {scene: %s, seed: 1}
+vehicles: [{name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}, trajectory: orbit}]
+sonars:
+  - {name: front, profile: oculus-m1200d, bind_ip: ADDRESS, status_to: [ADDRESS]}
+  - {name: dvl, profile: dvl-a50, mount: %s, bind_ip: 127.0.0.12}
+  - {name: altimeter, profile: ping1d, mount: %s, bind_ip: 127.0.0.13}
+control: {stream: "ADDRESS:14770", http: "ADDRESS:8088"}
+"""
+STEPS, STEP_S = 20, 0.1
+
+
+class Suite(unittest.TestCase):
+    """An Oculus, a DVL and a Ping1D on one vehicle, in time that steps."""
+
+    def digests(self, threads):
+        arguments = ["--clock", "lockstep", "--digest", "--threads", threads, "--fixed-fan", 2]
+        with Daemon(SUITE % (ROOT / "scenes/demo.yaml", DOWN, DOWN), str(SONARD), [str(a) for a in arguments]) as daemon:
+            links = []
+            for at, request in (((daemon.address, 52100), fire_message(version=2, rate_hz=10, range_=5)),
+                                (("127.0.0.12", PORT), b'{"command":"get_config"}'), (("127.0.0.13", 9090), profiles())):
+                links.append(socket.create_connection(at, PATIENCE_S))
+                links[-1].sendall(request)
+            received = [bytearray() for _ in links]
+            readers = [threading.Thread(target=read_all, args=pair) for pair in zip(links, received)]
+            for reader in readers:
+                reader.start()
+            control = Control(daemon.address)
+            eventually(lambda: all(sonar["pinging"] for sonar in control.status()["sonars"]) and len(received[1]) > 0)
+            pings = sum(control.step(STEP_S)["pings"] for _ in range(STEPS))
+            daemon.stop()
+            log = daemon.log()
+            for reader in readers:
+                reader.join(PATIENCE_S)
+            for link in links:
+                link.close()
+        found = re.findall(r"sha256 ([0-9a-f]{64})", log)
+        self.assertEqual(len(found), len(links), log)
+        self.assertGreater(pings, 3 * STEPS / 2)
+        return found, received[1]
+
+    def test_equal_bytes_twice(self):
+        (first, lines), (again, _) = self.digests(1), self.digests(2)
+        self.assertEqual(first, again)
+        reports = [json.loads(line) for line in lines.splitlines()]
+        self.assertGreater(sum(report.get("velocity_valid", False) for report in reports), 5)
+        self.assertGreater(sum(report["type"] == "position_local" for report in reports), 5)
+
+
+def read_all(link, to):
+    while data := link.recv(65536):
+        to += data
+
+
+def profiles():
+    """Continuous_start (1400) of profiles (1300) of the ping protocol."""
+    body = b"BR" + struct.pack("<HHBBH", 2, 1400, 0, 0, 1300)
+    return body + struct.pack("<H", sum(body) & 0xFFFF)
+
+
+if __name__ == "__main__":
+    unittest.main()
