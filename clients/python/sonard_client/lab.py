@@ -354,7 +354,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     given = sys.argv[1:] if arguments is None else arguments
     try:
         options = _parser().parse_args(given)
-    except SystemExit as end:  # of the parser, which has said why
+    except SystemExit as end:  # raised by the parser, which has printed why
         return 64 if end.code else 0
     command = options.command[1:] if options.command[:1] == ["--"] else options.command
     try:

@@ -47,7 +47,7 @@ class OculusClient:
     def __init__(self, address: str, port: int = layouts.DATA_PORT, timeout: float = 5.0) -> None:
         self.address, self._timeout = endpoint(address, port), timeout
         self.reader = MessageReader()
-        self.settings: Optional[FireSettings] = None  # of the last request
+        self.settings: Optional[FireSettings] = None  # settings of the last request
         self._last_fire = b""
         self._ready: Deque[Message] = deque()
         self._has_received = False

@@ -43,7 +43,7 @@ class Ping:
     start_counter: Optional[int]    # versions 0 and 1: 32 bits, free-running
     row_m: float
     ranges_m: Vector                # centres of the rows
-    azimuths_rad: Vector            # of the beams, positive to port
+    azimuths_rad: Vector            # azimuths of the beams, positive to port
     sample_bits: int                # 8, 16, 24 or 32
     samples: Grid                   # samples[row, beam], as sent
     row_gains: Optional[Tuple[int, ...]]

@@ -74,7 +74,7 @@ class PoseSender:
             return
         try:
             self._socket.send(data)
-        except ConnectionRefusedError:  # of an earlier datagram; a restart of the daemon must not stop the sender
+        except ConnectionRefusedError:  # caused by an earlier datagram; a restart of the daemon must not stop the sender
             self.undelivered += 1
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ import pytest
 from .control import Control
 from .daemon import ADDRESS_IN_USE, Daemon, DaemonFailed
 
-_HTTP = re.compile(r"^control .*\bhttp http://([\d.]+):(\d+)", re.M)  # of the banner
+_HTTP = re.compile(r"^control .*\bhttp http://([\d.]+):(\d+)", re.M)  # a line of the banner
 
 
 class RunningSonard:

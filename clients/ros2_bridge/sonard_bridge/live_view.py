@@ -218,7 +218,7 @@ class LiveView(threading.Thread):
         super().__init__(name="live view", daemon=True)
         self.at, self.token, self.wants, self.cloud_threshold = at, token, wants, cloud_threshold
         self.on_message, self.on_trouble = on_message, on_trouble
-        self.clock = ""  # of the daemon: realtime, stepped, lockstep, follow
+        self.clock = ""  # clock of the daemon: realtime, stepped, lockstep, follow
         self.over = threading.Event()
 
     def stop(self) -> None:

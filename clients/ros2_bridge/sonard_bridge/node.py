@@ -26,7 +26,7 @@ from .conversions import Unusable, json_line, name_in_topic, scan_of, stamp_ns, 
 from .parameters import PARAMETERS, BadParameter, checked
 from .polling import StatusPoll
 
-SAME = 1e-6  # of a mount: metres, and parts of a quaternion
+SAME = 1e-6  # tolerance for a mount: metres, and parts of a quaternion
 
 
 def set_stamp(stamp, ns: int) -> None:
@@ -231,7 +231,7 @@ class Bridge(Node):
         try:
             scan = scan_of(truth.azimuth_rad, truth.range_m)
         except Unusable:
-            return  # of one beam
+            return  # a sonar with one beam
         message = LaserScan()
         set_stamp(message.header.stamp, truth.stamp_ns)
         message.header.frame_id = topic.split("/")[1]

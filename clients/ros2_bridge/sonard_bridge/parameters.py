@@ -21,7 +21,7 @@ class BadParameter(ValueError):
 
 class Parameter(NamedTuple):
     name: str
-    default: Value  # of its type
+    default: Value  # a value of its type
     meaning: str
 
 

@@ -8,7 +8,7 @@ import urllib.error
 import urllib.request
 from typing import Any, Callable, Dict, Tuple
 
-LIMIT_S = 1.0  # of a request; then the next one
+LIMIT_S = 1.0  # limit for a request; then the next one is made
 WANTS_TOKEN = "sonard wants a token: set the parameter token_file to the file that its control.token_file names"
 
 

@@ -32,6 +32,6 @@ export function showList(element, content, build) {
   element.replaceChildren(...build());
 }
 
-/// A sign beside a coloured thing: its meaning must not hang on the colour.
+/// A sign beside a coloured element, because its meaning must not depend on the colour.
 export const sign = (level) =>
   make('span', { class: `sign ${level}`, 'aria-hidden': 'true' }, level === 'error' || level === 'warning' ? '!' : level === 'ok' ? '✓' : '•');

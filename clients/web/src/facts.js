@@ -1,4 +1,4 @@
-// The page's knowledge of the daemon: messages come in, panels read. No drawing here.
+// The page's knowledge of the daemon: messages come in, panels read. It draws nothing.
 import { Counter, Counters } from './rates.js';
 
 const log_lines = 500;
@@ -22,7 +22,7 @@ export class Facts {
     this.status = null;
     this.findings = null;
     this.faults = [];
-    this.troubles = new Map();  // by name: what is said of each
+    this.troubles = new Map();  // by name: what is known of each trouble
     this.frames = new Map();  // child -> {parent, translation, rotation}
     this.ping = null;
     this.geometry = new Map();  // by sonar
@@ -52,8 +52,8 @@ export class Facts {
     this.maySteer = meta['sonard.may_steer'] !== 'false';
     this.clock = meta['sonard.clock'] ?? 'realtime';
     if (!same) this.clear();
-    this.previews = meta['sonard.previews'] === 'true';  // by itself, without a driver
-    this.recording = meta['sonard.recording'] ?? '';  // the file that is played; empty = the sonars are looked at
+    this.previews = meta['sonard.previews'] === 'true';  // the daemon previews by itself, without a driver
+    this.recording = meta['sonard.recording'] ?? '';  // the file that is played; empty = live sonars are shown
     this.recordingFailure = meta['sonard.recording_failure'] ?? '';
     this.openedAt = now_s();
     this.parameters.clear();
@@ -70,7 +70,7 @@ export class Facts {
     const sonar = this.sonarStatus;
     return Boolean(sonar && (sonar.clients.length > 0 || sonar.receivers?.length > 0));
   }
-  /// "fan" and others: pictures of many pings, or of another shape, are sonard's to draw.
+  /// "fan" and others: sonard draws pictures of many pings, or of another shape.
   get pictureKind() {
     return this.pictures.get(this.sonar)?.kind ?? 'fan';
   }
@@ -90,7 +90,7 @@ export class Facts {
     const vehicles = this.status?.vehicles ?? [];
     return vehicles.find((v) => v.name === name) ?? (vehicles.length === 1 ? vehicles[0] : null);
   }
-  /// The daemon's time, carried on by the page's clock while it runs in real time.
+  /// The daemon's time; while it runs in real time, the page's clock continues it.
   get time_ns() {
     if (this.now_ns === null) return null;
     return this.realtime ? this.now_ns + (now_s() - this.now_at) * 1e9 : this.now_ns;
@@ -161,10 +161,10 @@ export class Facts {
     if (event) this.count(this.ping, event);
   }
 
-  /// A picture has no number: the event of the same time has, and comes before it or after it.
+  /// A picture has no number. The event of the same time has one; it comes before or after the picture.
   count(ping, event) {
     ping.number = event.number;
-    if (Boolean(event.preview) !== this.wasPreview) this.lastNumber = Infinity;  // they have numbers of their own
+    if (Boolean(event.preview) !== this.wasPreview) this.lastNumber = Infinity;  // previews have numbers of their own
     this.wasPreview = Boolean(event.preview);
     if (!ping.about && event.number > this.lastNumber + 1 && event.number - this.lastNumber < 1000) this.missed += event.number - this.lastNumber - 1;
     this.lastNumber = event.number;
@@ -178,7 +178,7 @@ export class Facts {
     const before = this.vehicle;
     this.status = status;
     if (!this.vehicle?.stale) this.staleSince = undefined;
-    else if (before && !before.stale) this.staleSince = now_s();  // opened later, the page cannot know
+    else if (before && !before.stale) this.staleSince = now_s();  // a page that was opened later cannot know it
     this.clock = status.clock || this.clock;
     this.setTime(status.now_ns || ns);
     if (!status.sonars.some((s) => s.name === this.sonar)) this.sonar = status.sonars[0]?.name ?? '';
@@ -205,7 +205,7 @@ export class Facts {
     }
   }
 
-  /// Pings the sonar makes a second; 0 when it has made none for longer than its rate allows.
+  /// Pings that the sonar makes in a second; 0 if it has made none for longer than its rate allows.
   get rate() {
     const last = this.history.at(-1);
     const first = this.history.findLast((h) => h.time_s <= (last?.time_s ?? 0) - 1.9) ?? this.history[0];

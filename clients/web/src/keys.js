@@ -1,4 +1,4 @@
-// Keys of the page, and the list of them. None acts while a field has the focus, or with Ctrl, Alt or Meta.
+// Keys of the page, and the list of them. They have no effect while a field has the focus, or with Ctrl, Alt or Meta.
 import { $, make } from './dom.js';
 
 const in_field = (element) => element?.matches?.('input:not([type=range]), select, textarea, [contenteditable]') || $('help').open;

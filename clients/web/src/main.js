@@ -20,7 +20,7 @@ import { makeRemembered } from './remember.js';
 import { mapNames } from './fan/colours.js';
 import { activeTroubles, titleOf } from './panels/faults.js';
 
-const test = Number(new URLSearchParams(location.search).get('test'));  // for tests: the fan so wide, without rings
+const test = Number(new URLSearchParams(location.search).get('test'));  // for tests: width of the fan, without rings
 const look = makeRemembered('look', { theme: '', tab: 'fan' });
 
 const scene_waits_ms = 1500;
@@ -74,7 +74,7 @@ const steering = {
   },
   start: (name, seconds) => steering.set(name, Number(seconds), 'float64'),
   clear(fault) {
-    if (!fault.name.startsWith('view.')) {  // another's: ended by its name
+    if (!fault.name.startsWith('view.')) {  // begun by another viewer or program: ended by its name
       for (const one of facts.faults)
         if (one.do === fault.do && one.sonar === fault.sonar && (fault.do || one.name === fault.name))
           steering.call('/sonard/end_faults', { name: one.name });
@@ -92,7 +92,7 @@ const log = new LogPane(facts);
 
 let chosenKind = '';
 let allEchoesOf = '';  // the sonar whose cloud shows every echo
-/// Subscribes to what is looked at: no pictures while the page is hidden.
+/// Subscribes to what is visible: no pictures while the page is hidden.
 function choose() {
   if (!facts.sonar) {
     const first = [...connection.byTopic.keys()].find((topic) => /^\/[^/]+\/image$/.test(topic));
@@ -105,11 +105,12 @@ function choose() {
   if (!document.hidden && scene) topics.push('/scene', '/swath', ...(facts.pictureKind === 'range image' ? [own('cloud')] : []));
   showAllEchoes(own('view/cloud_threshold'));
   facts.judged = connection.byTopic.has('/doctor');
-  if (!document.hidden && !connection.topics.has('/scene')) scene?.removeObjects();  // those that went meanwhile are not named
+  // The daemon does not name the objects that were removed meanwhile.
+  if (!document.hidden && !connection.topics.has('/scene')) scene?.removeObjects();
   connection.want(topics);
 }
 
-/// Once for each sonar that makes range images and each connection.
+/// Called once for each sonar that makes range images and each connection.
 function showAllEchoes(threshold) {
   const wanted = facts.pictureKind === 'range image' && facts.maySteer && facts.connection === 'open' ? facts.sonar : '';
   if (wanted && wanted !== allEchoesOf) steering.set(threshold, 0, 'float64');

@@ -1,13 +1,13 @@
-// How numbers are written. What is not known is a dash.
+// Formats of numbers. A dash stands for what is not known.
 
-const thin = '\u202f';  // does not break
+const thin = '\u202f';  // a space at which lines do not break
 const known = (value) => typeof value === 'number' && Number.isFinite(value);
 
 export const dash = '–';
 /// 12909 -> "12 909", with thin spaces.
 export const whole = (value) => (known(value) ? String(Math.round(value)).replace(/\B(?=(\d{3})+$)/g, thin) : dash);
 export const fixed = (value, digits) => (known(value) ? value.toFixed(digits).replace(/^-(0\.?0*)$/, '$1') : dash);
-/// As short as it is: 10, 7.5
+/// The shortest form: 10, 7.5
 export const short = (value, digits = 2) => (known(value) ? String(Number(value.toFixed(digits))) : dash);
 export const clockTime = (ns) => new Date(ns / 1e6).toTimeString().slice(0, 8);
 /// 0:09, 1:30

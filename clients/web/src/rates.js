@@ -1,6 +1,6 @@
-// Rates of counters that are read now and then.
+// Rates of counters that are read from time to time.
 
-const window_s = 4;  // counts are whole: shorter, 7.0 would read 6.5
+const window_s = 4;  // counts are integers: with a shorter window 7.0 would be shown as 6.5
 const slow_window_s = 5;  // below slow_hz
 const slow_hz = 2;
 
@@ -10,12 +10,12 @@ export class Counter {
 
   add(time_s, count) {
     const last = this.readings.at(-1);
-    if (last && (time_s < last.time_s || count < last.count)) this.readings = [];  // it began again
+    if (last && (time_s < last.time_s || count < last.count)) this.readings = [];  // the counter started again
     this.readings.push({ time_s, count });
     while (this.readings.length > 2 && this.readings[1].time_s <= time_s - slow_window_s) this.readings.shift();
   }
 
-  /// A second, or undefined with fewer than two readings.
+  /// The rate per second, or undefined with fewer than two readings.
   get rate() {
     const quick = this.over(window_s);
     return quick !== undefined && quick < slow_hz ? this.over(slow_window_s) : quick;

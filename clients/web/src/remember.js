@@ -7,7 +7,7 @@ export function makeRemembered(name, defaults) {
   try {
     values = { ...defaults, ...JSON.parse(localStorage.getItem(key) ?? '{}') };
   } catch {
-    // not readable: the defaults
+    // it cannot be read: use the defaults
   }
   return new Proxy(values, {
     set(target, property, value) {

@@ -1,4 +1,4 @@
-// The text of the fan's pane when there is no fresh picture, or a doubtful one: facts in, one sentence and at most one button out.
+// The text of the fan's pane when there is no fresh picture, or a doubtful one: it gets the facts and returns one sentence and at most one button.
 import { fixed, short } from './numbers.js';
 
 const stands_after_s = 2;

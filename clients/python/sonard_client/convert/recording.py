@@ -15,7 +15,7 @@ class Recorded(NamedTuple):
     logged_s: float
     data: bytes
     at: int  # byte offset in the file, for errors
-    unit: str = "byte"  # what `at` counts
+    unit: str = "byte"  # unit of `at`
 
 
 class _Topic:

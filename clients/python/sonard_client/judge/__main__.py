@@ -31,7 +31,7 @@ from .cases import CASES, Case, listing, select, torture
 
 USAGE, UNAVAILABLE, NOT_HELD = 64, 69, 1
 _PACKAGE = str(pathlib.Path(__file__).resolve().parents[2])
-ROS_MODULES = {"ros1": "rospy", "ros2": "rclpy"}  # of the taps
+ROS_MODULES = {"ros1": "rospy", "ros2": "rclpy"}  # modules that the taps import
 
 
 class NotJudged(RuntimeError):
@@ -114,7 +114,7 @@ class TimeLeft:
     def __init__(self, cases: Sequence[Case], jobs: int) -> None:
         self._waiting = {case.number: case for case in cases}
         self._jobs = jobs
-        self._expected_s = self._took_s = 0.0  # of those that are done
+        self._expected_s = self._took_s = 0.0  # of the cases that are done
 
     @staticmethod
     def expected_s(case: Case) -> float:
@@ -242,7 +242,7 @@ class Judge:
         kind = self.kinds.get(case.kind)
         if kind is None:
             return f"this sonard does not know {case.kind}"
-        product = self.options.profile.replace("-", "")  # which begins with the name of its make
+        product = self.options.profile.replace("-", "")  # it begins with the name of its make
         why = next((why for make, why in kind.get("without_effect", {}).items() if product.startswith(make)), "")
         if why:
             return f"{case.kind} {why}"
@@ -329,7 +329,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
                 options.page.write_text(markdown.page(columns), encoding="utf-8")
             return 0
         return _judge(_parser().parse_args(given))
-    except SystemExit as end:  # of the parser, which has said why
+    except SystemExit as end:  # raised by the parser, which has printed why
         return USAGE if end.code else 0
     except ValueError as why:
         print(f"judge: {why}", file=sys.stderr)

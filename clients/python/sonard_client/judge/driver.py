@@ -75,11 +75,11 @@ class Driver:
         self._threads: List[threading.Thread] = []
         self._lock = threading.Lock()
         self._log_bytes = 0
-        self.started = time.monotonic()  # of the case; times in the log count from here
+        self.started = time.monotonic()  # start of the case; times in the log count from here
         self.published: List[Published] = []
         self.states: List[State] = []
         self.lines: Dict[int, int] = {}      # log lines by tenth of a second
-        self.line_times: List[float] = []    # of the first lines after each start
+        self.line_times: List[float] = []    # times of the first lines after each start
         self.samples: List[Sample] = []
         self.peak_mib = 0.0
         self.exited: Optional[Tuple[float, int]] = None  # when and with what

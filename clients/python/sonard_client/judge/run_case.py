@@ -252,7 +252,7 @@ def _restart(scene: Scene) -> bool:
     """Does what an operator does: starts the driver again."""
     scene.say("the judge restarts the driver, as an operator would")
     scene.driver.stop()
-    scene.status.end_faults()  # those that wait for more pings
+    scene.status.end_faults()  # ends the faults that wait for more pings
     time.sleep(0.2)
     before = time.monotonic()
     scene.driver.start()

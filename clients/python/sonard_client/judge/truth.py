@@ -12,7 +12,7 @@ from typing import Callable, Dict, FrozenSet, List, NamedTuple, Optional, Protoc
 from .. import layouts
 
 _LONGEST = layouts.LONGEST_MESSAGE
-_FEWEST_SAMPLES, _MOST_SAMPLES = 4, 1 << 22  # of an image: fewer or more belong to no sonar
+_FEWEST_SAMPLES, _MOST_SAMPLES = 4, 1 << 22  # limits for an image: no sonar has fewer or more
 
 
 class TruePing(NamedTuple):

@@ -19,12 +19,12 @@ WORDS = {"notice_s": "notices within {:g} s", "recover_s": "is back within {:g} 
 class Observation:
     """The three eyes' observations in one run of a case. Times are monotonic seconds."""
     began: float
-    ended: float                  # of the fault
+    ended: float                  # end of the fault
     watched_until: float
     tapped: bool                  # whether there is a tap
     published: Sequence[Published] = ()
     true_pings: Sequence[Seen] = ()      # on the wire
-    delivered: Sequence[Seen] = ()       # of them, those the driver's computer acknowledged
+    delivered: Sequence[Seen] = ()       # those of them that the driver's computer acknowledged
     wire_times: Sequence[float] = ()     # instead of delivered, where the packets cannot be read
     touched: Sequence[int] = ()          # numbers of the pings that the fault touched
     connections: Sequence[Tuple[float, Optional[float], str]] = ()  # opened, ended, by whom

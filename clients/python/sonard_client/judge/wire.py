@@ -40,7 +40,7 @@ class Connection:
         self.fires: List[float] = []  # when settings or requests were sent
         self.zero_windows = 0
         self.sent = 0                 # bytes of the device, without repetitions
-        self.acked = 0                # of them, acknowledged
+        self.acked = 0                # number of them that were acknowledged
         self.pings: List[Seen] = []
         self.stream = bytearray()
         self._first: Optional[int] = None  # sequence number of the device's first byte

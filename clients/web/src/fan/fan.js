@@ -11,7 +11,7 @@ import { makeRemembered } from '../remember.js';
 const background = [13, 17, 23];
 const slow_ms = 40;
 const very_slow_ms = 80;
-const kinds = {  // what is said of pictures that sonard draws
+const kinds = {  // names of the pictures that sonard draws
   points: "points as sent, over the model's own water column",
   sweep: 'sweep',
   'range image': 'range image: near is bright',

@@ -1,5 +1,5 @@
-// Pictures that sonard has drawn (/SONAR/fan, mono8; 0 = outside), coloured here: of sonars whose picture is no fan of the last ping, and
-// of all without WebGL2.
+// Colours pictures that sonard has drawn (/SONAR/fan, mono8; 0 = outside): those of sonars whose picture is no fan of the last ping, and
+// without WebGL2 those of all sonars.
 
 const outside = new Uint32Array(new Uint8Array([13, 17, 23, 255]).buffer)[0];
 

@@ -1,4 +1,4 @@
-// Where a ping's metres lie among the picture's pixels, and where a direction lies among its beams: as core/image/draw_fan.cpp has it.
+// Converts between a ping's metres and the picture's pixels, and between directions and beams, as core/image/draw_fan.cpp does.
 
 /// The layout of an image by its geometry message: {rows, beams, spacing_m, start_m, range_m, azimuth_rad, full_scale}.
 export function polarOf(image, geometry) {
@@ -10,7 +10,7 @@ export function polarOf(image, geometry) {
     spacing_m,
     start_m,
     range_m: start_m + image.height * spacing_m,
-    azimuth_rad: geometry.azimuth_rad,  // falling, positive to port
+    azimuth_rad: geometry.azimuth_rad,  // in falling order, positive to port
   };
 }
 
@@ -33,7 +33,7 @@ export function fittedLayout(polar, width, height, margins) {
   return { width, height, apex_x: margins.left + wide / 2, apex_y: margins.top + tall / 2 + used / 2, metres_per_pixel };
 }
 
-/// Where a picture that sonard has drawn lies between the margins, and its polar layout when it has one.
+/// The place between the margins of a picture that sonard has drawn, and its polar layout if it has one.
 export function drawnLayout(image, polar, width, height, margins) {
   const scale = Math.min((width - margins.left - margins.right) / image.width, (height - margins.top - margins.bottom) / image.height);
   const box = { width: image.width * scale, height: image.height * scale };
@@ -88,7 +88,7 @@ export function beamTable(azimuth_rad) {
   return { first, last, beams };
 }
 
-/// Samples of the image as a typed array, and the code that is drawn brightest: as `sonarctl view` has it.
+/// Samples of the image as a typed array, and the code that is drawn brightest: as in `sonarctl view`.
 export function samplesOf(image) {
   const { data, encoding } = image;
   const at = data.byteOffset;

@@ -67,7 +67,7 @@ function drawBearings(g, polar, layout, port, starboard) {
   }
 }
 
-/// Where the head of a sweep looks.
+/// The direction of the head of a sweep.
 function drawHead(g, polar, layout, head_rad) {
   g.strokeStyle = 'rgba(79, 184, 255, 0.9)';
   g.lineWidth = 2;

@@ -1,4 +1,4 @@
-// Who is connected, what each receives, and the rate of the last minute.
+// The connections, what each receives, and the rate of the last minute.
 import { $, make, setClass, setText, showList } from '../dom.js';
 import { dash, fixed, megabits, whole } from '../numbers.js';
 

@@ -1,4 +1,4 @@
-// "Why is my driver silent?": the daemon's findings, worst first, each with its cure.
+// "Why is my driver silent?": the daemon's findings, worst first, each with a remedy.
 import { $, make, setHidden, setText, showList, sign } from '../dom.js';
 import { dash } from '../numbers.js';
 import { activeTroubles, titleOf, troubleOf } from './faults.js';

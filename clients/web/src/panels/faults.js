@@ -34,7 +34,7 @@ function offered(facts) {
   return out;
 }
 
-const wholes = new Map();  // {ends_ns, whole_s} of each trouble, for its bar; ends that messages tell differ by less than a second
+const wholes = new Map();  // {ends_ns, whole_s} of each trouble, for its bar; messages give the same end within a second
 
 function card(group, about) {
   return make(
@@ -48,7 +48,7 @@ function card(group, about) {
   );
 }
 
-/// Begins a trouble; says what it does, or why it cannot.
+/// Begins a trouble; returns what it does, or why it cannot begin.
 function button({ name, trouble }, facts, able, steering) {
   const about = facts.troubles.get(trouble.replace(/_/g, '-'));
   const cannot = about?.cannot_act.find((entry) => entry.key === facts.sonar)?.value;

@@ -1,4 +1,4 @@
-// The line at the top: which sonar, how it pings, what is wrong, whose time.
+// The line at the top: the sonar, its pings, problems, and the time.
 import { $, make, setClass, setHidden, setText, showList } from '../dom.js';
 import { dash, fixed, frequency } from '../numbers.js';
 
@@ -16,7 +16,7 @@ function rateOf(facts) {
 /// The product's short name: "oculus-m1200d" -> "M1200d".
 const product = (profile) => profile.replace(/^(oculus|blueview)-/, '').replace(/^aris-/, 'ARIS ').replace('waterlinked-3d15', 'Sonar 3D-15').replace(/^./, (c) => c.toUpperCase());
 
-/// UTC; of files without times a dash.
+/// UTC; a dash for files without times.
 const recordedTime = (ns) => (ns > 1e17 ? new Date(ns / 1e6).toISOString().slice(0, 19).replace('T', ' ') : dash);
 
 export function drawHead(facts) {

@@ -1,12 +1,12 @@
-// Recordings of the sonar: one button, and those that run or have ended, as the status has them.
+// Recordings of the sonar: one button, and a list of those that run or have ended, from the status.
 import { $, make, setText, showList } from '../dom.js';
 import { fixed, whole } from '../numbers.js';
 
 const running = (facts) => facts.status?.recordings.find((r) => r.running && r.sonar === facts.sonar);
 
-const nameOf = (recording) => recording.file.replace(/^.*\//, '');  // as it was started
+const nameOf = (recording) => recording.file.replace(/^.*\//, '');  // the name with which it was started
 
-/// The name of a new file: "front-20261128-010203.mcap", of now.
+/// The name of a new file, with the present time: "front-20261128-010203.mcap".
 function newName(sonar) {
   const digits = new Date().toISOString().replace(/\D/g, '');
   return `${sonar}-${digits.slice(0, 8)}-${digits.slice(8, 14)}.mcap`;
@@ -19,7 +19,7 @@ export function toggleRecording(facts, call) {
   else call('/sonard/start_recording', { file: newName(facts.sonar), sonar: facts.sonar });
 }
 
-/// Of those of earlier runs only the size is known.
+/// For recordings of earlier runs only the size is known.
 function about(r, facts) {
   if (r.running && r.sonar === facts.sonar && !facts.listened) return 'waits for a driver, such as sonarctl listen: previews are not recorded';
   const size = `${fixed(r.bytes / 1e6, 1)} MB`;

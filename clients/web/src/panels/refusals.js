@@ -1,4 +1,4 @@
-// Refusals of sonard, shown beside the control that asked, whichever panel or tab that is in.
+// Shows refusals of sonard beside the control that caused the request, in whichever panel or tab it is.
 import { $, setHidden, setText } from '../dom.js';
 
 const lasts_ms = 10000;
@@ -19,13 +19,13 @@ export class Refusals {
     setHidden($('refusal'), true);
   }
 
-  /// The control that was touched last asks for something.
+  /// Remembers the place of the control that was touched last, which caused request `id`.
   note(id) {
     const control = this.touched?.closest?.('button, input, select') ?? document.activeElement;
     this.asked.set(id, control.getBoundingClientRect());
   }
 
-  /// `name` in front of the text is the parameter's, which the place tells.
+  /// Shows the text beside the control, without the parameter's name in front, because the place shows that.
   show(id, text, name = '') {
     const box = $('refusal');
     const at = this.asked.get(id);

@@ -1,4 +1,4 @@
-// Settings of the sonar and the water: what holds, and a field for each that may be changed.
+// Settings of the sonar and the water: the present values, and a field for each that may be changed.
 import { $, make, setText, showList } from '../dom.js';
 import { dash, fixed, short } from '../numbers.js';
 
@@ -50,7 +50,7 @@ function rowsOf(facts, steering) {
   return rows;
 }
 
-/// Without parameters (an older daemon, or none yet): what the status says, to read only.
+/// Without parameters (an older daemon, or none yet): the values of the status, read only.
 function plainRows(sonar) {
   const rows = [['range', `${short(sonar?.range_m)} m`], ['rate', `${short(sonar?.rate_hz)} Hz`], ['gain', `${fixed(sonar?.gain_db, 0)} dB`]];
   return rows.map(([label, text]) => make('div', { class: 'setting' }, make('span', {}, label), make('b', {}, sonar ? text : dash)));

@@ -52,7 +52,7 @@ export class Timeline {
     this.settling = { from: performance.now() };
   }
 
-  /// Carried on between the daemon's messages, so that the bar moves evenly.
+  /// The position, continued between the daemon's messages so that the bar moves evenly.
   position() {
     const trajectory = this.trajectory;
     const status_s = trajectory.position_s;

@@ -85,7 +85,7 @@ export class Camera {
     event.stopPropagation();
   }
 
-  /// `place`: of the vehicle, or null; `heading`: its direction ahead, counter-clockwise from east.
+  /// `place`: that of the vehicle, or null; `heading`: its direction ahead, counter-clockwise from east.
   update(place, heading, aspect) {
     if (place && (this.mode !== 'orbit' || !this.placed)) {
       this.target.copy(place);
@@ -101,11 +101,11 @@ export class Camera {
     this.camera.lookAt(target);
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();
-    this.view = azimuth + Math.PI;  // where it looks, counter-clockwise from east
+    this.view = azimuth + Math.PI;  // its direction, counter-clockwise from east
   }
 }
 
-/// North on a small round card; `view`: where the camera looks.
+/// North on a small round card; `view`: the direction of the camera.
 export function drawCompass(canvas, view) {
   const g = canvas.getContext('2d');
   g.setTransform(2, 0, 0, 2, 0, 0);

@@ -1,4 +1,4 @@
-// The scene's pane: objects as the daemon sends them, the vehicle, and the last ping where it was heard.
+// The scene's pane: objects as the daemon sends them, the vehicle, and the last ping at its place.
 import { $, setHidden, setText } from '../dom.js';
 import { Camera, drawCompass } from './camera.js';
 import { Color, DirectionalLight, DoubleSide, FogExp2, Group, HemisphereLight, Mesh, MeshPhongMaterial, Raycaster, Scene as Graph, Vector2, Vector3, WebGLRenderer } from 'three.module.js';
@@ -58,7 +58,7 @@ export class Scene {
     for (const id of [...this.objects.keys()]) this.remove(id);
   }
 
-  /// A new session: nothing of the old scene holds.
+  /// A new session: nothing of the old scene is valid.
   forget() {
     if (this.missing) return;
     this.removeObjects();
@@ -139,7 +139,7 @@ export class Scene {
     this.stale = true;
   }
 
-  /// Places the frames as the last ping's poses have them.
+  /// Places the frames by the poses of the last ping.
   place() {
     for (const [name, { translation: t, rotation: r }] of this.facts.frames) {
       const group = this.frame(name);
@@ -157,7 +157,7 @@ export class Scene {
     }
     const sonar = this.frame(this.facts.sonar);
     if (sonar !== this.graph && this.plane.mesh.parent !== sonar) sonar.add(this.plane.mesh);
-    if (this.points) this.points.visible = this.points.parent === sonar;  // not those of a sonar that was looked at before
+    if (this.points) this.points.visible = this.points.parent === sonar;  // not the points of a sonar that was shown before
     this.graph.updateMatrixWorld();
   }
 
@@ -208,7 +208,7 @@ export class Scene {
     setText($('pose'), p ? `${fixed(p.x, 2)}, ${fixed(p.y, 2)}, ${fixed(p.z, 2)} m` : '–');
   }
 
-  /// A click names what lies under it.
+  /// Names the object under a click.
   pick(event) {
     if (!this.pressed || Math.hypot(event.clientX - this.pressed[0], event.clientY - this.pressed[1]) > click_px) return;
     const box = this.canvas.getBoundingClientRect();

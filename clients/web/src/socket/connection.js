@@ -1,4 +1,4 @@
-// The page's connection: opens the socket again when it is lost, subscribes to the topics that are wanted, hands out decoded messages.
+// The page's connection: opens the socket again when it is lost, subscribes to the requested topics, and passes decoded messages on.
 import { decode, readDescriptors } from './protobuf.js';
 import { callFrame, readFrame } from './frames.js';
 
@@ -66,7 +66,7 @@ export class Connection {
     this.heard = false;
   }
 
-  /// A browser does not tell why a socket was refused: an ordinary request does.
+  /// A browser does not say why a socket was refused, but an ordinary request does.
   async refused() {
     try {
       return (await fetch('/api/v1/status', { headers: this.token ? { Authorization: `Bearer ${this.token}` } : {} })).status === 401;
@@ -93,7 +93,7 @@ export class Connection {
   word(word) {
     switch (word.op) {
       case 'serverInfo':
-        if (!this.heard) this.forget();  // later ones of a connection leave channels and subscriptions as they are
+        if (!this.heard) this.forget();  // later messages of a connection do not change channels and subscriptions
         this.heard = true;
         this.tries = 0;
         this.lostAt = null;
@@ -141,7 +141,7 @@ export class Connection {
     for (const [subscription, of] of this.subscriptions) if (of === channel) this.subscriptions.delete(subscription);
   }
 
-  /// From now on these topics, and no others, once they exist.
+  /// Subscribes to these topics, and no others, as soon as they exist.
   want(topics) {
     this.topics = new Set(topics);
     this.subscribe();

@@ -1,6 +1,6 @@
 // Decodes protobuf messages by the descriptors that the daemon advertises with each channel. Fields are found by name; those that
-// are not on the wire have protobuf's defaults. 64-bit numbers become doubles: they are
-// exact below 2^53, and time stamps in nanoseconds are rounded to a quarter of a microsecond.
+// are not on the wire have protobuf's defaults. 64-bit numbers become doubles:
+// those below 2^53 are exact, and time stamps in nanoseconds are rounded to a quarter of a microsecond.
 
 const utf8 = new TextDecoder();
 
