@@ -24,11 +24,14 @@ class ObjText {
  public:
   struct Step {
     char c;  // as the importer gets it
-    bool begins_object = false, begins_face = false, begins_corner = false;
+    bool begins_object = false, begins_vertex = false, begins_face = false, begins_corner = false;
+    bool is_index = false;  // part of the number of a corner's vertex
   };
 
   Step next(char c) {
     Step step{c};
+    step.begins_vertex = after_v_ && is_blank(c);
+    after_v_ = false;
     const bool goes_on =
         in_face_ && before_ == '\\' && (c == '\n' || c == '\r');  // the face goes on in the next line; both become one line
     if (goes_on) {
@@ -39,6 +42,7 @@ class ObjText {
       in_face_ = in_word_ = in_comment_ = false;
     } else if (line_begins_) {
       step.begins_object = begins_object(c) && before_ == '\n';
+      after_v_ = c == 'v' && before_ == '\n';  // the importer passes over lines that begin with a blank
       if (!is_blank(c))
         line_begins_ = false, in_face_ = step.begins_face = c == 'f', in_word_ = true, in_vertex_ = slashed_ = false;
     } else if (is_blank(c)) {
@@ -51,51 +55,106 @@ class ObjText {
       in_word_ = true;
       if (c == '/') in_vertex_ = false, slashed_ = true;
       if (!in_vertex_ && slashed_) step.c = ' ';
-      if (in_vertex_) slashed_ = false;
+      if (in_vertex_) slashed_ = false, step.is_index = true;
     }
     if (c != '\r') before_ = goes_on ? ' ' : c;
+    faces_ += step.begins_face;
     return step;
   }
+  /// How many faces have begun.
+  std::uint64_t faces() const { return faces_; }
 
  private:
   static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+  std::uint64_t faces_ = 0;
   char before_ = '\n';
-  bool line_begins_ = true, in_face_ = false, in_word_ = false, in_vertex_ = false, slashed_ = false, in_comment_ = false;
+  bool after_v_ = false, line_begins_ = true, in_face_ = false, in_word_ = false, in_vertex_ = false, slashed_ = false,
+       in_comment_ = false;
 };
 
 struct ObjCounts {
   std::uint64_t objects = 0, triangles = 0;
+  std::vector<std::uint64_t> bad_faces;  // the numbers of those that name vertices which the file does not have, rising
 };
+
+/// Counts the parts of an OBJ file and finds the faces at which the importer would refuse the whole file.
+class ObjCounter {
+ public:
+  void take(char c) {
+    const ObjText::Step step = text_.next(c);
+    counts_.objects += step.begins_object;
+    vertices_ += step.begins_vertex;
+    if (!step.is_index) end_corner();  // before more vertices come: negative numbers count back from here
+    if (step.begins_face) {
+      end_face();
+      face_ = text_.faces();
+    }
+    if (step.begins_corner) {
+      ++corners_;
+      index_ = 0, is_negative_ = c == '-', is_number_ = true;
+      if (is_negative_) return;
+    }
+    if (step.is_index && is_number_) {
+      is_number_ = c >= '0' && c <= '9';
+      if (is_number_) index_ = std::min<std::uint64_t>(10 * index_ + static_cast<std::uint64_t>(c - '0'), most_index);
+    }
+  }
+  ObjCounts end() {
+    end_face();
+    for (const auto& [face, furthest] : later_)
+      if (furthest > vertices_) counts_.bad_faces.push_back(face);
+    std::sort(counts_.bad_faces.begin(), counts_.bad_faces.end());
+    return std::move(counts_);
+  }
+
+ private:
+  static constexpr std::uint64_t most_index = std::uint64_t{1} << 40;
+  void end_corner() {
+    if (!is_number_) return;
+    is_bad_ |= is_negative_ ? index_ > vertices_ || index_ == 0 : index_ == 0;
+    if (!is_negative_) furthest_ = std::max(furthest_, index_);
+    is_number_ = false;
+  }
+  void end_face() {
+    end_corner();
+    counts_.triangles += std::max<std::uint64_t>(corners_, 2) - 2;
+    if (is_bad_)
+      counts_.bad_faces.push_back(face_);
+    else if (furthest_ > vertices_)  // vertices may follow
+      later_.emplace_back(face_, furthest_);
+    corners_ = furthest_ = 0, is_bad_ = false;
+  }
+
+  ObjText text_;
+  ObjCounts counts_;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> later_;  // faces, and the last vertex that they name
+  std::uint64_t vertices_ = 0, face_ = 0, corners_ = 0, index_ = 0, furthest_ = 0;
+  bool is_negative_ = false, is_number_ = false, is_bad_ = false;
+};
+
 ObjCounts counts_of(std::FILE* file) {
   std::array<char, std::size_t{1} << 16> part;
-  ObjCounts counts;
-  ObjText text;
-  std::uint64_t corners = 0;
-  const auto end_face = [&] { counts.triangles += std::max<std::uint64_t>(corners, 2) - 2, corners = 0; };
+  ObjCounter counter;
   while (const std::size_t n = std::fread(part.data(), 1, part.size(), file))
-    for (std::size_t i = 0; i < n; ++i) {
-      const ObjText::Step step = text.next(part[i]);
-      counts.objects += step.begins_object;
-      if (step.begins_face) end_face();
-      corners += step.begins_corner;
-    }
-  end_face();
-  return counts;
+    for (std::size_t i = 0; i < n; ++i) counter.take(part[i]);
+  return counter.end();
 }
 
-/// An OBJ file with faces of vertices alone and, if asked, with the lines that begin objects as comments: the surface and its
-/// materials are the same without them.
+/// An OBJ file with faces of vertices alone, with bad faces as comments and, if asked, with the lines that begin objects as
+/// comments: the surface and its materials are the same without them.
 class ObjStream final : public Assimp::IOStream {
  public:
-  ObjStream(OpenFile file, std::size_t size, bool without_objects)
-      : file_(std::move(file)), size_(size), without_objects_(without_objects) {}
+  ObjStream(OpenFile file, std::size_t size, bool without_objects, const std::vector<std::uint64_t>& bad_faces)
+      : file_(std::move(file)), size_(size), without_objects_(without_objects), bad_faces_(bad_faces) {}
 
   std::size_t Read(void* to, std::size_t size, std::size_t count) override {
     char* bytes = static_cast<char*>(to);
     const std::size_t n = size == 0 ? 0 : std::fread(bytes, 1, size * count, file_.get());
     for (std::size_t i = 0; i < n; ++i) {
       const ObjText::Step step = text_.next(bytes[i]);
-      bytes[i] = step.begins_object && without_objects_ ? '#' : step.c;
+      const bool left_out = (step.begins_object && without_objects_) ||
+                            (step.begins_face && std::binary_search(bad_faces_.begin(), bad_faces_.end(), text_.faces()));
+      bytes[i] = left_out ? '#' : step.c;
     }
     return size == 0 ? 0 : n / size;
   }
@@ -125,6 +184,7 @@ class ObjStream final : public Assimp::IOStream {
   OpenFile file_;
   std::size_t size_;
   bool without_objects_;
+  const std::vector<std::uint64_t>& bad_faces_;  // of the ImportFiles that opened this
   ObjText text_;
 };
 
@@ -143,9 +203,10 @@ ImportFiles::ImportFiles(const MeshFile& request, std::optional<Error>& fault, s
   if (mesh_extension(mesh_) != ".obj") return;
   is_obj_ = true;
   if (const auto file = open_regular(mesh_)) {
-    const ObjCounts counts = counts_of(file->get());
+    ObjCounts counts = counts_of(file->get());
     without_objects_ = counts.objects > most_objects;
     obj_triangles_ = counts.triangles;
+    bad_faces_ = std::move(counts.bad_faces);
   }
 }
 
@@ -185,7 +246,7 @@ Assimp::IOStream* ImportFiles::Open(const char* file, const char* mode) {
     }
     opened_(bytes_);
   }
-  if (is_mesh && is_obj_) return new ObjStream(std::move(*opened), bytes, without_objects_);
+  if (is_mesh && is_obj_) return new ObjStream(std::move(*opened), bytes, without_objects_, bad_faces_);
   return DefaultIOSystem::Open(place.c_str(), mode);
 }
 

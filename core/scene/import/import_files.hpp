@@ -37,6 +37,7 @@ class ImportFiles final : public Assimp::DefaultIOSystem {
   std::uintmax_t bytes_ = 0;
   bool is_obj_ = false, without_objects_ = false;
   std::optional<std::uint64_t> obj_triangles_;
+  std::vector<std::uint64_t> bad_faces_;  // of an OBJ file: faces that name vertices which it does not have
 };
 
 }  // namespace sonar

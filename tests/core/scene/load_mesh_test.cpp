@@ -266,7 +266,13 @@ TEST_F(LoadMesh, TrianglesThatAFileListsAndTheMeshHasNotAreCounted) {
   const LoadedMesh three = good("beyond.ply", beyond);
   EXPECT_EQ(three.centred.mesh.triangles.size(), 3u);
   EXPECT_EQ(three.lost, 1u);
-  EXPECT_THAT(refusal("beyond.obj", corners + "f 1 2 3\nf 1 2 9\n"), HasSubstr("vertex index out of range"));
+  for (const char* bad : {"1 2 9", "1 2 0", "-5 2 3", "1 2/1/1 9/1/1", "1 2 \\\n 9", "1 2 99999999999999999999999"}) {
+    const LoadedMesh good_ones = good("beyond.obj", corners + "f 1 2 3\nf " + bad + "\nf 1 3 4\n");
+    EXPECT_EQ(good_ones.centred.mesh.triangles.size(), 2u) << bad;
+    EXPECT_EQ(good_ones.lost, 1u) << bad;
+  }
+  EXPECT_EQ(good("before.obj", "f 1 2 3\nf 1 3 -1\n" + corners + "f -4 -3 -2\n").lost, 1u) << "vertices may follow their face";
+  EXPECT_THAT(refusal("beyond.obj", corners + "f 1 2 9\n"), HasSubstr("no triangles"));
   EXPECT_EQ(good("d.obj", corners + "f 1 2 3\nf 1 1 2\n").lost, 0u) << "without area is another count";
   EXPECT_EQ(good("whole.stl", stl).lost, 0u);
   EXPECT_EQ(good("whole.ply", ply).lost, 0u);
