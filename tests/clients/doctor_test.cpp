@@ -120,7 +120,7 @@ TEST(Doctor, WarnsOfPortsThatOthersMayTake) {
                         "connection may occupy one before sonard starts; to reserve them: sysctl "
                         "net.ipv4.ip_local_reserved_ports=52100,52102\n8 checks, 0 errors, 1 warning\n"));
   facts.kernel_ports.reserved = "8080,52101-52110";
-  expect(line(facts, "ports"), Level::warn, "ports 52100 lie", "ip_local_reserved_ports=8080,52101-52110,52100");
+  expect(line(facts, "ports"), Level::warn, "port 52100 lies", "ip_local_reserved_ports=8080,52101-52110,52100");
   facts.kernel_ports = {true, 10000, 50000, ""};
   expect(line(facts, "ports"), Level::ok, "outside the ephemeral range 10000-50000", "");
   facts.kernel_ports.known = false;
@@ -474,7 +474,7 @@ TEST(Doctor, ChecksThePortsOfTheSonarsThatAreThere) {
   Facts facts = healthy();
   facts.sonars[0].at.port = 62312, facts.sonars[0].make = make_at(62312);
   facts.kernel_ports = {true, 32768, 65000, ""};
-  expect(line(facts, "ports"), Level::warn, "ports 62312 lie", "ip_local_reserved_ports=62312");
+  expect(line(facts, "ports"), Level::warn, "port 62312 lies", "ip_local_reserved_ports=62312");
 }
 
 TEST(Doctor, FailsWhileADriverGetsNoPing) {
