@@ -14,7 +14,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 from browser import Browser  # noqa: E402
 from foxglove_viewer import Viewer  # noqa: E402
 from page_checks import WHY_NOT, PageChecks, shown  # noqa: E402
-from running_sonard import SONARCTL, SONARD, Daemon, eventually, run  # noqa: E402
+from running_sonard import ROOT, SONARCTL, SONARD, Daemon, eventually, run  # noqa: E402
 
 HTTP, SONAR = "127.0.0.1", "127.0.0.2"
 # Of the demo: its picture, the pings that make one, and the port of its driver.
@@ -81,6 +81,14 @@ class Preview(unittest.TestCase):
                     share = echoes(seen, self.rows(viewer, pings))
                 print(f"\n  {maker}: echoes in {100 * share:.0f} % of the picture", end="", file=sys.stderr)
                 self.assertGreater(share, LEAST_ECHOES, daemon.log())
+
+    def test_the_example_of_an_aris_shows_echoes_too(self):
+        with Daemon(ROOT / "scenes/sonard-aris.yaml", str(SONARD)), Viewer(HTTP) as viewer:
+            viewer.greeted().subscribe("/front/image")
+            viewer.say(op="setParameters", parameters=[{"name": "/front/preview", "value": True}], id="preview")
+            seen = self.rows(viewer, 1)
+            self.assertEqual(run(SONARCTL, "set", "sonar", "front", "--transmit", "off").returncode, 0)
+            self.assertGreater(echoes(seen, self.rows(viewer, 1)), LEAST_ECHOES)
 
     def test_a_driver_takes_over_and_the_preview_comes_back(self):
         with demo("oculus") as daemon, Viewer(HTTP) as viewer:
