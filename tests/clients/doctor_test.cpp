@@ -573,6 +573,18 @@ TEST(Doctor, PrintsWhatTheSonarAnswered) {
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("another program")));
 }
 
+TEST(Doctor, NamesAFaultWhereItsOwnConnectionGetsNoPing) {
+  Facts facts = healthy();
+  v1::DaemonStatus& daemon = daemon_in(facts);
+  v1::FaultStatus& fault = *daemon.add_faults();
+  fault.set_name("F01"), fault.set_code("F01"), fault.set_state("active"), fault.set_sonar(daemon.sonars(0).name());
+  facts.sonars[0].reported = std::make_shared<v1::SonarStatus>(daemon.sonars(0));
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("A fault acts"))) << "it got pings";
+  facts.sonars[0].stream = {};
+  facts.sonars[0].stream.outcome = Outcome::no_ping;
+  expect(line(facts, "fault"), Level::fail, "A fault acts on " + daemon.sonars(0).name() + ": F01", "sonarctl fault reset");
+}
+
 TEST(Doctor, SpeaksJson) {
   Facts facts = healthy();
   facts.kernel_ports.reserved = "";

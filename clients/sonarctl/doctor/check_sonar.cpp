@@ -279,7 +279,9 @@ class SonarChecks {
       if (finding.sonar != reported->name() || finding.level == Level::ok || finding.check == "rate") continue;
       if (finding.check == "places" && all_get_pings)
         finding.level = Level::warn;  // the refused client gets a slot when one leaves
-      if (has_connected() && (finding.client.empty() || finding.level != Level::fail)) continue;  // this check got pings
+      const bool is_cause = finding.check == "fault" && sonar_.stream.outcome != Outcome::pings;
+      if (has_connected() && !is_cause && (finding.client.empty() || finding.level != Level::fail))
+        continue;  // this check got pings
       found.push_back(std::move(finding));
     }
     const bool any_fails = std::any_of(found.begin(), found.end(), [](const Finding& f) { return f.level == Level::fail; });
