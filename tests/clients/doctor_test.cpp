@@ -227,7 +227,8 @@ TEST(Doctor, SaysWhereSomethingDoesListen) {
   facts.status.received.push_back(received("127.0.0.9"));
   expect(line(facts, "ping"), Level::fail, "refuses", "names a sonar at 127.0.0.9: sonarctl doctor 127.0.0.9");
   facts.daemons = {{"127.0.0.5:52100", 12, "sonard"}};
-  expect(line(facts, "ping"), Level::fail, "refuses", "sonard (pid 12) listens on 127.0.0.5:52100: sonarctl doctor 127.0.0.5");
+  expect(line(facts, "ping"), Level::fail, "refuses",
+         "sonard (pid 12) listens on 127.0.0.5:52100: sonarctl doctor 127.0.0.5:52100");
   facts = {};
   facts.sonars.push_back({});
   facts.sonars[0].at = {"192.0.2.7", 52100};

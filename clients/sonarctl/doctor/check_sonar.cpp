@@ -205,10 +205,8 @@ class SonarChecks {
   std::string where_else() const {
     std::string others;
     for (const PortHolder& daemon : facts_.daemons) others += (others.empty() ? "" : ", ") + daemon.at;
-    if (!others.empty()) {
-      const std::string host = facts_.daemons.front().at.substr(0, facts_.daemons.front().at.find(':'));
-      return text_of(facts_.daemons.front()) + " listens on " + others + ": sonarctl doctor " + host;
-    }
+    if (!others.empty())
+      return text_of(facts_.daemons.front()) + " listens on " + others + ": sonarctl doctor " + facts_.daemons.front().at;
     for (const ReceivedStatus& received : facts_.status.received)
       if (received.advertised != sonar_.at.host)
         return "a status broadcast names a sonar at " + received.advertised + ": sonarctl doctor " + received.advertised;
