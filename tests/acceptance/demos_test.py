@@ -14,7 +14,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 from browser import Browser  # noqa: E402
 from foxglove_viewer import Viewer  # noqa: E402
 from page_checks import WHY_NOT, PageChecks, shown  # noqa: E402
-from running_sonard import SONARCTL, SONARD, Daemon, eventually, run  # noqa: E402
+from running_sonard import ROOT, SONARCTL, SONARD, Daemon, eventually, run  # noqa: E402
 
 HTTP, SONAR = "127.0.0.1", "127.0.0.2"
 # Of the demo: its picture, the pings that make one, and the port of its driver.
@@ -81,6 +81,14 @@ class Preview(unittest.TestCase):
                     share = echoes(seen, self.rows(viewer, pings))
                 print(f"\n  {maker}: echoes in {100 * share:.0f} % of the picture", end="", file=sys.stderr)
                 self.assertGreater(share, LEAST_ECHOES, daemon.log())
+
+    def test_the_example_of_an_aris_shows_echoes_too(self):
+        with Daemon(ROOT / "scenes/sonard-aris.yaml", str(SONARD)), Viewer(HTTP) as viewer:
+            viewer.greeted().subscribe("/front/image")
+            viewer.say(op="setParameters", parameters=[{"name": "/front/preview", "value": True}], id="preview")
+            seen = self.rows(viewer, 1)
+            self.assertEqual(run(SONARCTL, "set", "sonar", "front", "--transmit", "off").returncode, 0)
+            self.assertGreater(echoes(seen, self.rows(viewer, 1)), LEAST_ECHOES)
 
     def test_a_driver_takes_over_and_the_preview_comes_back(self):
         with demo("oculus") as daemon, Viewer(HTTP) as viewer:
@@ -154,6 +162,20 @@ class Pages(PageChecks, unittest.TestCase):
                     break
                 seen.add(focused)
             self.assertEqual(wanted - seen, set(), f"Tab does not come there; tab {tab}")
+
+    def test_only_the_settings_that_a_sonar_has(self):
+        for maker, choices in {"oculus": ["mode", "beams", "transmit"], "ping360": ["transmit"]}.items():
+            with self.subTest(demo=maker), demo(maker):
+                page = self.opened(self.browser.open(f"http://{HTTP}:8088/", 1600, 1000))
+                shown(page)
+                page.wait("!!document.querySelector('#setting-rows select')")
+                self.assertEqual(page.run("[...document.querySelectorAll('#setting-rows select')].map((s) => s.name.split('/').pop())"), choices)
+                if maker == "ping360":  # whose host asks for each ping: no engine is as fast as its rate
+                    with subprocess.Popen([SONARCTL, "listen", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
+                        page.wait("document.querySelector('#rate-word').textContent === 'pinging'")
+                        page.wait("parseFloat(document.querySelector('#rate').textContent) > 0")
+                        self.assertNotIn("of 1000 Hz", page.text("#badges"))
+                        driver.terminate()
 
     def test_a_setting_by_keys_and_a_refusal_beside_it(self):
         for width, height in ((1600, 1000), (390, 844)):

@@ -1,6 +1,6 @@
 """The page of the live view in a real browser, before sonard itself with a driver. Skipped without browser or page.
 
-SONARD_SHOTS names a folder for pictures, those of docs/live-view.md among them; without it there are only those of tests that fail
+SONARD_SHOTS names a folder for pictures; without it there are only those of tests that fail
 (SONARD_SHOT_HZ: at that rate, for slow computers).
 """
 import collections
@@ -253,7 +253,7 @@ class Live(PageChecks, unittest.TestCase):
             self.assertIn("recording: {folder: DIR}", page.text("#refusal"))
 
     def test_everything_at_once(self):
-        """Two drivers, one of them slow, a trajectory and a fault: the pictures of docs/live-view.md."""
+        """Two drivers, one of them slow, a trajectory and a fault: all panels have something to show."""
         trajectory = f"{{file: {self.circle()}, loop: true}}"
         with Sonard(mount=MOUNT, trajectory=trajectory, arguments=["--faults", "--clients", "2"]) as daemon, \
                 Driver(daemon.address, rate_hz=RATE_HZ), Driver(daemon.address, reads_hz=0.7 * RATE_HZ, rate_hz=RATE_HZ):

@@ -18,7 +18,8 @@ from check_floors import line_of, tracked_files  # noqa: E402
 FENCED = re.compile(r"^(?P<fence>```+|~~~+).*?^(?P=fence)[ \t]*$", re.M | re.S)
 INDENTED = re.compile(r"(?:(?<=\n\n)|\A)(?:(?: {4}|\t).*\n?)+")
 CODE = re.compile(r"(?<!`)(`+)(?!`)(.+?)(?<!`)\1(?!`)", re.S)
-LINK = re.compile(r"\]\(\s*<?(?P<inline>[^\s)>]+)>?(?:\s+\"[^\"]*\")?\s*\)|^ {0,3}\[[^\]^]+\]:\s+<?(?P<reference>[^\s>]+)", re.M)
+LINK = re.compile(r"\]\(\s*<?(?P<inline>[^\s)>]+)>?(?:\s+\"[^\"]*\")?\s*\)|^ {0,3}\[[^\]^]+\]:\s+<?(?P<reference>[^\s>]+)"
+                  r"|<img\b[^>]*?\bsrc=\"(?P<picture>[^\"]+)\"", re.M)
 WEB = re.compile(r"[a-z][a-z0-9+.-]*:", re.I)
 # What a page names in backticks, alone or at the beginning of a command: a path; `*` and `{a,b}` stand for several files.
 NAMED = re.compile(r"(?:\./)?(?P<path>[\w.+-]+/[\w./+*{},-]*?)/?(?::\d+(?:-\d+)?)?(?:\s.*)?", re.S)
@@ -100,7 +101,7 @@ class Tree:
     def dead_links(self, page):
         text = prose_of(self.text(page))
         for match in LINK.finditer(CODE.sub(blank, text)):
-            target = match["inline"] or match["reference"]
+            target = match["inline"] or match["reference"] or match["picture"]
             why = None if WEB.match(target) else self.why_dead(page, target)
             if why:
                 yield f"{page}:{line_of(text, match.start())}: link: {target}: {why}"

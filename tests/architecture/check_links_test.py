@@ -40,7 +40,8 @@ class Planted(unittest.TestCase):
     def test_files_pictures_and_folders(self):
         for target in ("nowhere.txt", "../docs/nowhere/", "deep/../nowhere.txt", "../../outside.txt", "/docs/picture.png"):
             for line in (f"see [it]({target})", f"![a picture]({target})", f"[![both]({target})](picture.png)", f"[it]: {target}",
-                         f'[it]({target} "title")', f"[it](<{target}>)", f"| [in a table]({target}) |\n|---|", f"- [in a list]({target})"):
+                         f'[it]({target} "title")', f"[it](<{target}>)", f'<img alt="x" src="{target}" height="9">',
+                         f"| [in a table]({target}) |\n|---|", f"- [in a list]({target})"):
                 for installed in (False, True):
                     with self.subTest(line=line, installed=installed):
                         self.expect(line, f"link: {target}: does not exist", installed)

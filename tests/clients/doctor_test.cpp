@@ -120,7 +120,7 @@ TEST(Doctor, WarnsOfPortsThatOthersMayTake) {
                         "connection may occupy one before sonard starts; to reserve them: sysctl "
                         "net.ipv4.ip_local_reserved_ports=52100,52102\n8 checks, 0 errors, 1 warning\n"));
   facts.kernel_ports.reserved = "8080,52101-52110";
-  expect(line(facts, "ports"), Level::warn, "ports 52100 lie", "ip_local_reserved_ports=8080,52101-52110,52100");
+  expect(line(facts, "ports"), Level::warn, "port 52100 lies", "ip_local_reserved_ports=8080,52101-52110,52100");
   facts.kernel_ports = {true, 10000, 50000, ""};
   expect(line(facts, "ports"), Level::ok, "outside the ephemeral range 10000-50000", "");
   facts.kernel_ports.known = false;
@@ -227,7 +227,8 @@ TEST(Doctor, SaysWhereSomethingDoesListen) {
   facts.status.received.push_back(received("127.0.0.9"));
   expect(line(facts, "ping"), Level::fail, "refuses", "names a sonar at 127.0.0.9: sonarctl doctor 127.0.0.9");
   facts.daemons = {{"127.0.0.5:52100", 12, "sonard"}};
-  expect(line(facts, "ping"), Level::fail, "refuses", "sonard (pid 12) listens on 127.0.0.5:52100: sonarctl doctor 127.0.0.5");
+  expect(line(facts, "ping"), Level::fail, "refuses",
+         "sonard (pid 12) listens on 127.0.0.5:52100: sonarctl doctor 127.0.0.5:52100");
   facts = {};
   facts.sonars.push_back({});
   facts.sonars[0].at = {"192.0.2.7", 52100};
@@ -474,7 +475,7 @@ TEST(Doctor, ChecksThePortsOfTheSonarsThatAreThere) {
   Facts facts = healthy();
   facts.sonars[0].at.port = 62312, facts.sonars[0].make = make_at(62312);
   facts.kernel_ports = {true, 32768, 65000, ""};
-  expect(line(facts, "ports"), Level::warn, "ports 62312 lie", "ip_local_reserved_ports=62312");
+  expect(line(facts, "ports"), Level::warn, "port 62312 lies", "ip_local_reserved_ports=62312");
 }
 
 TEST(Doctor, FailsWhileADriverGetsNoPing) {
@@ -571,6 +572,18 @@ TEST(Doctor, PrintsWhatTheSonarAnswered) {
   s.error = "tcp 127.0.0.2:62312 refused a request: wrong range";
   expect(line(facts, "ping"), Level::fail, s.error, "sonarctl status");
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("another program")));
+}
+
+TEST(Doctor, NamesAFaultWhereItsOwnConnectionGetsNoPing) {
+  Facts facts = healthy();
+  v1::DaemonStatus& daemon = daemon_in(facts);
+  v1::FaultStatus& fault = *daemon.add_faults();
+  fault.set_name("F01"), fault.set_code("F01"), fault.set_state("active"), fault.set_sonar(daemon.sonars(0).name());
+  facts.sonars[0].reported = std::make_shared<v1::SonarStatus>(daemon.sonars(0));
+  EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("A fault acts"))) << "it got pings";
+  facts.sonars[0].stream = {};
+  facts.sonars[0].stream.outcome = Outcome::no_ping;
+  expect(line(facts, "fault"), Level::fail, "A fault acts on " + daemon.sonars(0).name() + ": F01", "sonarctl fault reset");
 }
 
 TEST(Doctor, SpeaksJson) {

@@ -205,10 +205,8 @@ class SonarChecks {
   std::string where_else() const {
     std::string others;
     for (const PortHolder& daemon : facts_.daemons) others += (others.empty() ? "" : ", ") + daemon.at;
-    if (!others.empty()) {
-      const std::string host = facts_.daemons.front().at.substr(0, facts_.daemons.front().at.find(':'));
-      return text_of(facts_.daemons.front()) + " listens on " + others + ": sonarctl doctor " + host;
-    }
+    if (!others.empty())
+      return text_of(facts_.daemons.front()) + " listens on " + others + ": sonarctl doctor " + facts_.daemons.front().at;
     for (const ReceivedStatus& received : facts_.status.received)
       if (received.advertised != sonar_.at.host)
         return "a status broadcast names a sonar at " + received.advertised + ": sonarctl doctor " + received.advertised;
@@ -279,7 +277,9 @@ class SonarChecks {
       if (finding.sonar != reported->name() || finding.level == Level::ok || finding.check == "rate") continue;
       if (finding.check == "places" && all_get_pings)
         finding.level = Level::warn;  // the refused client gets a slot when one leaves
-      if (has_connected() && (finding.client.empty() || finding.level != Level::fail)) continue;  // this check got pings
+      const bool is_cause = finding.check == "fault" && sonar_.stream.outcome != Outcome::pings;
+      if (has_connected() && !is_cause && (finding.client.empty() || finding.level != Level::fail))
+        continue;  // this check got pings
       found.push_back(std::move(finding));
     }
     const bool any_fails = std::any_of(found.begin(), found.end(), [](const Finding& f) { return f.level == Level::fail; });
