@@ -10,7 +10,7 @@ namespace {
 
 constexpr double rssi_at_full_scale_dbm = 20;  // unknown: at 1 m; sand is then at -30 dBm at 0.5 m, as in the example of DOC
 constexpr double fom_without_velocity = 2.5;   // LOG: 2.4 to 2.7
-constexpr auto longest_gap = std::chrono::seconds(1);  // between pings; over longer ones no velocity is known
+constexpr auto longest_gap = std::chrono::seconds(3);  // between pings; over longer ones no velocity is known
 constexpr double drift_mps = 0.1;                      // unknown: of a position that no velocity supports
 
 /// In the streams of Domain::range_noise, beyond those of the pixels.
