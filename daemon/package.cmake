@@ -46,6 +46,7 @@ install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT sonard PATTERN "
 install(FILES protocol/oculus/README.md DESTINATION ${documents}/protocol/oculus COMPONENT sonard)
 install(FILES protocol/aris/README.md DESTINATION ${documents}/protocol/aris COMPONENT sonard)
 install(FILES protocol/waterlinked/README.md DESTINATION ${documents}/protocol/waterlinked COMPONENT sonard)
+install(FILES protocol/dvl/README.md DESTINATION ${documents}/protocol/dvl COMPONENT sonard)
 install(FILES protocol/ping/README.md DESTINATION ${documents}/protocol/ping COMPONENT sonard)
 install(FILES protocol/control/control.proto DESTINATION ${CMAKE_INSTALL_DATADIR}/sonard/protocol/control COMPONENT sonard)
 # What pages link to beyond the documents is installed below share/sonard; symbolic links lead there from where it lies in the
