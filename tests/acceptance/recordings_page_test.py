@@ -151,6 +151,8 @@ class Recordings(PageChecks, unittest.TestCase):
             with subprocess.Popen([SONARCTL, "listen", SONAR, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
                 page.wait("/ [1-9]\\d* pings .* running/.test(document.querySelector('#recordings').innerText)")
                 driver.terminate()
+            # The page changes as the driver leaves; a press meanwhile may miss the button.
+            page.wait("document.querySelector('#recordings').innerText.includes('waits for a driver, such as sonarctl listen')")
             page.press_mouse("#record")
             page.wait("document.querySelector('#record').innerText === 'Record'")
             page.close()
