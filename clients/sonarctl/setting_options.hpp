@@ -29,7 +29,8 @@ struct SourceArguments {
   std::filesystem::path token_file, recording;
   SettingArguments settings;
 
-  /// `recordings`: also instead of a sonar. `control_help`: what the daemon is asked for.
+  /// `recordings`: adds --from, which reads a recording instead of a sonar. `control_help`: what --control's help says about the
+  /// daemon.
   void add_to(CLI::App& app, bool recordings, const std::string& control_help = "reports the address for observers");
   Result<SourceOptions> finish() const;
 };

@@ -38,18 +38,20 @@ struct AppOptions {
   std::uint64_t exit_after_pings = 0;  // served, over all sonars; 0 = never
   bool digest = false;                 // SHA-256 of every client's stream
   bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP reads the configuration again
-  /// How the configuration is read again, the command line's part included; any thread. Empty: there is none (the demo).
+  /// Reads the configuration again and applies the command line's options to it; may be called on any thread. Empty if there is
+  /// no configuration file (the demo).
   std::function<Result<Config>()> read_config;
   LoadScene load_scene;
-  NotifyTarget service_manager;  // notified when we are ready, stop, and that we are alive
+  NotifyTarget service_manager;  // gets messages that the daemon is ready, stops, and, at intervals, is alive
 };
 
 class App {
  public:
-  /// After stop() run() returns by then, whatever is still under way: half of the promised 2 s is for a loaded machine.
+  /// run() returns at most this long after stop(), even if a ping or a scene is still being computed; files that are being
+  /// written get longer. The rest of the documented 2 s is a margin for a busy machine.
   static constexpr std::chrono::milliseconds stop_limit{1100};
 
-  /// `make_engine` is kept: later scenes get theirs on another thread. What it refers to must outlive the App.
+  /// `make_engine` is copied, and makes the engines of later scenes on another thread. What it refers to must outlive the App.
   App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);
 
   /// Opens every listener; errors name the address and the next step.
@@ -64,7 +66,7 @@ class App {
   const Config& config() const { return config_; }
   const Scene& scene() const { return *changes_.scene(); }
   const std::string& engine_description() const { return simulator_.engine_description(); }
-  /// After run(): the destructor would wait for a scene or a ping that is not needed any more, or for a disk.
+  /// Call it after run(). True if the destructor would wait for a scene or a ping that is not needed any more, or for files.
   bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0 || !files_are_written(); }
   const PoseServer& poses() const { return pose_server_; }
   const MavlinkServer& mavlink() const { return mavlink_server_; }
@@ -125,7 +127,7 @@ class App {
   Reload reload_;
   bool look_posted_ = false, stopping_ = false;
   bool slow_load_logged_ = false;
-  bool notes_due_ = true;  // the configuration or the scene is another one
+  bool notes_due_ = true;  // the configuration or the scene has changed since notes were last logged
   int exit_code_ = 0;
 };
 

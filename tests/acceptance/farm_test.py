@@ -159,7 +159,7 @@ class Farm(unittest.TestCase):
         self.submit(job)
         worker = self.worker(self.path / "own")
         self.assertEqual(worker.wait(timeout=120), 69, self.logs())
-        self.assertIn("start the worker with the --out of", self.logs())
+        self.assertIn("start the worker with the same --out folder as", self.logs())
         self.assertIn("0 running, 6 queued, 0 dead", self.status())
 
     def test_unequal_bytes_stop_the_job(self):

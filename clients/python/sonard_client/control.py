@@ -16,7 +16,8 @@ Json = Dict[str, Any]
 
 _FIRST_REPLY_S = 2.0  # sonard replies to /healthz at once; a longer silence means a different server
 
-# 64-bit fields of control.proto's answers: strings in protobuf's JSON mapping, converted to int here. A test compares them.
+# 64-bit fields of control.proto's answers: strings in protobuf's JSON mapping, converted to int here. A test
+# checks that the list has all of them.
 _WIDE = {"seed", "pings", "refused", "served", "dropped", "skipped_ticks", "clients", "refused_clients", "pings_written",
          "pings_dropped", "bytes_written", "bytes_read", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "now_ns", "unsent", "messages", "bytes",
          "seq", "utc_ns", "mono_ns", "time_ns", "client_number", "offset", "bytes_before", "bytes_after", "injections"}
@@ -52,7 +53,7 @@ class Events(Iterator[Json]):
         return dict(_read_json(line))
 
     def interrupt(self) -> None:
-        """From another thread: the iteration ends."""
+        """Ends the iteration. May be called from another thread."""
         try:
             if self._socket is not None:
                 self._socket.shutdown(socket.SHUT_RDWR)
@@ -110,7 +111,7 @@ class Control:
         connection = http.client.HTTPConnection(self.host, self.port, timeout=timeout)
         try:
             connection.request("GET", "/api/v1/events" + ("?" + query if query else ""), headers=self._headers)
-            sock = connection.sock  # getresponse() may give it away
+            sock = connection.sock  # getresponse() may move it to the reply and set this to None
             reply = connection.getresponse()
             if reply.status != 200:
                 raise _error(reply.status, reply.read().decode(errors="replace"))
@@ -175,7 +176,7 @@ class Control:
                   rpy: Optional[Sequence[float]] = None, frame: str = "ENU_FLU", vehicle: str = "",
                   timestamp: Optional[float] = None, timeout: float = 330.0) -> None:
         """Sends a vehicle's pose with acknowledgement; for high rates use PoseSender. timestamp: seconds of the sender's clock.
-        With clock: follow the reply comes after every ping that the pose enabled."""
+        With `clock: follow` the reply comes when all pings that the pose made possible are sent."""
         stamp = None if timestamp is None else {"domain": "SIM", "ns": str(round(timestamp * 1e9))}
         self._post("pose", dict(_placement(position, quaternion, rpy, frame), **_given(vehicle=vehicle or None, time=stamp)),
                    timeout)
@@ -190,7 +191,7 @@ class Control:
 
     def start_recording(self, file: str, sonar: str = "", labels: bool = False) -> None:
         """Starts a recording inside sonard, in its folder. The extension selects the kind (docs/recording.md).
-        labels: only .mcap: also record which object's echo each sample holds. Returns when the file is open."""
+        labels: also record to which object the echo in each sample belongs (only .mcap). Returns when the file is open."""
         self._post("start_recording", _given(file=file, sonar=sonar or None, labels=labels or None))
 
     def stop_recording(self, file: str = "") -> None:
@@ -205,14 +206,14 @@ class Control:
     def add_fault(self, what: str, name: str = "", sonar: str = "", client: str = "", at: Optional[Mapping[str, Any]] = None,
                   seconds: Optional[float] = None, pings: Optional[int] = None, count: Optional[int] = None,
                   parameters: Optional[Mapping[str, Any]] = None) -> None:
-        """what: code or name of a kind, or a trouble. at: {"ping": 200}, {"every": 50, "phase": 3}, {"time_s": 4.0},
-        {"probability": 0.01} or {"on": "connect"}; None = now. parameters: {"bytes": 16, "fill": "zero"}."""
+        """what: code or name of a kind, or name of a trouble (a group of faults). at: {"ping": 200}, {"every": 50, "phase": 3},
+        {"time_s": 4.0}, {"probability": 0.01} or {"on": "connect"}; None = now. parameters: {"bytes": 16, "fill": "zero"}."""
         lasts = _given(seconds=seconds, pings=pings, count=count)
         record = _given(name=name or None, sonar=sonar or None, client=client or None, at=at, **{"with": parameters})
         self._post("faults", dict(record, **{"do": what, "for": lasts}))
 
     def end_fault(self, name: str) -> None:
-        """Raises ControlError if none of this name waits or acts."""
+        """Raises ControlError if no fault of this name is waiting or active."""
         self._request_ok("DELETE", "/api/v1/faults/" + quote(name, safe=""))
 
     def reset_faults(self) -> None:
@@ -303,7 +304,7 @@ def _error(status: int, body: str) -> ControlError:
 
 def _as_number(item: Json) -> Json:
     def number(value: Any) -> Any:
-        if isinstance(value, dict):  # a map: its keys are names of other things
+        if isinstance(value, dict):  # a protobuf map, as `dropped`: its keys are not field names
             return {key: number(inner) for key, inner in value.items()}
         return int(value) if isinstance(value, str) else value
 

@@ -36,7 +36,7 @@ struct StatusFacts {
   Endpoint on{"0.0.0.0", 52102};
   std::string error;                     // why listening failed; empty = it did not
   std::vector<PortHolder> holders;       // programs that have the port, if listening failed
-  std::vector<ReceivedStatus> received;  // one for each pair of addresses
+  std::vector<ReceivedStatus> received;  // one for each pair of `from` and `advertised`
   double waited_s = 0;
 };
 
@@ -52,7 +52,7 @@ struct StreamFacts {
   std::uint64_t pings = 0, missing = 0, broken = 0;
   std::string first_complaint;  // complaint about the first broken ping
   double asked_hz = 0, rate_hz = 0;
-  // Spread of the delays by the stamps in the pings: lateness relative to the earliest.
+  // How much later pings arrive than the most prompt one, relative to the time stamps in them.
   std::optional<double> spread_p99_ms;
   // Time from transmission to the last byte received, by the events of the control stream.
   std::optional<double> latency_p50_ms, latency_p99_ms;
@@ -74,12 +74,12 @@ struct SonarFacts {
 
 struct ControlFacts {
   Endpoint at;
-  bool given = false;                              // given by the user: then no answer is an error
+  bool given = false;                              // given by the user: then it is an error if nothing answers
   std::string error;                               // why there is no status
-  bool token_required = false;                     // the reason, and none was given
+  bool token_required = false;                     // there is no status, because the daemon requires a token and got none
   std::shared_ptr<const v1::DaemonStatus> status;  // null = there is none
   std::shared_ptr<const v1::DaemonStatus> latest;  // after the pings; null = it was not asked again
-  std::optional<double> clock_ahead_s;             // the daemon's clock against ours, other computers only
+  std::optional<double> clock_ahead_s;             // how far the daemon's clock is ahead of ours; only if on another computer
 };
 struct HttpFacts {
   enum class Place {
@@ -97,9 +97,9 @@ struct FoundSonar {
   const protocol::Make* make = nullptr;
   std::string at, about;  // "BlueView head P900-90 (7001)"
 };
-/// By HTTP, with images by UDP: no client connects for them.
+/// Whether drivers control the sonar by HTTP and receive its images by UDP. Such a sonar has no client connections.
 inline bool is_by_http(const SonarFacts& sonar) { return sonar.make->ports.front().kind == protocol::HostPort::Kind::http; }
-/// Drivers find it by status messages to the port that StatusFacts are of.
+/// Whether drivers find the sonar by status messages to the port that `status` is about.
 inline bool sends_status(const SonarFacts& sonar, const StatusFacts& status) {
   const protocol::Port* const beacon = sonar.make->device->port(protocol::Port::Kind::udp_beacon);
   return beacon != nullptr && beacon->number == status.on.port;
@@ -112,7 +112,7 @@ struct KernelPorts {
   std::string reserved;   // "52100,52102" or with ranges
 };
 
-/// The kind of machine doctor runs on, as far as networks in front of it pass no broadcast.
+/// The kind of machine on which doctor runs. The networks of WSL2 and of containers pass no broadcasts to it.
 enum class Machine { ordinary, wsl2, container };
 
 struct Facts {

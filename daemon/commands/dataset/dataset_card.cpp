@@ -17,7 +17,7 @@ using nlohmann::json;
 /// A JSON string is a YAML string in double quotes.
 std::string quoted(const std::string& text) { return json(text).dump(-1, ' ', false, json::error_handler_t::replace); }
 
-/// Identifiers that the hub knows; others are named beside `other`.
+/// The licence in the card's metadata. A licence without an identifier of the Hugging Face hub is `other`, with a `license_name`.
 std::string license_lines(const std::string& license) {
   constexpr std::array<std::string_view, 14> known{
       "cc0-1.0",    "cc-by-4.0",    "cc-by-sa-4.0", "cc-by-nc-4.0", "cc-by-nd-4.0", "cc-by-nc-sa-4.0", "cc-by-nc-nd-4.0", "mit",
@@ -69,10 +69,11 @@ std::string dataset_card(const DatasetJob& job, const Statistics& s, const std::
   for (const auto& [name, n] : s.pixels.items())
     text += "| " + name + " | " + text::format("%.2f %%", 100 * n.get<double>() / all) + " |\n";
   return text +
-         "\nEach ping has `samples.png`, `labels.png` (instance of each sample, 16 bits), `share.png` (of the sample's energy, "
-         "255 = all), `caster.png` (instance that casts a shadow there) and `json` (pose, settings, water, truth, instances, "
-         "boxes, draws). Rows by range, beam 0 most to port. The echoes are modelled, not recorded: tests on real data "
-         "decide.\n";
+         "\nEach ping has `samples.png`, `labels.png` (instance of each sample, 16 bits), `share.png` (the instance's share of "
+         "the sample's energy, 255 = all), `caster.png` (instance that casts a shadow there) and `json` (pose, settings, "
+         "water, truth, instances, boxes, values drawn at random). Rows are ordered by range; beam 0 is the one "
+         "farthest to port. The echoes are simulated, not recorded: only tests on real data show how useful a model trained on "
+         "them is.\n";
 }
 
 }  // namespace sonar::dataset

@@ -211,7 +211,8 @@ class Export {
                          card_head(job_, form_ == ExportForm::folder ? files : std::vector<FilesOfSplit>{}, false) + "# " +
                              job_.name + "\n\n" + (job_.about.empty() ? "" : job_.about + "\n\n") + "License: " + job_.license +
                              "\n\n" + what + "\n" + table + "\nNone of the " + std::to_string(exported_.scenes) +
-                             " scenes is in two splits. The echoes are modelled, not recorded: tests on real data decide.\n");
+                             " scenes is in two splits. The echoes are simulated, not recorded: "
+                             "only tests on real data show how useful a model trained on them is.\n");
   }
 
   const DatasetJob& job_;

@@ -199,7 +199,7 @@ Result<path> receive_files(const FarmJob& record, const path& files, Queue& queu
                      (files / f.name).string() + " is missing, or differs from the submitted file" +
                          (record.in_bucket ? ", and the queue does not have it; submit the job again"
                                            : "; the files of this job are 8 MiB or more in all, so the queue does not carry "
-                                             "them: start the worker with the --out of `sonarctl farm submit`"));
+                                             "them: start the worker with the same --out folder as `sonarctl farm submit`"));
     if (const auto done = write_below(files, f.name, contents); !done) return tl::make_unexpected(done.error());
   }
   return files / record.file;
@@ -218,7 +218,7 @@ Result<dataset::DatasetJob> load_files(const FarmJob& record, const path& file) 
 std::string why_unfit(const FarmJob& record) {
   if (record.version != render::version)
     return record.folder() + " was submitted with sonard " + record.version + ", and this is sonard " + render::version +
-           ", which may make other bytes: install sonard " + record.version + " here, or submit the job with sonard " +
+           ", which may give other results: install sonard " + record.version + " here, or submit the job with sonard " +
            render::version;
   const auto level = enum_from<SimdLevel>(record.instruction_set, simd_level_names);
   const std::string here = level ? simd::kernels_for(*level).name : "unknown";

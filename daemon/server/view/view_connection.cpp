@@ -204,7 +204,7 @@ asio::awaitable<bool> ViewConnection::write(const ViewMessage& message) {
   co_return !ec;
 }
 
-/// Closes the socket when no byte of a message is taken.
+/// Closes the socket when the viewer has accepted no byte of a message for `limits.stall`.
 void ViewConnection::look_for_progress() {
   stall_.expires_at(moved_at_ + services_.limits.stall);
   stall_.async_wait([weak = weak_from_this()](const error_code& ec) {

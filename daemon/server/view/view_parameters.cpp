@@ -25,7 +25,7 @@ std::string fault_parameter(std::string_view trouble, const std::string& sonar, 
   for (const char c : trouble) name += c == '-' ? '_' : c;
   return name;
 }
-/// The remaining time of a trouble that a viewer began; 0 = none.
+/// Seconds until a trouble (a named group of faults) that a viewer started ends; 0 = it is not active.
 double seconds_left(const Device& device, const std::string& fault, Time now) {
   double left = 0;
   for (const Faults::Listed& listed : device.sonar().faults().list())
@@ -67,7 +67,7 @@ std::optional<bool> flag_of(const Value& value) {
   return flag == nullptr ? std::nullopt : std::optional(*flag);
 }
 
-/// A number, a count or a flag of an operation: refused when the value is of another type.
+/// Sets one member of an operation: a number, a whole number or true/false. A value of another type is refused.
 template <class Op, class T>
 Result<control::Operation> with(Op operation, std::optional<T> Op::*member, const std::optional<T>& value) {
   if (!value)

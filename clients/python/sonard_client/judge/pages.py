@@ -18,9 +18,12 @@ _DATA = {"CLEAN": "good", "LOST": "fair", "STALE": "bad", "FALSE": "worst"}
 _RECOVERY = {"NONE NEEDED": "good", "BACK": "good", "OPERATOR": "bad", "NEVER": "bad", "CRASH": "worst"}
 _WORDS = {"CLEAN": "all that arrived whole was published once", "LOST": "pings that arrived whole were not published",
           "STALE": "pings were published a second time as new", "FALSE": "published pings differ from what was measured",
-          "UNSEEN": "no tap", "NONE NEEDED": "pings never stopped", "BACK": "from the fault's end to three pings in a row",
-          "OPERATOR": "came back only after the judge started the driver again", "NEVER": "did not come back, started again neither",
-          "CRASH": "ended by a signal or with an exit code"}
+          "UNSEEN": "not known: the driver has no tap (--tap), or the make's data are not judged",
+          "NONE NEEDED": "pings never stopped",
+          "BACK": "time from the fault's end to the first of three pings published in a row",
+          "OPERATOR": "came back only after the judge started the driver again",
+          "NEVER": "did not come back, not even when started again",
+          "CRASH": "ended by a signal, or with an exit code other than 0"}
 _JOURNAL_LEFT_OUT = ("seq", "mono_ns", "utc_ns", "time_ns", "do", "fault", "sonar")
 LOG_LINES = 40
 
@@ -177,7 +180,7 @@ def matrix(columns: Sequence[Json], summary: Callable[[Json], str], causes: Call
                     f'{_e(case["sentence"])}</th>{"".join(_cell(c, r) for c, r in zip(columns, rows))}'
                     f'{f"<td class=why>{why}</td>" if single else ""}</tr>')
     heads = "".join(f'<th scope="col">{_e(c["name"])}</th>' for c in columns)
-    heads += '<th scope="col">Not held</th>' if single else ""
+    heads += '<th scope="col">Not met</th>' if single else ""
     legend = "".join(f'<li><span class="swatch {c}" aria-hidden="true">{_MARKS[c]}</span>{_MEANINGS[c]}</li>'
                      for c in ("good", "fair", "flaky", "bad", "worst", "none"))
     title = columns[0]["name"] if single else f"{len(columns)} drivers"
@@ -265,7 +268,7 @@ def _run_part(row: Json, number: int, folder: pathlib.Path) -> str:
 {w["pings_published"]} published. {_e(w["capture"])}</p>
 <h2>Process</h2><p>{_e(state)}</p>
 <h2>Journal of the fault</h2>{_list(journal)}
-<h2>Bytes around the first touched one</h2>{_list(w["hex"])}
+<h2>Bytes around the first one that the fault changed</h2>{_list(w["hex"])}
 <h2>Last lines of the driver's log</h2>{_list(_log_tail(folder / place / "driver.log"))}
 <h2>Files</h2><ul>{files}</ul>"""
 
