@@ -21,7 +21,13 @@ constexpr std::size_t least_work = 64;                  // bytes: cost of a read
 constexpr int most_not_json = 8;                        // lines in a row that are too long or not JSON; then the connection ends
 constexpr std::size_t dropped_per_s = 1024u << 20;      // limit of discarded bytes: 32 floods hold 0.1 to 1 GB in the kernel
 constexpr std::chrono::milliseconds between_looks{10};  // for new input
+constexpr std::chrono::milliseconds longest_wait{100};  // of poses in the kernel
 constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
+
+std::size_t waiting_bytes(tcp::socket& socket) {
+  int waiting = 0;
+  return ::ioctl(socket.native_handle(), FIONREAD, &waiting) == 0 && waiting > 0 ? static_cast<std::size_t>(waiting) : 0;
+}
 
 Sender sender_of(bool json, const char* transport, const asio::ip::address& ip, std::uint16_t port) {
   const std::string encoding = json ? "json" : "protobuf";
@@ -179,8 +185,10 @@ asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
   std::array<std::byte, work_of_a_turn> buffer;
   error_code ec;
   while (true) {
+    const bool was_empty = waiting_bytes(c.socket) == 0;
     const std::size_t n = co_await c.socket.async_read_some(asio::buffer(buffer), into(ec));
     if (ec || stopping_) co_return;
+    if (was_empty) c.kept_up_at = std::chrono::steady_clock::now();
     c.lines.feed(std::span(buffer).first(n));
     Work work{n + least_work};
     for (Turn turn = Turn::not_over; turn == Turn::not_over; work = {}) {
@@ -247,19 +255,22 @@ void PoseServer::take_newest(Connection& c) {
   if (newest) on_line(*newest, c.sender);
 }
 
-/// Keeps the newest bytes that wait in the kernel: 0.1 s of the allowed rate, or one line of a sender that is paused for
-/// exceeding it. The kernel of such a sender holds megabytes more, even after the sender has closed; reading them at the allowed
-/// rate would let old poses act for seconds. True: the rest was dropped.
+/// Keeps the newest bytes that wait in the kernel: 0.1 s of the allowed rate, or two lines if the sender is paused for exceeding
+/// it, or if this computer has not kept up with it for 0.1 s. The kernel of such a sender holds megabytes more, even after the
+/// sender has closed; reading them all would let old poses act for seconds. True: the rest was dropped.
 bool PoseServer::drop_backlog(Connection& c, bool pauses) {
-  int waiting = 0;
-  if (::ioctl(c.socket.native_handle(), FIONREAD, &waiting) != 0 || waiting <= 0) return false;
+  const std::size_t waiting = waiting_bytes(c.socket);
   const auto now = std::chrono::steady_clock::now();
-  const std::size_t burst = pauses ? 0 : std::min(limits_.input_bytes_per_s, together_.share()) / 10;
-  const std::size_t kept = std::max(burst, 2 * control::longest_line);
-  if (static_cast<std::size_t>(waiting) <= kept || dropping_.left(now) == 0) return false;
+  constexpr std::size_t least = 2 * control::longest_line;
+  const bool is_behind = now - c.kept_up_at > longest_wait || now < c.behind_until;
+  if (waiting <= least) c.kept_up_at = now;
+  if (waiting <= least || dropping_.left(now) == 0) return false;
+  if (is_behind) c.behind_until = now + longest_wait;
+  const std::size_t burst = pauses || is_behind ? 0 : std::min(limits_.input_bytes_per_s, together_.share()) / 10;
+  const std::size_t kept = std::max(burst, least);
+  if (waiting <= kept) return false;
   // The kernel frees the bytes without copying them (tcp(7), MSG_TRUNC).
-  const ssize_t dropped =
-      ::recv(c.socket.native_handle(), nullptr, static_cast<std::size_t>(waiting) - kept, MSG_TRUNC | MSG_DONTWAIT);
+  const ssize_t dropped = ::recv(c.socket.native_handle(), nullptr, waiting - kept, MSG_TRUNC | MSG_DONTWAIT);
   if (dropped <= 0) return false;
   dropping_.pause_after(static_cast<std::size_t>(dropped), now);
   c.lines.skip_gap();

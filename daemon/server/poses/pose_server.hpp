@@ -62,7 +62,9 @@ class PoseServer {
     control::LineParser lines;
     int not_json = 0;                                                                    // lines in a row
     std::chrono::steady_clock::time_point active_at = std::chrono::steady_clock::now();  // a pose, within the limits
-    bool proved = false;                                                                 // the last pose was within the limits
+    std::chrono::steady_clock::time_point kept_up_at = active_at;  // when little or nothing waited in the kernel
+    std::chrono::steady_clock::time_point behind_until{};
+    bool proved = false;  // the last pose was within the limits
     void close() {
       error_code ec;
       socket.close(ec);
