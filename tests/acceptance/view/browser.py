@@ -167,10 +167,19 @@ class Page:
         return place
 
     def press_mouse(self, selector):
-        """Clicks as a mouse does: the topmost element at that place gets the click."""
-        x, y = self.place(selector)
-        for kind in ("mousePressed", "mouseReleased"):
-            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+        """Clicks as a mouse does: the topmost element at that place gets the click. A message of the daemon can move the element
+        between the look at its place and the press; a click that reached another element is therefore made again."""
+        for _ in range(5):
+            x, y = self.place(selector)
+            self.run("window.clicked = null, addEventListener('click', (e) => { window.clicked = e.target; }, {capture: true, once: true})")
+            for kind in ("mousePressed", "mouseReleased"):
+                self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+            # Undefined after a click on a link, which loads another page.
+            other = self.run(f"""window.clicked === undefined || window.clicked?.closest({json.dumps(selector)}) ? ''
+              : window.clicked?.outerHTML.slice(0, 200) ?? 'nothing'""")
+            if not other:
+                return
+        raise AssertionError(f"a click at the place of {selector} reaches {other}")
 
     def touch(self, selector):
         """As a finger does."""
