@@ -1,6 +1,6 @@
 -- Wireshark dissector for Sound Metrics ARIS sonars: commands on TCP 56888, beacons on UDP 56124, parts of frames on UDP 56444 and
 -- on the ports that a SET_FRAMESTREAM_RECEIVER of the same capture names. It shares nothing with the C++ code, so that the two can
--- judge each other (tests/acceptance/aris_link_test.py). Layouts: docs/protocols/aris.md; how to install it: docs/wireshark.md.
+-- judge each other (tests/acceptance/aris_link_test.py). Layouts: docs/protocols/aris.md; use: clients/wireshark/README.md.
 
 local aris = Proto("aris", "Sound Metrics ARIS sonar")
 local aris_beacon = Proto("aris_beacon", "Sound Metrics ARIS sonar, beacon")

@@ -1,6 +1,6 @@
 -- Wireshark dissector for Blueprint Oculus sonars: the stream on TCP 52100, the status datagrams on UDP 52102.
 -- It shares nothing with the C++ code, so that the two can judge each other (tests/acceptance/dissector_test.py). The layouts are
--- those of docs/protocols/oculus.md; how to install and use it: docs/wireshark.md. One file, because it is installed by copying.
+-- those of docs/protocols/oculus.md; use: clients/wireshark/README.md. One file, because it is installed by copying.
 
 local oculus = Proto("oculus", "Blueprint Oculus sonar")
 local oculus_status = Proto("oculus_status", "Blueprint Oculus sonar, status datagram")  -- hands on to the one above

@@ -1,6 +1,6 @@
 -- Wireshark dissector for the images of a Water Linked Sonar 3D-15, UDP 4747 (for other ports: "Decode as"). It shares nothing with
 -- the C++ code, so that the two can judge each other (tests/acceptance/waterlinked_link_test.py). Layouts:
--- docs/protocols/waterlinked.md; how to install it: docs/wireshark.md.
+-- docs/protocols/waterlinked.md; how to install it: clients/wireshark/README.md.
 
 local rip = Proto("waterlinked", "Water Linked Sonar 3D-15")
 local OVERHEAD, LARGEST = 12, 1048576

@@ -370,7 +370,7 @@ class Malformed(Dissected):
 
 
 class Used(Dissected):
-    """As docs/wireshark.md tells."""
+    """As clients/wireshark/README.md describes."""
 
     def capture(self, **settings):
         capture = Capture(**settings)
@@ -398,7 +398,7 @@ class Used(Dissected):
         self.assertNotIn("ping", tshark("-r", path, "-Y", "oculus.ping.temperature > 30"))
 
     def test_every_filter_of_the_manual_works(self):
-        manual = (ROOT / "docs/wireshark.md").read_text(encoding="utf-8")
+        manual = (ROOT / "clients/wireshark/README.md").read_text(encoding="utf-8")
         filters = re.findall(r"^\| `(oculus[^`]+)` \|", manual, re.M)
         self.assertGreater(len(filters), 8)
         path = self.path("run.pcap")

@@ -63,7 +63,7 @@ class ClosedForm {
     if (!has_pattern_) return std::abs(psi) < unit_reach_rad_ ? 1 : 0;
     return std::abs(psi) < pi / 2 ? elevation_two_way(aperture_, psi) : 0;
   }
-  /// Returns whether the beams see the bed in the whole footprint of a bin: the bin, and one pulse and one beam to either side.
+  /// Returns whether the beams see the bed in the whole footprint of a bin: the bin, and pulse_m and beam_sine to either side.
   bool holds(double range_m, double sine, double pulse_m, double beam_sine) const {
     for (const double r : {range_m - pulse_m, range_m, range_m + pulse_m})
       for (const double u : {sine - beam_sine, sine, sine + beam_sine})

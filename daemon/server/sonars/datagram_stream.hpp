@@ -17,17 +17,17 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
       : parent_(parent), socket_(socket), id_(id), gap_(gap), wake_(socket.get_executor()), pause_(socket.get_executor()) {}
 
   void start();
-  /// There is something to send.
+  /// Call it when there is something to send.
   void wake() { wake_.cancel(); }
-  /// No more pings after the one being sent, and no more of that when the socket is closed.
+  /// Ends the stream after the ping that is being sent; closing the socket ends that too.
   void finish(std::string why, bool by_host = false);
-  /// An empty datagram.
+  /// Sends an empty datagram.
   void send_nothing_to(const Endpoint& to);
-  /// A request of the host came, or a sign of it: it has not gone.
+  /// Call it when a request of the host arrived, or another sign that the host is alive.
   void heard() {
     heard_at_ = std::chrono::steady_clock::now();
     looked_ = false;
-    wake_.cancel();  // what it said may limit how long it may be silent
+    wake_.cancel();  // the request may have set another limit of silence
   }
   ConnectionId id() const { return id_; }
 
