@@ -19,10 +19,6 @@ for packages in "${test_packages[*]}" "${browser_packages[*]}"; do
   # shellcheck disable=SC2086
   need_packages $packages || echo "going on without: the tests that need them are skipped"
 done
-if [ -n "$long" ]; then  # tests that measure what reliability_table.py shows leave it there
-  export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
-  rm -f "$SONARD_RELIABILITY"/*.json  # items not measured now are shown as "not run"
-fi
 # Most tests that take long wait: for sockets, pictures or a time to pass. Two a processor use it better than one.
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"
 timed "tests" ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-$(($(nproc) * 2))}" --output-on-failure --no-tests=error \
@@ -36,10 +32,6 @@ python3 tests/oracles/oracle_table.py build/release/oracles "${partial[@]}" || [
 if [ -n "$long" ]; then
   before_long=$status
   tests/tools/long_checks.sh || status=1
-  strict=()
-  [ ${#partial[@]} -gt 0 ] || strict=(--strict)  # some tests only: rows are missing
-  python3 tests/reliability/reliability_table.py "$SONARD_RELIABILITY" "${strict[@]}" >"${SONARD_RELIABILITY}/reliability.md" || status=1
-  echo "the table: ${SONARD_RELIABILITY}/reliability.md"
   echo "tests: $([ "$before_long" -eq 0 ] && echo passed || echo "FAILED, see above")"
 fi
 exit $status

@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# The load tests in full length, about five minutes on a machine that does nothing else; figures go where SONARD_RELIABILITY says.
+# The load tests in full length, about ten minutes on a machine that does nothing else; figures go where SONARD_RELIABILITY says.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
 . tests/tools/setup.sh
 
-build release load_test sonard || exit
+build release load_test sonard in_own_network || exit
+export SONARD_BUILD=$PWD/build/release
 failed=0
-build/release/tests/load/load_test --gtest_brief=1 || failed=1
-for test in descriptors real_pings beside_driver; do
-  SONARD_BUILD=$PWD/build/release python3 -B tests/load/${test}_test.py || failed=1
-done
+alone() { "$SONARD_BUILD/tests/own_network/in_own_network" "$@" || failed=1; }
+alone "$SONARD_BUILD/tests/load/load_test" --gtest_brief=1
+for test in descriptors real_pings beside_driver; do alone python3 -B tests/load/${test}_test.py; done
+alone python3 -B tests/load/strangers_test.py --measure 5
 exit $failed

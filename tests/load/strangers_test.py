@@ -26,6 +26,7 @@ from running_sonard import Sonard  # noqa: E402
 MEASURES = "--measure" in sys.argv
 SECONDS = float(sys.argv[sys.argv.index("--measure") + 1]) if MEASURES else 1.5
 LIMIT = 1 << 20  # limits.input_bytes_per_s
+REQUEST_S = 10  # to receive a whole request or Hello
 TOKEN = "0123456789abcdef-lab"
 
 
@@ -285,6 +286,32 @@ class Strangers(unittest.TestCase):
                     self.assertEqual(answer.read(), b"ok\n")
             for s in slow:
                 s.close()
+
+    def test_a_request_that_is_not_whole_in_time_is_ended(self):
+        """Bytes that come now and then extend no limit: neither of a head, nor of a body, nor of the stream's Hello."""
+        with Sonard() as daemon:
+            begins = {"head": (8088, f"GET /healthz HTTP/1.1\r\nHost: {daemon.address}\r\nX: ".encode()),
+                      "body": (8088, f"POST /api/v1/sonar HTTP/1.1\r\nHost: {daemon.address}\r\nContent-Type: application/json\r\n"
+                                     "Content-Length: 100000\r\n\r\n ".encode()),
+                      "Hello": (14770, b"\xff\x0f")}  # 2 KB are to come
+            slow, begin = {}, time.monotonic()
+            for name, (port, data) in begins.items():
+                slow[name] = connect(daemon.address, port)
+                slow[name].sendall(data)
+            while slow and time.monotonic() < begin + 10 * REQUEST_S:
+                for name, sender in list(slow.items()):
+                    try:
+                        sender.sendall(b" ")
+                        if sender.recv(4096):
+                            continue
+                    except TimeoutError:
+                        continue
+                    except OSError:
+                        pass
+                    sender.close()
+                    del slow[name]
+            self.assertEqual(list(slow), [], "still open")
+            self.assertGreater(time.monotonic() - begin, REQUEST_S / 2, "ended for another reason")
 
     def test_floods_of_poses_that_have_closed_steer_nothing(self):
         with Sonard() as daemon:

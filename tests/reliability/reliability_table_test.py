@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -45,6 +46,24 @@ class Table(unittest.TestCase):
         code, page, said = table(self.folder.name, "--strict")
         self.assertEqual((code, said), (0, ""))
         self.assertIn("| 5,000: the importer", page)
+        self.assertIn("| 50,000: each is", page)
+
+    def test_each_item_is_recorded_by_a_program_that_the_long_checks_run(self):
+        tests = HERE.parent
+        steps = "".join((tests / script).read_text(encoding="utf-8") for script in ("tools/long_checks.sh", "load/load.sh"))
+        listed = {key for rows in reliability_table.items().values() for key, _, _ in rows if not key.startswith("fuzz-")}
+        listed -= set(reliability_table.read_records(reliability_table.BY_HAND))
+        recorded = {"asan", "tsan"}  # by sanitized_tests.sh, whose argument it is
+        for source in [*tests.glob("*/*.py"), *tests.glob("load/*.cpp")]:
+            text = source.read_text(encoding="utf-8")
+            if source.parent == HERE or not re.search(r'"tests/reliability"|"reliability"|load_case.hpp', text):
+                continue
+            items = set(re.findall(r'"([a-z0-9-]+)"', text)) & listed
+            items |= set(re.findall(r'\b(?:record|keep|kept)\(\s*"([a-z0-9-]+)"', text))
+            program = "load_test" if source.suffix == ".cpp" else source.stem.removesuffix("_test")
+            self.assertTrue(not items or re.search(rf"(?<![a-z_]){program}(?![a-z])", steps), f"no step of the long checks runs {source}")
+            recorded |= items
+        self.assertEqual(recorded, listed)
 
     def test_what_was_measured_is_shown_with_its_machine(self):
         self.assertTrue(record("load-dropped", "0.02 % of 57,600 | 3", "at most 0.5 %", True, "build/x --only load"))

@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# What takes too long for every run, and is run before a release: the loads, a mission of ten minutes, the page for 20, full fuzzing, the whole
-# functional suite under the address and undefined-behaviour sanitizers, and what has threads under the thread sanitizer. Run by
-# ./test.sh --long, or alone; two to four hours on two cores. Every step is run, also after one that failed; a table ends it.
+# What takes too long for every run, and is run before a release: the loads, starts, stops and reloads on a quiet computer, a mission
+# of ten minutes, the page for 20, full fuzzing, the whole functional suite under the address and undefined-behaviour sanitizers, and
+# what has threads under the thread sanitizer. Run by ./test.sh --long, or alone; two to four hours on two cores. Every step is run,
+# also after one that failed; a table ends it. The figures of all steps become the table of reliability: one that misses its bound
+# fails, and without STEPs also one that was not measured.
 # usage: tests/tools/long_checks.sh [STEP...]
 #   SONARD_FUZZ_RUNS, SONARD_FUZZ_SECONDS   see tests/tools/fuzz.sh
-#   SONARD_RELIABILITY                      where figures are kept (build/reliability)
+#   SONARD_RELIABILITY                      where figures and their table are kept (build/reliability)
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -23,15 +25,39 @@ step() {  # step NAME COMMAND...: runs it, when wished, and remembers how it end
   rows+=("$(printf '%-10s %-7s %6d s   %s' "$name" "$result" $((SECONDS - before)) "$*")")
 }
 
+# alone SCRIPT [ARGUMENTS]: of tests/acceptance, with the release build, in a network of its own.
+alone() {
+  SONARD_BUILD=$PWD/build/release build/release/tests/own_network/in_own_network python3 -B "tests/acceptance/$1.py" "${@:2}" </dev/null
+}
+
+# one_by_one NAME...: acceptance tests that keep figures.
+one_by_one() {
+  local name failed=0
+  for name in "$@"; do alone "${name}_test" || failed=1; done
+  return $failed
+}
+
+if [ ${#wished[@]} -eq 0 ]; then  # what is not measured now is shown as "not run"
+  rm -f "$SONARD_RELIABILITY"/*.json
+fi
+if [ ${#wished[@]} -eq 0 ] || [[ " ${wished[*]} " =~ \ (load|life|mission|page)\  ]]; then
+  setup_and_build sonard sonarctl load_test dump_oculus in_own_network || exit
+fi
 step load tests/load/load.sh
-step mission env SONARD_BUILD=build/release python3 -B tests/acceptance/mission_test.py --long
-step page env SONARD_BUILD=build/release python3 -B tests/acceptance/page_figures.py
+step life one_by_one life_cycle reload service dissector farm
+step mission alone mission_test --long
+step page alone page_figures
 step tsan tests/tools/sanitized_tests.sh tsan
 step asan tests/tools/sanitized_tests.sh asan-all
 step fuzz tests/tools/fuzz.sh
 
-[ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are load, mission, page, tsan, asan, fuzz" >&2; exit 64; }
+[ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are load, life, mission, page, tsan, asan, fuzz" >&2; exit 64; }
+strict=(--strict)
+[ ${#wished[@]} -eq 0 ] || strict=()  # some steps only: rows are missing
+mkdir -p "$SONARD_RELIABILITY"
+python3 tests/reliability/reliability_table.py "$SONARD_RELIABILITY" "${strict[@]}" >"${SONARD_RELIABILITY}/reliability.md" ||
+  failures=$((failures + 1))
 say "long checks"
 printf '%s\n' "${rows[@]}"
-echo "figures: $SONARD_RELIABILITY"
+echo "the table: ${SONARD_RELIABILITY}/reliability.md"
 [ $failures -eq 0 ]

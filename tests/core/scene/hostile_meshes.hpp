@@ -80,6 +80,9 @@ inline std::vector<HostileMesh> hostile_meshes() {
       {"brackets.gltf", std::string(200'000, '['), deep},
       {"objects.gltf", repeated("{\"a\":", 200'000), deep},
       {"deep.gltf", gltf_nodes(20'000, 1), deep},
+      {"nested.dae", collada_scene(repeated("<node>", 501) + repeated("</node>", 501)), deep},  // small: seeds
+      {"nested.gltf", std::string(201, '['), deep},
+      {"nodes.gltf", gltf_nodes(201, 1), deep},
       {"fan.gltf", gltf_nodes(24, 2), multiplies},
       {"itself.gltf", R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]})", itself},
       {"named.gltf",

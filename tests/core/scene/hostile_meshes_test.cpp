@@ -50,7 +50,7 @@ TEST_F(HostileMeshes, AreRefusedAndTheProgramGoesOn) {
     const std::string text = refusal(mesh.name, mesh.bytes);
     EXPECT_THAT(text, StartsWith(mesh.name + ": "));
     EXPECT_THAT(text, HasSubstr(mesh.words));
-    if (const char* folder = std::getenv("SONARD_WRITE_SEEDS"); folder && mesh.bytes.size() < 4096)
+    if (const char* folder = std::getenv("SONARD_WRITE_SEEDS"); folder && mesh.bytes.size() < 8192)
       std::ofstream(std::filesystem::path(folder) / mesh.name, std::ios::binary) << mesh.bytes;
   }
 }
