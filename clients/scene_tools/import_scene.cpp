@@ -1,8 +1,11 @@
 #include "clients/scene_tools/import_scene.hpp"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <set>
+#include <string_view>
+#include <utility>
 
 #include "clients/scene_tools/imported_files.hpp"
 #include "clients/scene_tools/resource_paths.hpp"
@@ -44,6 +47,20 @@ std::vector<std::string> words_of(std::string_view name) {
   return words;
 }
 
+/// Words in names and the materials that they stand for, besides the names of the materials themselves.
+constexpr auto meanings = std::to_array<std::pair<std::string_view, std::string_view>>(
+    {{"silt", "mud"},           {"clay", "mud"},        {"ooze", "mud"},      {"muddy", "mud"},       {"sandy", "sand"},
+     {"beach", "sand"},         {"dune", "sand"},       {"dunes", "sand"},    {"pebble", "gravel"},   {"pebbles", "gravel"},
+     {"cobble", "gravel"},      {"shingle", "gravel"},  {"rocks", "rock"},    {"rocky", "rock"},      {"stone", "rock"},
+     {"stones", "rock"},        {"boulder", "rock"},    {"boulders", "rock"}, {"cliff", "rock"},      {"reef", "rock"},
+     {"coral", "rock"},         {"granite", "rock"},    {"basalt", "rock"},   {"cement", "concrete"}, {"brick", "concrete"},
+     {"bricks", "concrete"},    {"iron", "steel"},      {"rust", "steel"},    {"rusty", "steel"},     {"stainless", "steel"},
+     {"aluminum", "aluminium"}, {"wooden", "wood"},     {"timber", "wood"},   {"plank", "wood"},      {"tyre", "rubber"},
+     {"tire", "rubber"},        {"neoprene", "rubber"}, {"pvc", "plastic"},   {"acrylic", "plastic"}, {"iceberg", "ice"}});
+/// Words for ground of whatever material.
+constexpr auto ground_words = std::to_array<std::string_view>(
+    {"heightmap", "seabed", "seafloor", "bathymetry", "terrain", "seamount", "ground", "riverbed", "lakebed", "sediment"});
+
 class MaterialChooser {
  public:
   static Result<MaterialChooser> from(const std::vector<std::string>& given, const ImportedWorld& world) {
@@ -66,17 +83,21 @@ class MaterialChooser {
     return chooser;
   }
 
-  std::string choose(const PlacedShape& shape, const std::string& model) const {
+  /// By the names that the files give: of the appearance, the shape, the model, and of the file or the library that it is from.
+  std::string choose(const PlacedShape& shape, const ImportedModel& model) const {
     for (const auto& [path, name] : for_model_)
-      if (model == path || model.starts_with(path + "/")) return name;
+      if (model.path == path || model.path.starts_with(path + "/")) return name;
     if (!for_all_.empty()) return for_all_;
-    for (const std::string_view hint :
-         {std::string_view(shape.material), std::string_view(shape.label), std::string_view(shape.link), std::string_view(model)})
+    bool is_ground = shape.shape.kind == Shape::Kind::plane || shape.shape.kind == Shape::Kind::heightmap;
+    for (const std::string& hint :
+         {shape.material, shape.label, shape.link, model.path, model.source, fs::path(shape.shape.uri).stem().string()})
       for (const std::string& word : words_of(hint)) {
         if (known_.contains(word)) return word;
-        if (word == "aluminum") return "aluminium";
+        for (const auto& [other, material] : meanings)
+          if (word == other) return std::string(material);
+        is_ground = is_ground || std::find(ground_words.begin(), ground_words.end(), word) != ground_words.end();
       }
-    return shape.shape.kind == Shape::Kind::plane || shape.shape.kind == Shape::Kind::heightmap ? "sand" : "concrete";
+    return is_ground ? "sand" : "concrete";
   }
 
  private:
@@ -130,7 +151,7 @@ Result<Imported> import_scene(const ImportOptions& options) {
       why += (i == 0 ? "; left out: " : "; ") + plain(left_out[i], 400);
     return failure(ErrorKind::bad_data, why);
   }
-  for (PlacedShape& shape : world->shapes) shape.material = materials->choose(shape, world->models[shape.model].path);
+  for (PlacedShape& shape : world->shapes) shape.material = materials->choose(shape, world->models[shape.model]);
 
   const WriteOptions writing{.moving = options.moving, .offset_m = options.offset_m, .command = options.file.filename().string()};
   if (const auto done = files.write_converted(); !done) return tl::make_unexpected(done.error());

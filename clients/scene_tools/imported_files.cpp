@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "clients/scene_tools/fuel.hpp"
 #include "core/scene/files/load_mesh.hpp"
 #include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/shapes/terrain.hpp"
@@ -52,20 +53,25 @@ bool FileResolver::resolve(PlacedShape& placed) {
   const fs::path file = library_.find(placed.shape.uri, placed.at.in->path);
   if (!file.empty()) return mesh ? resolve_mesh(placed, file) : resolve_heightmap(placed, file);
   const std::string what = std::string(mesh ? "mesh " : "heightmap ") + plain(placed.shape.uri, 200);
+  const std::string fetch = fetch_command(placed.shape.uri);
   if (skip_missing_)
-    findings_.leave_out(placed.at, what + ": not found");
-  else if (std::none_of(missing_.begin(), missing_.end(), [&](const auto& known) { return known.second == what; }))
-    missing_.emplace_back(placed.at, what);
+    findings_.leave_out(placed.at, what + ": not found" + (fetch.empty() ? "" : "; fetch its model: " + fetch));
+  else if (std::none_of(missing_.begin(), missing_.end(), [&](const Missing& known) { return known.what == what; }))
+    missing_.push_back({placed.at, what, fetch});
   return false;
 }
 
 void FileResolver::report_missing() {
   if (missing_.empty()) return;
-  std::string text = missing_.front().second +
+  std::string text = missing_.front().what +
                      ": no such file here; give the folder that holds it with --model-path, or go on without it with "
                      "--skip-missing";
-  for (std::size_t i = 1; i < missing_.size(); ++i) text += (i == 1 ? "; neither are there: " : ", ") + missing_[i].second;
-  findings_.fail(missing_.front().first, text);
+  for (std::size_t i = 1; i < missing_.size(); ++i) text += (i == 1 ? "; neither are there: " : ", ") + missing_[i].what;
+  std::vector<std::string> commands;  // one a model
+  for (const Missing& m : missing_)
+    if (!m.fetch.empty() && std::find(commands.begin(), commands.end(), m.fetch) == commands.end()) commands.push_back(m.fetch);
+  for (const std::string& command : commands) text += (&command == &commands.front() ? "; fetch from Fuel: " : "; ") + command;
+  findings_.fail(missing_.front().at, text);
 }
 
 bool FileResolver::resolve_mesh(PlacedShape& placed, const fs::path& file) {

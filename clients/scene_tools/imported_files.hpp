@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "clients/scene_tools/imported_world.hpp"
@@ -35,7 +34,11 @@ class FileResolver {
   std::filesystem::path scene_;
   bool skip_missing_, try_files_;
   Findings& findings_;
-  std::vector<std::pair<Place, std::string>> missing_;
+  struct Missing {
+    Place at;
+    std::string what, fetch;  // fetch: a command; may be empty
+  };
+  std::vector<Missing> missing_;
   std::map<std::filesystem::path, std::string> tried_;      // why a mesh cannot be used; empty: it can
   std::map<std::string, std::string> known_conversions_;    // by file and scale: the path to write
   std::map<std::filesystem::path, std::string> converted_;  // file to write, its text

@@ -36,6 +36,7 @@ struct ImportedModel {
   Pose in_world;
   bool is_static = false;
   Place at = {};
+  std::string source = {};  // name of the model that an include names
 };
 
 struct ImportedWorld {

@@ -30,7 +30,7 @@ class SdfReader {
     list_what_is_left_out(model);
     if (!model.is_world) {
       const std::size_t index = world_.models.size();
-      world_.models.push_back({model.path, in_world, model.is_static, model.element.place()});
+      world_.models.push_back({model.path, in_world, model.is_static, model.element.place(), model.source});
       for (const Element& link : model.element.children("link")) read_link(model, link, in_world, index);
     }
     for (const auto& nested : model.nested)

@@ -6,7 +6,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <optional>
+
+#include "clients/scene_tools/fuel.hpp"
 
 namespace sonar::scene_tools {
 namespace {
@@ -22,13 +23,7 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-/// The version that names a folder; -1 if its name is not a number.
-int version_of(const fs::path& folder) {
-  const std::string name = folder.filename().string();
-  const bool digits =
-      !name.empty() && name.size() < 9 && std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
-  return digits ? std::atoi(name.c_str()) : -1;
-}
+int version_of(const fs::path& folder) { return version_number(folder.filename().string()); }
 
 constexpr int most_looked_at = 20'000;  // entries of a folder
 
@@ -126,27 +121,6 @@ fs::path look_around(const fs::path& wanted, const fs::path& from_file, const st
   return {};
 }
 
-/// A model's address on a Fuel server: HOST/1.0/OWNER/models/NAME, then perhaps VERSION or tip, and files/ with a path in it.
-struct FuelAddress {
-  std::string host, owner, name, version;
-  std::vector<std::string> inside;
-};
-std::optional<FuelAddress> fuel_address(const fs::path& address) {
-  std::vector<std::string> parts;
-  for (const fs::path& part : address) parts.push_back(part.string());
-  std::erase_if(parts, [](const std::string& part) { return part.empty() || part == "/"; });
-  const auto is_api = [](const std::string& part) { return part.find_first_not_of("0123456789.") == std::string::npos; };
-  if (parts.size() > 1 && is_api(parts[1])) parts.erase(parts.begin() + 1);
-  if (parts.size() > 3 && parts[2] == "fuel" && parts[3] == "models") parts.erase(parts.begin() + 2);  // as web pages name it
-  if (parts.size() < 4 || lower(parts[2]) != "models") return std::nullopt;
-  FuelAddress out{parts[0], parts[1], parts[3], "", {}};
-  std::size_t next = 4;
-  if (parts.size() > next && (version_of(parts[next]) >= 0 || parts[next] == "tip")) out.version = parts[next++];
-  if (parts.size() > next && parts[next] == "files") ++next;
-  out.inside.assign(parts.begin() + static_cast<std::ptrdiff_t>(next), parts.end());
-  return out;
-}
-
 /// The folders in which both generations of Gazebo keep downloads.
 std::vector<fs::path> fuel_caches() {
   std::vector<fs::path> caches;
@@ -170,7 +144,7 @@ fs::path find_in_fuel_caches(const FuelAddress& address) {
         if (!model.empty()) model = child_of(model, part);
       if (model.empty()) continue;
       std::vector<fs::path> places = versions_in(model);
-      const int named = version_of(address.version);
+      const int named = version_number(address.version);
       if (named < 0) places.push_back(model);
       for (fs::path place : places) {
         if (named >= 0 && version_of(place) != named) continue;
@@ -206,11 +180,11 @@ fs::path find_resource(std::string_view uri, const fs::path& from_file, const st
   std::string path = std::string(scheme.empty() ? uri : uri.substr(colon + 3));
   if (!scheme.empty()) path = without_escapes(path);
   if (scheme == "http" || scheme == "https" || scheme == "fuel") {  // never fetched, but a copy may lie here
-    const auto address = fuel_address(fs::path(path).lexically_normal());
+    const auto address = fuel_address(path);
     if (address)
       if (fs::path found = find_in_fuel_caches(*address); !found.empty()) return found;
     const std::string name = address && address->inside.empty() ? address->name : fs::path(path).filename().string();
-    const int version = address && address->inside.empty() ? version_of(address->version) : -1;
+    const int version = address && address->inside.empty() ? version_number(address->version) : -1;
     if (name.empty()) return {};
     for (const fs::path& folder : folders)
       if (const fs::path there = child_of(folder, name); !there.empty())

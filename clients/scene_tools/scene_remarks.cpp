@@ -11,6 +11,7 @@ namespace {
 constexpr double far_m = 1000, tiny_m = 0.005, wide_m = 5;
 constexpr double tiny_ground_m = 1, steepest_ground = 10;  // width of the ground; its height over its width
 constexpr double flat_ground = 0.1, huge_ground_m = 5000;  // the same of ground as a mesh, which may be long
+constexpr double at_surface_m = 0.001;                     // a height that is rounded to 0
 constexpr std::size_t many_triangles = 2'000'000;
 
 std::string list_of(const std::vector<std::string>& names) {
@@ -62,17 +63,27 @@ void remark_on_places(const SceneDescription& scene, Remarks& out) {
     return o.kind == "heightmap" && !o.in_world.empty() && o.in_world.distance_m({}) > far_m;
   });
   if (!far.empty())
-    out.warnings.push_back(
-        std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far) +
-        (far_grid == scene.objects.end() ? "" : "; centred: true brings the middle of " + far_grid->file + " to its pose"));
-  const auto above = names_where(
-      scene, [](const DescribedObject& o) { return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > 0; });
-  const auto grid = std::find_if(scene.objects.begin(), scene.objects.end(), [](const DescribedObject& o) {
-    return o.kind == "heightmap" && !o.in_world.empty() && o.in_world.low_m.z > 0;
-  });
+    out.warnings.push_back(std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far) +
+                           (far_grid == scene.objects.end()
+                                ? ""
+                                : "; centred: true brings the middle of " + far_grid->file +
+                                      " to its pose, and origin: {lat, lon} places it if its coordinates are degrees or "
+                                      "UTM (utm: 33N, its zone)"));
+  const auto is_above = [](const DescribedObject& o) {
+    return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > at_surface_m;
+  };
+  const auto above = names_where(scene, is_above);
+  const auto grid = std::find_if(scene.objects.begin(), scene.objects.end(),
+                                 [&](const DescribedObject& o) { return o.kind == "heightmap" && is_above(o); });
   if (!above.empty())
     out.warnings.push_back("wholly above z = 0, the water's surface: " + list_of(above) +
                            (grid == scene.objects.end() ? "" : "; if " + grid->file + " has depths, set z_scale: -1"));
+  const auto dry = names_where(scene, [&](const DescribedObject& o) {
+    return is_ground(o, scene) && !is_above(o) && o.in_world.low_m.z >= -at_surface_m;
+  });
+  if (!dry.empty())
+    out.warnings.push_back("ground at z = 0, the water's surface, with no water above it: " + list_of(dry) +
+                           "; move it down by its pose, or by sonarctl scene import --offset");
   if (std::none_of(scene.objects.begin(), scene.objects.end(), [&](const DescribedObject& o) { return is_ground(o, scene); }))
     out.warnings.push_back(
         "no seabed: no object is ground or 5 m wide in both directions, so beams that miss the objects stay black");

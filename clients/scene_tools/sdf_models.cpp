@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "clients/scene_tools/fuel.hpp"
 #include "clients/scene_tools/read_parts.hpp"
 #include "core/text/nearest.hpp"
 
@@ -12,20 +13,6 @@ constexpr int most_includes_deep = 16, most_frames_deep = 256;
 constexpr std::size_t most_models = 4096, most_elements = 5'000'000;
 
 bool is_true(std::string_view text) { return text == "true" || text == "1"; }
-
-/// The name of a model in small letters: "coast water" for ".../models/Coast%20Water/2".
-std::string model_name(std::string_view uri) {
-  const auto last = [&] { return uri.substr(uri.find_last_of('/') + 1); };
-  uri = uri.substr(0, uri.find("/files/"));  // a file in a model of Fuel
-  while (uri.ends_with('/')) uri.remove_suffix(1);
-  while (uri.find('/') != std::string_view::npos &&
-         (last() == "tip" || last().find_first_not_of("0123456789") == std::string_view::npos))
-    uri.remove_suffix(last().size() + 1);
-  std::string name(uri.substr(uri.find_last_of('/') + 1));
-  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c == '_' ? ' ' : c;
-  for (std::size_t at = 0; (at = name.find("%20")) != std::string::npos;) name.replace(at, 3, " ");
-  return name;
-}
 
 /// The kind of a well-known model without an echo of its own, which is left out even where it is found. Empty for all others.
 std::string known_kind_without_echo(std::string_view name) {
@@ -40,18 +27,6 @@ std::string known_kind_without_echo(std::string_view name) {
 std::string probable_kind_without_echo(std::string_view name) {
   if (name == "axes" || name.ends_with(" frame")) return "coordinate frame";
   return name == "ocean" ? "drawn water surface" : "";
-}
-
-/// The shell command that fetches a model of a Fuel server. Empty for an address that a shell could read as something else.
-std::string fetch_command(std::string_view uri) {
-  constexpr std::string_view safe = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789:/._-+~% ";
-  if (!uri.starts_with("https://") && !uri.starts_with("http://")) return {};
-  if (uri.size() > 200 || uri.find_first_not_of(safe) != std::string_view::npos) return {};
-  std::string url(uri);  // the command does not take the addresses of web pages
-  for (const std::string_view page : {"://app.gazebosim.org/", "://app.ignitionrobotics.org/"})
-    if (const std::size_t at = url.find(page), models = url.find("/fuel/models/"); at != url.npos && models != url.npos)
-      url.replace(models, 13, "/models/").replace(0, at + page.size(), "https://fuel.gazebosim.org/1.0/");
-  return "gz fuel download --url '" + url + "'";
 }
 
 std::string text_or(std::string_view text, const char* otherwise) { return std::string(text.empty() ? otherwise : text); }
@@ -157,6 +132,7 @@ void SdfTree::add_model(SdfModel& parent, const Element& element, const Element&
   model->parent = &parent;
   model->is_static = is_true(either("static").text()) || parent.is_static;
   model->merged = is_true(include.attribute("merge"));
+  model->source = include ? model_name(include.child("uri").text()) : parent.source;
   const std::string_view placed = include.child("placement_frame").text();
   model->placement_frame = placed.empty() ? element.attribute("placement_frame") : placed;
 

@@ -24,6 +24,7 @@ struct SdfFrame {
 
 struct SdfModel {
   std::string name, path;  // crane, ship/crane; both empty for the world
+  std::string source;      // name of the model that an include names, which may say more than the name given here
   Element element;         // <model> or <world>
   SdfModel* parent = nullptr;
   bool is_world = false, is_static = false, merged = false;

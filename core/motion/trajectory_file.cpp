@@ -257,6 +257,12 @@ Result<std::string> text_of(const std::filesystem::path& file) {
   return text;
 }
 
+/// Logs and recordings have bytes of 0 near their beginning, which no line of numbers has.
+bool is_log(std::string_view text) {
+  constexpr std::size_t beginning = 4096;
+  return text.substr(0, beginning).find('\0') != std::string_view::npos || text.starts_with("$G");  // of a GPS
+}
+
 }  // namespace
 
 std::string_view name_of(Format format) { return format_names[static_cast<std::size_t>(format)]; }
@@ -269,6 +275,12 @@ Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::stri
 Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options) {
   const auto text = text_of(file);
   if (!text) return tl::make_unexpected(text.error());
+  if (is_log(*text))
+    return failure(
+        ErrorKind::bad_data,
+        file.string() +
+            ": not lines of poses; convert a log or recording: python3 -m sonard_client.convert FILE -o OUT.csv (without "
+            "a horizontal position --at NORTH,EAST places the vehicle, and --dead-reckon M/S moves it)");
   const auto lines = static_cast<std::uint64_t>(std::count(text->begin(), text->end(), '\n')) + 1;
   if (auto room = check_memory_for(file.string(), memory_of_a_line * lines); !room) return tl::make_unexpected(room.error());
   return parse_trajectories(*text, file.string(), options);

@@ -264,6 +264,7 @@ class WithoutHorizontalPosition(WithFolder):
         self.assertEqual(len(self.warned), 1, self.warned)
         self.assertIn(f"no horizontal position (no DVL, UGPS or the like): north and east are held at {at[0]:g}, {at[1]:g}",
                       self.warned[0])
+        self.assertIn("--dead-reckon M/S moves the vehicle ahead", self.warned[0])
 
     @staticmethod
     def telemetry(kinds, submarine=True, steps=20):

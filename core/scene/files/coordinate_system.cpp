@@ -1,4 +1,4 @@
-// The coordinate system of a grid by WKT and .prj files: degrees or lengths, and their units.
+// The coordinate system of a grid by WKT, .prj files and EPSG codes: degrees or lengths, their units, and the zone of UTM.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -26,6 +26,25 @@ constexpr std::array<std::string_view, 7> in_lengths{"PROJCS",   "PROJCRS", "PRO
 constexpr std::array<std::string_view, 6> in_degrees{"GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS", "GEODETICCRS", "GEODCS"};
 constexpr std::array<std::string_view, 4> of_heights{"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"};
 
+/// Datums that agree with WGS 84 within 2 m, as names of systems have them, without blanks and underscores.
+constexpr std::array<std::string_view, 13> modern_datums{"WGS84",   "WGS1984", "ETRS89",  "ETRS1989", "NAD83",
+                                                         "NAD1983", "GDA94",   "GDA1994", "GDA2020",  "SIRGAS2000",
+                                                         "SIRGAS",  "RGF93",   "NZGD2000"};
+
+/// From names like "WGS 84 / UTM zone 33N", "NAD_1983_UTM_Zone_10N" and "GDA94 / MGA zone 55" in capitals.
+std::optional<UtmZone> utm_of_name(std::string name) {
+  std::erase_if(name, [](char c) { return c == ' ' || c == '_' || c == '/'; });
+  const bool modern = std::any_of(modern_datums.begin(), modern_datums.end(),
+                                  [&](std::string_view datum) { return name.find(datum) != name.npos; });
+  for (const std::string_view kind : {"UTMZONE", "MGAZONE"}) {
+    const std::size_t at = name.find(kind);
+    if (!modern || at == name.npos) continue;
+    const std::string zone = name.substr(at + kind.size(), 3);
+    return utm_zone_from(kind == "MGAZONE" ? zone.substr(0, 2) + "S" : zone);
+  }
+  return std::nullopt;
+}
+
 bool is_unit(double v) { return v > 1e-4 && v < 1e5; }
 
 /// "Projection UTM", "Units FEET": a word and its value a line.
@@ -37,6 +56,8 @@ CoordinateSystem system_of_lines(const std::string& text) {
     return in_a_metre && is_unit(1 / *in_a_metre) ? 1 / *in_a_metre : 1;
   };
   constexpr const char* blanks = " \t\r";
+  std::string datum, zone;
+  bool is_utm = false;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
     const std::string line = text.substr(at, end - at);
@@ -46,10 +67,14 @@ CoordinateSystem system_of_lines(const std::string& text) {
                       from = std::min(line.find_first_not_of(blanks, gap), line.size()),
                       to = std::min(line.find_first_of(blanks, from), line.size());
     const std::string key = line.substr(word, gap - word), value = line.substr(from, to - from);
-    if (key == "PROJECTION") system.geographic = value == "GEOGRAPHIC";
+    if (key == "PROJECTION") system.geographic = value == "GEOGRAPHIC", is_utm = value == "UTM";
+    if (key == "DATUM") datum = value;
+    if (key == "ZONE") zone = value;
     if (key == "UNITS") system.unit_m = unit_of(value);
     if (key == "ZUNITS") system.height_unit_m = unit_of(value);
   }
+  if (is_utm)  // zones of the south have a sign
+    system.utm = utm_of_name(datum + " UTM ZONE " + (zone.starts_with('-') ? zone.substr(1) + "S" : zone + "N"));
   return system;
 }
 
@@ -83,6 +108,7 @@ CoordinateSystem system_of_wkt(std::string_view text) {
       const std::string name = upper(text.substr(at + 1, end - at - 1));
       for (const char* mercator : {"PSEUDO-MERCATOR", "PSEUDO_MERCATOR", "MERCATOR_AUXILIARY_SPHERE", "POPULAR VISUALISATION"})
         system.web_mercator = system.web_mercator || name.find(mercator) != name.npos;
+      if (open.size() == 1 && open[0].commas == 0) system.utm = utm_of_name(name);
       at = end;
     } else if (c == '[' || c == '(') {
       if (open.size() == deepest) return system;
@@ -102,6 +128,26 @@ CoordinateSystem system_of_wkt(std::string_view text) {
     }
   }
   return system;
+}
+
+std::optional<UtmZone> utm_of_epsg(std::uint32_t code) {
+  struct Row {
+    std::uint32_t first, last;
+    UtmZone zone;  // of the first
+  };
+  static constexpr std::array<Row, 9> rows{{{32601, 32660, {1, false}},   // WGS 84
+                                            {32701, 32760, {1, true}},    //
+                                            {25828, 25838, {28, false}},  // ETRS89
+                                            {26901, 26923, {1, false}},   // NAD83
+                                            {6330, 6348, {1, false}},     // NAD83(2011)
+                                            {31965, 31976, {11, false}},  // SIRGAS 2000
+                                            {31977, 31985, {17, true}},   //
+                                            {28348, 28358, {48, true}},   // GDA94
+                                            {7846, 7859, {46, true}}}};   // GDA2020
+  for (const Row& row : rows)
+    if (code >= row.first && code <= row.last)
+      return UtmZone{row.zone.number + static_cast<int>(code - row.first), row.zone.south};
+  return std::nullopt;
 }
 
 CoordinateSystem system_by_prj(const std::filesystem::path& heights) {

@@ -265,6 +265,7 @@ class GeoTiffReader {
     } else if (model == projected) {
       raw_.system.geographic = false;
       raw_.system.web_mercator = keys.value_of(projected_system) == web_mercator;
+      raw_.system.utm = utm_of_epsg(keys.value_of(projected_system).value_or(0));
     }
     auto of_heights = unit_of_band(metadata);
     if (!of_heights) of_heights = keys.value_of(vertical_units);

@@ -97,9 +97,37 @@ void bring_to_metres(RawHeights& raw, double z_scale, std::vector<std::string>& 
                        : ""));
 }
 
-Result<void> set_origin(HeightGrid& grid, const HeightOptions& options, bool guessed) {
+std::string place_text(const Geodetic& place) {
+  return text::format("latitude %.6f, longitude %.6f", deg_from_rad(place.latitude_rad), deg_from_rad(place.longitude_rad));
+}
+
+/// The origin as the scene or the configuration gives it; without both, the middle of the grid.
+void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodetic& middle) {
+  grid.origin = options.origin ? options.origin : options.world_origin;
+  if (grid.origin && !options.origin) grid.notes.push_back("its place is counted from world.origin, " + place_text(*grid.origin));
+  if (options.origin && options.world_origin) {
+    const Vec3d apart = enu_in_enu_of(*options.world_origin, *options.origin).position_m;
+    const double distance_m = std::hypot(apart.x, apart.y);
+    constexpr double agreeing_m = 2;
+    if (distance_m > agreeing_m)
+      grid.notes.push_back(
+          text::format("its origin is %.3g %s from world.origin: latitudes and longitudes of vehicles do not fit this ground; "
+                       "take origin away, and world.origin is used",
+                       distance_m < 1000 ? distance_m : distance_m / 1000, distance_m < 1000 ? "m" : "km"));
+  }
+  if (grid.origin) return;
+  grid.origin = middle;
+  grid.notes.push_back("x and y are about its middle, " + place_text(middle) + "; set origin: {lat, lon} to place it otherwise");
+}
+
+Result<void> set_origin_of_degrees(HeightGrid& grid, const HeightOptions& options, bool guessed) {
   const double longitude = 0.5 * (grid.x.front() + grid.x.back()), latitude = 0.5 * (grid.y.front() + grid.y.back());
-  grid.origin = options.origin.value_or(Geodetic{rad_from_deg(latitude), rad_from_deg(longitude), 0});
+  if (guessed)
+    grid.notes.push_back(
+        text::format("its coordinates (%.6g, %.6g, cells of %.6g) are taken as degrees; write geographic: true, or "
+                     "false if they are metres",
+                     grid.x.front(), grid.y.front(), grid.x[1] - grid.x[0]));
+  choose_origin(grid, options, {rad_from_deg(latitude), rad_from_deg(longitude), 0});
   const double from_longitude = deg_from_rad(grid.origin->longitude_rad), from_latitude = deg_from_rad(grid.origin->latitude_rad);
   const double turns = std::round((from_longitude - longitude) / 360);  // 0 to 360 and -180 to 180 both name places
   for (double& x : grid.x) x += 360 * turns;
@@ -107,22 +135,47 @@ Result<void> set_origin(HeightGrid& grid, const HeightOptions& options, bool gue
                                std::abs(grid.y.front() - from_latitude), std::abs(grid.y.back() - from_latitude)});
   if (far > farthest_deg)
     return failure(ErrorKind::bad_data,
-                   text::format("the grid, in degrees, reaches %.3g degrees from the origin (latitude %.6f, longitude %.6f); "
-                                "at most 5: cut a part out, or set origin",
-                                far, from_latitude, from_longitude));
+                   text::format("the grid, in degrees, reaches %.3g degrees from the origin (%s); at most 5: cut a part out, or "
+                                "set origin",
+                                far, place_text(*grid.origin).c_str()));
   if (std::max(std::abs(grid.y.front()), std::abs(grid.y.back())) > nearest_pole_deg)
     return failure(ErrorKind::bad_data, "the grid, in degrees, reaches within 1 degree of a pole; project it to metres");
-  if (guessed)
-    grid.notes.push_back(
-        text::format("its coordinates (%.6g, %.6g, cells of %.6g) are taken as degrees; write geographic: true, or "
-                     "false if they are metres",
-                     grid.x.front(), grid.y.front(), grid.x[1] - grid.x[0]));
-  if (!options.origin)
-    grid.notes.push_back(
-        text::format("x and y are about its middle, latitude %.6f, longitude %.6f; set origin: {lat, lon} to place "
-                     "it otherwise",
-                     from_latitude, from_longitude));
   return {};
+}
+
+Result<void> set_origin_of_zone(HeightGrid& grid, const HeightOptions& options, UtmZone zone) {
+  if (!are_utm(grid.x.front(), grid.y.front()) || !are_utm(grid.x.back(), grid.y.back()))
+    return failure(
+        ErrorKind::bad_data,
+        text::format("its coordinates (%.7g, %.7g) are no eastings and northings of UTM, zone %s; write geographic: false "
+                     "to take them as plain metres",
+                     grid.x.front(), grid.y.front(), text_of(zone).c_str()));
+  grid.zone = zone;
+  choose_origin(grid, options, {});
+  double far_m = 0;
+  for (const double x : {grid.x.front(), grid.x.back()})
+    for (const double y : {grid.y.front(), grid.y.back()})
+      far_m = std::max(far_m, length(enu_in_enu_of(*grid.origin, geodetic_from_utm(zone, x, y)).position_m));
+  if (far_m > farthest_deg * 111e3)
+    return failure(
+        ErrorKind::bad_data,
+        text::format("the grid, in UTM zone %s, reaches %.0f km from the origin (%s); at most 555: correct the zone or "
+                     "the origin, or cut a part out",
+                     text_of(zone).c_str(), far_m / 1000, place_text(*grid.origin).c_str()));
+  return {};
+}
+
+/// For metres of a zone that is not known: whether they are near the world's origin in the zone in which that lies.
+void hint_at_zone(HeightGrid& grid, const Geodetic& world_origin) {
+  constexpr double near_m = 50'000, least_northing_m = 10'000;
+  const double x = 0.5 * (grid.x.front() + grid.x.back()), y = 0.5 * (grid.y.front() + grid.y.back());
+  if (std::abs(y) < least_northing_m || !are_utm(x, y)) return;
+  const UtmZone zone = utm_zone_at(world_origin);
+  if (length(enu_in_enu_of(world_origin, geodetic_from_utm(zone, x, y)).position_m) < near_m)
+    grid.notes.push_back(
+        text::format("its coordinates are near world.origin if they are UTM of zone %s: write utm: %s to place it "
+                     "there",
+                     text_of(zone).c_str(), text_of(zone).c_str()));
 }
 
 }  // namespace
@@ -185,9 +238,13 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
     grid.notes.push_back(text::format("its heights, in units of %.6g m, become metres", raw.system.height_unit_m));
   if (geographic && !could_be_degrees(raw))
     return failure(ErrorKind::bad_data, "its coordinates are not longitudes and latitudes in degrees; remove geographic: true");
-  if (options.origin && !geographic)
+  const auto zone = options.utm || options.geographic ? options.utm : raw.system.utm;
+  if (geographic && zone && options.utm)
+    return failure(ErrorKind::bad_data, "utm is for coordinates in metres, and these are degrees; take it away");
+  if (options.origin && !geographic && !zone)
     return failure(ErrorKind::bad_data,
-                   "origin is for a grid in degrees; write geographic: true if it is one, else take it away");
+                   "origin is for a grid in degrees or UTM; write geographic: true or utm: 33N (its zone) if it is one, else "
+                   "take it away");
   const auto holes = static_cast<std::size_t>(std::count_if(raw.z.begin(), raw.z.end(), [](float z) { return std::isnan(z); }));
   if (holes > 0)
     grid.notes.push_back(text::format("%zu of its %zu heights (%.2g %%) are no data: holes in the ground", holes, raw.z.size(),
@@ -197,8 +254,16 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   grid.z_m = std::move(raw.z);
   const double z_scale = options.z_scale * raw.system.height_unit_m;
   for (float& z : grid.z_m) z = static_cast<float>(static_cast<double>(z) * z_scale);
-  if (geographic)
-    if (auto set = set_origin(grid, options, !said); !set) return tl::make_unexpected(set.error());
+  if (geographic) {
+    if (auto set = set_origin_of_degrees(grid, options, !said); !set) return tl::make_unexpected(set.error());
+  } else if (zone && (options.origin || options.world_origin)) {
+    if (auto set = set_origin_of_zone(grid, options, *zone); !set) return tl::make_unexpected(set.error());
+  } else if (zone && !options.centred) {
+    grid.notes.push_back("its coordinates are metres of UTM zone " + text_of(*zone) +
+                         "; set origin: {lat, lon}, or world.origin in the configuration, to place it by latitude and longitude");
+  } else if (options.world_origin && !options.geographic) {
+    hint_at_zone(grid, *options.world_origin);
+  }
   return grid;
 }
 

@@ -1,6 +1,7 @@
 // Common parts of readers of height grids with coordinates: cells without data, and degrees. Internal to these readers.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -37,6 +38,8 @@ struct CoordinateSystem {
   double unit_m = 1;                    // unit of coordinates that are not degrees
   double height_unit_m = 1;
   bool web_mercator = false;  // its metres are longer than metres on the ground
+  /// On a datum that agrees with WGS 84 within 2 m.
+  std::optional<UtmZone> utm = {};
 };
 
 /// As a file has them.
@@ -57,5 +60,7 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 CoordinateSystem system_by_prj(const std::filesystem::path& heights);
 /// From WKT; units that it does not name are metres.
 CoordinateSystem system_of_wkt(std::string_view text);
+/// The zone of a projected system of the EPSG data set; empty for other projections, and for older datums.
+std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
 
 }  // namespace sonar

@@ -23,10 +23,16 @@ void read_material_library(const text::Node& node, const std::filesystem::path& 
 }
 
 std::shared_ptr<const Scene> read_map(text::Map root, const std::filesystem::path& folder, const std::string& fallback_name,
-                                      std::span<const BuiltInFile> meshes_in_memory = {}, ShapeCache* known = nullptr) {
+                                      std::span<const BuiltInFile> meshes_in_memory = {}, ShapeCache* known = nullptr,
+                                      const std::optional<Geodetic>& world_origin = {}) {
   auto scene = std::make_shared<Scene>();
   MaterialTable materials(*scene);
-  ShapeReader shapes{.scene = *scene, .materials = materials, .folder = folder, .in_memory = meshes_in_memory, .cache = known};
+  ShapeReader shapes{.scene = *scene,
+                     .materials = materials,
+                     .folder = folder,
+                     .in_memory = meshes_in_memory,
+                     .cache = known,
+                     .world_origin = world_origin};
   scene->name = root.optional("name").text_or(fallback_name, 64);
   read_material_library(root.optional("material_library"), folder, materials);
   materials.read(root.optional("materials").map());
@@ -39,8 +45,9 @@ std::shared_ptr<const Scene> read_map(text::Map root, const std::filesystem::pat
 
 Result<std::shared_ptr<const Scene>> read_document(const text::Document& document, const std::filesystem::path& folder,
                                                    const std::string& fallback_name,
-                                                   std::span<const BuiltInFile> meshes_in_memory = {}) {
-  auto scene = read_map(document.root(), folder, fallback_name, meshes_in_memory);
+                                                   std::span<const BuiltInFile> meshes_in_memory = {},
+                                                   const std::optional<Geodetic>& world_origin = {}) {
+  auto scene = read_map(document.root(), folder, fallback_name, meshes_in_memory, nullptr, world_origin);
   if (auto error = document.finish()) return tl::make_unexpected(std::move(*error));
   return scene;
 }
@@ -52,10 +59,10 @@ std::shared_ptr<const Scene> read_scene(text::Map map, const std::filesystem::pa
   return read_map(map, folder, name, {}, known);
 }
 
-Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& file) {
+Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& file, const std::optional<Geodetic>& world_origin) {
   auto document = text::parse_yaml_file(file, {.error_kind = ErrorKind::bad_data});
   if (!document) return tl::make_unexpected(document.error());
-  return read_document(*document, file.parent_path(), file.stem().string());
+  return read_document(*document, file.parent_path(), file.stem().string(), {}, world_origin);
 }
 
 Result<std::shared_ptr<const Scene>> parse_scene(std::string_view text, const std::string& name,

@@ -3,9 +3,11 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
+#include "core/base/geodesy.hpp"
 #include "core/base/result.hpp"
 #include "core/scene/scene.hpp"
 
@@ -15,8 +17,10 @@ namespace text {
 class Map;
 }
 
-/// Errors: file:line:col: key.path: what, and the nearest valid name.
-Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& file);
+/// Errors: file:line:col: key.path: what, and the nearest valid name. `world_origin`: the place of x = y = 0, by which height
+/// grids in degrees and UTM without an origin of their own are placed.
+Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& file,
+                                                const std::optional<Geodetic>& world_origin = {});
 /// The same from text; `name` starts the errors, paths in the scene are relative to `folder`.
 Result<std::shared_ptr<const Scene>> parse_scene(std::string_view text, const std::string& name,
                                                  const std::filesystem::path& folder);

@@ -222,12 +222,17 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   if (!readers.contains(extension)) extension = grid_by_content(path);
   if (const auto reader = readers.find(extension); reader != readers.end()) {
     HeightOptions options{.z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000))};
-    const bool centred = keys.optional("centred").boolean_or(false);
+    const bool centred = options.centred = keys.optional("centred").boolean_or(false);
     if (const Node geographic = keys.optional("geographic")) options.geographic = geographic.boolean_or(false);
     if (const Node origin = keys.optional("origin")) {
       options.origin = origin_from(origin.map());
       if (centred) origin.fail("give origin or centred, not both");
     }
+    if (const Node utm = keys.optional("utm")) {
+      options.utm = utm_zone_from(utm.text(16));
+      if (!options.utm) utm.fail("is not a zone of UTM; write its number and hemisphere: 33N, 56S");
+    }
+    if (!centred) options.world_origin = world_origin;
     auto grid = reader->second(path, options);
     if (grid)
       for (const std::string& note : grid->notes) scene.notes.push_back(path.filename().string() + ": " + note);

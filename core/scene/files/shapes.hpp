@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -25,6 +26,7 @@ struct ShapeReader {
   std::filesystem::path folder;                   // paths in the scene are relative to it
   std::span<const BuiltInFile> in_memory = {};    // mesh files of a built-in scene, which are then not looked for on disk
   ShapeCache* cache = nullptr;                    // shapes of earlier scenes
+  std::optional<Geodetic> world_origin = {};      // for grids that know their latitudes and longitudes
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
   std::set<std::string> noted = {};               // meshes whose losses are in the scene's notes
   std::map<std::string, Shape> files = {};        // the same with their materials: objects that agree share one

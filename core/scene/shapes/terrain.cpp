@@ -6,7 +6,7 @@
 namespace sonar {
 namespace {
 
-/// East and north of every vertex of a grid. Coordinates in degrees give a point of the ellipsoid, which is
+/// East and north of every vertex of a grid. Coordinates in degrees or UTM give a point of the ellipsoid, which is
 /// projected into the plane that touches the ellipsoid at the origin, whatever the height. Seen from there, a length along the
 /// ground d away is too short by the part (d / R)^2 / 2.
 class PlaneOf {
@@ -14,35 +14,41 @@ class PlaneOf {
   explicit PlaneOf(const HeightGrid& grid) : grid_(grid) {
     if (!grid.origin) return;
     const Geodetic& o = *grid.origin;
-    const auto ring_at = [](double latitude_rad) {
-      const Vec3d p = ecef_from({latitude_rad, 0, 0});
-      return Ring{p.x, p.z};
-    };
-    const Ring at_origin = ring_at(o.latitude_rad);
-    const double s = std::sin(o.latitude_rad), c = std::cos(o.latitude_rad);
+    sin_latitude_ = std::sin(o.latitude_rad), cos_latitude_ = std::cos(o.latitude_rad);
+    at_origin_ = ring_at(o.latitude_rad);
+    if (grid.zone) return;
     for (const double longitude_deg : grid.x) {
       const double turn = rad_from_deg(longitude_deg) - o.longitude_rad;
       sin_.push_back(std::sin(turn)), cos_.push_back(std::cos(turn));
     }
-    for (const double latitude_deg : grid.y) {
-      const Ring ring = ring_at(rad_from_deg(latitude_deg));
-      radius_m_.push_back(ring.radius_m);
-      north_m_.push_back(s * at_origin.radius_m + c * (ring.z_m - at_origin.z_m));
-    }
-    sin_latitude_ = s;
+    for (const double latitude_deg : grid.y) rings_.push_back(ring_at(rad_from_deg(latitude_deg)));
   }
   Vec3d operator()(std::size_t i, std::size_t j, double z_m) const {
     if (!grid_.origin) return {grid_.x[i], grid_.y[j], z_m};
-    return {radius_m_[j] * sin_[i], north_m_[j] - sin_latitude_ * radius_m_[j] * cos_[i], z_m};
+    if (!grid_.zone) return at(rings_[j], sin_[i], cos_[i], z_m);
+    const Geodetic place = geodetic_from_utm(*grid_.zone, grid_.x[i], grid_.y[j]);
+    const double turn = place.longitude_rad - grid_.origin->longitude_rad;
+    return at(ring_at(place.latitude_rad), std::sin(turn), std::cos(turn), z_m);
   }
 
  private:
   struct Ring {
     double radius_m, z_m;  // about the earth's axis
   };
+  static Ring ring_at(double latitude_rad) {
+    const Vec3d p = ecef_from({latitude_rad, 0, 0});
+    return {p.x, p.z};
+  }
+  Vec3d at(const Ring& ring, double sin_turn, double cos_turn, double z_m) const {
+    const double north_m = sin_latitude_ * at_origin_.radius_m + cos_latitude_ * (ring.z_m - at_origin_.z_m);
+    return {ring.radius_m * sin_turn, north_m - sin_latitude_ * ring.radius_m * cos_turn, z_m};
+  }
+
   const HeightGrid& grid_;
-  std::vector<double> sin_, cos_, radius_m_, north_m_;
-  double sin_latitude_ = 0;
+  std::vector<double> sin_, cos_;
+  std::vector<Ring> rings_;
+  Ring at_origin_{};
+  double sin_latitude_ = 0, cos_latitude_ = 0;
 };
 
 }  // namespace

@@ -11,6 +11,7 @@
 
 #include "core/base/geodesy.hpp"
 #include "core/base/result.hpp"
+#include "core/base/utm.hpp"
 #include "core/scene/scene.hpp"
 
 namespace sonar {
@@ -19,10 +20,11 @@ inline constexpr std::size_t max_mesh_triangles = 20'000'000;
 
 /// Heights over the product of two rising coordinate lists; NaN = no ground there.
 struct HeightGrid {
-  std::vector<double> x, y;  // rising, at least two each; metres, or with an origin degrees of longitude and latitude
+  std::vector<double> x, y;  // rising, at least two each; metres, or with an origin but no zone degrees of longitude and latitude
   std::vector<float> z_m;    // [y][x]
   /// Set: the ground lies in the plane that touches the ellipsoid here. A height stays what it is, above a flat sea.
   std::optional<Geodetic> origin = {};
+  std::optional<UtmZone> zone = {};     // only with an origin: x and y are metres of this zone
   std::vector<std::string> notes = {};  // what the reader did that the scene's author should know
 };
 
@@ -45,7 +47,11 @@ Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double si
 struct HeightOptions {
   double z_scale = 1;                   // -1 for depths
   std::optional<bool> geographic = {};  // coordinates in degrees; unset: as the file says or shows
-  std::optional<Geodetic> origin = {};  // origin of a geographic grid; unset: the middle of the grid
+  std::optional<UtmZone> utm = {};      // zone of coordinates in metres; unset: as the file says, unless `geographic` is set
+  std::optional<Geodetic> origin = {};  // origin of a grid in degrees or UTM
+  /// Used if `origin` is unset. Without both, degrees are about the middle of the grid, and UTM stays as it is.
+  std::optional<Geodetic> world_origin = {};
+  bool centred = false;  // the caller puts the middle of the grid elsewhere, so its place does not matter
 };
 /// ESRI ASCII grid (.asc).
 Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const HeightOptions& options);

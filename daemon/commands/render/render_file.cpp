@@ -180,7 +180,7 @@ Result<RenderInput> from_config(const std::filesystem::path& file, const std::st
   if (sonar.empty()) index = 0;
   if (index == config->sonars.size())
     return failure(ErrorKind::usage, "no sonar \"" + sonar + "\" in " + file.string() + "; there are " + names);
-  const auto scene = load_scene(config->scene);
+  const auto scene = load_scene(config->scene, config->origin);
   if (!scene) return tl::make_unexpected(scene.error());
   if (std::string why = why_not_movable(**scene, *config); !why.empty()) return failure(ErrorKind::config, std::move(why));
   RenderJob job;

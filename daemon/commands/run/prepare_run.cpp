@@ -59,7 +59,7 @@ Result<PreparedRun> prepare_run(const RunCommand& command, bool& json,
   const Config& config = run.found.config;
   if (const auto r = check_files(config, run.token_warning); !r) return tl::make_unexpected(r.error());
   const LoadProgress loading(say_with(config));
-  const auto scene = load_scene(config.scene);
+  const auto scene = load_scene(config.scene, config.origin);
   if (!scene) return tl::make_unexpected(scene.error());
   if (std::string why = why_not_movable(**scene, config); !why.empty()) return failure(ErrorKind::config, std::move(why));
   run.scene = *scene;

@@ -33,14 +33,14 @@ void prepare_process() {
   raise_descriptor_limit();
 }
 
-AppOptions app_options(const RunCommand& command, const std::filesystem::path& file) {
+AppOptions app_options(const RunCommand& command, const FoundConfig& found) {
   AppOptions options;
   options.exit_after_pings = command.exit_after_pings;
   options.digest = command.digest;
   options.handle_signals = true;
-  options.load_scene = [](const SceneFile& scene) { return load_scene(scene); };
-  if (!file.empty())
-    options.read_config = [file, command]() -> Result<Config> {
+  options.load_scene = [origin = found.config.origin](const SceneFile& scene) { return load_scene(scene, origin); };
+  if (!found.file.empty())
+    options.read_config = [file = found.file, command]() -> Result<Config> {
       auto again = load_config(file);
       if (again)
         if (const auto r = override_config(*again, command); !r) return tl::make_unexpected(r.error());
@@ -72,7 +72,8 @@ Result<int> run_daemon(const RunCommand& command, Steady::time_point begin, bool
     if (prepared->engine) return std::move(prepared->engine);  // the first
     return prepared->make_engine(std::move(s));
   };
-  App app(std::move(found.config), std::move(prepared->scene), make_engine_for, app_options(command, found.file), log);
+  const AppOptions options = app_options(command, found);
+  App app(std::move(found.config), std::move(prepared->scene), make_engine_for, options, log);
   const double scene_ms = 1e3 * seconds_since(prepare_begin);
   if (const auto r = app.open(); !r) return tl::make_unexpected(r.error());
   log.announce(banner(app, {found.how, scene_ms}) + ready_line(app, seconds_since(begin)));

@@ -20,6 +20,7 @@ constexpr double turned_over = -0.5;           // the z axis points down, by mor
 constexpr std::size_t most_looked_at = 10000;  // poses of a trajectory, triangles of a mesh
 constexpr double ground_flatness = 0.05;       // height over width; flatter objects are ground, which may be long
 constexpr double least_ground_m = 2;           // width; a flat plate that is narrower is not ground
+constexpr double far_from_origin_m = 1000;     // within it vehicles may drive to the scene
 constexpr double long_ranges = 5;              // lengths of the longest range that an object may have
 
 // Each cure is one kind of note: a kind is reported once.
@@ -40,6 +41,10 @@ constexpr const char* angle_cure = "angles are radians there: were degrees sent?
 constexpr const char* mount_cure =
     "rpy_deg is [roll, pitch, yaw]: a roll near 180, or a pitch beyond 90, turns it over and swaps port and starboard; to look "
     "aft, set yaw 180";
+constexpr const char* origin_cure =
+    "vehicles with latitudes and longitudes are placed about world.origin: does it belong to this scene? A height map in degrees "
+    "or "
+    "UTM is placed about it, without origin and centred";
 constexpr const char* lift_cure = "move the scene down: sonarctl scene import --offset 0,0,-10, or the poses of its objects";
 
 struct Doubt {
@@ -213,6 +218,7 @@ std::vector<Note> notes_on_start(const Config& config, const Scene& scene, const
   const std::vector<Carrier> carriers = carriers_of(config);
   std::vector<Note> notes = notes_on_mounts(config);
   add(notes, notes_on_scene(scene, around));
+  if (config.origin) add(notes, notes_on_origin(around));
   for (std::size_t v = 0; v < carriers.size(); ++v) {
     const VehicleConfig& vehicle = config.vehicles[v];
     if (!vehicle.plan && (vehicle.has_initial_pose || vehicle.orbits))
@@ -279,6 +285,13 @@ std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around)
                      std::string(huge_mesh_cure)});
   }
   return notes;
+}
+
+std::vector<Note> notes_on_origin(const Surroundings& around) {
+  if (around.scene.empty()) return {};
+  const double away_m = around.scene.distance_m({0, 0, around.scene.low_m.z});
+  if (away_m < far_from_origin_m) return {};
+  return {{"", format("the scene is %.1f km from world.origin", away_m / 1000), origin_cure}};
 }
 
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {

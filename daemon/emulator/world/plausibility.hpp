@@ -52,6 +52,8 @@ std::vector<Carrier> carriers_of(const Config& config);
 std::vector<Note> notes_on_mounts(const Config& config);
 /// `around`: of this scene.
 std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around);
+/// Whether the scene is near the origin of a world that has a latitude and longitude.
+std::vector<Note> notes_on_origin(const Surroundings& around);
 /// At most one concerns the place, and one the attitude.
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
 /// `largest_angle_rad`: as in PoseSample.

@@ -119,7 +119,24 @@ TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
               ElementsAre(HasSubstr("degrees (geographic: true), or kilometres?")));
   files.write("utm.asc", "ncols 2\nnrows 2\nxllcorner 5e5\nyllcorner 6.6e6\ncellsize 10\n-20 -40 -22 -23\n");
   EXPECT_THAT(remarks("objects: [{name: bed, type: heightmap, file: utm.asc, material: sand}]\n").warnings,
-              ElementsAre(HasSubstr("every product: bed; centred: true brings the middle of utm.asc to its pose")));
+              ElementsAre(HasSubstr(
+                  "every product: bed; centred: true brings the middle of utm.asc to its pose, and origin: {lat, lon}")));
+}
+
+TEST_F(DescribeScene, WarnsOfGroundAtTheSurface) {
+  const auto surface = ElementsAre(HasSubstr("ground at z = 0, the water's surface, with no water above it: bed; move it down"));
+  files.write("flat.asc", "ncols 2\nnrows 2\ncellsize 30\n0 0 0 0\n");
+  const std::string grid = "objects: [{name: bed, type: heightmap, file: flat.asc, material: sand, pose: {xyz_m: [0, 0, ";
+  EXPECT_THAT(remarks(grid + "0]}}]\n").warnings, surface);
+  EXPECT_THAT(remarks(grid + "-0.5]}}]\n").warnings, IsEmpty());
+  files.write("hill.asc", "ncols 2\nnrows 2\ncellsize 30\n0 5 0 0\n");
+  EXPECT_THAT(remarks("objects: [{name: bed, type: heightmap, file: hill.asc, material: sand}]\n").warnings, surface);
+  EXPECT_THAT(remarks("objects: [{name: bed, type: plane, size_m: [40, 40], material: sand}]\n").warnings, surface);
+  EXPECT_THAT(
+      remarks("sea_surface: {}\nobjects: [{name: bed, type: plane, size_m: [40, 40], material: sand, pose: {xyz_m: [0, 0, "
+              "-4]}}]\n")
+          .warnings,
+      IsEmpty());
 }
 
 TEST_F(DescribeScene, ErrorsAreTheLoadersOwn) {

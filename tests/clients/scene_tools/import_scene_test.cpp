@@ -242,6 +242,52 @@ TEST_F(ImportScene, MaterialsByArgumentByNameAndByGuess) {
   EXPECT_THAT(error(world), HasSubstr("--material shop=steel: no model of that name"));
 }
 
+TEST_F(ImportScene, MaterialsByWordsThatMeanThem) {
+  const auto material_of = [&](const std::string& world) {
+    const auto done = run(world);
+    if (!done) return done.error().text;
+    const auto made = scene();
+    return made->materials.at(made->objects.at(0).mesh->material.at(0)).name;
+  };
+  for (const auto& [name, material] : {std::pair{"Silt_patch", "mud"},
+                                       {"PebbleBeach", "gravel"},
+                                       {"boulder_3", "rock"},
+                                       {"rusty anchor", "steel"},
+                                       {"brick_wall", "concrete"},
+                                       {"Iceberg", "ice"},
+                                       {"stainless_pipe", "steel"},
+                                       {"seafloor_2", "sand"},
+                                       {"terrain mud", "mud"},
+                                       {"pier", "concrete"}})
+    EXPECT_EQ(material_of(sdf(model(name, link("l")))), material) << name;
+  // A library's name of a model says more than the names inside it.
+  write("lib/Sand Heightmap/model.sdf", "<sdf version='1.9'><model name='m'>" + mesh("hill.stl") + "</model></sdf>");
+  write("lib/Sand Heightmap/hill.stl", triangle);
+  options.model_folders = {files.path("lib")};
+  const std::string include = "<include><name>world</name><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/";
+  EXPECT_EQ(material_of(sdf(include + "Sand%20Heightmap</uri></include>")), "sand");
+  // And so does the file of a mesh.
+  write("gravel_bed.stl", triangle);
+  EXPECT_EQ(material_of(sdf(model("m", mesh("gravel_bed.stl")))), "gravel");
+}
+
+TEST_F(ImportScene, MissingMeshesOfFuelComeWithTheCommandThatFetchesTheirModel) {
+  const Environment home("HOME", files.path("home").string());
+  const std::string fuel = "https://fuel.gazebosim.org/1.0/Cole/models/";
+  const std::string world =
+      sdf(model("a", mesh(fuel + "Coral01/1/files/meshes/c.stl")) + model("b", mesh(fuel + "Coral01/1/files/meshes/d.stl")) +
+          model("c", mesh(fuel + "Sea%20Vase/tip/files/v.dae")) + model("d", mesh("gone.stl")));
+  EXPECT_THAT(error(world), ::testing::EndsWith("mesh gone.stl; fetch from Fuel: gz fuel download --url '" + fuel +
+                                                "Coral01/1'; gz fuel download --url '" + fuel + "Sea%20Vase/tip'"));
+  options.read.skip_missing = true;
+  const auto done = run(sdf(model("a", mesh(fuel + "Coral01/1/files/meshes/c.stl")) + model("b", mesh("https://x.org/c.stl")) +
+                            model("e", link("l"))));
+  ASSERT_TRUE(done) << done.error().text;
+  EXPECT_THAT(done->left_out, ElementsAre(::testing::EndsWith("c.stl: not found; fetch its model: gz fuel download --url '" +
+                                                              fuel + "Coral01/1'"),
+                                          ::testing::EndsWith("https://x.org/c.stl: not found")));
+}
+
 TEST_F(ImportScene, MovingModelsAreBodiesWhereTheModelStands) {
   options.moving = {"rov"};
   options.offset_m = {0, 0, -5};

@@ -204,6 +204,19 @@ TEST(TrajectoryFile, OneThatIsMissingIsSaidToBe) {
   }
 }
 
+TEST(TrajectoryFile, LogsAreToldTheConverter) {
+  const std::filesystem::path file = testing::TempDir() + "poses-log-" + std::to_string(getpid());
+  for (const std::string& bytes :
+       {std::string("\0\5\xfd\x1c", 4), std::string("#ROSBAG V2.0\nE\0\0\0", 17), std::string("$GPGGA,1,2\n")}) {
+    std::ofstream(file, std::ios::binary) << bytes;
+    const auto refused = load_trajectories(file, enu);
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().text, HasSubstr("python3 -m sonard_client.convert FILE -o OUT.csv"));
+    EXPECT_THAT(refused.error().text, HasSubstr("--dead-reckon M/S"));
+  }
+  std::filesystem::remove(file);
+}
+
 TEST(TrajectoryFile, PosesThatTheMemoryDoesNotSufficeForAreRefused) {
   const std::filesystem::path root = testing::TempDir() + "poses-memory-" + std::to_string(getpid());
   std::filesystem::create_directories(root / "proc");

@@ -115,7 +115,8 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
         if source.held or (stays and (at is not None or (origin is None and own_origin is None))):
             held = at or local[0][1][:2]
             warn(f"no horizontal position (no DVL, UGPS or the like): north and east are held at {held[0]:g}, {held[1]:g}" +
-                 ("" if at else "; --at NORTH,EAST sets them") + ("" if origin is None else "; the origin is not used"))
+                 ("; " if at else "; --at NORTH,EAST sets them, ") + "--dead-reckon M/S moves the vehicle ahead" +
+                 ("" if origin is None else "; the origin is not used"))
             comments.append(f"north and east are held at {held[0]:g}, {held[1]:g}: the log has no horizontal position")
             local = [(t, (held[0], held[1], p[2])) for t, p in local]
             at, stays, is_held = None, False, True

@@ -121,6 +121,20 @@ TEST(Plausibility, NedTakenForEnuBelowTheBedAndFarAway) {
   EXPECT_THAT(at("xyz_m: [3000, 0, -3]"), ElementsAre(HasSubstr("positions are metres from the world's 0, 0, 0")));
 }
 
+TEST(Plausibility, ASceneFarFromTheOriginOfLatitudesIsToldBeforeTheFirstPose) {
+  Config config = config_with("");
+  Scene far = bed_scene();
+  far.objects[0].in_world.position_m = {500'000, 6'651'411, -5};
+  EXPECT_THAT(notes(config, far), IsEmpty()) << "poses may be metres there";
+  config.origin = Geodetic{rad_from_deg(60), rad_from_deg(15), 0};
+  EXPECT_THAT(notes(config, far),
+              ElementsAre(AllOf(HasSubstr("the scene is 6670.1 km from world.origin; vehicles with latitudes"),
+                                HasSubstr("A height map in degrees or UTM is placed about it"))));
+  EXPECT_THAT(notes(config, bed_scene()), IsEmpty());
+  far.objects[0].in_world.position_m = {900, 0, -5};
+  EXPECT_THAT(notes(config, far), IsEmpty()) << "a drive away";
+}
+
 TEST(Plausibility, OnlyGroundIsWhatASonarCanBeBelow) {
   const auto below = [](double z_m, std::vector<Object> things) {
     Scene scene = bed_scene(std::move(things));

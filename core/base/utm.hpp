@@ -1,0 +1,32 @@
+// Universal Transverse Mercator on WGS 84: the eastings and northings of charts and elevation models as latitude and longitude.
+// Source: C. F. F. Karney, "Transverse Mercator with an accuracy of a few nanometers", Journal of Geodesy 85 (2011): the series
+// of Krueger in the third flattening, here to its fourth power, which is exact to micrometres within 10 degrees of a zone.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/base/geodesy.hpp"
+
+namespace sonar {
+
+struct UtmZone {
+  int number = 31;  // 1 to 60; the zone n is about longitude 6 n - 183 degrees
+  bool south = false;
+  bool operator==(const UtmZone&) const = default;
+};
+
+/// "33N", "33S".
+std::string text_of(UtmZone zone);
+/// From "33N" or "33 south"; empty for all else.
+std::optional<UtmZone> utm_zone_from(std::string_view text);
+/// The zone that a place lies in, without the exceptions of Norway and Svalbard.
+UtmZone utm_zone_at(const Geodetic& place);
+
+/// Whether the coordinates [m] may be of a zone, or of the margin that grids have.
+bool are_utm(double easting_m, double northing_m);
+/// The place on the ellipsoid with these coordinates [m].
+Geodetic geodetic_from_utm(UtmZone zone, double easting_m, double northing_m);
+
+}  // namespace sonar

@@ -1,0 +1,328 @@
+// Height grids as GeoTIFF, written here field by field: places, units, kinds of numbers, and files that are wrong.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <type_traits>
+
+#include "core/scene/shapes/terrain.hpp"
+#include "tests/core/scene/temporary_files.hpp"
+
+namespace sonar::geo_tiff_test {
+namespace {
+
+using ::testing::HasSubstr;
+using tests::TemporaryFiles;
+
+/// A little-endian TIFF of one strip, from the format's description: field by field.
+struct TiffFile {
+  struct Field {
+    std::uint16_t tag, type;
+    std::uint32_t count;
+    std::string value;  // little-endian
+  };
+  template <class T>
+  static std::string bytes_of(const std::vector<T>& values) {
+    return {reinterpret_cast<const char*>(values.data()), sizeof(T) * values.size()};
+  }
+  std::vector<Field> fields;
+  std::string heights;
+
+  void shorts(std::uint16_t tag, const std::vector<std::uint16_t>& v) {
+    fields.push_back({tag, 3, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+  }
+  void longs(std::uint16_t tag, const std::vector<std::uint32_t>& v) {
+    fields.push_back({tag, 4, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+  }
+  void doubles(std::uint16_t tag, const std::vector<double>& v) {
+    fields.push_back({tag, 12, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+  }
+  void text(std::uint16_t tag, const std::string& v) {
+    fields.push_back({tag, 2, static_cast<std::uint32_t>(v.size() + 1), v + '\0'});
+  }
+
+  template <class T>
+  static TiffFile of(std::uint16_t columns, std::uint16_t rows, const std::vector<T>& heights) {
+    TiffFile f;
+    f.heights = bytes_of(heights);
+    f.shorts(256, {columns}), f.shorts(257, {rows}), f.shorts(258, {8 * sizeof(T)}), f.shorts(259, {1}), f.shorts(262, {1});
+    f.longs(273, {8}), f.shorts(277, {1}), f.shorts(278, {rows}), f.longs(279, {static_cast<std::uint32_t>(f.heights.size())});
+    f.shorts(339, {std::is_floating_point_v<T> ? std::uint16_t{3} : std::is_signed_v<T> ? std::uint16_t{2} : std::uint16_t{1}});
+    return f;
+  }
+  TiffFile& at(double west, double north, double cell_x, double cell_y) {
+    doubles(33550, {cell_x, cell_y, 0});
+    doubles(33922, {0, 0, 0, west, north, 0});
+    return *this;
+  }
+  TiffFile& keys(const std::vector<std::array<std::uint16_t, 2>>& keys) {
+    std::vector<std::uint16_t> words{1, 1, 0, static_cast<std::uint16_t>(keys.size())};
+    for (const auto& [key, value] : keys) words.insert(words.end(), {key, 0, 1, value});
+    shorts(34735, words);
+    return *this;
+  }
+  TiffFile& without(std::uint16_t tag) {
+    std::erase_if(fields, [&](const Field& f) { return f.tag == tag; });
+    return *this;
+  }
+
+  /// With another picture after it.
+  std::string bytes_before(const TiffFile& next) const {
+    std::string out = bytes(), more = next.bytes();
+    out.resize(out.size() + out.size() % 2);
+    const auto start = static_cast<std::uint32_t>(out.size());
+    const auto add = [&](std::string& in, std::size_t at) {
+      std::uint32_t v = 0;
+      std::memcpy(&v, in.data() + at, 4);
+      v += start;
+      std::memcpy(in.data() + at, &v, 4);
+    };
+    std::uint32_t directory = 0;
+    std::memcpy(&directory, out.data() + 4, 4);
+    std::uint32_t second = 0;
+    std::memcpy(&second, more.data() + 4, 4);
+    second += start;
+    std::memcpy(out.data() + directory + 2 + 12 * fields.size(), &second, 4);
+    for (std::size_t k = 0; k < next.fields.size(); ++k) {  // its strip lies farther back, too
+      const std::size_t at = second - start + 2 + 12 * k;
+      if (static_cast<unsigned char>(more[at]) == 273 % 256 && more[at + 1] == 1) add(more, at + 8);
+    }
+    return out + more;
+  }
+  std::string bytes() const {
+    std::vector<Field> sorted = fields;
+    std::sort(sorted.begin(), sorted.end(), [](const Field& a, const Field& b) { return a.tag < b.tag; });
+    const auto word = [](std::uint32_t v) { return bytes_of(std::vector<std::uint32_t>{v}); };
+    const auto half = [](std::uint16_t v) { return bytes_of(std::vector<std::uint16_t>{v}); };
+    const std::size_t directory = 8 + heights.size() + heights.size() % 2;
+    std::string out = "II*" + std::string(1, '\0') + word(static_cast<std::uint32_t>(directory)) + heights, more;
+    out.resize(directory);
+    out += half(static_cast<std::uint16_t>(sorted.size()));
+    const std::size_t behind = directory + 2 + 12 * sorted.size() + 4;
+    for (const Field& f : sorted) {
+      out += half(f.tag) + half(f.type) + word(f.count);
+      std::string value = f.value;
+      if (value.size() > 4) {
+        out += word(static_cast<std::uint32_t>(behind + more.size()));
+        more += value + std::string(value.size() % 2, '\0');
+      } else {
+        value.resize(4);
+        out += value;
+      }
+    }
+    return out + word(0) + more;
+  }
+};
+
+struct GeoTiff : ::testing::Test {
+  TemporaryFiles files;
+  Result<HeightGrid> read(const TiffFile& tiff, const HeightOptions& options = {}) {
+    return read_geo_tiff_heights(files.write("g.tif", tiff.bytes()), options);
+  }
+  void SetUp() override {
+    const auto grid = read_geo_tiff_heights(files.write("g.tif", "?"), {});
+    if (grid.error().kind != ErrorKind::unavailable) return;
+    EXPECT_THAT(grid.error().text, HasSubstr("gdal_translate -of AAIGrid g.tif g.asc"));
+    GTEST_SKIP() << "built without libtiff";
+  }
+};
+const std::vector<float> six{-1, -2, -3, -4, -9999, -6};
+
+TEST_F(GeoTiff, MetresByCornerAndByPoint) {
+  TiffFile area = TiffFile::of(3, 2, six).at(500000, 6600020, 10, 5).keys({{{1024, 1}, {1025, 1}}});
+  area.text(42113, "-9999");
+  const auto grid = read(area);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->x, (std::vector<double>{500005, 500015, 500025}));
+  EXPECT_EQ(grid->y, (std::vector<double>{6600012.5, 6600017.5}));
+  EXPECT_FLOAT_EQ(grid->z_m[3], -1);  // the first row is north
+  EXPECT_TRUE(std::isnan(grid->z_m[1]));
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 of its 6 heights")));
+  const auto points = read(TiffFile::of(3, 2, six).at(500000, 6600020, 10, 5).keys({{{1024, 1}, {1025, 2}}}));
+  ASSERT_TRUE(points);
+  EXPECT_EQ(points->x.front(), 500000);
+  EXPECT_EQ(points->y.back(), 6600020);
+  const auto feet =
+      read(TiffFile::of(3, 2, six).at(1000, 2000, 10, 10).keys({{{1024, 1}, {1025, 2}, {3076, 9002}, {4099, 9002}}}));
+  ASSERT_TRUE(feet) << feet.error().text;
+  EXPECT_NEAR(feet->x.back(), 1020 * 0.3048, 1e-9);
+  EXPECT_NEAR(feet->z_m[3], -0.3048, 1e-6);
+}
+
+TEST_F(GeoTiff, HeightsInFeetBecomeMetresWhereverTheFileSaysIt) {
+  const auto first = [&](TiffFile tiff) {
+    const auto grid = read(tiff.without(42113));
+    return grid ? static_cast<double>(grid->z_m[3]) : -9;
+  };
+  const auto good = [] { return TiffFile::of(3, 2, std::vector<float>{-1, -2, -3, -4, -5, -6}).at(0, 100, 10, 10); };
+  EXPECT_NEAR(first(good().keys({{{1024, 1}, {4096, 5703}}})), -1, 1e-6);  // NAVD88, in metres
+  EXPECT_NEAR(first(good().keys({{{1024, 1}, {4096, 6360}}})), -0.3048006, 1e-6);
+  EXPECT_NEAR(first(good().keys({{{1024, 1}, {4096, 8228}}})), -0.3048, 1e-6);
+  EXPECT_NEAR(first(good().keys({{{1024, 1}, {4096, 6360}, {4099, 9001}}})), -1, 1e-6);
+  const auto unit = [&](const std::string& word) {
+    TiffFile tiff = good();
+    tiff.text(42112, R"(<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">)" + word + "</Item></GDALMetadata>");
+    return first(tiff);
+  };
+  EXPECT_NEAR(unit("ft"), -0.3048, 1e-6);
+  EXPECT_NEAR(unit("US survey foot"), -0.3048006, 1e-6);
+  EXPECT_NEAR(unit("metre"), -1, 1e-6);
+  const auto lengths = read(good().keys({{{1024, 1}, {3076, 9003}}}));
+  ASSERT_TRUE(lengths);
+  EXPECT_NEAR(lengths->z_m[3], -1, 1e-6);
+  EXPECT_THAT(lengths->notes, ::testing::ElementsAre(HasSubstr("set z_scale: 0.304801 if they are")));
+}
+
+TEST_F(GeoTiff, WebMercatorHasItsLengthsOnTheGround) {
+  const std::vector<float> whole(6, -5);
+  // Cells of 100 "m" at 60 degrees north are 50 m wide.
+  const double north = 6378137 * std::log(std::tan(0.25 * pi + 0.5 * rad_from_deg(60.0)));
+  const auto grid =
+      read(TiffFile::of(3, 2, whole).at(0, north, 100, 100).keys({{{1024, 1}, {1025, 2}, {3072, 3857}, {3076, 9001}}}));
+  ASSERT_TRUE(grid) << grid.error().text;
+  ASSERT_TRUE(grid->origin);
+  EXPECT_NEAR(grid->y.back(), 60, 1e-9);
+  const auto mesh = mesh_from_grid(*grid);
+  ASSERT_TRUE(mesh);
+  const auto& v = mesh->mesh.vertices;
+  EXPECT_NEAR(v[1].x - v[0].x, 50, 0.2);
+  EXPECT_NEAR(v[3].y - v[0].y, 50, 0.2);
+  const auto as_metres =
+      read(TiffFile::of(3, 2, whole).at(0, north, 100, 100).keys({{{1024, 1}, {3072, 3857}}}), {.geographic = false});
+  ASSERT_TRUE(as_metres);
+  EXPECT_NEAR(as_metres->x[1] - as_metres->x[0], 100, 1e-9);
+}
+
+TEST_F(GeoTiff, BlocksThatAreLeftOutAreHolesAndAMaskIsRefused) {
+  TiffFile sparse = TiffFile::of(3, 2, six).at(0, 100, 10, 10).without(273).without(278).without(279);
+  sparse.shorts(278, {1}), sparse.longs(273, {8, 0}), sparse.longs(279, {12, 0});  // a strip a row, the second without bytes
+  sparse.fields[1].value = TiffFile::bytes_of(std::vector<std::uint16_t>{2});
+  const auto grid = read(sparse);
+  EXPECT_FALSE(grid && mesh_from_grid(*grid));
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_FLOAT_EQ(grid->z_m[3], -1);
+  EXPECT_TRUE(std::isnan(grid->z_m[0]));
+
+  TiffFile mask = TiffFile::of(3, 2, std::vector<std::uint8_t>(6)).without(262);
+  mask.longs(254, {4}), mask.shorts(262, {4});
+  std::string both = TiffFile::of(3, 2, six).at(0, 100, 10, 10).bytes_before(mask);
+  EXPECT_THAT(read_geo_tiff_heights(files.write("g.tif", both), {}).error().text, HasSubstr("gdalwarp -dstnodata"));
+}
+
+TEST_F(GeoTiff, AWorldFileBesideATiffGivesItsPlace) {
+  files.write("g.tfw", "10\n0\n0\n-5\n1000\n2000\n");
+  files.write("g.prj", "PROJCS[\"x\",GEOGCS[\"y\",UNIT[\"degree\",0.017]],UNIT[\"foot\",0.3048]]");
+  const auto grid = read(TiffFile::of(3, 2, six));
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_NEAR(grid->x.back(), 1020 * 0.3048, 1e-9);
+  EXPECT_NEAR(grid->y.front(), 1995 * 0.3048, 1e-9);
+}
+
+TEST_F(GeoTiff, DegreesStandAboutAnOrigin) {
+  const auto grid = read(TiffFile::of(3, 2, std::vector<std::int16_t>{-10, -20, -30, -40, -32768, -60})
+                             .at(5, 60, 0.01, 0.01)
+                             .keys({{{1024, 2}, {1025, 1}, {2054, 9102}}}),
+                         {.origin = Geodetic{rad_from_deg(60), rad_from_deg(5), 0}});
+  ASSERT_TRUE(grid) << grid.error().text;
+  ASSERT_TRUE(grid->origin);
+  EXPECT_NEAR(grid->x[0], 5.005, 1e-12);
+  EXPECT_NEAR(grid->y[1], 59.995, 1e-12);
+  EXPECT_TRUE(std::isnan(grid->z_m[1]));
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 cell of -32768, far from"), HasSubstr("are no data")));
+  EXPECT_FALSE(read(TiffFile::of(3, 2, six).at(5, 60, 0.01, 0.01).keys({{{1024, 1}}}))->origin) << "metres, says the file";
+}
+
+TEST_F(GeoTiff, ItsZoneOfUtmPlacesItAboutAnOrigin) {
+  const auto tiff = [](std::uint16_t system) {
+    return TiffFile::of(3, 2, std::vector<float>(6, -5))
+        .at(500000, 6651500, 100, 100)
+        .keys({{{1024, 1}, {1025, 2}, {3072, system}}});
+  };
+  const Geodetic origin{rad_from_deg(60), rad_from_deg(15), 0};
+  for (const std::uint16_t system : {std::uint16_t{32633}, std::uint16_t{25833}}) {
+    const auto grid = read(tiff(system), {.origin = origin});
+    ASSERT_TRUE(grid) << grid.error().text;
+    EXPECT_EQ(grid->zone, (UtmZone{33, false}));
+    const auto mesh = mesh_from_grid(*grid);
+    ASSERT_TRUE(mesh) << mesh.error().text;
+    const Vec3d corner = to_double(mesh->mesh.vertices[0]) + mesh->centre_m;
+    EXPECT_NEAR(corner.x, 0, 0.01);
+    EXPECT_NEAR(corner.y, (6651400 - 6651411.19) / 0.9996, 0.02);  // the northing of 60 degrees
+  }
+  EXPECT_EQ(read(tiff(32733), {.origin = Geodetic{rad_from_deg(-30.3), rad_from_deg(15), 0}})->zone, (UtmZone{33, true}));
+  // ED50: its coordinates are some 100 m from those of WGS 84.
+  EXPECT_THAT(read(tiff(23033), {.origin = origin}).error().text, HasSubstr("origin is for a grid in degrees or UTM"));
+}
+
+TEST_F(GeoTiff, EveryKindOfNumber) {
+  const auto first = [&](const TiffFile& tiff) {
+    const auto grid = read(TiffFile(tiff).at(0, 100, 10, 10));
+    return grid ? static_cast<double>(grid->z_m[2]) : -1;
+  };
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::uint8_t>{7, 1, 2, 3})), 7);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::int8_t>{-7, 1, 2, 3})), -7);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::uint16_t>{40000, 1, 2, 3})), 40000);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<std::int32_t>{-70000, 1, 2, 3})), -70000);
+  EXPECT_EQ(first(TiffFile::of(2, 2, std::vector<double>{-7.25, 1, 2, 3})), -7.25);
+  TiffFile turned = TiffFile::of(2, 2, six);
+  turned.doubles(34264, {10, 0, 0, 100, 0, 10, 0, 200, 0, 0, 0, 0, 0, 0, 0, 1});  // south first
+  const auto grid = read(turned);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->y, (std::vector<double>{205, 215}));
+  EXPECT_FLOAT_EQ(grid->z_m[0], -1);
+}
+
+TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
+  const auto refusal = [&](const TiffFile& tiff) {
+    const auto grid = read(tiff);
+    return grid ? std::string("accepted") : grid.error().text;
+  };
+  const auto good = [] { return TiffFile::of(3, 2, six).at(0, 100, 10, 10); };
+  EXPECT_EQ(refusal(good()), "accepted");
+  EXPECT_THAT(refusal(TiffFile::of(3, 2, six)), HasSubstr("gdal_translate -a_ullr"));
+  TiffFile picture = good().without(262).without(277);
+  picture.shorts(262, {2}), picture.shorts(277, {3});
+  EXPECT_THAT(refusal(picture), HasSubstr("not one band of heights but a picture"));
+  TiffFile huge = good().without(256).without(257);
+  huge.longs(256, {100000}), huge.longs(257, {100000});
+  EXPECT_THAT(refusal(huge), HasSubstr("more than 10 million"));
+  TiffFile jpeg = good().without(259);
+  jpeg.shorts(259, {7});
+  EXPECT_THAT(refusal(jpeg), HasSubstr("COMPRESS=DEFLATE"));
+  TiffFile scaled = good();
+  scaled.text(42112, R"(<GDALMetadata><Item name="SCALE" sample="0" role="scale">0.1</Item></GDALMetadata>)");
+  EXPECT_THAT(refusal(scaled), HasSubstr("gdal_translate -unscale"));
+  TiffFile unscaled = good();
+  unscaled.text(42112, R"(<GDALMetadata><Item name="OFFSET" sample="0" role="offset">0</Item>)"
+                       R"(<Item name="SCALE" sample="0" role="scale">1</Item></GDALMetadata>)");
+  EXPECT_EQ(refusal(unscaled), "accepted");
+  EXPECT_THAT(refusal(good().keys({{{1024, 1}, {3076, 32767}}})), HasSubstr("units of length of code 32767"));
+  TiffFile turned = TiffFile::of(3, 2, six);
+  turned.doubles(34264, {10, 1, 0, 0, 1, -10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1});
+  EXPECT_THAT(refusal(turned), HasSubstr("gdalwarp"));
+  EXPECT_THAT(refusal(TiffFile::of(3, 2, six).at(0, 0, 0, 10)), HasSubstr("cells whose sizes are not"));
+  EXPECT_THAT(refusal(TiffFile::of(2, 2, std::vector<float>{1e9f, 1, 2, 3}).at(0, 0, 1, 1)),
+              HasSubstr("row 1, column 1 is beyond 1e7 m"));
+  // Four tiles of 64 MiB for 256 KiB of heights: small when packed, minutes to unpack if there were thousands.
+  TiffFile tiles = TiffFile::of(2, 16384, std::vector<float>(2)).at(0, 100, 10, 10).without(273).without(278).without(279);
+  tiles.shorts(322, {4096}), tiles.shorts(323, {4096}), tiles.longs(324, {8, 8, 8, 8}), tiles.longs(325, {8, 8, 8, 8});
+  EXPECT_THAT(refusal(tiles), HasSubstr("tiles are much larger than the picture"));
+  EXPECT_EQ(read_geo_tiff_heights("no/such.tif", {}).error().kind, ErrorKind::missing_file);
+  const std::string whole = good().bytes();
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    const auto cut = read_geo_tiff_heights(files.write("cut.tif", whole.substr(0, n)), {});
+    EXPECT_FALSE(cut) << n;
+    if (!cut) {
+      EXPECT_THAT(cut.error().text, HasSubstr("cut.tif: ")) << n;
+    }
+    std::string bent = whole;
+    bent[n] = static_cast<char>(bent[n] ^ 0x55);
+    (void)read_geo_tiff_heights(files.write("bent.tif", bent), {});
+  }
+}
+
+}  // namespace
+}  // namespace sonar::geo_tiff_test
