@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -96,6 +97,13 @@ struct EngineFailed {
 using Action = std::variant<ComputePing, Serve, KeepWaiting, Refuse, Listen, ReadFrom, EndPauses, Wake, Finish, Reset, Closed,
                             Announce, PingQueued, Report, EngineFailed>;
 using Actions = std::vector<Action>;
+
+/// Adds a line of that sonar for the log.
+inline void report(const std::string& sonar, Report::Topic topic, LogLevel level, std::string phrase,
+                   std::vector<LogField> fields, Actions& actions) {
+  fields.insert(fields.begin(), {"sonar", sonar});
+  actions.emplace_back(Report{topic, {level, std::move(phrase), std::move(fields)}});
+}
 
 /// Outcome of a PingRequest.
 struct PingOutcome {

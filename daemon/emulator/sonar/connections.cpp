@@ -80,6 +80,11 @@ bool Connections::has_audience() const {
                                       [this](const Connection& c) { return c.role == Role::stream && !receivers(c).empty(); });
 }
 
+bool Connections::settled() const {
+  return std::all_of(all_.begin(), all_.end(),
+                     [](const Connection& c) { return c.role == Role::observer || c.state != State::served || c.outbox.idle(); });
+}
+
 Connections::Verdict Connections::verdict(Role role) const {
   if (role == Role::observer)
     return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::refuse;

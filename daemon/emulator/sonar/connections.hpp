@@ -90,6 +90,8 @@ class Connections {
   std::vector<protocol::Endpoint> receivers(const Connection& stream) const;
   /// A client is served or a stream has receivers.
   bool has_audience() const;
+  /// Every client has taken what it was sent.
+  bool settled() const;
 
   /// By the rules of max_clients, when_full and max_observers.
   enum class Verdict { serve, take_over, wait, refuse };
