@@ -8,10 +8,10 @@
 #include <boost/system/system_error.hpp>
 
 #include "daemon/commands/check_command.hpp"
-#include "daemon/commands/command_line.hpp"
 #include "daemon/commands/dataset/dataset_command.hpp"
 #include "daemon/commands/farm/farm_command.hpp"
 #include "daemon/commands/farm/worker.hpp"
+#include "daemon/commands/options/command_line.hpp"
 #include "daemon/commands/render/render_command.hpp"
 #include "daemon/commands/run/run_command.hpp"
 #include "daemon/server/system/log.hpp"

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "core/paper/paper_engine.hpp"
-#include "daemon/commands/load_progress.hpp"
+#include "daemon/commands/options/load_progress.hpp"
 #include "daemon/commands/render/coverage.hpp"
 #include "daemon/commands/render/render_pings.hpp"
 #include "daemon/commands/render/snapshots.hpp"

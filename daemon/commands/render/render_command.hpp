@@ -2,7 +2,7 @@
 // manual.
 #pragma once
 
-#include "daemon/commands/command_line.hpp"
+#include "daemon/commands/options/command_line.hpp"
 
 namespace sonar::render {
 

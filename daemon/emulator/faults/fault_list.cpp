@@ -1,6 +1,7 @@
 // The list of faults of a sonar: which it can have, how they are added and ended.
 #include <algorithm>
 
+#include "daemon/config/fault_support.hpp"
 #include "daemon/emulator/faults/faults.hpp"
 
 namespace sonar {

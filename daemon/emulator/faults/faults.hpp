@@ -14,8 +14,8 @@
 
 #include "core/sonar/ping.hpp"
 #include "daemon/config/faults/fault.hpp"
+#include "daemon/emulator/connections/connections.hpp"
 #include "daemon/emulator/faults/journal.hpp"
-#include "daemon/emulator/sonar/connections.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "daemon/emulator/connections/connections.hpp"
 #include "daemon/emulator/faults/faults.hpp"
-#include "daemon/emulator/sonar/connections.hpp"
 #include "daemon/emulator/sonar/sonar_data.hpp"
 
 namespace sonar {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "core/sonar/gain_assist.hpp"
+#include "daemon/emulator/connections/pacer.hpp"
 #include "daemon/emulator/sonar/audience.hpp"
-#include "daemon/emulator/sonar/pacer.hpp"
 #include "daemon/emulator/sonar/rate_watch.hpp"
 #include "daemon/emulator/sonar/sonar_data.hpp"
 

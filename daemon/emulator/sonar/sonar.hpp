@@ -11,8 +11,8 @@
 #include <optional>
 #include <string>
 
+#include "daemon/emulator/connections/actions.hpp"
 #include "daemon/emulator/faults/faults.hpp"
-#include "daemon/emulator/sonar/actions.hpp"
 #include "daemon/emulator/sonar/audience.hpp"
 #include "daemon/emulator/sonar/delivery.hpp"
 #include "daemon/emulator/sonar/ping_source.hpp"
