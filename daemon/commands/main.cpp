@@ -48,7 +48,7 @@ Result<int> code_of(const Result<void>& done) {
 Result<int> run_command(const Command& command, std::chrono::steady_clock::time_point begin, bool& json) {
   if (const auto* leave = std::get_if<Leave>(&command)) return leave->exit_code;
   if (const auto* check = std::get_if<CheckCommand>(&command)) return code_of(run_check(*check));
-  if (const auto* render = std::get_if<RenderCommand>(&command)) return render::run_render(*render);
+  if (const auto* render = std::get_if<RenderCommand>(&command)) return code_of(render::run_render(*render));
   if (const auto* dataset = std::get_if<DatasetCommand>(&command)) return dataset::run_dataset(*dataset);
   if (const auto* worker = std::get_if<WorkerCommand>(&command)) return farm::run_worker(*worker);
   if (const auto* on_farm = std::get_if<FarmCommand>(&command)) return farm::run_farm(*on_farm);

@@ -104,8 +104,6 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
                  "coverage: every bin of a plane bed against the closed form; without a configuration "
                  "for every sonar there is")
       ->check(one_of({"coverage"}));
-  app.add_flag("--check-expectations", render.check_expectations,
-               "measure what the render file expects; exit code 1 if it is not so");
   app.add_flag("--overwrite", render.overwrite, "replace the pings of other inputs in the folder");
   app.add_flag("--quiet", render.quiet, "no progress");
   add_engine_options(app, render.engine);
@@ -170,10 +168,10 @@ void add_farm_options(CLI::App& app, FarmCommand& farm) {
 
 /// The missing or contradictory option; empty = none.
 std::string complaint(const RenderCommand& render) {
-  const bool writes = render.report.empty() && !render.check_expectations;
+  const bool writes = render.report.empty();
   if (render.config.empty() && render.report.empty()) return "it needs a configuration or render file: sonard render FILE";
   if (writes && render.out.empty()) return "say where the files go: --out DIR";
-  if (!writes && !render.out.empty()) return "--report and --check-expectations write no files: leave out --out";
+  if (!writes && !render.out.empty()) return "--report writes no files: leave out --out";
   if (render.pose_rate_hz && render.poses.empty()) return "--pose-rate is about --poses FILE, which is not given";
   if (render.first - 1 + render.pings.value_or(1) > most_rendered_pings)
     return "--first and --pings go beyond ping " + std::to_string(most_rendered_pings) + ", the last that has a name";
@@ -255,10 +253,8 @@ Command parse_command_line(int argc, char** argv) {
     CLI::App& check_app = *app.add_subcommand("check", "validate a configuration and its scene, then exit");
     check_app.footer("examples:\n  sonard check my.yaml");
     check_app.add_option("config", check.config, "the configuration file to look at")->required();
-    CLI::App& render_app = *app.add_subcommand("render", "render pings into files, or check what they should hold");
-    render_app.footer(
-        "examples:\n  sonard render my.yaml --out pings --pings 5 --format npy,png\n  sonard render my.yaml "
-        "--check-expectations");
+    CLI::App& render_app = *app.add_subcommand("render", "render pings into files");
+    render_app.footer("examples:\n  sonard render my.yaml --out pings --pings 5 --format npy,png");
     add_render_options(render_app, render);
     add_dataset_options(*app.add_subcommand("dataset", "make a labelled data set from a job"), dataset);
     add_worker_options(*app.add_subcommand("worker", "make the shards of a farm's jobs"), worker);

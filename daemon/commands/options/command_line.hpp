@@ -41,7 +41,7 @@ struct RenderCommand {
   std::string image_rings = "on";
   std::optional<double> rate_hz;
   int batch = 1;
-  bool complex = false, labels = false, quiet = false, overwrite = false, check_expectations = false;
+  bool complex = false, labels = false, quiet = false, overwrite = false;
   EngineOptionsGiven engine;
 };
 struct DatasetCommand {

@@ -130,8 +130,8 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   read_sonar(root.optional("sonar"), job);
   root.optional("sweep").map().entries();
   root.optional("let").map().entries();
-  for (const char* key : {"dataset", "vary", "constraints", "counts"}) root.optional(key);  // these are keys of a data set's job
-  job.expectations = read_expectations(root.optional("expect"));
+  // Keys of a data set's job, and of an oracle (tests/oracles).
+  for (const char* key : {"dataset", "vary", "constraints", "counts", "expect"}) root.optional(key);
   if (auto error = document->finish()) return tl::make_unexpected(*error);
   auto scene = read_scene_of(scene_node, folder, job.name, *document, known);
   if (!scene) return tl::make_unexpected(scene.error());

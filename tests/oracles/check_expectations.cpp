@@ -4,15 +4,15 @@
 #include "core/paper/paper_engine.hpp"
 #include "core/text/format.hpp"
 #include "daemon/commands/render/coverage.hpp"
-#include "daemon/commands/render/expectation.hpp"
 #include "daemon/commands/render/render_job.hpp"
 #include "daemon/commands/render/resolution_cell.hpp"
 #include "daemon/server/engine/start_engine.hpp"
+#include "tests/oracles/expectation.hpp"
 
 namespace sonar::render {
 namespace {
 
-/// Names that formulas may use beside the sweep: docs/render.md lists them.
+/// Names that formulas may use beside the sweep: CONTRIBUTING.md lists them.
 Values known_values(const RenderJob& job, const PingRequest& request) {
   const FrequencyMode& mode = job.mode();
   const PingSettings& s = job.settings;
@@ -35,6 +35,7 @@ Values known_values(const RenderJob& job, const PingRequest& request) {
 
 struct Step {
   Values values;
+  std::vector<Expectation> expectations;
   std::vector<double> measured;  // by expectation
 };
 
@@ -59,7 +60,9 @@ tl::unexpected<Error> at_place(const Expectation& e, const Error& error) {
 }
 
 /// One ping of the job, with everything that is measured in it.
-Result<Step> take_step(const std::string& source, const RenderJob& job, Parallel& pool) {
+Result<Step> take_step(const RenderInput& input, const RenderJob& job, Parallel& pool) {
+  auto expectations = read_expectations(input.text, input.source, job.values);
+  if (!expectations) return tl::make_unexpected(expectations.error());
   const auto make = [&](std::shared_ptr<const Scene> s) {
     return make_engine(std::move(s), pool, {.simd = job.config.engine.simd});
   };
@@ -68,16 +71,16 @@ Result<Step> take_step(const std::string& source, const RenderJob& job, Parallel
   const std::vector<Time> times = pose_times(job);
   PingRequest request = make_request(job, world_of(job), PingNumber{1}, times.empty() ? Time{} : times.front());
   request.switches.keep_pressure = true;
-  Step step{known_values(job, request), {}};
+  Step step{known_values(job, request), *std::move(expectations), {}};
   try {
     const std::vector<Ping> pings = (*engine)->run({&request, 1});
-    for (const Expectation& e : job.expectations) {
+    for (const Expectation& e : step.expectations) {
       const auto value = measure(e, job, pings.at(0));
       if (!value) return at_place(e, value.error());
       step.measured.push_back(*value);
     }
   } catch (const std::invalid_argument& refused) {
-    return failure(ErrorKind::config, source + ": " + refused.what());
+    return failure(ErrorKind::config, input.source + ": " + refused.what());
   }
   return step;
 }
@@ -94,29 +97,29 @@ std::string Verdict::sentence() const {
   return text;
 }
 
-Result<std::vector<Verdict>> check_expectations(const std::string& source, const std::vector<RenderJob>& jobs, int threads) {
+Result<std::vector<Verdict>> check_expectations(const RenderInput& input, int threads) {
   Parallel pool(threads);
   std::vector<Step> steps;
-  for (const RenderJob& job : jobs) {
-    auto step = take_step(source, job, pool);
+  for (const RenderJob& job : input.jobs) {
+    auto step = take_step(input, job, pool);
     if (!step) return tl::make_unexpected(step.error());
     steps.push_back(*std::move(step));
   }
   std::vector<Verdict> verdicts;
-  for (std::size_t i = 0; i < jobs.front().expectations.size(); ++i) {
-    const Expectation& e = jobs.front().expectations[i];
+  for (std::size_t i = 0; i < steps.front().expectations.size(); ++i) {
+    const Expectation& e = steps.front().expectations[i];
     if (e.over != Over::each && steps.size() < 2)
       return failure(ErrorKind::config, e.place + ": a slope or difference needs a sweep of two steps or more");
-    if (e.over == Over::slope && !jobs.front().values.contains(e.against))
+    if (e.over == Over::slope && !input.jobs.front().values.contains(e.against))
       return failure(ErrorKind::config, e.place + ": against: " + e.against + " is not a swept value");
     for (std::size_t k = 0; k < steps.size(); ++k) {
       const bool last = k + 1 == steps.size();
       if (e.over != Over::each && !last) continue;
       Values known = steps[k].values;
       for (const auto& [name, value] : steps.front().values) known["first_" + name] = value;
-      const auto expected = evaluate(jobs[k].expectations[i].value, known);
+      const auto expected = evaluate(steps[k].expectations[i].value, known);
       if (!expected) return at_place(e, expected.error());
-      Verdict v{jobs[k].expectations[i], source, 0, *expected, false};
+      Verdict v{steps[k].expectations[i], 0, *expected, false};
       v.measured = e.over == Over::each    ? steps[k].measured[i]
                    : e.over == Over::slope ? slope_per_decade(steps, e.against, i)
                                            : steps.back().measured[i] - steps.front().measured[i];

@@ -1,5 +1,5 @@
-// Expectations of a render file, and how they are measured: `expect:` of docs/render.md. An oracle of acoustics is such a file;
-// tests/oracles runs them all.
+// Expectations of a render file, and how they are measured: its `expect:` list (CONTRIBUTING.md, "An oracle"). An oracle of
+// acoustics is such a file; oracle_files_test.cpp runs them all.
 #pragma once
 
 #include <optional>
@@ -8,11 +8,9 @@
 
 #include "core/base/result.hpp"
 #include "core/sonar/ping.hpp"
-#include "core/text/strict_yaml.hpp"
+#include "daemon/commands/render/render_job.hpp"
 
 namespace sonar::render {
-
-struct RenderJob;
 
 /// Part of the picture: device ranges and azimuths (positive to port); the whole picture by default.
 struct Window {
@@ -46,12 +44,13 @@ struct Expectation {
   Window window;
   std::optional<Window> less;  // measured there too, and taken away
   enum class Bound { near, at_least, at_most } bound = Bound::near;
-  std::string value;  // a formula (docs/render.md names what it may use)
+  std::string value;  // a formula (CONTRIBUTING.md names what it may use)
   double within = 0;  // near: the tolerance
   std::string place;  // file:line:col
 };
 
-std::vector<Expectation> read_expectations(const text::Node& list);
+/// Those of one step of the sweep. `text` of the render file; errors name its place.
+Result<std::vector<Expectation>> read_expectations(const std::string& text, const std::string& source, const Values& values);
 
 std::string name_of(Measure measure);
 std::string unit_of(const Expectation& expectation);
@@ -61,12 +60,12 @@ Result<double> measure(const Expectation& expectation, const RenderJob& job, con
 
 struct Verdict {
   Expectation expectation;
-  std::string source;  // the render file
   double measured = 0, expected = 0;
   bool met = false;
-  std::string sentence() const;  // file, quantity, what was measured and expected
+  std::string sentence() const;  // place in the file, quantity, what was measured and expected
 };
-/// Renders one ping of every job and checks it. Errors: an engine that cannot start, a formula that cannot be read.
-Result<std::vector<Verdict>> check_expectations(const std::string& source, const std::vector<RenderJob>& jobs, int threads);
+/// Renders one ping of every job of a file that parse_render_file() has read, and checks it. Errors: no expectations, wrong keys,
+/// an engine that cannot start, a formula that cannot be read.
+Result<std::vector<Verdict>> check_expectations(const RenderInput& input, int threads);
 
 }  // namespace sonar::render

@@ -2,8 +2,8 @@
 #include <cmath>
 
 #include "daemon/commands/render/coverage.hpp"
-#include "daemon/commands/render/expectation.hpp"
 #include "daemon/commands/render/resolution_cell.hpp"
+#include "tests/oracles/expectation.hpp"
 
 namespace sonar::render {
 namespace {

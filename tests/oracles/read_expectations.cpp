@@ -1,7 +1,8 @@
 // The keys of `expect:`.
 #include <array>
 
-#include "daemon/commands/render/expectation.hpp"
+#include "core/text/strict_yaml.hpp"
+#include "tests/oracles/expectation.hpp"
 
 namespace sonar::render {
 namespace {
@@ -62,9 +63,16 @@ Expectation read_one(const Node& node) {
 
 }  // namespace
 
-std::vector<Expectation> read_expectations(const Node& list) {
+Result<std::vector<Expectation>> read_expectations(const std::string& text, const std::string& source, const Values& values) {
+  const auto filled = substitute(text, values, source);
+  if (!filled) return tl::make_unexpected(filled.error());
+  const auto document = text::parse_yaml(*filled, source, {.error_kind = ErrorKind::config});
+  if (!document) return tl::make_unexpected(document.error());
+  Map root = document->root();
+  root.entries();  // the other keys are parse_render_file()'s
   std::vector<Expectation> all;
-  for (const Node& node : list.items(0, 100)) all.push_back(read_one(node));
+  for (const Node& node : root.required("expect").items(1, 100)) all.push_back(read_one(node));
+  if (auto error = document->finish()) return tl::make_unexpected(*std::move(error));
   return all;
 }
 
