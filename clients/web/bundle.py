@@ -37,7 +37,7 @@ def bytes_of(content):
 
 
 def cpp_of(files):
-    parts = ['// Made by clients/web/bundle.py.\n#include "daemon/server/view/page_files.hpp"\n\nnamespace sonar {\nnamespace {\n']
+    parts = ['// Made by clients/web/bundle.py.\n#include "daemon/server/http/page_files.hpp"\n\nnamespace sonar {\nnamespace {\n']
     rows = []
     for i, (name, content) in enumerate(files.items()):
         packed = gzip.compress(content, 9, mtime=0)

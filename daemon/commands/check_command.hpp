@@ -1,7 +1,7 @@
 // `sonard check`: validates a configuration and its scene, and prints its content and probable mistakes.
 #pragma once
 
-#include "daemon/commands/command_line.hpp"
+#include "daemon/commands/options/command_line.hpp"
 
 namespace sonar {
 

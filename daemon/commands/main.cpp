@@ -8,10 +8,10 @@
 #include <boost/system/system_error.hpp>
 
 #include "daemon/commands/check_command.hpp"
-#include "daemon/commands/command_line.hpp"
 #include "daemon/commands/dataset/dataset_command.hpp"
 #include "daemon/commands/farm/farm_command.hpp"
 #include "daemon/commands/farm/worker.hpp"
+#include "daemon/commands/options/command_line.hpp"
 #include "daemon/commands/render/render_command.hpp"
 #include "daemon/commands/run/run_command.hpp"
 #include "daemon/server/system/log.hpp"
@@ -48,7 +48,7 @@ Result<int> code_of(const Result<void>& done) {
 Result<int> run_command(const Command& command, std::chrono::steady_clock::time_point begin, bool& json) {
   if (const auto* leave = std::get_if<Leave>(&command)) return leave->exit_code;
   if (const auto* check = std::get_if<CheckCommand>(&command)) return code_of(run_check(*check));
-  if (const auto* render = std::get_if<RenderCommand>(&command)) return render::run_render(*render);
+  if (const auto* render = std::get_if<RenderCommand>(&command)) return code_of(render::run_render(*render));
   if (const auto* dataset = std::get_if<DatasetCommand>(&command)) return dataset::run_dataset(*dataset);
   if (const auto* worker = std::get_if<WorkerCommand>(&command)) return farm::run_worker(*worker);
   if (const auto* on_farm = std::get_if<FarmCommand>(&command)) return farm::run_farm(*on_farm);

@@ -3,6 +3,7 @@
 
 #include "core/text/nearest.hpp"
 #include "daemon/config/config_parts.hpp"
+#include "daemon/config/fault_support.hpp"
 
 namespace sonar {
 namespace {

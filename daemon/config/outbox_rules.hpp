@@ -1,4 +1,4 @@
-// Limits of the pings queued for a client (daemon/emulator/sonar/outbox.hpp).
+// Limits of the pings queued for a client (daemon/emulator/connections/outbox.hpp).
 #pragma once
 
 #include <array>

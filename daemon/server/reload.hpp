@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "daemon/config/config.hpp"
-#include "daemon/server/scene_changes.hpp"
+#include "daemon/server/engine/scene_changes.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
 

@@ -1,6 +1,6 @@
 // Requests to a running daemon as plain structs: the messages of control.proto, checked and in sonard's frames (world ENU, body
-// FLU, SI). protocol/control converts from protobuf and JSON; daemon/server/operations.hpp executes them. Answers and events stay
-// protobuf: protocol/control/answers.hpp.
+// FLU, SI). protocol/control converts from protobuf and JSON; daemon/server/api/operations.hpp executes them. Answers and events
+// stay protobuf: protocol/control/answers.hpp.
 #pragma once
 
 #include <cstdint>

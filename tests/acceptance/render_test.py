@@ -324,24 +324,6 @@ class Render(unittest.TestCase):
                 self.expect(self.render("--quiet", "--format", kind, out=folder), 74, name + ": No space left", "make room")
                 self.assertFalse([p.name for p in folder.iterdir() if p.name in (name, name + ".tmp", "000001.json")])
 
-    def test_expectations_decide_the_exit_code(self):
-        good = pathlib.Path(ROOT) / "tests/oracles/46-conical.yaml"
-        self.assertEqual(run(SONARD, "render", good, "--check-expectations").returncode, 0)
-        wrong = self.path / "wrong.yaml"
-        wrong.write_text(re.sub(r"value: [^,]*,", "value: 40,", good.read_text(encoding="utf-8")), encoding="utf-8")
-        result = run(SONARD, "render", wrong, "--check-expectations")
-        self.assertEqual(result.returncode, 1, result.stderr)
-        self.assertIn("NOT AS EXPECTED", result.stdout)
-        self.assertIn("wrong.yaml", result.stdout)
-        self.assertIn("expected 40", result.stdout)
-
-    def test_the_manuals_example_is_true(self):
-        page = (pathlib.Path(ROOT) / "docs/render.md").read_text(encoding="utf-8")
-        example = self.path / "example.yaml"
-        example.write_text(re.search(r"```yaml\n(.*?)```", page, re.S).group(1), encoding="utf-8")
-        result = run(SONARD, "render", example, "--check-expectations")
-        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
-
     def test_coverage_of_a_bed(self):
         bed = self.path / "bed.yaml"
         bed.write_text("scene: {objects: [{type: plane, material: sand, size_m: [40, 40], pose: {xyz_m: [0, 0, -12]}}]}\n"

@@ -50,6 +50,8 @@ FLOORS = {
     "clients/bvtsdk": ["clients/bvtsdk/", "protocol/blueview/link.hpp"],  # loaded into foreign processes: only constants are shared
     "tests": [""],
 }
+# The folders in these include each other in one direction only.
+ONE_DIRECTION = r"daemon/"
 # Headers that go to other people's include folders find each other by name alone.
 INSTALLED = r"clients/bvtsdk/abi\d/include/"
 # Header of a dependency -> the only files that may include it (tests may include anything).
@@ -68,7 +70,7 @@ DEPENDENCIES = {
     r"google/protobuf|.*\.pb\.h": ["protocol/control/", "protocol/foxglove/", "protocol/waterlinked/messages.cpp"],
     # protoc's classes take long to compile: headers name them only, and requests are structs.
     r"protocol/control/answers\.hpp": [
-        "protocol/control/", "protocol/doctor/", "daemon/server/control/control_http.cpp", "daemon/server/control/stream_connection.cpp", "daemon/server/events.cpp",
+        "protocol/control/", "protocol/doctor/", "daemon/server/control/control_http.cpp", "daemon/server/control/stream_connection.cpp", "daemon/server/http/operation_answer.cpp", "daemon/server/api/events.cpp",
         "daemon/server/faults/fault_log.cpp", "daemon/server/operations/fault_operations.cpp",
         "daemon/server/operations/monitoring.cpp", "daemon/server/operations/time_operations.cpp", "daemon/server/recording/recordings.cpp",
         "daemon/server/sonars/device_control.cpp", "daemon/server/sonars/fleet.cpp", "daemon/server/view/recording_views.cpp", "daemon/server/view/view_doctor.cpp", "daemon/server/view/view_messages.cpp", "clients/sonarctl/control/control_client.cpp",
@@ -118,13 +120,10 @@ MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|surveyor
 MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
 NAME_MAKES = {
     "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py",
-    "clients/python/sonard_client/daemon.py", "clients/python/sonard_client/judge/__main__.py",
     "clients/python/sonard_client/judge/cases.py", "clients/python/sonard_client/judge/truth.py",
-    "clients/python/sonard_client/lab.py", "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/oculus.py",
+    "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/oculus.py",
     "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py", "clients/web/src/panels/head.js",
-    "clients/wireshark/aris.lua", "clients/wireshark/oculus.lua", "clients/wireshark/ping.lua",
-    "clients/wireshark/waterlinked.lua", "daemon/commands/render/render_file.cpp", "daemon/commands/replay/replay_device.cpp",
-    "daemon/commands/replay/replay_device.hpp",
+    "daemon/commands/replay/replay_device.cpp", "daemon/commands/replay/replay_device.hpp",
 }
 CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc"}
 TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ".js", ""}
@@ -199,6 +198,28 @@ def include_violations(name, code):
                 yield number, f'{floor} must not include "{header}" (floors of docs/architecture.md)'
 
 
+def circle_violations(includes):
+    """`includes`: (file, line, header). Every include that closes a circle of folders."""
+    below = {}
+    for name, _, header in includes:
+        below.setdefault(name.rpartition("/")[0], set()).add(header.rpartition("/")[0])
+
+    def reaches(start, goal):
+        seen, left = set(), [start]
+        while left:
+            folder = left.pop()
+            if folder == goal:
+                return True
+            left += below.get(folder, set()) - seen
+            seen.add(folder)
+        return False
+
+    for name, number, header in includes:
+        here, there = name.rpartition("/")[0], header.rpartition("/")[0]
+        if here != there and reaches(there, here):
+            yield f'{name}:{number}: includes "{header}": the folders {here} and {there} include each other; give them one direction'
+
+
 def wording_violations(name, text):
     """The first line of a comment must not begin as a fragment; no line may have a word of PERSONS."""
     before = ""
@@ -227,6 +248,7 @@ def line_of(text, position):
 
 
 def violations(root):
+    includes = []
     for name in tracked_files(root):
         path = root / name
         if path.suffix not in TEXT:
@@ -240,6 +262,8 @@ def violations(root):
         if is_code:
             for number, what in [*include_violations(name, code), *wording_violations(name, text)]:
                 yield f"{name}:{number}: {what}"
+            if re.match(ONE_DIRECTION, name):
+                includes += [(name, line_of(code, m.start(1)), m[1]) for m in re.finditer(r'^#include "(daemon/[^"]+)"', code, re.M)]
             if path.suffix in {".hpp", ".cuh", ".h"} and not re.search(r"^#pragma once$", text, re.M):
                 yield f"{name}:1: header without #pragma once"
             if not name.startswith("tests/") and text.count("\n") > LONGEST_FILE:
@@ -255,6 +279,7 @@ def violations(root):
             searched = code if where else text  # house rules hold in comments too
             for match in re.finditer(pattern, searched):
                 yield f"{name}:{line_of(searched, match.start())}: {rule}: \"{match.group().strip()}\"; {why}"
+    yield from circle_violations(includes)
 
 
 def main():

@@ -44,6 +44,17 @@ class Planted(unittest.TestCase):
             with self.subTest(name=name, header=header):
                 self.expect(name, f'\n#include "{header}"\n', 2, "must not include")
 
+    def test_folders_of_the_daemon_include_each_other_in_one_direction(self):
+        def include(folder):
+            return f'#pragma once\n#include "daemon/server/{folder}/a.hpp"\n'
+        tree = {"daemon/server/http/a.hpp": include("view"), "daemon/server/view/a.hpp": include("control"),
+                "daemon/server/control/a.hpp": "#pragma once\n"}
+        self.assertEqual(found_in(tree), [])
+        tree["daemon/server/control/a.hpp"] = include("http")
+        found = found_in(tree)
+        self.assertEqual([f.split(":")[0] for f in found], sorted(tree), found)
+        self.assertIn("daemon/server/control and daemon/server/http include each other", found[0])
+
     def test_include_paths_start_at_the_root(self):
         self.expect("core/base/a.cpp", '#include "units.hpp"\n', 1, "start at the root")
 

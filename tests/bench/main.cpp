@@ -10,7 +10,7 @@
 #include "core/text/arguments.hpp"
 #include "cuda/cuda_status.hpp"
 #include "cuda/device_engine.hpp"
-#include "daemon/commands/engine_options.hpp"
+#include "daemon/commands/options/engine_options.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/config/scene_file.hpp"
 #include "daemon/server/engine/start_engine.hpp"

@@ -2,7 +2,7 @@
 // folder.
 #include <iostream>
 
-#include "daemon/config/faults/kinds.hpp"
+#include "daemon/config/fault_support.hpp"
 
 int main() {
   std::cout << "# Faults: what takes effect where\n\n" << sonar::support_table();

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/config/fault_support.hpp"
 #include "tests/example_make/host_link.hpp"
 
 namespace sonar::faults_test {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/server/control/http_router.hpp"
-#include "daemon/server/view/door.hpp"
-#include "daemon/server/view/page.hpp"
+#include "daemon/server/http/door.hpp"
+#include "daemon/server/http/http_router.hpp"
+#include "daemon/server/http/page.hpp"
 #include "tests/fuzz/byte_script.hpp"
 
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/text/format.hpp"
-#include "daemon/emulator/sonar/metrics.hpp"
+#include "daemon/emulator/connections/metrics.hpp"
 #include "tests/load/ping_reader.hpp"
 #include "tests/reliability/record.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/emulator/sonar/metrics.hpp"
+#include "daemon/emulator/connections/metrics.hpp"
 
 namespace sonar::load {
 

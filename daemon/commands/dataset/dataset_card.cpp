@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "core/text/format.hpp"
-#include "daemon/commands/render/sonar_version.hpp"
+#include "daemon/commands/options/sonar_version.hpp"
 
 namespace sonar::dataset {
 namespace {

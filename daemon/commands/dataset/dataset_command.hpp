@@ -1,7 +1,7 @@
 // `sonard dataset`: a labelled data set from one job file. docs/datasets.md is its manual.
 #pragma once
 
-#include "daemon/commands/command_line.hpp"
+#include "daemon/commands/options/command_line.hpp"
 
 namespace sonar::dataset {
 

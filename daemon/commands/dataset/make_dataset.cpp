@@ -17,8 +17,8 @@
 #include "daemon/commands/dataset/labelled_ping.hpp"
 #include "daemon/commands/dataset/parts.hpp"
 #include "daemon/commands/dataset/shards.hpp"
+#include "daemon/commands/options/sonar_version.hpp"
 #include "daemon/commands/render/sidecar.hpp"
-#include "daemon/commands/render/sonar_version.hpp"
 
 namespace sonar::dataset {
 namespace {

@@ -2,7 +2,8 @@
 // finished shards.
 #pragma once
 
-#include "daemon/commands/command_line.hpp"
+#include "daemon/commands/farm/queue.hpp"
+#include "daemon/commands/options/command_line.hpp"
 
 namespace sonar::farm {
 

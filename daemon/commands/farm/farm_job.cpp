@@ -9,7 +9,7 @@
 #include "core/base/regular_file.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "daemon/commands/dataset/shards.hpp"
-#include "daemon/commands/render/sonar_version.hpp"
+#include "daemon/commands/options/sonar_version.hpp"
 #include "daemon/server/system/sha256.hpp"
 
 namespace sonar::farm {

@@ -1,7 +1,8 @@
 // `sonard worker`: makes shards of a farm's jobs, one after the other, for as long as it runs. docs/datasets.md, "A farm".
 #pragma once
 
-#include "daemon/commands/command_line.hpp"
+#include "daemon/commands/farm/queue.hpp"
+#include "daemon/commands/options/command_line.hpp"
 
 namespace sonar::farm {
 

@@ -1,5 +1,5 @@
 // Compares a rendered bed with its closed form: every bin of a flat bed in expected power against the closed form of its level
-// (docs/acoustics.md, section 3), with the beams' patterns. The command's --report coverage, and a measure of expectations.
+// (docs/acoustics.md, section 3), with the beams' patterns. The command's --report coverage.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Formulas in render files: scene values that depend on a swept value, and the values of expectations.
+// Formulas in render files: scene values that depend on a swept value.
 // + - * / ^, parentheses, pi, named values, and log10 ln exp sqrt abs sin cos tan asin acos atan deg rad.
 #pragma once
 

@@ -12,8 +12,8 @@
 #include <utility>
 
 #include "core/image/raster.hpp"
+#include "daemon/commands/options/sonar_version.hpp"
 #include "daemon/commands/render/npy.hpp"
-#include "daemon/commands/render/sonar_version.hpp"
 
 namespace sonar::render {
 namespace {

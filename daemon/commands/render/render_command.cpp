@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "core/paper/paper_engine.hpp"
-#include "daemon/commands/load_progress.hpp"
+#include "daemon/commands/options/load_progress.hpp"
 #include "daemon/commands/render/coverage.hpp"
 #include "daemon/commands/render/render_pings.hpp"
 #include "daemon/commands/render/snapshots.hpp"
@@ -21,8 +21,6 @@
 
 namespace sonar::render {
 namespace {
-
-constexpr int not_as_expected = 1;
 
 int threads_of(const EngineConfig& engine) {
   return engine.threads > 0 ? engine.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -124,7 +122,7 @@ Result<Coverage> coverage_of(const RenderJob& given, Parallel& pool) {
   }
 }
 
-Result<int> report_coverage(const std::vector<RenderJob>& jobs) {
+Result<void> report_coverage(const std::vector<RenderJob>& jobs) {
   Parallel pool(threads_of(jobs.front().config.engine));
   std::printf("%-32s %5s %8s %6s %9s %9s %9s %9s\n", "sonar", "beams", "range m", "rows", "bins", "within 1dB", "worst dB",
               "mean dB");
@@ -135,20 +133,7 @@ Result<int> report_coverage(const std::vector<RenderJob>& jobs) {
                 job.settings.range_m, job.settings.range_bin_count, c->bins, c->percent(), c->worst_db, c->mean_db);
     std::fflush(stdout);
   }
-  return 0;
-}
-
-Result<int> check(const RenderInput& input) {
-  if (input.jobs.front().expectations.empty())
-    return failure(ErrorKind::config, input.source + " has no expectations: there is no expect: list");
-  const auto verdicts = check_expectations(input.source, input.jobs, threads_of(input.jobs.front().config.engine));
-  if (!verdicts) return tl::make_unexpected(verdicts.error());
-  bool all_met = true;
-  for (const Verdict& v : *verdicts) {
-    all_met &= v.met;
-    std::printf("%s %s\n", v.met ? "as expected " : "NOT AS EXPECTED", v.sentence().c_str());
-  }
-  return all_met ? 0 : not_as_expected;
+  return {};
 }
 
 /// A line each, however many steps a sweep has.
@@ -181,7 +166,7 @@ OutputOptions output_options(const RenderCommand& command) {
 
 }  // namespace
 
-Result<int> run_render(const RenderCommand& command) {
+Result<void> run_render(const RenderCommand& command) {
   if (command.config.empty()) {
     std::vector<RenderJob> jobs = shipped_sonars_over_a_bed();
     for (RenderJob& job : jobs)
@@ -193,9 +178,10 @@ Result<int> run_render(const RenderCommand& command) {
   if (!command.quiet) loading.emplace(LoadProgress::to_console);
   auto input = input_of(command);
   if (!input) return tl::make_unexpected(input.error());
-  if (!command.report.empty() || command.check_expectations) loading.reset();
-  if (!command.report.empty()) return report_coverage(input->jobs);
-  if (command.check_expectations) return check(*input);
+  if (!command.report.empty()) {
+    loading.reset();
+    return report_coverage(input->jobs);
+  }
   if (std::string note = note_of_air(*input, output_options(command)); !note.empty()) input->notes.push_back(std::move(note));
   if (!command.quiet) print_notes(*input);
   for (const std::string& note : input->notes) std::fprintf(stderr, "sonard: %s\n", note.c_str());
@@ -208,7 +194,7 @@ Result<int> run_render(const RenderCommand& command) {
   loading.reset();
   if (!done) return tl::make_unexpected(done.error());
   line.conclude(*done);
-  return 0;
+  return {};
 }
 
 }  // namespace sonar::render

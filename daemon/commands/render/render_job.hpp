@@ -1,5 +1,5 @@
 // The input of `sonard render`: one sonar over one scene with its settings and trajectory, read from a configuration or from a
-// render file (docs/render.md), which may sweep values and have expectations.
+// render file (docs/render.md), which may sweep values.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,6 @@
 #include "core/motion/trajectory_file.hpp"
 #include "core/scene/scene.hpp"
 #include "core/sonar/ping.hpp"
-#include "daemon/commands/render/expectation.hpp"
 #include "daemon/commands/render/formula.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/world/world.hpp"
@@ -37,7 +36,6 @@ struct RenderJob {
   bool snapshots = false;     // the vehicle's poses are unrelated: the sonar rests within each ping
   bool wants_motion = false;  // engine.motion: on is written in the file
   Values values;              // what the sweep set, and what `let` made of it
-  std::vector<Expectation> expectations;
 
   SonarConfig& sonar() { return config.sonars.at(sonar_index); }
   const SonarConfig& sonar() const { return config.sonars.at(sonar_index); }

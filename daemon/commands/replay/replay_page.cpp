@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "daemon/server/control/http_router.hpp"
+#include "daemon/server/http/http_router.hpp"
 
 namespace sonar {
 

@@ -3,7 +3,7 @@
 #include <csignal>
 #include <cstdlib>
 
-#include "daemon/server/control/http_rules.hpp"
+#include "daemon/server/http/http_rules.hpp"
 #include "daemon/server/system/listen.hpp"
 #include "daemon/server/time/clock.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "core/text/format.hpp"
 #include "cuda/cuda_status.hpp"
-#include "daemon/server/view/page_files.hpp"
+#include "daemon/server/http/page_files.hpp"
 #include "protocol/host.hpp"
 
 namespace sonar {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "core/base/parallel.hpp"
-#include "daemon/commands/command_line.hpp"
-#include "daemon/commands/load_progress.hpp"
+#include "daemon/commands/options/command_line.hpp"
+#include "daemon/commands/options/load_progress.hpp"
 #include "daemon/config/find_config.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <chrono>
 
-#include "daemon/commands/command_line.hpp"
+#include "daemon/commands/options/command_line.hpp"
 
 namespace sonar {
 

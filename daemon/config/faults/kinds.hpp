@@ -132,9 +132,6 @@ std::span<const FaultKind> fault_kinds();
 /// By code or name, upper or lower case; null.
 const FaultKind* find_fault_kind(std::string_view code_or_name);
 
-/// Empty when it takes effect on sonars of this vendor; else why not.
-std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& vendor);
-
 /// A trouble: several kinds under the name by which people know it. `severity` (1 to 3) chooses the parameters.
 struct Trouble {
   struct Part {
@@ -147,8 +144,5 @@ struct Trouble {
   std::array<Part, 4> parts = {};  // unused ones have no code
 };
 std::span<const Trouble> troubles();
-
-/// The table of kinds by vendors, as text: "takes effect" or why not.
-std::string support_table();
 
 }  // namespace sonar

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "daemon/config/faults/fault.hpp"
+#include "daemon/emulator/connections/outbox.hpp"
 #include "daemon/emulator/faults/draws.hpp"
-#include "daemon/emulator/sonar/outbox.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar {

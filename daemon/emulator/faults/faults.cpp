@@ -12,14 +12,6 @@ namespace {
 using std::chrono::nanoseconds;
 
 constexpr std::size_t most_hits = 64;  // pings remembered: more than an outbox holds
-constexpr std::size_t most_over = 64;  // faults listed after their end
-
-/// FNV-1a, so that a fault draws the same numbers in every run.
-std::uint32_t key_of_name(const std::string& name) {
-  std::uint32_t hash = 2166136261u;
-  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619u;
-  return hash;
-}
 
 nanoseconds length_of_power_cycle(const Fault& fault) {
   return nanoseconds_from(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
@@ -40,77 +32,6 @@ protocol::SettingsOverride override_of(const Fault& fault) {
 }
 
 }  // namespace
-
-// ---- the list
-
-void Faults::add(Fault fault, bool manual, Time now) {
-  forget_old();
-  // Entries are in the order of their stages, in which they act; within a stage in the order in which they were added.
-  const auto place =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.fault.kind->stage > fault.kind->stage; });
-  Entry& entry = *entries_.emplace(place);
-  entry.key = key_of_name(fault.name);
-  entry.fault = std::move(fault);
-  entry.manual = manual;
-  if (manual) entry.expires = now + longest_manual_fault;
-  const FaultRecord::At& at = entry.fault.at;
-  const bool waits = at.ping || at.every || at.time_s || at.probability || entry.fault.on;
-  // Faults with a duration begin now; faults of single pings begin with the next ping (begin_ping). Three kinds act at once even
-  // if they are counted in pings.
-  if (!waits && !entry.fault.kind->per_ping()) begin(entry, now);
-  if (!waits && (entry.fault.kind->effect == Effect::power_cycle || entry.fault.kind->effect == Effect::forget_settings ||
-                 entry.fault.kind->effect == Effect::clock_restart))
-    begin(entry, now);
-}
-
-/// The last few ended faults stay listed.
-void Faults::forget_old() {
-  std::size_t over =
-      static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.over; }));
-  for (auto it = entries_.begin(); it != entries_.end() && over > most_over;) {
-    const auto one = it++;
-    if (!one->over) continue;
-    entries_.erase(one);
-    --over;
-  }
-}
-
-bool Faults::remove(const std::string& name, Time now) {
-  bool found = false;
-  for (Entry& e : entries_) {
-    // The parts of a trouble are NAME.1, NAME.2, ...; a fault without a name of its own has its code as name, and its word ends
-    // it too.
-    const bool by_word = e.fault.name == e.fault.kind->code && e.fault.what == name;
-    if (e.over || (e.fault.name != name && !by_word && !e.fault.name.starts_with(name + "."))) continue;
-    found = true;
-    finish(e, now);
-  }
-  return found;
-}
-
-void Faults::clear(Time now) {
-  for (Entry& e : entries_) finish(e, now);
-}
-
-/// The fault no longer acts on any ping, not even on one that waits in an outbox.
-void Faults::finish(Entry& e, Time now) {
-  end(e, now);
-  e.over = true;
-  e.hits.clear();
-  if (e.fault.kind->effect == Effect::swap) orders_.emplace_back(ReleaseHeld{});
-  if (e.fault.kind->stage == FaultStage::stream || e.fault.kind->effect == Effect::thin_link) orders_.emplace_back(StopShaping{});
-}
-
-std::vector<Faults::Listed> Faults::list() const {
-  std::vector<Listed> all;
-  for (const Entry& e : entries_)
-    all.push_back({&e.fault, e.active, e.over, e.injections, e.active ? std::min(e.until, e.expires) : e.expires});
-  return all;
-}
-
-std::size_t Faults::active_count() const {
-  return static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.active; }));
-}
 
 bool Faults::any(Effect effect) const {
   return std::any_of(entries_.begin(), entries_.end(),

@@ -14,8 +14,8 @@
 
 #include "core/sonar/ping.hpp"
 #include "daemon/config/faults/fault.hpp"
+#include "daemon/emulator/connections/connections.hpp"
 #include "daemon/emulator/faults/journal.hpp"
-#include "daemon/emulator/sonar/connections.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar {
@@ -66,11 +66,12 @@ class Faults {
   Faults(Around around, Time now) : around_(around), start_(now) {}
 
   // ---- what there is
-  /// `manual` ones end after longest_manual_fault.
-  void add(Fault fault, bool manual, Time now);
-  /// False: there is none of that name.
-  bool remove(const std::string& name, Time now);
-  void clear(Time now);
+  /// Why this sonar cannot have these faults, as a sentence: its vendor has no such thing, or another fault writes the same part.
+  std::string why_not(const std::vector<Fault>& faults) const;
+  /// Those of `faults` that are for this sonar and take effect on it. `manual` ones end after longest_manual_fault.
+  void add(const std::vector<Fault>& faults, bool manual, Time now, Actions& actions);
+  /// Empty `name` = all. False: there is none of that name.
+  bool end(const std::string& name, Time now, Actions& actions);
   struct Listed {
     const Fault* fault;
     bool active, over;
@@ -79,6 +80,8 @@ class Faults {
   };
   std::vector<Listed> list() const;
   std::size_t active_count() const;
+  /// None is listed, not even one that has ended.
+  bool empty() const { return entries_.empty(); }
   std::vector<FaultOrder> take_orders() { return std::exchange(orders_, {}); }
 
   // ---- time
@@ -140,6 +143,8 @@ class Faults {
   };
   using Effect = FaultEffect;
 
+  bool is_for_this(const Fault& fault) const { return fault.sonar.empty() || fault.sonar == around_.sonar; }
+  void add(Fault fault, bool manual, Time now);
   bool any(Effect effect) const;
   Entry* active(Effect effect);
   const Entry* active(Effect effect) const { return const_cast<Faults*>(this)->active(effect); }

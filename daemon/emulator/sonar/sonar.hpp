@@ -1,4 +1,5 @@
-// One emulated sonar without sockets, threads or a clock: settings, pacing, ping requests, and the conversations of its clients.
+// One emulated sonar without sockets, threads or a clock. It leads the conversations of its clients and connects three parts: the
+// Audience (who is connected), the PingSource (settings, and when which ping is made) and the Delivery (what is sent).
 //
 // Flow: the caller reports what happened (a connection, bytes, a finished ping, time passing) with the time it happened; the
 // sonar changes its state and returns the Actions to carry out. Replies and pings wait in outboxes, from which the caller takes
@@ -10,26 +11,18 @@
 #include <optional>
 #include <string>
 
-#include "core/sonar/gain_assist.hpp"
-#include "daemon/config/config.hpp"
+#include "daemon/emulator/connections/actions.hpp"
 #include "daemon/emulator/faults/faults.hpp"
-#include "daemon/emulator/sonar/actions.hpp"
-#include "daemon/emulator/sonar/connections.hpp"
-#include "daemon/emulator/sonar/metrics.hpp"
-#include "daemon/emulator/sonar/pacer.hpp"
-#include "daemon/emulator/sonar/rate_watch.hpp"
-#include "daemon/emulator/world/world.hpp"
+#include "daemon/emulator/sonar/audience.hpp"
+#include "daemon/emulator/sonar/delivery.hpp"
+#include "daemon/emulator/sonar/ping_source.hpp"
+#include "daemon/emulator/sonar/sonar_data.hpp"
 
 namespace sonar {
 
 class Sonar {
  public:
-  /// Both outlive the sonar. Of the configuration it reads what all sonars share: water, seed, switches, rules for stale poses.
-  struct Surroundings {
-    const Config& config;
-    const World& world;
-    FaultJournal* journal = nullptr;  // journal of faults; may be null
-  };
+  using Surroundings = SonarData::Surroundings;
   /// `index` keys its noise; `skipped`: what stepped time has jumped over so far.
   Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time now, std::chrono::nanoseconds skipped = {});
   Sonar(const Sonar&) = delete;
@@ -43,23 +36,23 @@ class Sonar {
   /// A port of kind udp_stream is open: messages for its receivers can be taken under this id.
   Actions open_stream(ConnectionId id, const protocol::Port& port, Time now);
   /// Where a message of the stream, or of the host at a port of kind udp_dialogue, goes, as of now.
-  std::vector<protocol::Endpoint> receivers(ConnectionId stream) const;
+  std::vector<protocol::Endpoint> receivers(ConnectionId stream) const { return delivery_.receivers(stream); }
   /// Another host goes on with the dialogue at a port of kind udp_dialogue.
-  void hand_over(ConnectionId id, Peer to);
+  void hand_over(ConnectionId id, Peer to) { audience_.hand_over(id, std::move(to)); }
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
   /// The next message to write, whole; empty when there is none or one is being written.
-  Outbox::Message next_message(ConnectionId id, Time now);
+  Outbox::Message next_message(ConnectionId id, Time now) { return delivery_.next_message(id, now); }
   /// Reports `bytes` of it as sent; after the last one on_written() follows.
-  void on_sent(ConnectionId id, std::size_t bytes);
-  void on_written(ConnectionId id, const Outbox::Message& message, Time now);
+  void on_sent(ConnectionId id, std::size_t bytes) { delivery_.on_sent(id, bytes); }
+  void on_written(ConnectionId id, const Outbox::Message& message, Time now) { delivery_.on_written(id, message, now); }
   /// The message of a stream that was taken last had no receiver left, or none of its datagrams could be sent.
-  void on_not_sent(ConnectionId id);
+  void on_not_sent(ConnectionId id) { delivery_.on_not_sent(id); }
   /// The caller ends the connection after the message being written.
-  void finish(ConnectionId id);
+  void finish(ConnectionId id) { audience_.finish(id); }
   /// The connection is closed; also one that waited. `why` is for the log.
   Actions on_closed(ConnectionId id, const std::string& why, Time now, bool by_client = false);
   /// The caller had no slot for a client that connected.
-  void count_refused_client() { ++figures_.refused_clients; }
+  void count_refused_client() { ++data_.figures.refused_clients; }
   /// Every connection is finished and no ping requested any more; `why` is for the log.
   Actions stop(const std::string& why);
 
@@ -67,7 +60,7 @@ class Sonar {
 
   Actions on_ping(PingOutcome outcome, Time now);
   /// The datagrams of a status broadcast, in order; none when the vendor has no beacon.
-  std::vector<protocol::Bytes> beacons(Time now);
+  std::vector<protocol::Bytes> beacons(Time now) { return delivery_.beacons(now); }
   struct Answers {
     std::vector<protocol::Bytes> datagrams;  // datagrams to send back, in order
     Actions actions;
@@ -88,151 +81,79 @@ class Sonar {
   /// When on_tick() has something to do next.
   std::optional<Time> next_tick() const;
   // The stepped clock advances to the next of these and performs them one by one.
-  std::optional<Time> next_ping() const;
-  std::optional<Time> next_conversation() const { return earliest(&Connection::next_tick); }
+  std::optional<Time> next_ping() const { return source_.next_ping(); }
+  std::optional<Time> next_conversation() const { return audience_.earliest(&Connection::next_tick); }
   /// When a conversation will request a ping by itself.
   std::optional<Time> next_request() const;
-  Actions tick_pacer(Time now);
+  Actions tick_pacer(Time now) { return source_.tick(now); }
   Actions tick_conversations(Time now);
   /// Stepped time jumps ahead.
   void skip(std::chrono::nanoseconds by);
   /// No ping is being computed and every client has taken what it was sent.
-  bool settled() const;
+  bool settled() const { return !busy() && connections().settled(); }
 
   // ---- control
 
   /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
   /// Returns whether that was a change.
-  bool set_transmit(bool on);
-  bool transmits() const { return transmits_; }
+  bool set_transmit(bool on) { return source_.set_transmit(on); }
+  bool transmits() const { return source_.transmits(); }
   /// The last who changed the settings; empty = they are the initial ones.
-  const std::string& asked_by() const { return asked_by_; }
-  Pose pose_at(Time at) const { return compose(around_.world.vehicle_at(config_.vehicle, at), config_.mount); }  // in world
+  const std::string& asked_by() const { return source_.asked_by(); }
+  Pose pose_at(Time at) const { return data_.pose_at(at); }  // in world
   void move_mount(const Pose& mount, Time now);
   /// Vehicle and mount of a configuration that is otherwise the same.
   void move(const SonarConfig& config, Time now);
-  void use_water(const Water& water, Time now);
+  void use_water(const Water& water, Time now) { source_.use_water(water, now); }
 
   /// Why this sonar cannot have these faults, as a sentence: its vendor has no such thing, or another fault writes the same part.
-  std::string why_no_faults(const std::vector<Fault>& faults) const;
+  std::string why_no_faults(const std::vector<Fault>& faults) const { return faults_.why_not(faults); }
   /// Those of `faults` that are for this sonar and take effect on it.
   Actions add_faults(const std::vector<Fault>& faults, bool manual, Time now);
   /// Empty `name` = all. False: there is none of that name.
   bool end_faults(const std::string& name, Time now, Actions& actions);
   const Faults& faults() const { return faults_; }
 
-  const SonarConfig& config() const { return config_; }
-  const protocol::Vendor& vendor() const { return vendor_; }
-  const protocol::DeviceState& state() const { return state_; }
-  const PingSettings& settings() const { return settings_; }
-  PingSettings initial_settings() const { return vendor_.initial_settings(state_).settings; }
-  const Connections& connections() const { return connections_; }
-  std::uint32_t index() const { return index_; }
-  bool busy() const { return busy_; }
-  bool wants_pings() const;
+  const SonarConfig& config() const { return data_.config; }
+  const protocol::Vendor& vendor() const { return data_.vendor; }
+  const protocol::DeviceState& state() const { return data_.state; }
+  const PingSettings& settings() const { return source_.settings(); }
+  PingSettings initial_settings() const { return vendor().initial_settings(state()).settings; }
+  const Connections& connections() const { return audience_.connections(); }
+  std::uint32_t index() const { return data_.index; }
+  bool busy() const { return source_.busy(); }
+  bool wants_pings() const { return source_.wants_pings(); }
   DeviceFigures figures() const;
   /// Pings that at least one client received, and pings that were made.
-  std::uint64_t served() const { return figures_.served; }
-  std::uint64_t pings() const { return figures_.pings; }
+  std::uint64_t served() const { return data_.figures.served; }
+  std::uint64_t pings() const { return data_.figures.pings; }
   /// A ping as a client would get it now, with a number and noise that no client's ping has: nothing of the sonar changes. None
   /// when its rule for stale poses says so.
-  std::optional<PingRequest> preview_request(PingNumber number, Time at) const;
+  std::optional<PingRequest> preview_request(PingNumber number, Time at) const { return source_.preview_request(number, at); }
 
  private:
-  Time unskipped(Time now) const { return now - state_.skipped; }
-  /// The way back, if nothing more is skipped.
-  Time clock_time(Time unskipped) const {
-    return unskipped > Time::max() - state_.skipped ? Time::max() : unskipped + state_.skipped;
-  }
-  std::optional<Time> earliest(std::optional<Time> (Connection::*of)() const) const;
-  void handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions);
-  /// `connection`: null when a datagram or an HTTP request caused it.
+  /// The cause of an event. `connection`: null for a datagram or an HTTP request.
   struct Source {
     Connection* connection = nullptr;
     std::string name;
     protocol::Ipv4 ip{};
   };
   static Source source_of(Connection& connection) { return {&connection, connection.peer.name, connection.peer.ip}; }
+  void handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions);
   void on_event(const Source& from, const protocol::Event& event, Time now, Actions& actions);
-  void set_receivers(const Source& from, protocol::SetReceivers wanted, Time now);
-  void update_pacer(Time now);
-  // Faults (sonar_faults.cpp).
+  void serve(Connection& connection, Time now, Actions& actions);
+  void serve_waiting(Time now, Actions& actions);
+  void on_membership(Time now, Actions& actions);
   void apply_fault_orders(Time now, Actions& actions);
   void apply(const FaultOrder& order, Time now, Actions& actions);
-  void deliver(Connection& to, Outbox::Message ping, Time now, Actions& actions);
-  void release_held(Connection& to, Time now, bool all, Actions& actions);
-  void serve_waiting(Time now, Actions& actions);
   void change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions);
-  void end_by_fault(Connection& connection, Faults::RequestVerdict verdict, Actions& actions);
-  void serve(Connection& connection, Time now, Actions& actions);
-  /// An exception is a mistake in sonard: it may cost this connection, never the others.
-  template <class Call>
-  void guarded(Connection& connection, Actions& actions, Call call) {
-    try {
-      call();
-    } catch (const std::exception& e) {
-      report_fault(e, actions);
-      finish(connection.id);
-      actions.emplace_back(Reset{connection.id, "an internal fault"});
-    }
-  }
-  void report_fault(const std::exception& e, Actions& actions) const {
-    report(Report::Topic::fault, LogLevel::error, std::string("internal fault: ") + e.what(), {}, actions);
-  }
-  void begin_finish(Connection& connection, const std::string& why, Actions& actions);
-  void on_membership(Time now, Actions& actions);
-  void use_initial_settings();
-  void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
-  bool waits_for_pose(Time at) const;
-  PingRequest request_at(Time at, const protocol::RequestPing& aim) const;
-  void request_ping(Time at, Actions& actions);
-  PingNumber next_number();
-  void queue_ping(const PingOutcome& outcome, Time now, Actions& actions);
-  std::vector<protocol::Event> offer(Connection& to, const std::shared_ptr<const protocol::Bytes>& bytes, const Ping& reported,
-                                     const PingRequest& ping, Time now, Actions& actions);
-  std::shared_ptr<const Outbox::Shape> parted(const Connection& to, const Ping& ping) const;
-  void offer_datagrams(Connection& stream, const Ping& ping, Time now, PingQueued& queued, Actions& actions);
-  std::vector<protocol::Event> offer_to_host(Connection& host, const Ping& ping, Time now, PingQueued& queued, Actions& actions);
-  void push_datagrams(Connection& to, const Ping& ping, Time now, PingQueued& queued, Actions& actions);
-  void note_water(const PingRequest& computed, Time now, Actions& actions);
-  void update_depth(Time now);
-  void follow_water();
-  void report(Report::Topic topic, LogLevel level, std::string phrase, std::vector<LogField> fields, Actions& actions) const;
 
-  Surroundings around_;
-  SonarConfig config_;
-  const protocol::Vendor& vendor_;
-  std::uint32_t index_;
-  protocol::DeviceState state_;
-  Connections connections_;
+  SonarData data_;
+  Audience audience_;
   Faults faults_;
-
-  Pacer pacer_;
-  PingSettings settings_;
-  protocol::RequestPing aim_;  // the last
-  GainAssist gain_assist_;
-  bool asked_ = false;  // settings were requested since the first client or receiver came
-  std::string asked_by_;
-  bool transmits_ = true;
-  bool stopping_ = false;
-
-  // The ping that is being computed.
-  bool busy_ = false;
-  std::shared_ptr<const VendorSettings> busy_settings_;
-  bool busy_blank_ = false;     // requested as noise only
-  bool busy_unwanted_ = false;  // its clients have gone
-
-  std::uint32_t ping_number_ = 0;
-  std::uint64_t numbered_skips_ = 0;  // ticks lost to overload, as of the last ping
-  bool in_air_ = false;               // at the last ping
-  std::optional<Time> air_reported_;
-  struct {
-    std::uint32_t ping = 0;
-    Time tick{}, at{};
-  } last_served_;
-  RateWatch rate_watch_;
-  DeviceFigures figures_;
+  PingSource source_;
+  Delivery delivery_;
 };
 
 }  // namespace sonar

@@ -13,15 +13,6 @@ using control::StatusCode;
 
 }  // namespace
 
-HttpAnswer answer_from(const OperationResult& result) {
-  if (result.code == OperationResult::Code::refused) return answer_of(400, StatusCode::refused, result.text);
-  if (result.code == OperationResult::Code::failed) return answer_of(409, StatusCode::failed, result.text);
-  if (result.status) return {200, control::json_of(*result.status) + "\n"};
-  if (result.faults) return {200, control::json_of(*result.faults) + "\n"};
-  if (result.stepped) return {200, control::json_of(*result.stepped) + "\n"};
-  return answer_of(200, StatusCode::ok, result.text);
-}
-
 asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, HttpConnection& from) {
   RoutedRequest routed = route_request(request, {services_.token, from.reached().ip, config_.hosts});
   if (!routed.pose_refusal.empty()) targets_.poses.refuse(routed.pose_refusal, from.sender());

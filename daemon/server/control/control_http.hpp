@@ -3,14 +3,12 @@
 
 #include "daemon/server/connections/http_connection.hpp"
 #include "daemon/server/control/control_targets.hpp"
-#include "daemon/server/control/http_router.hpp"
+#include "daemon/server/http/http_router.hpp"
+#include "daemon/server/http/operation_answer.hpp"
 
 namespace sonar {
 
 class ViewFeed;
-
-/// With the body that the operation's result has by HTTP.
-HttpAnswer answer_from(const OperationResult& result);
 
 class ControlHttp final : public HttpService {
  public:

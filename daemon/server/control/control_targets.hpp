@@ -1,9 +1,9 @@
 // Parts of the daemon that requests of control act on, by stream or HTTP.
 #pragma once
 
+#include "daemon/server/api/events.hpp"
+#include "daemon/server/api/operations.hpp"
 #include "daemon/server/connections/shared_rate.hpp"
-#include "daemon/server/events.hpp"
-#include "daemon/server/operations.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 
 namespace sonar {

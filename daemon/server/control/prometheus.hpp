@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/emulator/sonar/metrics.hpp"
+#include "daemon/emulator/connections/metrics.hpp"
 #include "daemon/emulator/view/viewer.hpp"
 #include "daemon/server/system/process_figures.hpp"
 

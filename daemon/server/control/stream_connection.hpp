@@ -11,7 +11,7 @@
 #include "daemon/server/connections/connection_services.hpp"
 #include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/control/control_targets.hpp"
-#include "daemon/server/control/http_rules.hpp"
+#include "daemon/server/http/http_rules.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/delimited.hpp"
 

@@ -13,7 +13,7 @@
 
 #include "core/base/result.hpp"
 #include "core/pipeline/ping_engine.hpp"
-#include "daemon/emulator/sonar/actions.hpp"
+#include "daemon/emulator/connections/actions.hpp"
 #include "daemon/server/engine/fair_turns.hpp"
 #include "daemon/server/system/asio.hpp"
 

@@ -12,7 +12,7 @@
 #include "core/base/result.hpp"
 #include "daemon/emulator/faults/journal.hpp"
 #include "daemon/emulator/world/plausibility.hpp"
-#include "daemon/server/events.hpp"
+#include "daemon/server/api/events.hpp"
 #include "daemon/server/faults/journal_file.hpp"
 #include "daemon/server/recording/recordings.hpp"
 #include "daemon/server/recording/writer_thread.hpp"

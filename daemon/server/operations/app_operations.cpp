@@ -2,17 +2,9 @@
 
 #include <utility>
 
+#include "core/base/overloaded.hpp"
+
 namespace sonar {
-namespace {
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-template <class... F>
-Overloaded(F...) -> Overloaded<F...>;  // clang 14 does not deduce it
-
-}  // namespace
 
 void AppOperations::perform(const control::Operation& operation, const Sender& sender, Done done) {
   std::visit(Overloaded{[&](const control::GetStatus&) { done({.status = monitoring_.status()}); },

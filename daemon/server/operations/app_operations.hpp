@@ -2,7 +2,7 @@
 // App, as they are.
 #pragma once
 
-#include "daemon/server/operations.hpp"
+#include "daemon/server/api/operations.hpp"
 #include "daemon/server/operations/fault_operations.hpp"
 #include "daemon/server/operations/monitoring.hpp"
 #include "daemon/server/operations/scene_operations.hpp"

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/text/nearest.hpp"
+#include "daemon/config/fault_support.hpp"
 #include "daemon/server/operations/operation_results.hpp"
 #include "protocol/control/answers.hpp"
 

@@ -1,8 +1,8 @@
 // Requests for faults: adding, ending, listing them; the plan of the configuration; MAVLink's failure injection.
 #pragma once
 
+#include "daemon/server/api/operations.hpp"
 #include "daemon/server/faults/fault_log.hpp"
-#include "daemon/server/operations.hpp"
 #include "daemon/server/sonars/fleet.hpp"
 #include "daemon/server/system/log.hpp"
 #include "protocol/mavlink/mavlink_poses.hpp"

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/base/result.hpp"
-#include "daemon/server/operations.hpp"
+#include "daemon/server/api/operations.hpp"
 
 namespace sonar {
 

@@ -5,10 +5,10 @@
 #include <string>
 
 #include "daemon/config/config.hpp"
-#include "daemon/server/events.hpp"
-#include "daemon/server/operations.hpp"
+#include "daemon/server/api/events.hpp"
+#include "daemon/server/api/operations.hpp"
+#include "daemon/server/engine/scene_changes.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
-#include "daemon/server/scene_changes.hpp"
 
 namespace sonar {
 

@@ -1,7 +1,7 @@
 // Requests to the sonars: settings, the water around them, and recordings of them.
 #pragma once
 
-#include "daemon/server/operations.hpp"
+#include "daemon/server/api/operations.hpp"
 #include "daemon/server/recording/recordings.hpp"
 #include "daemon/server/sonars/fleet.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "daemon/server/operations.hpp"
+#include "daemon/server/api/operations.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/sonars/fleet.hpp"
 #include "daemon/server/time/stepped_time.hpp"

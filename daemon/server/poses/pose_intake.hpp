@@ -9,7 +9,7 @@
 
 #include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/emulator/world/world.hpp"
-#include "daemon/server/events.hpp"
+#include "daemon/server/api/events.hpp"
 #include "daemon/server/system/log.hpp"
 #include "daemon/server/time/clock.hpp"
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
-#include "daemon/server/events.hpp"
+#include "daemon/server/api/events.hpp"
 #include "daemon/server/recording/recordings.hpp"
 #include "daemon/server/sonars/device.hpp"
 

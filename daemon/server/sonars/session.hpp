@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "daemon/config/config.hpp"
-#include "daemon/emulator/sonar/actions.hpp"
-#include "daemon/emulator/sonar/connections.hpp"
+#include "daemon/emulator/connections/actions.hpp"
+#include "daemon/emulator/connections/connections.hpp"
 #include "daemon/server/connections/input_rate.hpp"
-#include "daemon/server/control/http_rules.hpp"
+#include "daemon/server/http/http_rules.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/sha256.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "daemon/emulator/view/viewer.hpp"
 #include "daemon/server/connections/http_connection.hpp"
-#include "daemon/server/view/door.hpp"
+#include "daemon/server/http/door.hpp"
 
 namespace sonar {
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "daemon/emulator/view/ping_payloads.hpp"
-#include "daemon/server/operations.hpp"
+#include "daemon/server/api/operations.hpp"
 #include "daemon/server/time/clock.hpp"
 #include "protocol/doctor/judge.hpp"
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <utility>
 
-#include "daemon/server/control/control_http.hpp"
+#include "daemon/server/http/operation_answer.hpp"
 #include "daemon/server/view/view_feed.hpp"
 #include "protocol/control/control.hpp"
 

@@ -48,7 +48,7 @@ def read_pings(folder):
 
 def policy():
     """The Content-Security-Policy of the daemon: that of its source."""
-    text = re.sub(r'"\s*\n\s*"', "", (ROOT / "daemon/server/view/page.cpp").read_text())
+    text = re.sub(r'"\s*\n\s*"', "", (ROOT / "daemon/server/http/page.cpp").read_text())
     return re.search(r"default-src[^\"]*", text).group()
 
 

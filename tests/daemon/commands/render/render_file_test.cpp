@@ -1,4 +1,4 @@
-// Render files: what their keys reach, what they refuse, and that an expectation that is wrong fails.
+// Render files: what their keys reach, and what they refuse.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -11,7 +11,6 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "daemon/commands/render/coverage.hpp"
-#include "daemon/commands/render/expectation.hpp"
 #include "daemon/commands/render/npy.hpp"
 #include "daemon/commands/render/render_job.hpp"
 #include "daemon/commands/render/resolution_cell.hpp"
@@ -154,10 +153,6 @@ TEST(RenderFile, WindowsListedBeamsAndLevelsReachTheSonar) {
   EXPECT_EQ(about.at("settings").at("range_start_m"), 4);
   EXPECT_EQ(about.at("settings").at("scale"), "logarithmic");
   EXPECT_EQ(about.at("sonar").at("beam_spacing"), "listed");
-  Expectation there;
-  there.measure = Measure::mean_level_db;
-  there.window = {.from_m = 4, .to_m = 4.1};
-  EXPECT_TRUE(measure(there, job, ping)) << "windows are in real ranges";
 
   EXPECT_THAT(refusal(point + "sonar: {model: {beam_azimuths_deg: [20, 25]}}\n"), HasSubstr("must be below the one before"));
   EXPECT_THAT(refusal(point + "sonar: {model: {beam_azimuths_deg: [20, 5]}, ping: {beams: 3}}\n"), HasSubstr("beams"));
@@ -216,9 +211,6 @@ TEST(RenderFile, RefusesWithAPlace) {
   EXPECT_THAT(refusal(point + "sweep: {a: [1, 2], b: [1]}\n"), HasSubstr("equally long"));
   EXPECT_THAT(refusal(point + "seed: $q\n"), HasSubstr("r.yaml:5: "));
   EXPECT_THAT(refusal(point + "let: {a: 1/0}\n"), HasSubstr("finite"));
-  EXPECT_THAT(refusal(point + "expect: [{measure: peak_level_db, value: 1}]\n"), HasSubstr("within"));
-  EXPECT_THAT(refusal(point + "expect: [{measure: peak_level_db}]\n"), HasSubstr("at_least"));
-  EXPECT_THAT(refusal(point + "expect: [{measure: peek, at_most: 1}]\n"), HasSubstr("peak"));
 }
 
 TEST(RenderFile, WhatIsWrongWithASceneIsBadDataWhereverItStands) {
@@ -249,39 +241,6 @@ TEST(RenderFile, ARangeThatTheProductDoesNotHaveGetsANote) {
   EXPECT_THAT(note("profile: oculus-m370s, ping: {range_m: 0.15}"), HasSubstr("takes 0.2 to 200 m"));
   EXPECT_EQ(note("ping: {range_m: 1e4}"), "") << "a plain sonar is no product";
   EXPECT_EQ(note("ping: {range_m: 0.01}"), "");
-}
-
-std::vector<Verdict> judged(const std::string& expect) {
-  const RenderInput input = parsed(point + "sonar: {ping: {range_m: 6, beams: 65}}\nexpect: [" + expect + "]\n");
-  auto verdicts = check_expectations(input.source, input.jobs, 1);
-  if (!verdicts) throw std::runtime_error(verdicts.error().text);
-  return *std::move(verdicts);
-}
-
-TEST(Expectations, AreMetWhenTrueAndNotWhenWrong) {
-  const auto met = [](const std::string& expect) { return judged(expect).at(0).met; };
-  EXPECT_TRUE(met("{measure: peak_range_m, value: 4, within: 0.002}"));
-  EXPECT_FALSE(met("{measure: peak_range_m, value: 4.01, within: 0.002}"));
-  EXPECT_TRUE(met("{measure: peak_level_db, value: SL - 40*log10(4) - 8*alpha - 10, within: 0.1}"));
-  EXPECT_FALSE(met("{measure: peak_level_db, value: SL - 40*log10(4) - 8*alpha - 9.8, within: 0.1}"));
-  EXPECT_TRUE(met("{measure: peak_bearing_deg, value: 0, within: 0.01}"));
-  EXPECT_FALSE(met("{measure: peak_bearing_deg, value: 1, within: 0.01}"));
-  EXPECT_TRUE(met("{measure: mean_level_db, at_most: 180}"));
-  EXPECT_FALSE(met("{measure: mean_level_db, at_least: 180}"));
-  EXPECT_TRUE(met("{measure: peak_level_db, range_m: [3.9, 4.1], less: {range_m: [4.5, 5]}, at_least: 100}"));
-}
-
-TEST(Expectations, TellFileQuantityMeasuredAndExpected) {
-  EXPECT_THAT(
-      judged("{measure: peak_range_m, value: 5, within: 0.01, what: a point}").at(0).sentence(),
-      AllOf(HasSubstr("r.yaml:6"), HasSubstr("a point"), HasSubstr("peak_range_m 4"), HasSubstr("expected 5 within 0.01")));
-}
-
-TEST(Expectations, SlopesNeedASweep) {
-  EXPECT_THROW(judged("{measure: peak_level_db, over: slope, against: r, value: -40, within: 1}"), std::runtime_error);
-  EXPECT_THROW(judged("{measure: peak_level_db, value: nothing_known, within: 1}"), std::runtime_error);
-  EXPECT_THROW(judged("{measure: peak_level_db, range_m: [50, 60], value: 0, within: 1}"), std::runtime_error);
-  EXPECT_THROW(judged("{measure: coverage_percent, at_least: 99}"), std::runtime_error);  // no bed in the scene
 }
 
 TEST(Npy, HeadersAreAlignedAndTellTypeAndShape) {

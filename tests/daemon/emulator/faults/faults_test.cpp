@@ -6,6 +6,7 @@
 #include <limits>
 #include <set>
 
+#include "daemon/config/fault_support.hpp"
 #include "tests/daemon/emulator/sonar/virtual_time.hpp"
 
 namespace sonar {

@@ -1,0 +1,79 @@
+// The user's command line, command by command. CLI11 is included by few .cpp files only: it is slow to compile.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "daemon/commands/options/engine_options.hpp"
+#include "daemon/commands/options/queue_options.hpp"
+#include "daemon/commands/replay/replay_command.hpp"
+#include "daemon/config/config.hpp"
+
+namespace sonar {
+
+struct RunCommand {
+  std::string config;  // empty = search
+  bool demo = false;
+  std::string demo_of;  // whose sonar the demo has, as "blueview"; empty = its own
+  std::string profile;  // profile of the demo's sonar; empty = the default
+  std::uint64_t exit_after_pings = 0;
+  bool digest = false;
+  // Empty = as the configuration says.
+  std::string clock, log_format, log_level, bind;
+  std::optional<int> clients;
+  bool faults = false;
+  std::string fault_journal;
+  int offset = 0;
+  EngineOptionsGiven engine;
+};
+struct RenderCommand {
+  std::string config;  // may be empty for the coverage report
+  std::string out;
+  std::uint64_t first = 1;             // number of the first ping
+  std::optional<std::uint64_t> pings;  // nothing: one, or one for every line of a file of poses
+  std::vector<std::string> formats{"npy", "png"};
+  std::optional<double> pose_rate_hz;  // rate of a KITTI file, which has no times
+  std::string sonar, poses, pose_frame, report;
+  std::string image_rings = "on";
+  std::optional<double> rate_hz;
+  int batch = 1;
+  bool complex = false, labels = false, quiet = false, overwrite = false;
+  EngineOptionsGiven engine;
+};
+struct DatasetCommand {
+  std::string job, out, shards;              // shards: "I/N", or empty for all
+  std::string export_form, split, split_by;  // "coco" or "folder", or empty; "80,10,10"; "bed_seed,coat"
+  std::optional<int> threads;
+  bool quiet = false;
+};
+struct WorkerCommand {
+  farm::QueueOptions queue;
+  std::string out;
+  std::optional<int> threads;
+  bool until_empty = false, quiet = false;
+};
+struct FarmCommand {
+  enum class What { submit, status, collect } what = What::status;
+  farm::QueueOptions queue;
+  std::string job, out, simd;
+  double ack_wait_s = 60;
+  bool watch = false;
+};
+struct CheckCommand {
+  std::string config;
+};
+struct Leave {  // help, version or a usage error, already printed
+  int exit_code = 0;
+};
+using Command =
+    std::variant<RunCommand, CheckCommand, RenderCommand, DatasetCommand, WorkerCommand, FarmCommand, ReplayCommand, Leave>;
+
+Command parse_command_line(int argc, char** argv);
+/// Options of the command line, or of the environment, override the file.
+Result<void> override_config(Config& config, const RunCommand& command);
+
+}  // namespace sonar

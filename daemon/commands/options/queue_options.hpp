@@ -1,0 +1,19 @@
+// Where the farm's queue is, as the command line names it.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+namespace sonar::farm {
+
+struct QueueOptions {
+  std::string url = "nats://127.0.0.1:4222";  // several URLs are separated by commas
+  std::filesystem::path credentials;          // a NATS credentials file; empty = none
+  std::filesystem::path token_file;
+  /// When no server answers, connect() calls this with the reason, and tries again if it returns true. Empty: connect() tries
+  /// once.
+  std::function<bool(const std::string& why)> try_again{};
+};
+
+}  // namespace sonar::farm

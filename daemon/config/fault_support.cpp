@@ -1,0 +1,118 @@
+#include "daemon/config/fault_support.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "daemon/config/products.hpp"
+#include "protocol/host.hpp"
+
+namespace sonar {
+namespace {
+
+using E = FaultEffect;
+using S = FaultStage;
+
+/// Whether a kind acts on a sonar that sends its pings only as datagrams. Such a kind changes the first datagram, or no ping. In
+/// a dialogue by datagrams it may also hold pings back.
+bool acts_without_stream(const FaultKind& kind, bool dialogue) {
+  if (kind.stage == S::stream) return false;
+  if (kind.stage == S::framing)
+    return kind.effect == E::set_field || kind.effect == E::add_to_field || kind.effect == E::flip || kind.effect == E::drop ||
+           kind.effect == E::renumber;
+  if (dialogue && (kind.effect == E::delay || kind.effect == E::jitter)) return true;
+  constexpr E of_streams[] = {E::end, E::thin_link, E::delay, E::jitter, E::outbox_policy};
+  return std::find(std::begin(of_streams), std::end(of_streams), kind.effect) == std::end(of_streams);
+}
+
+/// Whether an effect can change an integer without a fixed place.
+bool takes_integer(E effect) {
+  constexpr E all[] = {E::renumber, E::add_to_field, E::heat, E::beacon_address, E::second_beacon};
+  return std::find(std::begin(all), std::end(all), effect) != std::end(all);
+}
+
+bool has_integer(const protocol::Vendor& vendor, protocol::Part part, protocol::FieldName name) {
+  protocol::Bytes none;
+  return vendor.change_integer(
+      part, name, [](auto n) { return n; }, none);
+}
+
+/// How many of the values from first to last a model of the vendor accepts; the largest number over its models.
+template <class T>
+std::size_t accepted(const protocol::Vendor& vendor, std::optional<T> protocol::SettingsOverride::*setting, std::uint32_t first,
+                     std::uint32_t last) {
+  std::size_t most = 0;
+  for (const auto& model : vendor.models()) {
+    protocol::DeviceState device;
+    device.id = 1;
+    device.model = model;
+    if (const auto options = check_options(vendor, {})) device.options = *options;
+    device.settings = vendor.initial_settings(device).vendor_settings;
+    std::size_t taken = 0;
+    for (std::uint32_t value = first; value <= last; ++value) {
+      protocol::SettingsOverride wanted;
+      wanted.*setting = static_cast<T>(value);
+      taken += vendor.apply_override(wanted, device).has_value();
+    }
+    most = std::max(most, taken);
+  }
+  return most;
+}
+
+/// `what` is the name of a parameter of the kind. Vendor::apply_override refuses it whatever the value is.
+std::string why_without_setting(std::string_view what, const protocol::Vendor& vendor) {
+  using Wanted = protocol::SettingsOverride;
+  const auto has_modes = [](const auto& model) { return model->modes.size() > 1; };
+  if ((what == "sample-bits" || what == "row-gains" || what == "largest") && accepted(vendor, &Wanted::sample_bits, 8, 32) < 2)
+    return "has one type of samples";
+  if (what == "beams" && accepted(vendor, &Wanted::beams, 1, 512) < 2) return "has one number of beams";
+  if (what == "mode" && std::none_of(vendor.models().begin(), vendor.models().end(), has_modes)) return "has one mode";
+  if (what == "rate" && accepted(vendor, &Wanted::rate_hz, 0, 0) == 0) return "has no standby";
+  return {};
+}
+
+}  // namespace
+
+std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& vendor) {
+  using Port = protocol::Port::Kind;
+  if (kind.code == "B15") return "is of files: cut one with head -c";
+  if (kind.effect == E::harness) return "needs two network namespaces: sonarctl lab";
+  for (const protocol::Make& make : protocol::makes())
+    if (kind.code.front() == make.own_faults && vendor.name() != make.name())
+      return "only the " + title_of(*make.device) + " link has it";
+  const bool dialogue = vendor.port(Port::udp_dialogue) != nullptr;
+  if (const protocol::Port* const stream = vendor.port(Port::udp_stream); kind.stage == S::datagrams) {
+    if (stream == nullptr && !dialogue) return "sends no datagrams of pings";
+    return kind.effect == E::leave_group && (stream == nullptr || stream->group.port == 0) ? "has no group of its own" : "";
+  }
+  const bool of_beacon = kind.stage == S::status || kind.effect == E::heat;
+  if (of_beacon && vendor.port(Port::udp_beacon) == nullptr) return "has no status message";
+  const protocol::Part part = of_beacon ? protocol::Part::beacon : protocol::Part::ping;
+  if (kind.field && !vendor.field(part, *kind.field, {}) &&
+      !(takes_integer(kind.effect) && has_integer(vendor, part, *kind.field)))
+    return "has no field " + std::string(protocol::field_names[static_cast<std::size_t>(*kind.field)]);
+  if (kind.effect == E::bearings && !vendor.region(protocol::Region::bearings, {})) return "sends no bearings";
+  const bool of_stream = kind.stage == S::framing || kind.stage == S::stream || kind.stage == S::link || kind.stage == S::clients;
+  const bool of_port = kind.effect == E::close_ports || kind.effect == E::flap || kind.effect == E::power_cycle;
+  const bool of_datagrams = dialogue && kind.stage != S::clients && !of_port && acts_without_stream(kind, dialogue);
+  if (of_stream && vendor.port(Port::tcp_stream) == nullptr && !of_datagrams) return "has no TCP stream";
+  if (vendor.pings_by() == protocol::PingsBy::datagrams && !acts_without_stream(kind, dialogue))
+    return "sends pings by datagrams alone";
+  return kind.effect == E::change_settings ? why_without_setting(kind.given().front().value, vendor) : std::string();
+}
+
+std::string support_table() {
+  std::string text = "| code | name | tier |";
+  for (const protocol::Vendor* vendor : protocol::vendors()) text += " " + std::string(vendor->name()) + " |";
+  text += "\n|---|---|---|";
+  for (std::size_t i = 0; i < protocol::vendors().size(); ++i) text += "---|";
+  for (const FaultKind& kind : fault_kinds()) {
+    text += "\n| " + std::string(kind.code) + " | " + std::string(kind.name) + " | " + std::to_string(kind.tier) + " |";
+    for (const protocol::Vendor* vendor : protocol::vendors()) {
+      const std::string why = why_without_effect(kind, *vendor);
+      text += " " + (why.empty() ? std::string("takes effect") : why) + " |";
+    }
+  }
+  return text + "\n";
+}
+
+}  // namespace sonar

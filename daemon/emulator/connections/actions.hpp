@@ -1,0 +1,117 @@
+// Requests of an emulated sonar to its caller, which moves the bytes: returned by every call of Sonar, carried out in order.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/sonar/ping.hpp"
+#include "daemon/emulator/log_line.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar {
+
+/// Chosen by the caller, unique for the life of a Sonar.
+using ConnectionId = std::uint64_t;
+
+enum class Role { client, observer, stream };  // stream: the datagrams of a port of kind udp_stream
+
+/// Compute this ping and return it through Sonar::on_ping().
+struct ComputePing {
+  PingRequest request;
+};
+/// The connection has a slot: read its bytes and write its outbox.
+struct Serve {
+  ConnectionId connection = 0;
+};
+/// All slots are taken: keep the connection open, neither read nor write, until Serve.
+struct KeepWaiting {
+  ConnectionId connection = 0;
+};
+/// Close it without sending a byte. The Sonar has no record of it.
+struct Refuse {
+  ConnectionId connection = 0;
+  bool reset = false;  // RST in place of FIN
+};
+/// The ports of kind tcp_stream accept connections, or refuse them as a port does that no program listens at. Open from the
+/// start.
+struct Listen {
+  bool on = true;
+};
+/// Stop or go on reading what this client sends: its window fills.
+struct ReadFrom {
+  ConnectionId connection = 0;
+  bool on = true;
+};
+/// Write the rest of a message that a fault shaped without its pauses.
+struct EndPauses {
+  ConnectionId connection = 0;
+};
+/// The outbox has something to write.
+struct Wake {
+  ConnectionId connection = 0;
+};
+/// No messages after the one being written, then the end of the stream; on_closed() follows.
+struct Finish {
+  ConnectionId connection = 0;
+  std::string why;
+};
+/// At once; on_closed() follows. Not of a stream.
+struct Reset {
+  ConnectionId connection = 0;
+  std::string why;
+};
+/// A connection is closed and forgotten.
+struct Closed {
+  std::string peer;  // name of the peer
+  Role role{};
+  bool served = false;  // if false, it waited for a slot
+  std::uint64_t pings_written = 0, pings_dropped = 0;
+  std::string why;
+  bool by_client = false;  // it left
+};
+/// The status broadcast has news: send it now.
+struct Announce {};
+/// A ping was framed and queued to every client, observer and stream that takes it.
+struct PingQueued {
+  std::shared_ptr<const Ping> ping;
+  std::shared_ptr<const protocol::Bytes> bytes;                                // null: not sent over TCP
+  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream that has receivers
+  double simulation_s = 0;
+  bool preview = false;  // for viewers of the live view alone
+};
+/// A line for the log; those of one topic are limited together.
+struct Report {
+  enum class Topic { settings, notice, ignored, refused_ping, state, fault, topics } topic{};
+  LogLine line;
+};
+/// The engine failed: no sonar can go on.
+struct EngineFailed {
+  Error why;
+};
+
+using Action = std::variant<ComputePing, Serve, KeepWaiting, Refuse, Listen, ReadFrom, EndPauses, Wake, Finish, Reset, Closed,
+                            Announce, PingQueued, Report, EngineFailed>;
+using Actions = std::vector<Action>;
+
+/// Adds a line of that sonar for the log.
+inline void report(const std::string& sonar, Report::Topic topic, LogLevel level, std::string phrase,
+                   std::vector<LogField> fields, Actions& actions) {
+  fields.insert(fields.begin(), {"sonar", sonar});
+  actions.emplace_back(Report{topic, {level, std::move(phrase), std::move(fields)}});
+}
+
+/// Outcome of a PingRequest.
+struct PingOutcome {
+  std::shared_ptr<const Ping> ping = nullptr;  // null on failure
+  std::string failure = {};
+  bool refused = false;             // only this ping could not be made: it is invalid or there was no memory for it
+  ErrorKind kind = ErrorKind::bug;  // kind of a failure that is more than that
+  double seconds = 0;               // wall time of its computation, without pings of other sonars computed in between
+};
+
+}  // namespace sonar

@@ -1,0 +1,112 @@
+// The connections of one emulated sonar: its clients, those that wait for a slot, those that are leaving, and observers, which
+// receive every ping and change nothing. Each has its conversation in the vendor's protocol and its outbox. Streams of datagrams
+// are connections without a conversation. No sockets, no clock.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <list>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "daemon/config/config.hpp"
+#include "daemon/emulator/connections/actions.hpp"
+#include "daemon/emulator/connections/metrics.hpp"
+#include "daemon/emulator/connections/outbox.hpp"
+
+namespace sonar {
+
+struct Peer {
+  std::string name;     // for the log: "127.0.0.1:40123"
+  protocol::Ipv4 ip{};  // as the status message shows it
+  std::uint16_t port = 0;
+};
+
+struct Connection {
+  enum class State {
+    waiting,  // for a slot
+    served,
+    leaving,  // finishing: gets the rest of its message, is no longer a client when another took over
+  };
+  ConnectionId id = 0;
+  Role role = Role::client;
+  Peer peer;
+  State state = State::served;
+  std::uint64_t number = 0;              // number of a client, counted from 1
+  const protocol::Port* port = nullptr;  // one of the vendor's ports
+  std::unique_ptr<protocol::Dialogue> dialogue;
+  Outbox outbox;
+  /// Receivers that a client requested, one list for each stream it named; for a stream the device's own list, one.
+  std::vector<protocol::SetReceivers> receivers;
+  struct Held {  // held back by a fault
+    Outbox::Message ping;
+    Time until{};
+    bool after_next = false;  // held until the next ping has overtaken it
+  };
+  std::deque<Held> held;
+  bool finishing = false;  // no more bytes are taken in, no more pings offered
+  Time not_before{};       // earliest next call of dialogue->on_tick, in unskipped time
+  std::uint64_t bytes_written = 0, bytes_read = 0;
+  std::uint64_t streamed_pings = 0, streamed_bytes = 0;  // sent to the receivers of this client by a stream's datagrams
+  std::uint64_t requests = 0;                            // for settings or a ping
+  std::string complaint = {};                            // the last about what it sent
+
+  /// Whether it gets datagrams: its port is of kind udp_stream or udp_dialogue.
+  bool takes_datagrams() const { return port != nullptr && port->kind != protocol::Port::Kind::tcp_stream; }
+  /// By its own connection or a stream.
+  std::uint64_t pings_written() const { return outbox.pings_written() + streamed_pings; }
+  /// Names a receiver of that stream.
+  bool receives(std::size_t stream) const;
+  /// When the conversation has something to do; nothing while it ends.
+  std::optional<Time> next_tick() const;
+  /// When it will request a ping by itself.
+  std::optional<Time> next_request() const;
+};
+
+/// Adds what was sent to it, dropped and received.
+void add_traffic(DeviceFigures& figures, const Connection& of);
+
+class Connections {
+ public:
+  using List = std::list<Connection>;
+  static constexpr std::size_t longest_queue = 16;
+
+  explicit Connections(const SonarConfig& config) : config_(config) {}
+
+  Connection* find(ConnectionId id);
+  const Connection* find(ConnectionId id) const { return const_cast<Connections*>(this)->find(id); }
+  /// Served clients, oldest first.
+  std::size_t clients() const { return count(Role::client, Connection::State::served); }
+  std::size_t observers() const { return count(Role::observer, Connection::State::served); }
+  std::size_t waiting() const { return count(Role::client, Connection::State::waiting); }
+  bool empty() const { return all_.empty(); }
+  Connection* oldest_client();
+  const Connection* oldest_client() const { return const_cast<Connections*>(this)->oldest_client(); }
+  Connection* longest_waiting();
+  /// The stream of that number, counted from 0 among the vendor's ports.
+  Connection* stream(std::size_t number);
+  /// Where the datagrams of a stream go: the device's own list and those of the clients, each address once.
+  std::vector<protocol::Endpoint> receivers(const Connection& stream) const;
+  /// A client is served or a stream has receivers.
+  bool has_audience() const;
+  /// Every client has taken what it was sent.
+  bool settled() const;
+
+  /// By the rules of max_clients, when_full and max_observers.
+  enum class Verdict { serve, take_over, wait, refuse };
+  Verdict verdict(Role role) const;
+  Connection& add(ConnectionId id, Role role, Peer peer, Connection::State state, const protocol::Port* port);
+  void remove(ConnectionId id);
+
+  List& all() { return all_; }
+  const List& all() const { return all_; }
+
+ private:
+  std::size_t count(Role role, Connection::State state) const;
+
+  const SonarConfig& config_;
+  List all_;  // in the order of arrival
+};
+
+}  // namespace sonar

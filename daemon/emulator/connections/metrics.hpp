@@ -1,0 +1,64 @@
+// Counters of the running daemon: figures of one sonar and histograms of its times.
+// Plain values, filled by the Sonar and written out by prometheus.hpp; no clock, no I/O.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "daemon/emulator/connections/outbox.hpp"
+#include "daemon/emulator/connections/pacer.hpp"
+#include "daemon/emulator/world/world.hpp"
+
+namespace sonar {
+
+/// How often a time was how long. Fixed bounds: adding costs no memory, and pictures of different runs can be compared.
+class Histogram {
+ public:
+  static constexpr std::array bounds_s{0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02,
+                                       0.05,   0.1,    0.2,    0.5,   1.0,   2.0,   5.0,  10.0};
+
+  /// Negative times count as 0.
+  void add(double seconds);
+  std::uint64_t count() const { return count_; }
+  double sum_s() const { return sum_s_; }
+  /// Counts of times up to and including bounds_s[i], above the bound before; the last counts those beyond all bounds.
+  const std::array<std::uint64_t, bounds_s.size() + 1>& counts() const { return counts_; }
+  /// Linear between the bounds round it, so right to a factor of 2.5; beyond them the last bound. 0 when empty. q in [0, 1].
+  double quantile_s(double q) const;
+
+ private:
+  std::array<std::uint64_t, bounds_s.size() + 1> counts_{};
+  std::uint64_t count_ = 0;
+  double sum_s_ = 0;
+};
+
+/// One sonar. ticks = pings + skipped (+ one ping under way, + a trigger that waits);
+/// pings = refused + unwanted + those offered to clients; offered = sent + dropped (+ what is in the outboxes now).
+struct DeviceFigures {
+  std::uint64_t ticks = 0;
+  std::uint64_t skipped_ticks = 0;                       // ticks of which no ping came
+  SkippedTicks skipped;                                  // why
+  std::uint64_t skipped_stale = 0;                       // why, too: the vehicle's poses had stopped (poses.on_stale: stop)
+  std::uint64_t pings = 0;                               // simulated
+  std::uint64_t refused = 0;                             // pings that the engine refused
+  std::uint64_t unwanted = 0;                            // pings whose clients had gone or had requested other settings
+  std::uint64_t out_of_water = 0;                        // pings of noise only, because the sonar was above the sea surface
+  std::uint64_t served = 0;                              // written whole to at least one client
+  std::uint64_t offered = 0;                             // pings offered to clients: a ping counts for each of them
+  std::uint64_t sent = 0;                                // written whole to a client
+  std::uint64_t dropped = 0;                             // pings that were not written to a client
+  std::array<std::uint64_t, drop_reasons> dropped_by{};  // why, by DropReason
+  std::uint64_t waiting = 0;                             // in outboxes now, not yet begun
+  std::uint64_t clients = 0, refused_clients = 0;        // since the start
+  std::uint64_t clients_now = 0, clients_queued = 0;
+  std::uint64_t bytes_written = 0, bytes_read = 0;
+  double simulation_s = 0;  // wall time of all pings
+  Histogram simulation;     // time to compute a ping
+  Histogram lateness;       // from when a tick was due to when it was taken up
+  Histogram jitter;         // how far the time between two pings at a client's socket is off the time between their ticks
+  Histogram latency;        // from a ping's tick to its last byte handed to the kernel, for each client
+};
+
+}  // namespace sonar

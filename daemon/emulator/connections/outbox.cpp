@@ -1,0 +1,86 @@
+#include "daemon/emulator/connections/outbox.hpp"
+
+#include <cassert>
+#include <numeric>
+#include <utility>
+
+namespace sonar {
+
+bool Outbox::push_reply(Bytes reply) {
+  if (replies_.size() >= most_replies || reply_bytes_ + reply.size() > most_reply_bytes) return false;
+  reply_bytes_ += reply.size();
+  replies_.push_back(std::move(reply));
+  return true;
+}
+
+std::size_t Outbox::Message::size() const {
+  std::size_t all = bytes ? bytes->size() : 0;
+  if (datagrams)
+    for (const Bytes& datagram : *datagrams) all += datagram.size();
+  return all;
+}
+
+void Outbox::push(Message ping, bool limited) {
+  const std::size_t size = ping.size();
+  ++pings_offered_;
+  const auto full = [&] {
+    return limited && !pings_.empty() &&
+           (pings_.size() >= static_cast<std::size_t>(rules_.depth) || ping_bytes_ + size > most_ping_bytes);
+  };
+  if (full() && rules_.when_full == WhenFull::drop_newest) {
+    count_drop(DropReason::slow);
+    return;
+  }
+  while (full()) {
+    ping_bytes_ -= pings_.front().size();
+    pings_.pop_front();
+    count_drop(DropReason::slow);
+  }
+  ping_bytes_ += size;
+  pings_.push_back(std::move(ping));
+}
+
+Outbox::Message Outbox::take() {
+  if (writing_ || (replies_.empty() && pings_.empty())) return {};
+  writing_ = true;
+  writing_ping_ = replies_.empty();
+  if (writing_ping_) {
+    Message ping = std::move(pings_.front());
+    pings_.pop_front();
+    ping_bytes_ -= ping.size();
+    return ping;
+  }
+  auto reply = std::make_shared<const Bytes>(std::move(replies_.front()));
+  replies_.pop_front();
+  reply_bytes_ -= reply->size();
+  return {std::move(reply), 0, {}, {}};
+}
+
+void Outbox::written() {
+  assert(writing_);
+  if (writing_ping_) ++pings_written_;
+  writing_ = false;
+}
+
+void Outbox::not_written(DropReason why) {
+  assert(writing_);
+  if (writing_ping_) count_drop(why);
+  writing_ = false;
+}
+
+void Outbox::drop_waiting_pings(DropReason why) {
+  count_drop(why, pings_.size());
+  pings_.clear();
+  ping_bytes_ = 0;
+}
+
+void Outbox::end(DropReason why) {
+  drop_waiting_pings(why);
+  if (std::exchange(writing_, false) && writing_ping_) count_drop(why);
+  replies_.clear();
+  reply_bytes_ = 0;
+}
+
+std::uint64_t Outbox::pings_dropped() const { return std::accumulate(dropped_.begin(), dropped_.end(), std::uint64_t{0}); }
+
+}  // namespace sonar

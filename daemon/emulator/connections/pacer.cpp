@@ -1,0 +1,108 @@
+#include "daemon/emulator/connections/pacer.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace sonar {
+
+namespace {
+
+double travel_s(const PingSettings& s) {
+  const double sound_speed_mps = s.device_sound_speed_mps > 0 ? static_cast<double>(s.device_sound_speed_mps) : 1500.0;
+  return 2.0 * s.range_m / sound_speed_mps + 0.002;
+}
+
+}  // namespace
+
+std::chrono::nanoseconds ping_period(const PingSettings& s) {
+  if (!(s.rate_hz > 0)) return std::chrono::nanoseconds(0);
+  return nanoseconds_from(std::max(1.0 / static_cast<double>(s.rate_hz), travel_s(s)));
+}
+
+void Pacer::configure(const PingSettings& settings, Time now) {
+  const auto period = ping_period(settings);
+  travel_ = nanoseconds_from(travel_s(settings));
+  // An unchanged rhythm keeps its grid: some drivers repeat their settings at ping rate.
+  if (running_ && period == period_ && settings.triggered == triggered_) return;
+  // A new grid begins when the last echo has arrived and the shorter of both periods is over.
+  const Time quiet_until = has_fired_ ? std::max(home_at_, last_tick_ + std::min(period_, period)) : now;
+  running_ = period.count() > 0;
+  if (!(running_ && triggered_ && settings.triggered)) forget_trigger();
+  triggered_ = settings.triggered;
+  if (running_) {
+    period_ = period;
+    start_ = std::max(now, quiet_until);
+    index_ = 0;
+    trigger_at_ = std::max(trigger_at_, start_);
+  }
+}
+
+void Pacer::skip(std::chrono::nanoseconds by) {
+  start_ += by;
+  trigger_at_ += by;
+  last_tick_ += by;
+  home_at_ += by;
+}
+
+void Pacer::stop() {
+  running_ = false;
+  forget_trigger();
+}
+
+void Pacer::forget_trigger() {
+  if (std::exchange(trigger_waits_, false)) ++skipped_.trigger;
+}
+
+void Pacer::trigger(Time now, bool joins) {
+  if (!running_ || !triggered_) return;
+  // At most one ping is due. A trigger joins the one that waits, or is counted as skipped.
+  if (trigger_waits_) {
+    if (joins) return;
+    ++ticks_;
+    ++skipped_.trigger;
+    return;
+  }
+  ++ticks_;
+  trigger_waits_ = true;
+  trigger_at_ = has_fired_ ? std::max({now, start_, last_tick_ + period_}) : std::max(now, start_);
+}
+
+std::optional<Time> Pacer::next_tick() const {
+  if (!running_) return std::nullopt;
+  if (triggered_) return trigger_waits_ ? std::optional(trigger_at_) : std::nullopt;
+  return start_ + index_ * period_;
+}
+
+void Pacer::note_ping(Time at) {
+  last_tick_ = at;
+  home_at_ = at + travel_;
+  has_fired_ = true;
+}
+
+bool Pacer::fire(Time now, bool busy) {
+  const auto due = next_tick();
+  if (!due || now < *due) return false;
+  if (triggered_) {
+    if (busy) {
+      trigger_at_ = now + std::chrono::milliseconds(1);  // try again shortly: a trigger causes exactly one ping
+      return false;
+    }
+    trigger_waits_ = false;
+    note_ping(now);
+    return true;
+  }
+  // In free running, ticks that have passed, or that come while the simulation is busy, are counted and never repeated.
+  const std::int64_t reached = (now - start_) / period_;  // index of the newest tick that has passed
+  const auto missed = static_cast<std::uint64_t>(reached - index_);
+  ticks_ += missed + 1;
+  skipped_.late += missed;
+  index_ = reached + 1;
+  if (busy) {
+    ++skipped_.busy;
+    return false;
+  }
+  note_ping(start_ + reached * period_);
+  return true;
+}
+
+}  // namespace sonar

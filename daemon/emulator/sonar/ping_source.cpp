@@ -1,0 +1,218 @@
+#include "daemon/emulator/sonar/ping_source.hpp"
+
+#include <utility>
+
+#include "daemon/emulator/sonar/ping_request.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr auto air_reported_every = std::chrono::minutes(1);  // a vehicle on waves leaves the water with each of them
+
+}  // namespace
+
+PingSource::PingSource(SonarData& sonar, Audience& audience, const Faults& faults)
+    : sonar_(sonar), audience_(audience), faults_(faults) {
+  use_initial_settings();
+}
+
+// ---- settings
+
+void PingSource::use_initial_settings() {
+  asked_ = false;
+  asked_by_.clear();
+  aim_ = {};
+  protocol::ChangeSettings initial = sonar_.vendor.initial_settings(sonar_.state);
+  settings_ = initial.settings;
+  sonar_.state.settings = std::move(initial.vendor_settings);
+  if (initial.receivers) audience_.restore_receivers(*std::move(initial.receivers));
+  // A ping that is being computed was requested with the settings of clients that have left: on_ping() drops it.
+  busy_unwanted_ = busy_;
+}
+
+void PingSource::change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions) {
+  // Some drivers repeat their settings at ping rate: only a change is worth a line. Equal ones may hold another state of the
+  // device.
+  const auto before = std::exchange(sonar_.state.settings, change.vendor_settings);
+  if (!asked_ || !change.vendor_settings->equals(*before)) {
+    if (!who.empty()) asked_by_ = who;  // empty: the device itself, perhaps with every ping
+    sonar_.report(Report::Topic::settings, who.empty() ? LogLevel::debug : LogLevel::info, "settings: " + change.summary,
+                  {{"client", who.empty() ? "the sonar itself" : who}}, actions);
+  }
+  settings_ = change.settings;  // also for a repeat, because the device's own sound speed follows its depth
+  asked_ = true;
+  if (change.receivers) audience_.set_receivers(nullptr, {}, *change.receivers);
+  if (change.receivers || wants_pings()) update_pacer(now);
+}
+
+void PingSource::use_water(const Water& water, Time now) {
+  sonar_.state.water = water;
+  follow_water();
+  if (wants_pings()) update_pacer(now);
+}
+
+/// The client's request stays. Values that the device derives from it follow the water at its depth.
+void PingSource::follow_water() {
+  const auto same = sonar_.vendor.apply_override({}, sonar_.state);
+  if (same && same->settings.device_sound_speed_mps != settings_.device_sound_speed_mps) settings_ = same->settings;
+}
+
+// ---- faults
+
+void PingSource::forget_settings(Time now) {
+  use_initial_settings();
+  update_pacer(now);
+}
+
+void PingSource::restart(bool clock_only, Time now) {
+  sonar_.state.powered_up_at = now;
+  if (clock_only) return;
+  sonar_.state.last_ping = ping_number_ = 0;
+  forget_settings(now);
+}
+
+void PingSource::override_settings(const protocol::SettingsOverride& wanted, Time now, Actions& actions) {
+  if (const auto change = sonar_.vendor.apply_override(wanted, sonar_.state))
+    change_settings(*change, "a fault", now, actions);
+  else
+    sonar_.report(Report::Topic::state, LogLevel::warning, "fault without effect: " + change.error().text, {}, actions);
+}
+
+// ---- when pings are due
+
+bool PingSource::wants_pings() const {
+  return !audience_.stopping() && audience_.has_audience() && (asked_ || sonar_.vendor.pings_before_first_request(sonar_.state));
+}
+
+void PingSource::update_pacer(Time now) {
+  PingSettings paced = settings_;
+  if (const double factor = faults_.rate_factor(); factor != 1) paced.rate_hz *= static_cast<float>(factor);
+  if (wants_pings())
+    pacer_.configure(paced, now);
+  else
+    pacer_.stop();
+}
+
+std::optional<Time> PingSource::next_ping() const {
+  const auto next = pacer_.next_tick();
+  return next && waits_for_pose(*next) ? std::nullopt : next;
+}
+
+bool PingSource::waits_for_pose(Time at) const {
+  return sonar_.around.config.poses.on_stale == OnStale::stop && sonar_.around.world.is_stale(sonar_.config.vehicle, at);
+}
+
+void PingSource::trigger(const protocol::RequestPing& request, Time now) {
+  // The ping being computed is used only if it was fired with the present settings.
+  if (request.joins && busy_ && busy_settings_ == sonar_.state.settings) return;
+  aim_ = request;
+  pacer_.trigger(now, request.joins);
+}
+
+Actions PingSource::tick(Time now) {
+  Actions actions;
+  const auto due = pacer_.next_tick();
+  if (!due || now < *due) return actions;
+  sonar_.figures.lateness.add(seconds(now - *due));
+  if (pacer_.fire(now, busy_)) request_ping(pacer_.last_tick(), actions);
+  return actions;
+}
+
+// ---- pings
+
+/// A device may keep its rhythm while its host cannot keep up. Then pings that were not made have numbers too.
+PingNumber PingSource::next_number() {
+  const SkippedTicks& skipped = pacer_.skipped();
+  const std::uint64_t lost = skipped.late + skipped.busy;
+  const std::uint64_t since = lost - std::exchange(numbered_skips_, lost);
+  if (sonar_.config.overload == Overload::count && ping_number_ > 0) ping_number_ += static_cast<std::uint32_t>(since);
+  return PingNumber(sonar_.state.last_ping = ++ping_number_);
+}
+
+/// The request without its number.
+PingRequest PingSource::request_at(Time at, const protocol::RequestPing& aim) const {
+  const Config& config = sonar_.around.config;
+  const World& world = sonar_.around.world;
+  const bool stale = world.is_stale(sonar_.config.vehicle, at);
+  const Pose head{{}, quat_from_rpy({0, 0, aim.head_rad})};
+  const Pose mount = aim.head_rad == 0 ? sonar_.config.mount : compose(sonar_.config.mount, head);
+  PingRequest request = ping_request(config, world, sonar_.config.vehicle, mount, at);
+  request.model = sonar_.state.model;
+  request.settings = settings_;
+  request.vendor_settings = aim.with ? aim.with : sonar_.state.settings;
+  request.sonar_id = sonar_.index;
+  request.bearings = sonar_.config.bearings;
+  request.blank = (stale && config.poses.on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
+  return request;
+}
+
+std::optional<PingRequest> PingSource::preview_request(PingNumber number, Time at) const {
+  if (waits_for_pose(at)) return std::nullopt;
+  const auto step = sonar_.vendor.scan_step(static_cast<std::uint32_t>(number), sonar_.state);
+  PingRequest request = request_at(at, step ? step->aim : aim_);
+  if (step) request.settings = step->settings;
+  request.number = number;
+  // The key of the noise differs from that of the sonar's pings.
+  request.sonar_id = ~sonar_.index;
+  return request;
+}
+
+void PingSource::request_ping(Time at, Actions& actions) {
+  if (waits_for_pose(at)) {
+    ++sonar_.figures.skipped_stale;
+    return;
+  }
+  // Before the request reads the settings: the sound speed of the device follows the water at its depth.
+  sonar_.update_depth(at);
+  follow_water();
+  PingRequest request = request_at(at, aim_);
+  request.number = next_number();
+  request.settings.gain_db = gain_assist_.gain_db(settings_, at);
+  busy_settings_ = sonar_.state.settings;
+  busy_ = true;
+  busy_blank_ = request.blank;
+  busy_unwanted_ = false;
+  actions.emplace_back(ComputePing{std::move(request)});
+}
+
+bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions) {
+  DeviceFigures& figures = sonar_.figures;
+  busy_ = false;
+  ++figures.pings;
+  figures.simulation_s += outcome.seconds;
+  figures.simulation.add(outcome.seconds);
+  if (!settings_.triggered && pacer_.period().count() > 0)
+    if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period()),
+                                           sonar_.around.config.sonars.size() > 1))
+      sonar_.report(Report::Topic::state, LogLevel::warning, *slow, {}, actions);
+  if (outcome.ping) gain_assist_.look_at(*outcome.ping);
+  if (outcome.ping && !audience_.stopping() && !busy_unwanted_ && !outcome.ping->request.blank)
+    if (const auto change = sonar_.vendor.after_ping(*outcome.ping, sonar_.state)) change_settings(*change, {}, now, actions);
+  if (outcome.ping) note_water(outcome.ping->request, now, actions);
+  if (outcome.refused) {
+    ++figures.refused;
+    sonar_.report(Report::Topic::refused_ping, LogLevel::warning, "ping dropped: " + outcome.failure, {}, actions);
+  } else if (!outcome.ping) {
+    actions.emplace_back(
+        EngineFailed{{outcome.kind, "sonar " + sonar_.config.name + ": the ping engine failed: " + outcome.failure}});
+  } else if (!audience_.stopping() && audience_.has_audience() && !busy_unwanted_) {
+    return true;
+  } else {
+    ++figures.unwanted;
+  }
+  return false;
+}
+
+/// This ping was requested like any other, and the engine computed only noise, because the sonar is above the sea surface.
+void PingSource::note_water(const PingRequest& computed, Time now, Actions& actions) {
+  const bool was_in_air = std::exchange(in_air_, computed.blank && !busy_blank_);
+  if (!in_air_) return;
+  ++sonar_.figures.out_of_water;
+  if (was_in_air || (air_reported_ && now - *air_reported_ < air_reported_every)) return;
+  air_reported_ = now;
+  sonar_.report(Report::Topic::state, LogLevel::warning,
+                "the sonar is above the sea surface and receives noise only: z = 0 is the surface, lower is negative",
+                {{"z_m", computed.sonar_in_world.position_m.z}}, actions);
+}
+
+}  // namespace sonar

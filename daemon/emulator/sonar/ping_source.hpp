@@ -1,0 +1,97 @@
+// The settings of an emulated sonar and its pings: when they are due, what each of them requests from the engine, and what the
+// device learns from the result.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/sonar/gain_assist.hpp"
+#include "daemon/emulator/connections/pacer.hpp"
+#include "daemon/emulator/sonar/audience.hpp"
+#include "daemon/emulator/sonar/rate_watch.hpp"
+#include "daemon/emulator/sonar/sonar_data.hpp"
+
+namespace sonar {
+
+class PingSource {
+ public:
+  /// All outlive it.
+  PingSource(SonarData& sonar, Audience& audience, const Faults& faults);
+
+  // ---- settings
+
+  const PingSettings& settings() const { return settings_; }
+  /// The last who changed the settings; empty = they are the initial ones.
+  const std::string& asked_by() const { return asked_by_; }
+  /// Restores the state in which no client has ever connected, so that the next client finds the device as delivered.
+  void use_initial_settings();
+  /// `who` is for the log and for asked_by(); empty = the device itself.
+  void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
+  /// Returns whether that was a change.
+  bool set_transmit(bool on) { return std::exchange(transmits_, on) != on; }
+  bool transmits() const { return transmits_; }
+  void use_water(const Water& water, Time now);
+
+  // ---- when pings are due
+
+  bool wants_pings() const;
+  /// The pacer runs while pings are wanted, at the requested rate times the factor of faults.
+  void update_pacer(Time now);
+  const Pacer& pacer() const { return pacer_; }
+  std::optional<Time> next_ping() const;
+  /// A vehicle without fresh poses: the configuration wants no pings then.
+  bool waits_for_pose(Time at) const;
+  /// One ping now; with `joins`, none if one with these settings is being computed.
+  void trigger(const protocol::RequestPing& request, Time now);
+  Actions tick(Time now);
+  void skip(std::chrono::nanoseconds by) { pacer_.skip(by); }
+  void stop() { pacer_.stop(); }
+  // Effects of faults.
+  void forget_settings(Time now);
+  /// Unless only its clock restarts, the device numbers pings from 1 again and has its initial settings.
+  void restart(bool clock_only, Time now);
+  void override_settings(const protocol::SettingsOverride& wanted, Time now, Actions& actions);
+
+  // ---- pings
+
+  /// A ping is being computed.
+  bool busy() const { return busy_; }
+  /// See Sonar::preview_request.
+  std::optional<PingRequest> preview_request(PingNumber number, Time at) const;
+  /// The engine is done. Returns whether the ping goes to clients.
+  bool on_ping(const PingOutcome& outcome, Time now, Actions& actions);
+
+ private:
+  PingRequest request_at(Time at, const protocol::RequestPing& aim) const;
+  void request_ping(Time at, Actions& actions);
+  PingNumber next_number();
+  void follow_water();
+  void note_water(const PingRequest& computed, Time now, Actions& actions);
+
+  SonarData& sonar_;
+  Audience& audience_;
+  const Faults& faults_;
+
+  Pacer pacer_;
+  PingSettings settings_;
+  protocol::RequestPing aim_;  // the last
+  GainAssist gain_assist_;
+  bool asked_ = false;  // settings were requested since the first client or receiver came
+  std::string asked_by_;
+  bool transmits_ = true;
+
+  // The ping that is being computed.
+  bool busy_ = false;
+  std::shared_ptr<const VendorSettings> busy_settings_;
+  bool busy_blank_ = false;     // requested as noise only
+  bool busy_unwanted_ = false;  // its clients have gone
+
+  std::uint32_t ping_number_ = 0;
+  std::uint64_t numbered_skips_ = 0;  // ticks lost to overload, as of the last ping
+  bool in_air_ = false;               // at the last ping
+  std::optional<Time> air_reported_;
+  RateWatch rate_watch_;
+};
+
+}  // namespace sonar

@@ -1,0 +1,52 @@
+// Maps a request to an action, or to the answer that rejects it: the rules of http_rules.hpp in order. Pure; ControlHttp
+// executes the action.
+#pragma once
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "daemon/server/connections/http_answer.hpp"
+#include "daemon/server/connections/http_reader.hpp"
+#include "daemon/server/connections/token.hpp"
+#include "daemon/server/http/http_rules.hpp"
+#include "protocol/control/control.hpp"
+
+namespace sonar {
+
+/// {"code", "text"}: the body of every answer without a document.
+HttpAnswer answer_of(unsigned status, control::StatusCode code, const std::string& text);
+
+struct HttpPolicy {
+  const Token& token;
+  Ipv4 reached;  // our end of the connection
+  const std::vector<std::string>& hosts;
+};
+
+struct HelpAction {};
+struct HealthAction {
+  bool with_text = false;  // the reason too, for authorized clients
+};
+struct MetricsAction {};
+struct OperationAction {
+  control::Operation operation;
+};
+/// A WebSocket of the live view: daemon/server/http/door.hpp decides, by rules of its own for Origin and secrets.
+struct SocketAction {
+  std::vector<std::pair<std::string, std::string>> query;
+};
+struct TicketAction {};
+/// Action of an HTTP request. A Subscribe = a stream of events.
+using HttpAction = std::variant<HttpAnswer, HelpAction, HealthAction, MetricsAction, OperationAction, control::Subscribe,
+                                SocketAction, TicketAction>;
+
+struct RoutedRequest {
+  HttpAction action;
+  std::string pose_refusal = {};  // why a malformed pose is refused; it is counted
+};
+RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy);
+
+/// The text of GET /, for those who do not ask for the page.
+std::string help_text(const std::string& address);
+
+}  // namespace sonar

@@ -1,0 +1,61 @@
+// The rules of the HTTP server, each a pure function: targets, hosts, origins, tokens, routes.
+// daemon/server/http/http_router.hpp applies them in order.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "daemon/config/config.hpp"
+#include "protocol/control/operations.hpp"
+
+namespace sonar {
+
+/// "/api/v1/sonars/front%20left?pings=1", split and decoded.
+struct Target {
+  std::vector<std::string> segments;
+  std::vector<std::pair<std::string, std::string>> query;
+};
+/// Empty for a full URL, a broken %xx, or control characters.
+std::optional<Target> parse_target(std::string_view text);
+
+/// Allowed values of "Host: name:port" when the connection's local address is `reached`: that address, loopback, localhost, and
+/// the names of control.hosts. Against DNS rebinding.
+bool host_allowed(std::string_view host, Ipv4 reached, const std::vector<std::string>& names);
+/// The same for "Origin: http://name:port": rejects cross-origin requests of browsers.
+bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std::string>& names);
+
+/// "application/json", with any parameters.
+bool is_json(std::string_view content_type);
+
+/// Needs the first longest_http_method bytes.
+bool begins_http_request(std::string_view bytes);
+inline constexpr std::size_t longest_http_method = 8;  // "OPTIONS "
+
+/// Detects HTTP requests on ports of other protocols: any web page can make a browser send one.
+class HttpDetector {
+ public:
+  /// Whether the stream, up to these bytes, begins as an HTTP request.
+  bool speaks_http(std::span<const std::byte> received);
+
+ private:
+  std::string first_bytes_;
+};
+
+struct Route {
+  enum class Kind { unknown, help, health, metrics, status, events, operation, faults, end_fault, ticket };
+  Kind kind = Kind::unknown;
+  std::string_view method;  // the allowed one
+  std::string op;           // operation: the member of Request.op; for faults "faults", "kinds" or "journal"
+  std::string name = {};    // name of the sonar, object or fault, if the path has it
+};
+Route route_of(const Target& target, std::string_view method);
+
+/// ?pings=1&clients=0...; an empty query = all kinds. The error is a sentence.
+Result<control::Subscribe> subscription_of(const Target& target);
+
+}  // namespace sonar

@@ -1,0 +1,187 @@
+// Ticks lie on a grid computed from its start; late ones are skipped and counted; travel time bounds the rate.
+#include "daemon/emulator/connections/pacer.hpp"
+
+#include <gtest/gtest.h>
+
+namespace sonar::pacer_test {
+namespace {
+
+using std::chrono::milliseconds;
+
+PingSettings settings(float rate_hz, double range_m = 5, bool triggered = false) {
+  PingSettings s;
+  s.rate_hz = rate_hz;
+  s.range_m = range_m;
+  s.triggered = triggered;
+  return s;
+}
+const Time t0 = Time(std::chrono::hours(1000));
+
+TEST(Pacer, PeriodIsTheRateOrTheTravelTimePlusTwoMilliseconds) {
+  EXPECT_EQ(ping_period(settings(10)), milliseconds(100));
+  EXPECT_EQ(ping_period(settings(40, 120)), milliseconds(162));  // 2 * 120 / 1500 + 2 ms: docs/protocols/oculus.md, section 5.6
+  EXPECT_EQ(ping_period(settings(0)).count(), 0);
+  EXPECT_EQ(ping_period(settings(-1)).count(), 0);
+}
+
+TEST(Pacer, TicksLieOnAGridWithoutDrift) {
+  Pacer pacer;
+  EXPECT_FALSE(pacer.next_tick());
+  pacer.configure(settings(15), t0);  // 66.666667 ms: not a whole number of anything
+  const auto period = pacer.period();
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_EQ(*pacer.next_tick(), t0 + i * period);
+    ASSERT_TRUE(pacer.fire(*pacer.next_tick() + milliseconds(i % 60), false)) << "lateness within a period changes nothing";
+    ASSERT_EQ(pacer.last_tick(), t0 + i * period);
+  }
+  EXPECT_EQ(pacer.skipped_ticks(), 0u);
+}
+
+TEST(Pacer, LateTicksAreSkippedAndCountedNeverQueued) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  EXPECT_TRUE(pacer.fire(t0, false));
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(450), false));  // ticks 100, 200, 300 are lost, 400 fires
+  EXPECT_EQ(pacer.skipped_ticks(), 3u);
+  EXPECT_EQ(pacer.last_tick(), t0 + milliseconds(400));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(500));
+}
+
+TEST(Pacer, ABusySimulationLosesTheTick) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  EXPECT_TRUE(pacer.fire(t0, false));
+  EXPECT_FALSE(pacer.fire(t0 + milliseconds(100), true));
+  EXPECT_EQ(pacer.skipped_ticks(), 1u);
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(200), false));
+}
+
+TEST(Pacer, TimeThatIsSkippedHasNoTicks) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  EXPECT_TRUE(pacer.fire(t0, false));
+  pacer.skip(std::chrono::hours(1));
+  EXPECT_EQ(*pacer.next_tick(), t0 + std::chrono::hours(1) + milliseconds(100)) << "as long from now as it was";
+  EXPECT_TRUE(pacer.fire(*pacer.next_tick(), false));
+  EXPECT_EQ(pacer.skipped_ticks(), 0u);
+}
+
+TEST(Pacer, NothingHappensBeforeTheTick) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  EXPECT_TRUE(pacer.fire(t0, false));
+  EXPECT_FALSE(pacer.fire(t0 + milliseconds(99), false));
+  EXPECT_EQ(pacer.skipped_ticks(), 0u);
+}
+
+TEST(Pacer, SameRhythmDoesNotRestartTheGrid) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  ASSERT_TRUE(pacer.fire(t0, false));
+  for (int i = 1; i < 100; ++i) pacer.configure(settings(10), t0 + milliseconds(i));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(100));
+}
+
+TEST(Pacer, ANewRhythmStartsAtOnceButNotBeforeTheLastPingIsHome) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  ASSERT_TRUE(pacer.fire(t0, false));
+  pacer.configure(settings(5), t0 + milliseconds(30));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(100));
+  ASSERT_TRUE(pacer.fire(t0 + milliseconds(100), false));
+  pacer.configure(settings(40), t0 + milliseconds(5000));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(5000));
+}
+
+TEST(Pacer, AFasterRhythmStartsWithItsOwnPeriod) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  ASSERT_TRUE(pacer.fire(t0, false));
+  pacer.configure(settings(40), t0 + milliseconds(3));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(25));
+  ASSERT_TRUE(pacer.fire(t0 + milliseconds(25), false));
+  // Sound travels 60 m and back in 82 ms, with 2 ms to spare.
+  pacer.configure(settings(10, 60), t0 + milliseconds(50));
+  ASSERT_TRUE(pacer.fire(t0 + milliseconds(50), false));
+  pacer.configure(settings(40, 1), t0 + milliseconds(60));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(50 + 82));
+}
+
+TEST(Pacer, ChangesOfTheRhythmMakeNoMorePingsThanTheFastestOfThem) {
+  Pacer pacer;
+  int pings = 0;
+  for (int ms = 0; ms < 1000; ++ms) {
+    pacer.configure(settings(ms % 2 == 0 ? 10 : 40, 1), t0 + milliseconds(ms));
+    pings += pacer.fire(t0 + milliseconds(ms), false);
+  }
+  EXPECT_LE(pings, 41);
+}
+
+TEST(Pacer, StandbyStopsAndAnyOtherRateResumesAtOnce) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  ASSERT_TRUE(pacer.fire(t0, false));
+  pacer.configure(settings(0), t0 + milliseconds(50));
+  EXPECT_FALSE(pacer.next_tick());
+  pacer.configure(settings(10), t0 + milliseconds(777));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(777));
+}
+
+TEST(Pacer, TriggeredMeansOnePingEach) {
+  Pacer pacer;
+  pacer.configure(settings(10, 5, true), t0);
+  EXPECT_FALSE(pacer.next_tick());
+  pacer.trigger(t0 + milliseconds(5));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(5));
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(5), false));
+  EXPECT_FALSE(pacer.next_tick());
+  pacer.trigger(t0 + milliseconds(6));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(105)) << "not faster than the rate allows";
+  pacer.trigger(t0 + milliseconds(7));
+  EXPECT_EQ(pacer.skipped_ticks(), 1u) << "one waits, more are counted";
+  EXPECT_FALSE(pacer.fire(t0 + milliseconds(105), true));
+  ASSERT_TRUE(pacer.next_tick());
+  EXPECT_TRUE(pacer.fire(*pacer.next_tick(), false)) << "a trigger waits for a busy simulation";
+}
+
+TEST(Pacer, TriggersAreIgnoredWhenFreeRunningOrInStandby) {
+  Pacer pacer;
+  pacer.trigger(t0);
+  EXPECT_FALSE(pacer.next_tick());
+  pacer.configure(settings(0, 5, true), t0);
+  pacer.trigger(t0);
+  EXPECT_FALSE(pacer.next_tick());
+}
+
+TEST(Pacer, StopForgetsTheRhythm) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  ASSERT_TRUE(pacer.fire(t0, false));
+  pacer.stop();
+  EXPECT_FALSE(pacer.next_tick());
+  pacer.configure(settings(10), t0 + milliseconds(130));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(130));
+}
+
+TEST(Pacer, EveryTickIsFiredOrSkippedForAReason) {
+  Pacer pacer;
+  pacer.configure(settings(10), t0);
+  EXPECT_TRUE(pacer.fire(t0, false));
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(450), false));  // 100, 200, 300 are late
+  EXPECT_FALSE(pacer.fire(t0 + milliseconds(620), true));  // 500 late, 600 busy
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(700), false));
+  EXPECT_EQ(pacer.ticks(), 8u);
+  EXPECT_EQ(pacer.skipped().late, 4u);
+  EXPECT_EQ(pacer.skipped().busy, 1u);
+  pacer.configure(settings(10, 5, true), t0 + milliseconds(700));
+  pacer.trigger(t0 + milliseconds(750));
+  pacer.trigger(t0 + milliseconds(751), true);  // joins: not one of its own
+  pacer.trigger(t0 + milliseconds(752));
+  pacer.stop();  // the one that waits has no client left
+  EXPECT_EQ(pacer.ticks(), 10u);
+  EXPECT_EQ(pacer.skipped().trigger, 2u);
+  EXPECT_EQ(pacer.ticks(), 3u + pacer.skipped_ticks());
+}
+
+}  // namespace
+}  // namespace sonar::pacer_test
