@@ -36,6 +36,7 @@ configure_file(daemon/debian/copyright.in ${made}/copyright @ONLY)
 install(FILES ${made}/copyright DESTINATION ${documents} COMPONENT sonard)
 install(FILES ${made}/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
 install(FILES docs/bvtsdk.md docs/blueview.png DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
+install(FILES clients/bvtsdk/README.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
 install(FILES docs/protocols/blueview-link.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk/protocols COMPONENT bvtsdk)
 install(FILES scenes/sonard.yaml scenes/sonard-blueview.yaml scenes/sonard-aris.yaml scenes/sonard-3d15.yaml scenes/sonard-ping360.yaml
   scenes/sonard-surveyor.yaml scenes/sonard-omniscan.yaml scenes/sonard-ping1d.yaml

@@ -1,4 +1,4 @@
-// The functions BVTHead_* of both interfaces, 3.x and 4.x (BVT_ABI). See docs/bvtsdk.md for each function.
+// The functions BVTHead_* of both interfaces, 3.x and 4.x (BVT_ABI). What each function does: clients/bvtsdk/README.md.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

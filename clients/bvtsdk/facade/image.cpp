@@ -1,4 +1,4 @@
-// BVTMagImage_*, BVTColorImage_* and BVTColorMapper_*. See docs/bvtsdk.md for each function.
+// BVTMagImage_*, BVTColorImage_* and BVTColorMapper_*. What each function does: clients/bvtsdk/README.md.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;

@@ -1,4 +1,4 @@
-// BVTImageGenerator_*, 4.x only: how pings become images and range profiles. See docs/bvtsdk.md for each function.
+// BVTImageGenerator_*, 4.x only: how pings become images and range profiles. What each function does: clients/bvtsdk/README.md.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

@@ -1,4 +1,4 @@
-// Discovery, error texts, version and log. See docs/bvtsdk.md for each function.
+// Discovery, error texts, version and log. What each function does: clients/bvtsdk/README.md.
 #include "clients/bvtsdk/core/errors.hpp"
 #include "clients/bvtsdk/facade/getter.hpp"
 

@@ -1,4 +1,4 @@
-// BVTNavData_*: where the vehicle is; both interfaces, 3.x without the time. See docs/bvtsdk.md for each function.
+// BVTNavData_*: where the vehicle is; both interfaces, 3.x without the time. What each function does: clients/bvtsdk/README.md.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

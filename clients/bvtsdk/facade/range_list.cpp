@@ -1,4 +1,4 @@
-// BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x): one range per bearing. See docs/bvtsdk.md for each function.
+// BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x): one range per bearing. What each function does: clients/bvtsdk/README.md.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;

@@ -1,4 +1,4 @@
-// BVTSonar_*: both interfaces. See docs/bvtsdk.md for each function.
+// BVTSonar_*: both interfaces. What each function does: clients/bvtsdk/README.md.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;
