@@ -55,7 +55,7 @@ class Frames(unittest.TestCase):
             self.assert_close(c.rotate(c.wxyz(c.IMAGE_IN_FLU_XYZW), v), c.flu_from_image(v))
 
     def test_the_manual_gives_the_same_rotations(self):
-        text = (ROOT / "docs/ros2.md").read_text(encoding="utf-8")
+        text = (ROOT / "clients/ros2_bridge/README.md").read_text(encoding="utf-8")
         image, clouds = ([float(part.split(f"--q{axis} ")[1].split()[0]) for axis in "xyzw"]
                          for part in text.split("static_transform_publisher")[1:3])
         for got, wanted in zip(image, c.IMAGE_IN_FLU_XYZW):
