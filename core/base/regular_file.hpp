@@ -17,11 +17,11 @@ struct CloseFile {
 };
 using OpenFile = std::unique_ptr<std::FILE, CloseFile>;
 
-/// For reading, bytes as they are. missing_file when there is none, or what it is instead: "x.png: is a FIFO, not a regular
-/// file".
+/// Opens a file for reading, as binary. Error: missing_file if it does not exist or is not a regular file ("x.png: is a FIFO, not
+/// a regular file").
 Result<OpenFile> open_regular(const std::filesystem::path& file);
-/// All of it, or the first `most_bytes` + 1: the caller rejects what is too long. io when reading fails,
-/// unavailable when memory does not suffice.
+/// Reads the file, but at most `most_bytes` + 1 bytes, so that the caller can reject a file that is too long. Errors: io when
+/// reading fails, unavailable when memory does not suffice.
 Result<std::string> read_regular(const std::filesystem::path& file, std::size_t most_bytes);
 
 }  // namespace sonar

@@ -21,23 +21,23 @@ struct Prepared {
   PingPlan plan;
   PaperFan fan;
   PaperSpectrum spectrum;
-  std::unique_ptr<spectral::FrequencySums> fast;  // none: term by term
+  std::unique_ptr<spectral::FrequencySums> fast;  // null: sums term by term
   InverseTransform inverse;
   std::unique_ptr<PulsePower> pulse_power;    // in expected power only
-  std::unique_ptr<BeamTransformTables> even;  // the correction of even azimuths, or none:
-  std::vector<float> correction;              // panels of it, see panels_of
-  std::vector<double> pattern;                // D(phi) of a row, of fans
+  std::unique_ptr<BeamTransformTables> even;  // the beam correction for even azimuths; null: uses `correction`
+  std::vector<float> correction;              // panels of the beam correction, see panels_of
+  std::vector<double> pattern;                // D(phi) of each row of a fan
   double elevation_per_sine = 0;              // D(phi) = sinc(elevation_per_sine sin phi); 0 = no pattern
 };
 
-/// D(phi) of an elevation.
+/// D(phi) at an elevation.
 double elevation_pattern(const Prepared& prepared, double elevation_rad);
 
 /// Adds the echo of a scatterer of a known cross-section; false when it lies outside the record.
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& prepared,
               const PingScalars& scalars, PaperEchoes& echoes);
 
-/// Eq. (2) and the rest of eq. (1) but the sum: one column's hits as echoes. `mu` per material. Hits outside the record are
+/// Makes echoes of one column's hits by eq. (2) and eq. (1), without the sum. `mu` per material. Hits outside the record are
 /// dropped, as the reference code does.
 void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene, const Prepared& prepared,
                const PingScalars& scalars, const PingRequest& request, const simd::Kernels& kernels, PaperEchoes& echoes);

@@ -16,15 +16,16 @@ namespace sonar {
 
 class NoiseTable {
  public:
-  /// Draws the table anew when seed or filter changed, or shares that of `others` which have the same. E|n|^2 = 1 per sample.
+  /// Draws the table anew when seed or filter changed, or shares the table of one of `others` that has the same seed and
+  /// filter. E|n|^2 = 1 per sample.
   void prepare(Seed seed, const std::vector<float>& filter, std::span<const NoiseTable* const> others = {});
   /// column[2 n], column[2 n + 1] += rms * noise for n in [0, samples). A function of (seed, sonar, ping, column, n) alone.
   void add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
-  /// The same in place of what is there.
+  /// As add(), but replaces the values of the column.
   void set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The table that add() reads: noise_table_samples complex values (core/pipeline/arithmetic/noise_place.hpp).
   const std::vector<float>& shaped() const { return *shaped_; }
-  /// Size of its draws without those in `counted`, which other tables share.
+  /// Size of the table in memory, without draws in `counted`, which other tables share.
   std::size_t bytes(std::set<const void*>& counted) const;
 
  private:

@@ -1,6 +1,5 @@
-// Finds out which parts of the model have an effect together: the comparison modes and the fixed fan leave some out whatever
-// their switches say (docs/acoustics.md, section 8). Used by every reader of switches, and by the sidecar, which records the
-// parameters of a ping.
+// Decides which parts of the model take effect. The comparison modes and the fixed fan leave some parts out even if their
+// switches are on (docs/acoustics.md, section 8). Used by every reader of switches, and by the JSON of a rendered ping.
 #pragma once
 
 #include <string>
@@ -9,13 +8,13 @@
 
 namespace sonar {
 
-/// The same pings by switches that are all true: parts that take no effect are off.
+/// The switches without the parts that take no effect. Pings made with the result are the same.
 Switches effective_switches(Switches switches);
 
-/// Why a part does nothing in spite of its switch; empty where it takes effect.
+/// Why a part has no effect although its switch is on; empty if it has one.
 std::string why_without_effect(const Switches& switches, const NamedSwitch& part);
 
-/// One sentence that names the parts that are on and do nothing; empty when there is none.
+/// One sentence that names the parts whose switches are on but which have no effect; empty if there is none.
 std::string note_of_parts_left_out(const Switches& switches);
 
 }  // namespace sonar

@@ -38,10 +38,10 @@ tl::unexpected<Error> cannot_move(const std::string& what) { return failure(Erro
 Result<void> move_sonar(SonarConfig& sonar, int offset) {
   for (Ipv4* const ip : {&sonar.bind_ip, &sonar.advertise_ip}) {
     if (!is_loopback(*ip))
-      return cannot_move("moves sonars on 127.x.x.x, and sonar \"" + sonar.name + "\" has " + text_of(*ip) +
-                         ": give it an address of its own in the configuration");
+      return cannot_move("only sonars on 127.x.x.x can be moved, and sonar \"" + sonar.name + "\" has " + text_of(*ip) +
+                         ": give it another address in the configuration");
     if ((*ip)[2] + offset > 255)
-      return cannot_move("there is no room for " + text_of(*ip) + " that far on; give a smaller number");
+      return cannot_move("the third number of " + text_of(*ip) + " would exceed 255; give a smaller offset");
     (*ip)[2] = static_cast<std::uint8_t>((*ip)[2] + offset);
   }
   derive_addresses(sonar);
@@ -51,7 +51,7 @@ Result<void> move_sonar(SonarConfig& sonar, int offset) {
 Result<void> move_port(Endpoint& at, int offset) {
   if (at.port == 0) return {};
   const int port = at.port + ports_an_offset * offset;
-  if (port > 65535) return cannot_move("there is no port that far above " + text_of(at) + "; give a smaller number");
+  if (port > 65535) return cannot_move("the port of " + text_of(at) + " would exceed 65535; give a smaller offset");
   at.port = static_cast<std::uint16_t>(port);
   return {};
 }
@@ -91,7 +91,7 @@ void add_tcp_ports(std::vector<Listening>& all, const SonarConfig& sonar) {
 
 /// An offset daemon must not use an address or port of the daemon without an offset.
 Result<void> check_apart(const Config& moved, const Config& unmoved) {
-  const std::string instead = " without an offset; give another number";
+  const std::string instead = " without an offset; give another offset";
   for (const SonarConfig& a : moved.sonars)
     for (const SonarConfig& b : unmoved.sonars) {
       if (a.name == b.name) continue;
@@ -126,7 +126,8 @@ Result<void> move_addresses(Config& config, int offset, bool first_too) {
   const Config unmoved = config;
   for (SonarConfig& sonar : config.sonars) {
     const int id = sonar.device_id + 100 * offset;
-    if (id > 65535) return cannot_move("there is no device_id that far above " + std::to_string(sonar.device_id));
+    if (id > 65535)
+      return cannot_move("device_id " + std::to_string(sonar.device_id) + " would exceed 65535; give a smaller offset");
     sonar.device_id = static_cast<std::uint16_t>(id);
     if (&sonar == &config.sonars.front() && !first_too) continue;
     if (auto r = move_sonar(sonar, offset); !r) return r;

@@ -25,10 +25,10 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   if (!std::all_of(devices.begin(), devices.end(), [](const Device& d) { return d.sonar().settled(); })) return false;
   const Due due = next_due();
   const SteppedTime::Bound bound = time_.bound(is_first(due.request, due.ping) ? due.request : due.ping);
-  // A conversation comes before the ping that is due at the same moment.
+  // If a dialogue's tick and a ping are due at the same moment, the dialogue comes first.
   const bool converses = is_first(due.conversation, due.ping) || due.conversation == due.ping;
   const std::optional<Time> next = converses ? due.conversation : due.ping;
-  // A tick at this very moment needs no time to pass.
+  // A dialogue's tick that is due now may run although no time may pass.
   const bool may_come = next && (*next <= bound.last_tick || (converses && *next <= clock_.now()));
   if (!may_come && bound.then) advance(*bound.then);
   const bool answered = time_.answer(next);

@@ -104,7 +104,7 @@ std::string sentence_from(const std::string& words) {
   return in_quotes(key) + ": " + what;
 }
 
-/// False when the message names another one.
+/// Sets the name from the path; false if the message has another name.
 bool set_name(Message& message, const std::string& name) {
   const auto& of = *message.GetDescriptor();
   const auto* field = of.FindFieldByName("sonar") != nullptr ? of.FindFieldByName("sonar") : of.FindFieldByName("object");
@@ -122,7 +122,7 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
   const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
   if (field == nullptr || field->containing_oneof() == nullptr) return refused("unknown request");
   if (json.size() > largest_json) return refused("longer than 1 MiB");
-  // For the reader this is the end, for protobuf there is more to read.
+  // The strict reader would stop at a zero byte, protobuf's reader would go on.
   if (const auto zero = json.find('\0'); zero != std::string_view::npos)
     return refused("not JSON: a zero byte at character " + std::to_string(zero + 1));
   StrictReader reader;

@@ -248,7 +248,8 @@ void MavlinkPoses::handle(const GpsGlobalOrigin& m, Moment at) {
   local_in_world_ = *place;
 }
 
-/// ArduSub's altitude there is above the surface; others send that above the sea or the home. It has no stamp.
+/// In VFR_HUD ArduSub sends its altitude relative to the surface; other vehicles send that above mean sea level or home. The
+/// message has no stamp.
 void MavlinkPoses::handle(const VfrHud& m, Moment at) {
   const double altitude_m = static_cast<double>(m.altitude_m);
   if (!is_submarine_ || receives(GlobalPositionInt::id, at.now) || !(std::abs(altitude_m) <= highest_hud_m)) return;
@@ -336,9 +337,8 @@ void MavlinkPoses::add_pose(Source source, const RawPose& raw, Stamp stamp, cons
   at.out.poses.push_back({*std::move(pose), "system " + std::to_string(*system_) + " " + std::string(name_of(source))});
 }
 
-/// The stamp is UNIX time or time since boot, both of the sender's own clock. Without a stamp, or with an absurd one, it is the
-/// moment
-// of arrival.
+/// The stamp is UNIX time or time since boot, both of the sender's own clock. If there is none, or an absurd one, the pose gets
+/// the time of its arrival.
 Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
   if (time_us == 0 || time_us > control::largest_stamp_ns / 1000) return {};
   const auto ns = static_cast<std::int64_t>(time_us * 1000);

@@ -32,7 +32,8 @@ Shot shot_of(const Ping& ping, const Settings& settings, const protocol::DeviceS
   shot.sequence = static_cast<std::uint32_t>(ping.request.number);
   shot.speed_of_sound_mps = s.device_sound_speed_mps;
   shot.range_m = static_cast<float>(s.range_m);
-  shot.frequency = static_cast<std::uint32_t>(mode.rate_hz);  // unknown: called a frequency, a real unit sends its rate
+  // unknown: the field is named frequency, but a real unit sends its rate in it
+  shot.frequency = static_cast<std::uint32_t>(mode.rate_hz);
   shot.width = columns;
   shot.height = rows;
   shot.horizontal_deg = static_cast<float>(mode.horizontal_deg);

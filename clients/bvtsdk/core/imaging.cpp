@@ -56,12 +56,12 @@ int rows_by_resolution(const Extent& extent, const ImageSettings& settings, doub
   return std::max(1, to_int(std::min(std::round(rows), std::floor(polite))));
 }
 
-/// Verified, by a public table of the range and bearing of every pixel of one image (SDK 3.x, 45 degree head, 2 to 15 m asked
-/// for, 394 x 480): x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m. So the image ends 70 rows before the sonar, and
-/// places are whole pixels from the origin. Inferred: it ends at the nearest corners of the sector, start cos(half of it)
-/// ahead, and begins at the stop range; its sides are the sector's widest points. Unknown: sector and stop range of that ping.
-/// 70 rows and 197 columns both follow from 20.9 to 21 degrees to each side and 14.54 m when the rows below the image are cut to
-/// whole ones, and from no sector when they are rounded.
+/// Verified, by a public table of the range and bearing of every pixel of one image (SDK 3.x, 45 degree head, 2 to 15 m
+/// requested, 394 x 480): x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m. So the image ends 70 rows before the sonar, and
+/// pixels are whole numbers of pixels from the origin. Inferred: the image ends at the nearest corners of the sector, start
+/// cos(half of it) ahead, and begins at the stop range; its sides touch the widest points of the sector. Unknown: sector and stop
+/// range of that ping. 20.9 to 21 degrees to each side and 14.54 m give 70 rows and 197 columns if the number of rows below the
+/// image is rounded down. If it is rounded to nearest, no sector gives both.
 void plan_xy(const Extent& extent, const ImageSettings& settings, ImageGeometry& g) {
   const double half_deg = std::max(std::abs(static_cast<double>(g.fov_min_deg)), std::abs(static_cast<double>(g.fov_max_deg)));
   const double half_rad = std::min(half_deg, 90.0) / degrees;

@@ -37,8 +37,8 @@ class Source {
   virtual int set(int /*head*/, RangeLimits&) { return success; }
   virtual int get(int /*head*/, RangeLimits&) { return success; }
 
-  /// n < 0: the next one. Live: always a new one, regardless of n; `patience` on top of the sonar's own time.
-  /// `settings`: the head's, which become those the ping was recorded with.
+  /// A recording gives ping n, or the next one if n < 0. A live sonar makes a new ping for every n; the call waits `patience`
+  /// longer than the sonar needs. `settings`: in, those of the head; out, those that the ping was recorded with.
   virtual int get_ping(int /*head*/, int /*n*/, std::chrono::milliseconds /*patience*/, PolarPing&,
                        HeadDescription& /*settings*/) {
     return not_implemented;

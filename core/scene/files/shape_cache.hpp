@@ -21,10 +21,10 @@ struct Shape {
 
 class ShapeCache {
  public:
-  // Limits for shapes that were not among the last used.
+  // Shapes of the last `always_kept` calls of shape() are never removed; older ones are, while there are too many triangles.
   static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;
 
-  /// The shape of that key, made with make() when it is not known. A shape without a mesh is not kept.
+  /// Returns the shape of that key; calls make() if the cache does not have it. A shape without a mesh is made again each time.
   template <class Make>
   Shape shape(const std::string& key, const Make& make) {
     Kept& kept = shapes_[key];

@@ -131,7 +131,7 @@ class Edges {
   std::unordered_map<std::uint64_t, Triangles> sharing_;
 };
 
-/// Whether the face is a facet of something curved: its neighbours go on at a slight angle.
+/// Whether the face is a facet of a curved surface: much of its border meets neighbours at a slight angle.
 bool curves_on(const Mesh& mesh, const Edges& edges, const Candidate& c) {
   const double gentle_bend = std::cos(smooth_edge_rad);
   double border_m = 0, gentle_m = 0;

@@ -11,7 +11,7 @@ namespace sonar {
 /// number, settings and sonar_id are the caller's.
 PingRequest ping_request(const Config& config, const World& world, std::size_t vehicle, const Pose& mount, Time at);
 
-/// As the sonar's own packets describe it, powered up at `now`; without settings.
+/// The state that the sonar's messages report after power-up at `now`. Its settings are not set.
 protocol::DeviceState device_state(const SonarConfig& sonar, const Config& config, Time now);
 
 }  // namespace sonar

@@ -98,7 +98,7 @@ void Viewer::on_word(const foxglove::GetParameters& word, Moment) {
   say(foxglove::parameter_values(host_.parameters(*this, word.names), word.request));
 }
 
-/// Answered with the values that hold afterwards.
+/// The answer has the values that are in force afterwards.
 void Viewer::on_word(const foxglove::SetParameters& word, Moment now) {
   std::vector<std::string> names;
   for (const foxglove::Parameter& wanted : word.parameters) {
@@ -218,7 +218,7 @@ void Viewer::on_parameters(std::span<const foxglove::Parameter> changed) {
 
 // ---- to the socket
 
-/// The one that has waited longest since its last message.
+/// The waiting slot whose last message was sent longest ago.
 Viewer::Slot* Viewer::next_slot(bool last_values, Moment now, std::uint32_t& subscription) {
   Slot* best = nullptr;
   for (auto& [id, slot] : slots_) {

@@ -11,9 +11,9 @@ namespace sonar {
 
 inline OperationResult refused(std::string text) { return {OperationResult::Code::refused, std::move(text)}; }
 inline OperationResult failed(std::string text) { return {OperationResult::Code::failed, std::move(text)}; }
-/// Empty = done.
+/// `why` is empty if the operation was done.
 inline OperationResult done_or_refused(std::string why) { return why.empty() ? OperationResult{} : refused(std::move(why)); }
-/// Mistakes in the request are refused; all else has failed.
+/// A mistake in the request is a refusal; any other error is a failure.
 inline OperationResult result_of(const Error& error) {
   const bool is_request_wrong = error.kind == ErrorKind::usage || error.kind == ErrorKind::config;
   return is_request_wrong ? refused(error.text) : failed(error.text);

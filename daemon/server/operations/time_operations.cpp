@@ -14,7 +14,10 @@ void TimeOperations::take(const control::PoseSample& sample, const Sender& sende
   std::string refusal = poses_.take(sample, sender);
   if (!refusal.empty()) return done(refused(std::move(refusal)));
   if (sample.of != control::PoseSample::Of::vehicle || !time_.follows_poses()) return done({});
-  if (time_.is_full()) return done(failed("the pose counts, but too many wait for their pings already to wait for these"));
+  if (time_.is_full())
+    return done(
+        failed("the pose was accepted, but too many earlier poses wait for their pings; this answer is "
+               "sent before the pose's own pings"));
   time_.wait([done = std::move(done)](Time) { done({}); });
 }
 

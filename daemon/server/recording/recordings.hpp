@@ -29,7 +29,7 @@ class Recordings {
  public:
   static constexpr std::size_t most_at_once = 4, most_remembered = 8;
   static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // limit for all recordings together
-  /// Called once, when it was begun or has ended, before this returns or later; never after finish().
+  /// Called once, when the recording was begun or has ended; perhaps before start() or stop() returns, never after finish().
   using Done = std::function<void(const Result<void>&)>;
 
   /// `on_change` is called when a recording has ended.
@@ -41,27 +41,27 @@ class Recordings {
 
   /// Names the newest files that are in the folder already, as recordings that have ended.
   void find_earlier();
-  /// `who` asks, for the log. usage: the name, or that nothing may be recorded; io, unavailable.
+  /// `who`: the requester's name for the log. Errors: usage (a bad file name, or recording is not configured), io, unavailable.
   void start(const control::StartRecording& asked, RecordedSonar sonar, const std::string& who, Done done);
-  /// An empty name = all that there are.
+  /// An empty name stops all recordings.
   void stop(const control::StopRecording& asked, Done done);
-  /// The sonar stops: nothing more will come of it.
+  /// Ends the recordings of a sonar that stops.
   void end_of(const std::string& sonar, const std::string& why);
-  /// The daemon stops: files are finished, no callback is called.
+  /// Finishes all files when the daemon stops; no callback is called.
   void finish();
 
   bool takes(const std::string& sonar) const;
-  /// Whether first hits of beams are wanted: they are kept in MCAP only.
+  /// Whether a recording wants the first hits of beams; only MCAP files hold them.
   bool wants_truth(const std::string& sonar) const;
   bool wants_labels(const std::string& sonar) const;
   void take(const std::string& sonar, RecordedPing ping);
 
-  /// An entry of the journal of faults, in JSON; kept in MCAP only.
+  /// Writes an entry of the journal of faults, in JSON, into MCAP files.
   void take_fault(const std::string& sonar, Time at, const std::string& json);
 
   /// Call it before anything is recorded, and whenever another scene is used.
   void use_scene(const Scene& scene);
-  /// Names of the scene that pings are made in from now on.
+  /// Names of the objects of the scene in which pings are made from now on.
   const std::shared_ptr<const SceneNames>& names() const { return names_; }
 
   /// Recordings that run, and the last ones that have ended, oldest first.
@@ -70,7 +70,7 @@ class Recordings {
   bool idle() const { return running() == 0; }
 
  private:
-  struct Work {  // the thread's
+  struct Work {  // used by the writer thread only
     std::unique_ptr<RecordingFile> file;
     bool failed = false;
   };
@@ -84,10 +84,10 @@ class Recordings {
   template <class Job, class After>
   void on_thread(const std::shared_ptr<Work>& work, Job job, After after);
   std::size_t running() const;
-  /// Whether this recording may let so many bytes more wait; the one that lets most wait ends when there is no room.
+  /// Whether `bytes` more of this recording may wait. If there is no room, the recording with most waiting bytes is ended.
   bool has_room_for(const Pointer& recording, std::size_t bytes);
   Result<Pointer> begin(const control::StartRecording& asked, const RecordedSonar& sonar);
-  /// `job` writes so many bytes, now or when the thread comes to it.
+  /// Queues `job`, which writes `bytes` bytes, for the writer thread.
   template <class Job>
   void write(const Pointer& recording, std::size_t bytes, Job job);
   void end(const Pointer& recording, const std::string& why);

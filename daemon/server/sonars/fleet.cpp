@@ -56,7 +56,7 @@ std::string Fleet::problem() const {
   return {};
 }
 
-/// The sonar's position in the configuration. If a sonar that continues, or one to be opened, has that index: the first free one.
+/// The sonar's position in the configuration, or the first free index if a sonar that continues or will be opened has that one.
 std::uint32_t Fleet::free_index(std::size_t wanted, const std::vector<Opening>& given) const {
   const auto taken = [&](std::uint32_t index) {
     return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) { return d.sonar().index() == index; }) ||

@@ -3,10 +3,11 @@
 
 namespace sonar {
 
-/// Opens the null device for each of the descriptors 0 to 2 that is closed: else the next socket would get its number, and log
-/// lines would end in a client's stream.
+/// Opens the null device for each of the descriptors 0 to 2 that is closed. Otherwise the next socket would get its number, and
+/// log lines would get into a client's stream.
 void open_closed_standard_streams();
-/// Standard error is blocked at the moment: a full pipe, a stopped terminal. A closed pipe takes, and loses.
+/// Whether a write to standard error would block now, because a pipe is full or a terminal is stopped. Writes to a closed pipe do
+/// not block; they are lost.
 bool standard_error_is_blocked();
 
 }  // namespace sonar

@@ -220,16 +220,18 @@ TEST(CommandLine, WhatAnOffsetCannotMoveIsSaid) {
     const auto config = moved({"run", "x.yaml", "--offset", offset}, bind_ip, poses);
     return config ? std::string("moved") : config.error().text;
   };
-  EXPECT_THAT(why("1", "192.168.2.42", "{}"),
-              ::testing::StartsWith("--offset: moves sonars on 127.x.x.x, and sonar \"a\" has 192.168.2.42: give it"));
-  EXPECT_THAT(why("9", "127.0.250.2", "{}"), ::testing::HasSubstr("there is no room for 127.0.250.2"));
-  EXPECT_THAT(why("9", "127.0.0.2", "{json: '127.0.0.1:65500'}"), ::testing::HasSubstr("no port that far above 127.0.0.1:65500"));
+  EXPECT_THAT(
+      why("1", "192.168.2.42", "{}"),
+      ::testing::StartsWith("--offset: only sonars on 127.x.x.x can be moved, and sonar \"a\" has 192.168.2.42: give it"));
+  EXPECT_THAT(why("9", "127.0.250.2", "{}"), ::testing::HasSubstr("the third number of 127.0.250.2 would exceed 255"));
+  EXPECT_THAT(why("9", "127.0.0.2", "{json: '127.0.0.1:65500'}"),
+              ::testing::HasSubstr("the port of 127.0.0.1:65500 would exceed 65535"));
   EXPECT_EQ(why("9", "127.0.0.2", "{json: '127.0.0.1:0'}"), "moved");
   // Addresses that would coincide with one of the daemon without an offset.
   const auto links = [](const std::string& more) { return "{mavlink: [{endpoint: 'udpin:127.0.0.1:14550'}" + more + "]}"; };
   EXPECT_EQ(
       why("22", "127.0.0.2", links("")),
-      "--offset: poses.mavlink would be at 127.0.0.1:14770, where poses.protobuf is without an offset; give another number");
+      "--offset: poses.mavlink would be at 127.0.0.1:14770, where poses.protobuf is without an offset; give another offset");
   EXPECT_EQ(why("21", "127.0.0.2", links("")), "moved");
   EXPECT_THAT(why("1", "127.0.0.2", links(", {endpoint: 'udpin:127.0.0.1:14560'}")),
               ::testing::HasSubstr("127.0.0.1:14560, where poses.mavlink is"));
