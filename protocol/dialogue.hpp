@@ -91,8 +91,8 @@ class Dialogue {
   virtual Time next_tick() const = 0;
   /// Time of the next ping that on_tick() will request by itself. Stepped time advances to it, but not for keep-alives alone.
   virtual std::optional<Time> next_ping_request() const { return std::nullopt; }
-  /// A client that is silent for longer has gone. Counted in wall time, because clients run in wall time even where that of
-  /// on_bytes() and on_tick() is simulated. Nothing: it may be silent.
+  /// A client that sends nothing for longer is disconnected. Counted in wall time, because clients run in wall time even if the
+  /// time of on_bytes() and on_tick() is simulated. nullopt: no limit.
   virtual std::optional<std::chrono::milliseconds> longest_silence() const { return std::nullopt; }
   /// Whether known hosts send nothing while they get pings. Then, with longest_silence() and datagrams, an answer of the host's
   /// computer counts as a message of the host.

@@ -26,12 +26,12 @@ struct Port {
   bool on_change = false;               // a beacon is also sent at once when a client comes or goes
   Endpoint group{};                     // receiver of a udp_stream until SetReceivers, often a multicast group; port 0 = none
   bool any_group = false;               // receivers of a udp_stream may be multicast groups that the configuration does not name
-  /// Of a udp_stream: least time between two datagrams of a ping. Of a tcp_stream: pause between the parts of a ping that
-  /// Vendor::datagrams gives and Vendor::frame holds one behind the other.
+  /// udp_stream: least time between two datagrams of a ping. tcp_stream: pause between the parts of a ping, which
+  /// Vendor::datagrams returns singly and Vendor::frame joined.
   std::chrono::nanoseconds gap{0};
 };
 
-/// Where a driver meets a sonar.
+/// An address at which a driver connects to a sonar.
 struct DriverAddress {
   std::string_view protocol;  // "tcp", "udp", "http", "multicast", "status": status messages, by UDP
   Endpoint at;

@@ -75,7 +75,7 @@ class Vendor {
   /// The gain as SettingsOverride::gain_percent has it: 0 to 100 of what a client can turn it.
   virtual double gain_percent(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const = 0;
-  /// The settings to which the device itself changes once it has that ping, such as an automatic range. Nothing: they stay.
+  /// The settings to which the device itself changes once it has that ping, such as an automatic range. nullopt: they stay.
   virtual std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const {
     static_cast<void>(ping), static_cast<void>(device);
     return std::nullopt;
@@ -118,7 +118,7 @@ class Vendor {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};
   }
-  /// Where a message has this field; of an empty `message`: as in the vendor's layout with the most fields. Nothing: there is no
+  /// Where a message has this field; of an empty `message`: as in the vendor's layout with the most fields. nullopt: there is no
   /// such field, or the message is too short.
   virtual std::optional<Field> field(Part part, FieldName name, BytesView message) const {
     static_cast<void>(part), static_cast<void>(name), static_cast<void>(message);
@@ -133,7 +133,7 @@ class Vendor {
   }
   /// Corrects the checksums of a ping whose fields were changed; it has the size of `before`.
   virtual void reseal(BytesView before, Bytes& message) const { static_cast<void>(before), static_cast<void>(message); }
-  /// {offset, size} of a region. Nothing: the vendor has no such region, or the ping is too short. Of an empty `ping`: {0, 0}
+  /// {offset, size} of a region. nullopt: the vendor has no such region, or the ping is too short. Of an empty `ping`: {0, 0}
   /// when the vendor has such a region.
   virtual std::optional<std::pair<std::size_t, std::size_t>> region(Region region, BytesView ping) const {
     static_cast<void>(region), static_cast<void>(ping);

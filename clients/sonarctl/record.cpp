@@ -158,7 +158,7 @@ void report(const RecordFiles& files, double seconds) {
               files.sizes().c_str());
 }
 
-/// Receives the status datagrams of a make that has them. Nothing when that fails, with a note.
+/// Opens the socket for the status datagrams of a make that has them. nullopt, with a note, if that fails.
 std::optional<Socket> listen_to_status(const RecordOptions& options, const Make& make) {
   const protocol::Port* const beacon = make.device->port(protocol::Port::Kind::udp_beacon);
   if (!options.status || beacon == nullptr || (options.pcap.empty() && options.mcap.empty())) return std::nullopt;

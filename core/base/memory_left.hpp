@@ -12,7 +12,7 @@
 namespace sonar {
 
 /// The least of /proc/meminfo (available and swap) and every control group above us, version 2 or 1, less what is used of it;
-/// file cache that can be given back counts as free. Nothing when none of them is known.
+/// file cache that can be given back counts as free. nullopt if none of them is known.
 std::optional<std::uint64_t> memory_left_bytes();
 
 /// Refused, as unavailable, when `what` needs more than is left, a tenth of it kept back. `bytes` is an estimate of its peak.

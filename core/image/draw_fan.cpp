@@ -10,7 +10,7 @@
 namespace sonar {
 namespace {
 
-/// The fractional position in the beam table; beam k spans [k - 0.5, k + 0.5]. Nothing outside the fan; a full turn has no
+/// The fractional position in the beam table; beam k spans [k - 0.5, k + 0.5]. nullopt outside the fan; a full turn has no
 /// outside.
 std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azimuth) {
   const auto next = std::lower_bound(azimuth_rad.begin(), azimuth_rad.end(), azimuth, std::greater<>());

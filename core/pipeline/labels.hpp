@@ -80,7 +80,7 @@ class LabelWork {
   };
   std::vector<Group> groups_;
   std::vector<std::vector<Gap>> gaps_;          // by column
-  std::vector<std::uint16_t> dark_;             // [columns][rows]: instance that casts a shadow where nothing is heard
+  std::vector<std::uint16_t> dark_;             // [columns][rows]: instance that casts a shadow where no echo is received
   std::vector<float> nothing_;                  // a depth map in which nothing was hit
   std::vector<float> from_points_;              // [rows][beams] of echoes without surface, in main lobes; empty without any
   std::vector<double> noise_far_, noise_near_;  // by beam [uPa^2]

@@ -19,7 +19,7 @@ double pattern(double angle_rad, double width_rad) {
   return std::abs(x) > reach ? 0 : std::exp(-4 * std::log(2.0) * x * x);
 }
 
-/// Power by range cell of one beam; sums of even spreads are kept as steps until finish(). As heard it has its speckle.
+/// Power of one beam by range cell. Even spreads are kept as steps until finish(). As received, it has speckle.
 class Profile {
  public:
   Profile(double cell_m, std::size_t cells, bool as_heard)

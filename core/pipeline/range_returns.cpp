@@ -15,7 +15,7 @@ constexpr double speckle_cell_m = 0.02;  // surfaces keep their speckle as long 
 constexpr std::uint32_t draws = 4096;    // number of draws, which the range cells of all returns share
 constexpr double least_blur = 0.5;       // least blur as a share of a range cell: half the length of the shortest echo
 
-// Rays round the middle of a cell: what the middle ray passes by is heard by the share of the cell that it fills.
+// Rays around the middle of a cell. An object that the middle ray misses counts by the share of the cell that it fills.
 constexpr int rays_across = 2, rays_up = 2, rays_around = rays_across * rays_up;
 constexpr int cells_a_packet = RayPacket::size / rays_around;
 // Things that fill less than this of the rays in a cell and its eight neighbours are thin. They are followed from cell to cell,

@@ -16,7 +16,7 @@
 
 namespace sonar {
 
-/// An echo that a beam hears from one direction, spread evenly over range_m -+ half_m in the device's metres.
+/// An echo that a beam receives from one direction, spread evenly over range_m -+ half_m in the device's metres.
 struct RangeReturn {
   double range_m = 0, half_m = 0, power = 0;  // power [uPa^2] in a beam that looks there; 0 = nothing
   ComplexNormal speckle{1, 0};

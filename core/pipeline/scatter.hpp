@@ -27,8 +27,8 @@ struct PreparedTile {
 /// The scattering law of every material of the scene, at this ping's frequency.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& scalars);
 
-/// Which way the normals of an object point that are turned away from a sonar at `sonar_m` [m], world, and hidden by the object
-/// itself: of closed meshes seen from outside, 1 or -1; else 0. Per object, as `skins` are.
+/// For each object (as `skins`), the sign of the normals of surfaces that face away from a sonar at `sonar_m` [m, world] and are
+/// hidden by the object itself: 1 or -1 for a closed mesh seen from outside, else 0.
 std::vector<float> turned_away_of(const Scene& scene, std::span<const Skin> skins, std::span<const Pose> bodies_in_world,
                                   Vec3d sonar_m);
 
@@ -52,7 +52,7 @@ std::size_t scatter(const std::vector<PreparedTile>& tiles, std::span<const std:
 void scatter_hits(const PingContext& context, std::span<const FanHit> hits, Seed seed, Echoes& echoes);
 
 /// The echo of a place in the axes of PingScalars::seen_from whose backscattering amplitude is `strength_m` [m]: pressure at 1 m
-/// per pressure there, sqrt of the cross-section, with a phase if it has one. Nothing when that place lies outside the fan or the
+/// per pressure there, sqrt of the cross-section, with a phase if it has one. nullopt if that place lies outside the fan or the
 /// record; the caller tests occlusion.
 std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> strength_m, const PingPlan& plan,
                                     const PingScalars& scalars);

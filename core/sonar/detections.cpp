@@ -97,7 +97,7 @@ std::optional<double> azimuth_of_peak(const Fan& fan, const Levels& level, int r
     const double shift = top_of(level(row, beam - 1), here, level(row, beam + 1));
     return fan.azimuth(beam) + std::abs(shift) * (fan.azimuth(shift < 0 ? beam - 1 : beam + 1) - fan.azimuth(beam));
   }
-  // At an edge, of which one side is heard: by the fall of the main lobe, 12 dB (offset / width)^2.
+  // At an edge only one side has a beam: the offset follows from the fall of the main lobe, 12 dB (offset / width)^2.
   const int inner = beam == 0 ? 1 : beam - 1;
   const double u = std::sin(fan.azimuth(beam)), v = std::sin(fan.azimuth(inner));
   const double sine = (u + v) / 2 + (here - level(row, inner)) * fan.width_sine * fan.width_sine / (24 * (u - v));

@@ -108,7 +108,7 @@ struct VendorSettings {
 
 /// Angles that a sonar reports, where its sound speed is not the water's (docs/acoustics.md, section 6).
 enum class Bearings {
-  are_true,             // beams look where they are said to
+  are_true,             // beams point where the sonar reports them
   follow_device_speed,  // the beamformer's delays are those of the device's sound speed
 };
 inline constexpr std::array<std::string_view, 2> bearings_names = {"true", "device_sound_speed"};

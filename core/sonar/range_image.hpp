@@ -25,8 +25,8 @@ struct RangeImageSettings : VendorSettings {
   double range_sample_m = 0;         // ranges are whole multiples of it, 0 = any
   // The device's filters, in this order; the pixels round one are the eight beside it, as far as they are of its block of rows.
   int block_rows = 0;        // rows that are measured together; 0 = all
-  int least_confirming = 0;  // a return that fewer of the pixels round it confirm is none
-  double confirming_m = 0;   // by a range that is no farther from its own
+  int least_confirming = 0;  // a return is dropped if fewer of the pixels round it confirm it
+  double confirming_m = 0;   // a pixel confirms a return if its range differs by no more than this
   int median_passes = 0;     // each range becomes the median of its own and of those round it, so many times over
 };
 

@@ -41,7 +41,7 @@ struct SharedNoise {
   float level_db = -200;  // level of a channel, re the channel's own noise; below -150 = none
   int channels = 128;     // even
   int group = 32;         // so many neighbours share it, less towards both ends; even; the channels a multiple of its half
-  float sine = 0.56f;     // from where the beams hear it, far away: half a wavelength over the channels' spacing
+  float sine = 0.56f;     // of the direction it seems to come from, far away: half a wavelength over the channels' spacing
   float full_m = 0.25f;   // nearer, its power is proportional to the range
   float steady = 0;       // share of its power that is the same in every ping, of one phase, shared by all channels
   float focus_rows = 0;   // the array is focused that many rows behind a row's centre

@@ -9,8 +9,8 @@
 
 namespace sonar {
 
-/// While it lives it says every so often what the load is at: "loading the scene: reading wreck.ply, 45 %, 12 s". Nothing of a
-/// load that ends before, and nothing of small scenes.
+/// While it exists, it periodically reports the state of a load: "loading the scene: reading wreck.ply, 45 %, 12 s". It reports
+/// nothing if the load ends before the first report, or the scene is small.
 class LoadProgress {
  public:
   using Say = std::function<void(const std::string& line)>;  // called on a thread of its own

@@ -14,7 +14,7 @@ struct Outcome {
   Json result = nullptr;
   std::string error = {};
 };
-/// Carries out a command; the settings that it changes. Nothing: there is no such command.
+/// Carries out a command; the settings that it changes. nullopt: there is no such command.
 std::optional<Outcome> carry_out(const std::string& command, const Json& parameters, const protocol::DeviceState& device,
                                  Time now, Settings& settings);
 protocol::Bytes response_line(const std::string& to, const Outcome& outcome);

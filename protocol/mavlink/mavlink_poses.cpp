@@ -25,7 +25,7 @@ bool contains_pose(std::uint32_t id) { return id != Heartbeat::id && id != Syste
 
 Stamp boot_stamp(std::int64_t at_ms) { return {ClockDomain::sim, at_ms * 1'000'000}; }
 
-/// A parameter of a command that is a count. Nothing: it is not a whole number, or it is too large.
+/// A parameter of a command that is a count. nullopt: it is not a whole number, or it is too large.
 std::optional<std::uint32_t> whole_number(float value) {
   if (!(value >= 0 && value <= 65535) || value != std::floor(value)) return std::nullopt;
   return static_cast<std::uint32_t>(value);

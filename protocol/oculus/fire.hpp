@@ -17,7 +17,7 @@ struct FireRequest {
   FireExtension extension;  // zero unless version 2
 };
 
-/// A whole message as framed. Nothing when it is too short to be a fire message; a missing tail of version 2 reads as 0.
+/// Parses a whole message. nullopt if it is too short to be a fire message; a missing tail of version 2 reads as 0.
 std::optional<FireRequest> parse_fire(wire::BytesView message);
 
 /// Exact bytes: 53 (versions 0, 1) or 89 (version 2 and above), payload size filled in unless `payload_size_zero`,

@@ -107,15 +107,15 @@ struct Frame {
 };
 
 /// Frames of a byte stream, however it is split. A payload stated to be longer than `longest` is no frame, and after a wrong sum
-/// the search goes on behind the start: at most one frame waits to be whole. Of a datagram nothing more comes: with
-/// `all_is_there` the search goes on behind the start of what is not whole. The work is in proportion to the bytes, whatever
-/// they are: each is summed once, and the sum of a frame is a difference.
+/// the search continues behind its start. So at most one incomplete frame waits. In a datagram (`all_is_there`) no more bytes
+/// come, so the search continues behind the start of an incomplete frame. The work is proportional to the number of bytes,
+/// whatever they are: each is summed once, and the sum of a frame is a difference of two sums.
 class Framer {
  public:
   explicit Framer(std::size_t longest = longest_request, bool all_is_there = false)
       : longest_(longest), all_is_there_(all_is_there) {}
   void append(BytesView received);
-  /// Nothing more comes.
+  /// Call it when no more bytes come.
   void end() { all_is_there_ = true; }
   std::optional<Frame> next();
   /// The bytes of the last frame whose sum is right, until append().

@@ -136,7 +136,7 @@ class Ping360Dialogue final : public Conversation {
     head_ = {head_.angle_at(now), head_.angle_at(now), now};
   }
 
-  /// After a ping: a scan goes on when its samples were taken and sent, and the head has turned.
+  /// Call it after a ping. A scan continues when the samples were taken and sent, and the head has turned.
   void advance(Time now) {
     fired_.reset();
     if (task_ != Task::scan) {

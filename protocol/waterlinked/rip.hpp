@@ -17,7 +17,7 @@ inline constexpr std::size_t longest_rip = 65507;  // a packet is a datagram
 Bytes rip_packet(BytesView content, Rip version = Rip::two);
 /// The length that a packet states; 0: this is not the beginning of one.
 std::size_t rip_length(BytesView beginning);
-/// The content of a whole packet. Nothing: another length than it states, a wrong CRC, or a block that is not Snappy's.
+/// The content of a whole packet. nullopt: another length than it states, a wrong CRC, or a block that is not Snappy's.
 std::optional<Bytes> rip_content(BytesView packet);
 
 }  // namespace sonar::waterlinked

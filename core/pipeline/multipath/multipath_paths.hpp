@@ -12,9 +12,9 @@ namespace sonar {
 
 /// At most so many mirrors take part in a ping: the largest that can reflect.
 inline constexpr int most_mirrors = 16;
-/// A mirror that would reflect less than this (pressure, at the angle in question) is none.
+/// A mirror that reflects less than this (pressure, at the angle of incidence) is ignored.
 inline constexpr double least_reflectance = 0.05;
-/// Nearer to a mirror than this a place, or the sonar, lies in it.
+/// A point, or the sonar, nearer to a mirror than this lies in the mirror.
 inline constexpr double touching_m = 1e-3;
 
 /// A flat face as one ping meets it, in the axes of PingScalars::seen_from: dot(normal, p) + height_m = 0 on its plane.

@@ -22,9 +22,9 @@ std::vector<std::string> arguments_of(const ImportRequest& request);
 /// The request; nullopt if it is of another version.
 std::optional<ImportRequest> request_from(const std::vector<std::string>& arguments);
 
-/// False when the file does not take it all. Nothing reads as an answer before it is whole.
+/// False if the file cannot hold it all. read_answer() returns an answer only when it is complete.
 bool write_answer(int descriptor, const Result<LoadedMesh>& mesh);
-/// The same of an error, from a signal handler: no memory is taken.
+/// Writes an error. It allocates no memory, so a signal handler may call it.
 bool write_refusal(int descriptor, ErrorKind kind, std::string_view text);
 /// The answer; nullopt if it is not complete.
 std::optional<Result<LoadedMesh>> read_answer(int descriptor);

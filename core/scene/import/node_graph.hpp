@@ -23,7 +23,7 @@ class NodeGraph {
   void contains(std::size_t parent, std::size_t child) { nodes_[parent].children.push_back(child); }
 
   /// The fault of the graph, as a sentence that lacks the file's name: nodes within themselves, too deep, or too many of them
-  /// below the roots together. Nothing when all is well. Linear in its edges.
+  /// below the roots together. nullopt if there is no fault. Linear in its edges.
   std::optional<std::string> fault(const std::vector<std::size_t>& roots) const;
 
   /// The nodes below the roots and these themselves, each as often as it is shown. Of a graph without a fault.

@@ -17,7 +17,7 @@ namespace sonar::dataset {
 std::vector<std::uint64_t> pings_on_sheet(std::uint64_t pings);
 
 /// The fan, and beside it the same fan dimmed, with things in a colour of their class, shadows in blue, and a box around each
-/// thing. `annotations` as render::annotations_of(). Nothing of a ping of one beam. Needs the ping's labels.
+/// thing. `annotations` as render::annotations_of(). nullopt for a ping of one beam. Needs the ping's labels.
 Result<std::optional<Raster>> contact_cell(const Ping& ping, const Scene& scene, const nlohmann::json& annotations);
 
 /// `cells` must not be empty.

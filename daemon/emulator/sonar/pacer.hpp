@@ -24,7 +24,7 @@ struct SkippedTicks {
 
 class Pacer {
  public:
-  /// New settings. The grid goes on when period and trigger mode stay the same; otherwise it restarts at `now`, but not before
+  /// New settings. The grid continues if period and trigger mode stay the same; otherwise it restarts at `now`, but not before
   /// the sound of the last ping has come back, and not sooner after it than the shorter of both periods. A pending trigger is
   /// kept as long as pings are triggered.
   void configure(const PingSettings& settings, Time now);
@@ -38,7 +38,7 @@ class Pacer {
   /// When fire() wants to be called next; none in standby, when stopped or waiting for a trigger.
   std::optional<Time> next_tick() const;
   /// At or after next_tick(): true = ping now, stamped with last_tick(). `busy`: the previous ping is still being computed; its
-  /// ticks are skipped and counted, never queued (a trigger waits instead). After a late call the grid goes on in phase.
+  /// ticks are skipped and counted, never queued (a trigger waits instead). A late call does not shift the grid.
   bool fire(Time now, bool busy);
 
   Time last_tick() const { return last_tick_; }

@@ -146,7 +146,8 @@ Sonar::Answers Sonar::on_datagram(const protocol::Port& port, const protocol::En
 Sonar::HttpAnswer Sonar::on_http(const protocol::Port& port, const protocol::ResourceRequest& request, Time now) {
   HttpAnswer answer{{500, "internal fault\n", "text/plain"}, {}};
   try {
-    answer.reply = vendor_.on_http(port, request, state_, now);  // as the stamps of pings: no conversation goes on
+    // The time is that of the stamps of pings, because no conversation is open.
+    answer.reply = vendor_.on_http(port, request, state_, now);
     const Source from{nullptr, "http " + text::format_ipv4(request.from), request.from};
     for (const protocol::Event& event : answer.reply.events) on_event(from, event, now, answer.actions);
   } catch (const std::exception& e) {

@@ -13,7 +13,7 @@ class PlaybackWatch {
  public:
   PlaybackWatch(const motion::Playback& of, Time now);
 
-  /// The state, if it has changed by a step since the last look; a round of a loop is a seek. Nothing: it was played on as
+  /// The state, if it has changed by a step since the last look; a round of a loop is a seek. nullopt: it was played on as
   /// before. `of`: null = the vehicle follows its trajectory no longer, which is a pause.
   std::optional<foxglove::PlaybackState> look(const motion::Playback* of, Time now);
   foxglove::PlaybackState state(Time now) const;

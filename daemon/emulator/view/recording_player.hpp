@@ -20,7 +20,7 @@ class RecordingPlayer {
   /// `interval`: between pings of recordings that store no times.
   RecordingPlayer(recording::RecordedPings pings, Ns interval) : pings_(std::move(pings)), interval_(interval) {}
 
-  /// Reads one ping more to find the length; false: there is none, and the recording is at its front again.
+  /// Reads one ping more to find the recording's length. False: there are no more, and the recording is at its start again.
   bool measure();
   Time begin() const { return begin_.value_or(Time{}); }
   /// Time from the first ping to the last.

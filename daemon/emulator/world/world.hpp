@@ -106,11 +106,11 @@ class World {
   std::vector<Stale> newly_stale(Time now);
 
   // When the rules follow the vehicles' stamps.
-  /// Time may pass as far as this: the least of the newest stamps, of the vehicles that are not left behind by more than
-  /// stale_after. Nothing before the first pose.
+  /// Time may advance to this: the smallest of the vehicles' newest stamps, without vehicles that lag by more than stale_after.
+  /// nullopt before the first pose.
   std::optional<Time> followed_until() const;
   /// How far the stamps have jumped ahead since the last call, at the first pose for example. Orbits and
-  /// trajectories stand where they stood.
+  /// trajectories do not advance by it.
   std::chrono::nanoseconds take_skipped();
 
   std::string_view source_of(std::size_t vehicle) const { return vehicles_[vehicle].source; }

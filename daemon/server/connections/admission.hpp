@@ -34,14 +34,15 @@ class Admission {
 
   enum class Purpose { client, control };
 
-  /// For a socket just accepted. An empty slot: it must be closed; the log has a line, once for each spell of it.
+  /// Gives a slot to a socket that was just accepted. If the slot is empty, close the socket; the first refusal of a series is
+  /// logged.
   Place enter(const tcp::socket& socket);
   /// Whether a socket of another kind has one of the descriptors for drivers, or one beyond. A connection of the same listener
   /// must then be closed for it.
   bool is_drivers(const tcp::socket& socket) const;
-  /// The next visitor of a listener, whatever its descriptor. Nothing: the listener is closed.
+  /// Accepts the next connection of a listener, whatever its descriptor. nullopt: the listener is closed.
   asio::awaitable<std::optional<tcp::socket>> accept(tcp::acceptor& acceptor);
-  /// The next one of a listener without places of ours, whose descriptor is none of the spare ones. Nothing: likewise.
+  /// Accepts the next connection of a listener without slots here, with a descriptor outside the reserve. nullopt: as accept().
   asio::awaitable<std::optional<tcp::socket>> next_visitor(tcp::acceptor& acceptor, Purpose purpose);
 
   /// Connected now: clients, waiting ones and those being refused.

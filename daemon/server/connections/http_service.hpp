@@ -26,7 +26,7 @@ struct HttpStream {
 class HttpTakeover {
  public:
   virtual ~HttpTakeover() = default;
-  /// The answer to the request. False: nothing goes on.
+  /// Sends the answer to the request. False: close the connection.
   virtual asio::awaitable<bool> begin() = 0;
   // Both until the socket closes.
   virtual asio::awaitable<void> read() = 0;

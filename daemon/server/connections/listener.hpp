@@ -23,7 +23,7 @@ class Listener {
 
   /// Port 0: the system chooses one. After an error it does not listen.
   Result<void> open(Endpoint at);
-  /// `take` gets each connection, `fault` what an exception said. Does nothing when it does not listen. It must live for
+  /// `take` gets each connection, `fault` the text of an exception. Does nothing when it does not listen. It must live for
   /// 100 ms after stop(): Admission may pause before it looks again.
   void start(Take take, Fault fault);
   void stop();

@@ -26,7 +26,7 @@ class WorkRate {
   /// Upper limit of a pause, however much work an address has caused: /healthz answers within it.
   static constexpr std::chrono::seconds longest_pause{1};
 
-  /// Work was done for, or has come from, the address; 0 = go on. `per_s` as it is now.
+  /// Counts work done for, or received from, the address. Returns how long it must wait, perhaps 0. `per_s`: the present limit.
   Steady::duration pause_after(const std::string& address, std::size_t amount, std::size_t per_s, Steady::time_point now) {
     if (!addresses_.contains(address) && addresses_.size() >= most_addresses) forget_one();
     auto& [rate, used_at] = addresses_.try_emplace(address, InputRate(per_s), now).first->second;

@@ -16,7 +16,7 @@ namespace sonar {
 
 class Beacon {
  public:
-  /// `make` returns the datagrams as of now, in order, or none; `fault` gets what an exception said. `log` outlives the beacon.
+  /// `make` returns the present datagrams, in order, or none; `fault` gets the text of an exception. `log` outlives the beacon.
   Beacon(asio::io_context& io, Log& log, std::string sonar, std::function<std::vector<protocol::Bytes>()> make,
          std::function<void(const std::string&)> fault)
       : log_(log), sonar_(std::move(sonar)), make_(std::move(make)), fault_(std::move(fault)), socket_(io), timer_(io) {}

@@ -23,11 +23,11 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   void finish(std::string why, bool by_host = false);
   /// An empty datagram.
   void send_nothing_to(const Endpoint& to);
-  /// A request of the host came, or a sign of it: it has not gone.
+  /// Call it when a request of the host arrived, or another sign that the host is alive.
   void heard() {
     heard_at_ = std::chrono::steady_clock::now();
     looked_ = false;
-    wake_.cancel();  // what it said may limit how long it may be silent
+    wake_.cancel();  // the request may have set another limit of silence
   }
   ConnectionId id() const { return id_; }
 

@@ -35,7 +35,7 @@ class SessionParent {
   virtual void on_written(ConnectionId to, const Outbox::Message& message) = 0;
   /// The message of a stream that was taken last had no receiver left.
   virtual void on_not_sent(ConnectionId stream) = 0;
-  /// A peer that is silent for longer has gone. Nothing: it may be silent.
+  /// A peer that sends nothing for longer is disconnected. nullopt: no limit.
   virtual std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const = 0;
   /// The host of a stream has been silent for half of that: it may be asked for a sign.
   virtual void look_for_host(ConnectionId stream) = 0;

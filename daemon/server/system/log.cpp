@@ -84,7 +84,7 @@ void Log::announce(std::string_view lines) {
   while (!lines.empty()) {
     const std::string_view line = lines.substr(0, lines.find('\n'));
     lines.remove_prefix(std::min(lines.size(), line.size() + 1));
-    const std::size_t first = line.find_first_not_of(' ');  // lines that go on are indented
+    const std::size_t first = line.find_first_not_of(' ');  // continuation lines are indented
     if (first != std::string_view::npos) emit(LogLevel::info, line.substr(first), {});
   }
 }

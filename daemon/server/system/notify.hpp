@@ -20,7 +20,7 @@ struct NotifyTarget {
   std::string socket;                     // a path, or @name in the abstract namespace; empty = no service manager
   std::chrono::microseconds watchdog{0};  // 0 = none
 };
-/// Read from NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID; a watchdog meant for another process is none.
+/// Read from NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID; a watchdog that is meant for another process is ignored.
 NotifyTarget notify_target_from_environment();
 
 class Notify {

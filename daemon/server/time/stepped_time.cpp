@@ -18,7 +18,7 @@ Time SteppedTime::tick_at(Time due) const {
   if (mode_ != ClockMode::follow || !now.then) return due;  // before the first pose there is no lead
   const bool is_waited_for =
       std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return w.until.last_tick >= due; });
-  // A ping that no request waits for lags at most most_lead behind the stamps; then time goes on and ticks are skipped.
+  // A ping that no request waits for lags at most most_lead behind the stamps; then time advances and ticks are skipped.
   return is_waited_for ? due : std::max(due, now.last_tick - most_lead);
 }
 

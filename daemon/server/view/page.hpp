@@ -16,7 +16,7 @@ struct PageRequest {
   std::string_view accept, accept_encoding, if_none_match;
 };
 
-/// Answers GET and HEAD. Nothing when the path is not of the page, or is "/" and `accept` does not name text/html: then the help
+/// Answers GET and HEAD. nullopt if the path is not of the page, or is "/" and `accept` does not name text/html: then the help
 /// text answers. 304 for the version that the client has, 406 for clients without gzip.
 std::optional<HttpAnswer> page_answer(const PageRequest& request, std::span<const PageFile> files = page_files());
 
