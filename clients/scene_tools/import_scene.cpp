@@ -107,7 +107,7 @@ Result<void> write_file(const fs::path& path, const std::string& text) {
 Result<Imported> import_scene(const ImportOptions& options) {
   std::error_code error;
   if (!options.overwrite && fs::exists(options.out, error))
-    return failure(ErrorKind::usage, options.out.string() + ": is there already; --overwrite replaces it");
+    return failure(ErrorKind::usage, options.out.string() + ": exists already; --overwrite replaces it");
   const Result<std::string> text = read_text(options.file);
   if (!text) return tl::make_unexpected(text.error());
   Findings findings;

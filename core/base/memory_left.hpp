@@ -15,7 +15,7 @@ namespace sonar {
 /// file cache that can be given back counts as free. nullopt if none of them is known.
 std::optional<std::uint64_t> memory_left_bytes();
 
-/// Refused, as unavailable, when `what` needs more than is left, a tenth of it kept back. `bytes` is an estimate of its peak.
+/// Error `unavailable` if `what` needs more than nine tenths of what is left. `bytes` is an estimate of its peak.
 Result<void> check_memory_for(const std::string& what, std::uint64_t bytes);
 
 /// If the system must end a process for want of memory, it ends this one.

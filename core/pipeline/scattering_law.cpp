@@ -23,7 +23,7 @@ double gsab(const GsabLaw& g, double cosine) {
 
 double lambert_mu(const Material& m) { return lambert_coefficient(static_cast<double>(m.lambert_db)); }
 
-/// Straight on, where every law is strongest.
+/// The strength at normal incidence, where every law is strongest.
 double strongest(const Material& m) { return m.law == ScatteringLaw::gsab ? gsab(m.gsab, 1) : lambert_mu(m); }
 
 /// 10^(trend decades / 10), decades from the reference frequency.

@@ -20,7 +20,7 @@ Pose read_world_pose(const text::Node& node);
 Pose read_mount(const text::Node& node);
 /// "127.0.0.1:14770"; the port may be left out unless it is needed.
 Endpoint read_endpoint(const text::Node& node, bool port_needed);
-/// `{lat, lon, alt}` of the world's origin; absent = nowhere.
+/// `{lat, lon, alt}` of the world's origin; nullopt if absent.
 std::optional<Geodetic> read_origin(const text::Node& node);
 /// One endpoint, or a list of links. `has_ranges`: poses.allow_from is given.
 std::vector<MavlinkConfig> read_mavlink(const text::Node& node, bool has_ranges, const std::vector<VehicleConfig>& vehicles);
@@ -32,10 +32,10 @@ ControlConfig read_control(const text::Node& node, const std::filesystem::path& 
 SceneFile read_scene_file(const text::Node& node, const std::filesystem::path& directory);
 /// `allow_hot` receives whether water of 30 C or more is accepted.
 Water read_water(const text::Node& node, bool* allow_hot = nullptr);
-/// The same rules for water from elsewhere: empty, or one sentence.
+/// Checks water that no file gave by the same rules: one sentence, or empty if it is valid.
 std::string why_no_water(const Water& water, bool allow_hot);
-/// Complete: defaults filled in. `others_too`: options that only other vendors have are checked and kept (products.hpp tells
-/// them).
+/// Complete: defaults are filled in. `others_too`: options that only other vendors have are checked and kept (products.hpp
+/// reports them).
 protocol::OptionValues read_options(const text::Node& node, const protocol::Vendor& vendor, bool others_too = false);
 EngineConfig read_engine(const text::Node& node);
 LimitConfig read_limits(const text::Node& node);

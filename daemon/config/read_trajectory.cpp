@@ -46,7 +46,7 @@ TrajectoryFiles::Named TrajectoryFiles::read(const Node& file, const motion::Rea
     if (k.path == path && k.options == options) return k.named;
   std::error_code ec;
   if (!std::filesystem::exists(path, ec) || std::filesystem::is_directory(path, ec)) {
-    // An empty folder is the working directory, which has no other name here. A path from the root was looked for nowhere else.
+    // An empty folder is the working directory, which has no other name here. For an absolute path no folder is named.
     const auto folder = std::filesystem::absolute(folder_.empty() ? "." : folder_, ec).lexically_normal();
     const bool is_whole = std::filesystem::path(name).is_absolute();
     file.fail("no such file: \"" + name + "\"" + (is_whole ? "" : "; looked in " + folder.string()));

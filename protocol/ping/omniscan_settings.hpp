@@ -22,16 +22,16 @@ struct HeldSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
   Settings settings;
 };
-/// The settings of a new device, for null.
+/// Null: the settings of a new device.
 Settings settings_from(const VendorSettings* held);
 
-/// Why the device refuses it; empty = it does not.
+/// Why the device refuses the parameters; empty if it accepts them.
 std::string complaint(const OsPingParams& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// 2198.
+/// Message 2198 of a ping.
 Bytes profile_of(const Ping& ping, const protocol::DeviceState& device);
 
 }  // namespace sonar::ping::omniscan

@@ -23,17 +23,17 @@ struct HeldSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
   Settings settings;
 };
-/// The settings of a new device, for null.
+/// Null: the settings of a new device.
 Settings settings_from(const VendorSettings* held);
 
-/// Why the device refuses it; empty = it does not.
+/// Why the device refuses the parameters; empty if it accepts them.
 std::string complaint(const PingParameters& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
 WaterStats water_stats(const protocol::DeviceState& device);
-/// In the order they are sent: 504, then as the settings want 3012 and 3011, and once a second 118.
+/// The frames in the order in which they are sent: 504, then 3012 and 3011 if the settings enable them, and once a second 118.
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device);
 
 }  // namespace sonar::ping::surveyor

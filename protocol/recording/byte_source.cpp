@@ -152,7 +152,7 @@ namespace {
 Result<std::unique_ptr<Sink>> sink_to(const std::filesystem::path& file, int more_flags) {
   const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | more_flags, 0666);
   const int error = errno;
-  if (fd < 0 && error == EEXIST) return failure(ErrorKind::io, file.string() + " is there already: give another name");
+  if (fd < 0 && error == EEXIST) return failure(ErrorKind::io, file.string() + " exists already: give another name");
   if (fd < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(error));
   return std::make_unique<FileSink>(file.string(), fd);
 }

@@ -53,7 +53,7 @@ class Export {
   Result<Exported> run() {
     std::error_code ec;
     if (std::filesystem::exists(folder_, ec))
-      return failure(ErrorKind::usage, folder_.string() + " is there already; remove it to export again");
+      return failure(ErrorKind::usage, folder_.string() + " exists already; remove it to export again");
     if (const auto done = find_splits(); !done) return tl::make_unexpected(done.error());
     std::filesystem::remove_all(unfinished_, ec);
     for (const auto step : {&Export::make_folders, &Export::unpack, &Export::write_annotations, &Export::write_card})

@@ -19,11 +19,11 @@ struct ReplayOptions {
   Endpoint at{{127, 0, 0, 2}, 0};   // port 0: any
   std::vector<Endpoint> status_to;  // empty = the broadcast address of `at`'s network, the device's port
   double speed = 1;                 // multiple of the recorded pace
-  bool stepped = false;             // no pace: the next message when the client has taken the last
-  bool loop = false;                // from the front again and again
-  double rate_hz = 10;              // messages a second of recordings that know no times
+  bool stepped = false;             // without a pace: sends a message when the client has read the previous one
+  bool loop = false;                // repeats the recording
+  double rate_hz = 10;              // messages a second of recordings without times
   bool handle_signals = false;
-  std::function<void()> on_end = {};  // nothing of the server keeps io.run() going any more
+  std::function<void()> on_end = {};  // called when the server has no more work on io
 };
 
 class ReplayServer {
@@ -32,14 +32,14 @@ class ReplayServer {
     std::uint64_t clients = 0, refused = 0, messages = 0, bytes = 0, times_through = 0, client_bytes = 0;
   };
 
-  /// The recording has been rewound. All must outlive io.run().
+  /// `reader` must be at its start. All arguments must outlive io.run().
   ReplayServer(asio::io_context& io, recording::RecordingReader& reader, ReplayDevice device, ReplayOptions options, Log& log);
 
-  /// Listens. unavailable.
+  /// Listens. Error: unavailable.
   Result<void> open();
-  /// Everything then happens inside io.run(), which returns when the recording was served to its end (not with loop), or stopped.
+  /// Serves the recording in io.run(), which returns at its end (not with loop) or after stop().
   void start();
-  /// The message under way is finished, then the client has the end of the stream; after 1.5 s it is cut off.
+  /// Completes the present message and ends the stream; after 1.5 s the connection is closed.
   void stop();
 
   const Figures& figures() const { return figures_; }

@@ -17,11 +17,11 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
       : parent_(parent), socket_(socket), id_(id), gap_(gap), wake_(socket.get_executor()), pause_(socket.get_executor()) {}
 
   void start();
-  /// There is something to send.
+  /// Call it when there is something to send.
   void wake() { wake_.cancel(); }
-  /// No more pings after the one being sent, and no more of that when the socket is closed.
+  /// Ends the stream after the ping that is being sent; closing the socket ends that too.
   void finish(std::string why, bool by_host = false);
-  /// An empty datagram.
+  /// Sends an empty datagram.
   void send_nothing_to(const Endpoint& to);
   /// Call it when a request of the host arrived, or another sign that the host is alive.
   void heard() {

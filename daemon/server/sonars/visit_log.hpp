@@ -32,7 +32,7 @@ class VisitLog {
   std::chrono::milliseconds spell_;
   asio::steady_timer timer_;
   bool in_spell_ = false, ended_ = false;
-  bool crowded_ = false;  // the spell before had more than its lines: this one is summed up as a whole
+  bool crowded_ = false;  // the previous spell had more visits than lines, so this one is only summed up
   int visits_ = 0;        // visits in this spell
   std::array<std::uint64_t, static_cast<std::size_t>(Kind::kinds)> unsaid_{};
   std::string last_unsaid_;

@@ -147,7 +147,7 @@ TEST(RecordingFile, AnExistingFileIsNotTouched) {
   std::ofstream(file) << "mine";
   const auto made = RecordingFile::create(file, &RecordingFile::mcap, {"front", "oculus", {}});
   ASSERT_FALSE(made);
-  EXPECT_THAT(made.error().text, HasSubstr("is there already"));
+  EXPECT_THAT(made.error().text, HasSubstr("exists already"));
   EXPECT_EQ(std::filesystem::file_size(file), 4u);
 }
 
