@@ -105,7 +105,7 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
                  "for every sonar there is")
       ->check(one_of({"coverage"}));
   app.add_flag("--check-expectations", render.check_expectations,
-               "measure what the render file expects; exit code 1 if it is not so");
+               "measure the expectations of the render file; exit code 1 if one is not met");
   app.add_flag("--overwrite", render.overwrite, "replace the pings of other inputs in the folder");
   app.add_flag("--quiet", render.quiet, "no progress");
   add_engine_options(app, render.engine);
