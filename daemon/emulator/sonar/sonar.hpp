@@ -42,9 +42,9 @@ class Sonar {
   Actions on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port = nullptr);
   /// A port of kind udp_stream is open: messages for its receivers can be taken under this id.
   Actions open_stream(ConnectionId id, const protocol::Port& port, Time now);
-  /// Where a message of the stream, or of the host at a port of kind udp_dialogue, goes, as of now.
+  /// The present receivers of a stream's message, or of a message to the host at a port of kind udp_dialogue.
   std::vector<protocol::Endpoint> receivers(ConnectionId stream) const;
-  /// Another host goes on with the dialogue at a port of kind udp_dialogue.
+  /// Another host takes over the dialogue at a port of kind udp_dialogue.
   void hand_over(ConnectionId id, Peer to);
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
   /// The next message to write, whole; empty when there is none or one is being written.
@@ -83,7 +83,7 @@ class Sonar {
 
   // ---- time
 
-  /// Everything that is due.
+  /// Does everything that is due.
   Actions on_tick(Time now);
   /// When on_tick() has something to do next.
   std::optional<Time> next_tick() const;
@@ -94,23 +94,23 @@ class Sonar {
   std::optional<Time> next_request() const;
   Actions tick_pacer(Time now);
   Actions tick_conversations(Time now);
-  /// Stepped time jumps ahead.
+  /// Call it when stepped time jumps ahead.
   void skip(std::chrono::nanoseconds by);
-  /// No ping is being computed and every client has taken what it was sent.
+  /// True if no ping is being computed and every client has received all that it was sent.
   bool settled() const;
 
   // ---- control
 
   /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
-  /// Returns whether that was a change.
+  /// Returns whether the setting changed.
   bool set_transmit(bool on);
   bool transmits() const { return transmits_; }
-  /// The last who changed the settings; empty = they are the initial ones.
+  /// Name of the client that last changed the settings; empty if they are the initial ones.
   const std::string& asked_by() const { return asked_by_; }
   Pose pose_at(Time at) const { return compose(around_.world.vehicle_at(config_.vehicle, at), config_.mount); }  // in world
   void move_mount(const Pose& mount, Time now);
-  /// Vehicle and mount of a configuration that is otherwise the same.
+  /// Uses vehicle and mount of a configuration that is otherwise the same.
   void move(const SonarConfig& config, Time now);
   void use_water(const Water& water, Time now);
 
@@ -135,13 +135,13 @@ class Sonar {
   /// Pings that at least one client received, and pings that were made.
   std::uint64_t served() const { return figures_.served; }
   std::uint64_t pings() const { return figures_.pings; }
-  /// A ping as a client would get it now, with a number and noise that no client's ping has: nothing of the sonar changes. None
-  /// when its rule for stale poses says so.
+  /// A request for a ping as a client would get it now, but with a number and noise that no client's ping has. The sonar does not
+  /// change. nullopt if poses are stale and the rule for stale poses forbids pings.
   std::optional<PingRequest> preview_request(PingNumber number, Time at) const;
 
  private:
   Time unskipped(Time now) const { return now - state_.skipped; }
-  /// The way back, if nothing more is skipped.
+  /// The inverse of unskipped(), if no more time is skipped.
   Time clock_time(Time unskipped) const {
     return unskipped > Time::max() - state_.skipped ? Time::max() : unskipped + state_.skipped;
   }
