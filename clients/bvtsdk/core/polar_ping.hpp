@@ -79,7 +79,8 @@ Bytes encode_ping(const PolarPing& ping, Packing packing = Packing::plain);
 
 /// Appends the bitmap and the values, as in PING_DATA and NAV_DATA; unknown bits are omitted.
 void put_nav(Bytes& out, const NavData& nav);
-/// Reads what put_nav() wrote. `reader.ok()` is false if it was incomplete or had unknown fields. NaN values count as absent.
+/// Reads what put_nav() wrote. `reader.ok()` is false if it was incomplete or had unknown fields. Values that are not finite
+/// count as absent.
 NavData decode_nav(Reader& reader);
 
 }  // namespace sonar::bvt
