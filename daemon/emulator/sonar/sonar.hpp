@@ -60,7 +60,7 @@ class Sonar {
   Actions on_closed(ConnectionId id, const std::string& why, Time now, bool by_client = false);
   /// The caller had no slot for a client that connected.
   void count_refused_client() { ++figures_.refused_clients; }
-  /// Every connection is finished and no ping requested any more; `why` is for the log.
+  /// Finishes every connection and requests no more pings; `why` is for the log.
   Actions stop(const std::string& why);
 
   // ---- pings and datagrams
