@@ -56,7 +56,7 @@ struct SceneArguments {
 };
 
 void add_check(CLI::App& scene, SceneArguments& a) {
-  CLI::App& command = *scene.add_subcommand("check", "load a scene file as the daemon does; say what looks wrong");
+  CLI::App& command = *scene.add_subcommand("check", "load a scene file as the daemon does, and report probable mistakes");
   command.add_option("FILE", a.file, "a scene, or demo.yaml")->required();
   command.add_flag("--strict", a.strict, "warnings are errors (exit code 65)");
   command.callback([&a] { a.what = SceneArguments::What::check; });

@@ -25,7 +25,7 @@ std::string why_no_files_in(const std::filesystem::path& folder) {
   struct statfs about {};
   if (::statfs(folder.c_str(), &about) == 0 &&
       std::find(kernels_own.begin(), kernels_own.end(), static_cast<unsigned long>(about.f_type)) != kernels_own.end())
-    return "holds the kernel's own files and takes no others";
+    return "holds the kernel's own files; no others can be written there";
   if (::access(folder.c_str(), W_OK | X_OK) == 0) return {};
   return std::string("cannot be written: ") + std::strerror(errno);
 }

@@ -54,7 +54,7 @@ struct BeamWeightOptions {
   bool transform = true;         // instead of a band that is wider than a transform is long, where beams allow it
 };
 struct BeamWeights {
-  int half_band = 0;  // columns on either side that a beam listens to
+  int half_band = 0;  // number of columns on either side that a beam sums
   std::vector<BeamPanel> panels;
   std::vector<float> weights;
   std::shared_ptr<const BeamTransformTables> transform;  // when set: the same as the panels, then of all columns, for less
@@ -64,7 +64,7 @@ struct BeamWeights {
 /// Power of a column's noise at a sample over column_noise_upa squared: far + near_less_far decay (docs/acoustics.md, section 5).
 struct NoiseProfile {
   std::vector<float> far, near_less_far;  // [columns]; empty = even
-  std::vector<float> decay;               // [samples], as far as it is not nothing
+  std::vector<float> decay;               // [samples], up to the last one that is not negligible
 
   bool is_even() const { return far.empty(); }
 };

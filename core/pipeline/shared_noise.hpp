@@ -57,8 +57,8 @@ class SharedNoiseTable {
 
   int samples_ = 0;
   std::size_t parts_ = 0, beams_ = 0, blocks_ = 0;
-  std::vector<std::uint32_t> at_;  // [parts][beams][blocks]: the how manieth of those heard; 0: none
-  std::vector<float> heard_;       // [blocks heard][2][block_samples]
+  std::vector<std::uint32_t> at_;  // [parts][beams][blocks]: number of the block in heard_, from 1; 0: none
+  std::vector<float> heard_;       // [received blocks][2][block_samples]
   std::vector<float> noise_upa_, steady_upa_, leak_upa_;
 };
 

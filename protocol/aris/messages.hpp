@@ -213,7 +213,7 @@ class CommandFramer {
   void append(BytesView received);
   /// The next whole message; points into the framer until the next call.
   std::optional<BytesView> next();
-  /// A length beyond longest_command: the stream cannot be followed any more.
+  /// True after a length beyond longest_command: the rest of the stream cannot be read.
   bool broken() const { return broken_; }
 
  private:

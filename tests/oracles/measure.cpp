@@ -90,7 +90,7 @@ Result<double> measure_in(Measure what, const Window& window, const RenderJob& j
   const Picture picture(job, ping, window);
   if (what == Measure::strength_db && job.mode().pattern.azimuth_taper == Taper::unit)
     return failure(ErrorKind::bad_data, "strength_db needs beams with a width; beams with azimuth_taper: unit have none");
-  if (picture.empty()) return failure(ErrorKind::bad_data, "no row or no beam of the picture lies in the window");
+  if (picture.empty()) return failure(ErrorKind::bad_data, "the window contains no row or no beam of the picture");
   switch (what) {
     case Measure::peak_level_db:
       return db_from_amplitude(picture.peak().height_upa);

@@ -13,7 +13,7 @@ namespace sonar::bvt {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Bytes of someone else; valid as long as they are.
+/// A view of bytes that another object owns.
 struct BytesView {
   const std::uint8_t* data = nullptr;
   std::size_t size = 0;

@@ -74,12 +74,13 @@ std::optional<PolarPing> decode_ping(BytesView payload, std::string* why = nullp
 /// ones. Noise and speckle leave most high bytes 0: the last is 15 to 23 % smaller than the second, and no slower.
 enum class Packing : std::uint8_t { plain = 0, deflate = 1, planes = 2 };
 
-/// The opposite.
+/// Encodes a ping as the payload of PING_DATA.
 Bytes encode_ping(const PolarPing& ping, Packing packing = Packing::plain);
 
-/// The bitmap and the values, as in PING_DATA and NAV_DATA; unknown bits are omitted.
+/// Appends the bitmap and the values, as in PING_DATA and NAV_DATA; unknown bits are omitted.
 void put_nav(Bytes& out, const NavData& nav);
-/// The opposite; `reader.ok()` tells whether it was whole and held known fields only. Values that are no numbers count as absent.
+/// Reads what put_nav() wrote. `reader.ok()` is false if it was incomplete or had unknown fields. Values that are not finite
+/// count as absent.
 NavData decode_nav(Reader& reader);
 
 }  // namespace sonar::bvt

@@ -119,7 +119,7 @@ Run add_fault(CLI::App& app) {
   fault.require_subcommand(1);
   fault.footer(
       "examples:\n"
-      "  sonarctl fault kinds                         what there is\n"
+      "  sonarctl fault kinds                         all kinds and troubles\n"
       "  sonarctl fault add silent-open --seconds 6\n"
       "  sonarctl fault list\n"
       "  sonarctl fault journal --follow              what was done to which client, at which byte");

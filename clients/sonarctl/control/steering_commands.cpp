@@ -109,7 +109,8 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
     steering->what = [steering, arguments]() -> Result<void> {
       const Result<control::SetSonar> wanted = arguments->finish();
       if (!wanted) return tl::unexpected(wanted.error());
-      return steer(steering->control, *wanted, name_or_its(wanted->sonar) + " is set; sonarctl status shows what it made of it");
+      return steer(steering->control, *wanted,
+                   name_or_its(wanted->sonar) + " is set; sonarctl status shows the resulting settings");
     };
   });
 }

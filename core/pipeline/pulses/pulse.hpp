@@ -25,10 +25,10 @@ class Pulse {
   std::vector<std::complex<double>> spectrum_s(const spectral::FrequencyGrid& grid) const;
 
   double width_s() const { return width_s_; }
-  /// p is nothing (Gaussian: below 2e-10) farther out than this.
+  /// Beyond this delay p is zero (Gaussian: below 2e-10).
   double reach_s() const { return reach_s_; }
-  /// P is nothing outside a band so wide about zero: below 1e-6 of its peak; of a tone, whose corners take
-  /// any band, 4e-4; of a measured pulse 1e-4.
+  /// Width of the band about zero outside of which P is negligible: below 1e-6 of its peak; for a tone, whose corners need an
+  /// unlimited band, 4e-4; for a measured pulse 1e-4.
   double band_hz() const { return band_hz_; }
   /// tau_eff = integral of |p|^2 dt.
   double energy_width_s() const { return energy_width_s_; }

@@ -70,7 +70,7 @@ SpecularWindow make_window(const SpecularPoint& p, double wavelength_m) {
   for (std::size_t k = 0; k < 2; ++k) {
     // Four Fresnel radii about the foot, or about the nearest place of the surface.
     double reach = window_in_units * fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]);
-    // Beyond half a radius of curvature [m] the surface is no parabola any more, on which (19) rests.
+    // Beyond half a radius of curvature [m] the surface is not a parabola, as (19) assumes.
     if (p.curvature[k] != 0) reach = std::min(reach, window_in_radii / std::abs(p.curvature[k]));
     const double middle = std::clamp(0.0, p.from[k], p.to[k]);
     const double from = std::max(p.from[k], middle - reach), to = std::min(p.to[k], middle + reach);

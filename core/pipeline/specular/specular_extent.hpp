@@ -11,7 +11,7 @@
 
 namespace sonar {
 
-/// The extent cut into cells about the place that matters most, to find the hidden parts. Outermost cells go on to the
+/// Divides the extent into cells about the place that matters most, to find hidden parts. The outermost cells reach to the
 /// edge.
 struct SpecularWindow {
   static constexpr std::size_t cells = 16;

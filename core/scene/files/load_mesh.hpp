@@ -44,7 +44,7 @@ using TriangleSource = std::function<void(const TriangleSink&)>;
 /// Shared checks of all meshes: finite, within 1e7 m; drops triangles without area and merges equal vertices, recentres. Asks for
 /// the triangles twice, so that no copy of their corners is held. Errors lack the file name.
 Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t most = max_mesh_triangles);
-/// The same of corners, three a triangle.
+/// As above, for a list of corners, three for each triangle.
 Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material,
                                std::size_t most = max_mesh_triangles);
 

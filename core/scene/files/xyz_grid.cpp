@@ -142,7 +142,7 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
   raw.fill_values = values.fill_values();
   auto grid = finish_heights(std::move(raw), options);
   if (!grid) return bad(grid.error().text);
-  if (again > 0) grid->notes.push_back(text::format("%zu points lie where another one was before, and took its place", again));
+  if (again > 0) grid->notes.push_back(text::format("%zu points have the position of an earlier point, and replaced it", again));
   return grid;
 }
 

@@ -53,7 +53,8 @@ void say_exported(const Exported& e, const DatasetCommand& command) {
                static_cast<unsigned long long>(e.pings[0]), static_cast<unsigned long long>(e.pings[1]),
                static_cast<unsigned long long>(e.pings[2]), e.scenes);
   if (e.scenes < split_names.size() && command.split_by.empty())
-    std::fprintf(stderr, "so few scenes fill no three splits; --split-by takes draws that tell pings apart\n");
+    std::fprintf(stderr,
+                 "there are too few different scenes for three splits; give --split-by a draw that differs between pings\n");
 }
 
 }  // namespace

@@ -35,13 +35,14 @@ struct FarmJob {
 
 /// Errors: a file that is not below the job file's folder.
 Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& instruction_set);
-/// bad_data: what is no record, or one whose id does not fit, whose counts no job has, or whose names lead out of the job's
-/// folder.
+/// Reads a record. Error bad_data: it is not a record, its id is another one, its counts are impossible, or its names lead out of
+/// the job's folder.
 Result<FarmJob> parse_farm_job(const std::string& id, const std::string& json);
 
 /// Copies the job's files to `files`, and into the queue when they are small enough; says so in the record.
 Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const std::filesystem::path& files, Queue& queue);
-/// Takes from the queue what is not in the folder `files`. The job file's path. missing_file: it is in neither.
+/// Fetches files from the queue that the folder `files` lacks. Returns the path of the job file. Error missing_file: a file is
+/// in neither.
 Result<std::filesystem::path> receive_files(const FarmJob& record, const std::filesystem::path& files, Queue& queue);
 
 /// The job in the file that receive_files() gave. bad_data: it is of another size than the record.

@@ -16,7 +16,7 @@ void add_replay_options(CLI::App& app, ReplayCommand& replay) {
       "  sonard replay run.pcap                            at 127.0.0.2, at the pace it was recorded with\n"
       "  sonard replay capture.pcapng --speed 4 --loop\n"
       "  sonard replay run.mcap --stepped                  as fast as the driver reads\n"
-      "Ends when a driver has had the whole recording, or, with --loop, by Ctrl-C.");
+      "Ends when a driver has received the whole recording, or, with --loop, by Ctrl-C.");
   app.add_option("file", replay.file, "recording: pcapng, " + recording::file_endings())->required();
   app.add_option("--ip", replay.ip, "address to serve it at, one of this computer's")->capture_default_str();
   app.add_option("--port", replay.port, "TCP port (default: the sonar's)")->check(text::whole_number(1, 65535));

@@ -23,7 +23,7 @@ asio::awaitable<HttpOutcome> ReplayPage::answer(const HttpRequest& request, Http
         open_view(request, asked->query, {services_.token, secrets_, from.reached().ip, access_}, ViewSecrets::Steady::now());
     if (auto* const answer = std::get_if<HttpAnswer>(&opened)) co_return std::move(*answer);
     if (views_.count() >= limits_.viewers || !from.claim_slot())
-      co_return answer_of(503, control::StatusCode::failed, "all places of viewers are taken");
+      co_return answer_of(503, control::StatusCode::failed, "all slots of viewers are in use");
     co_return views_.open(services_, from, request, std::get<ViewWelcome>(opened), of_);
   }
   if (std::holds_alternative<HelpAction>(routed.action))

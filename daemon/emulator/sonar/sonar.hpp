@@ -35,9 +35,9 @@ class Sonar {
   Actions on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port = nullptr);
   /// A port of kind udp_stream is open: messages for its receivers can be taken under this id.
   Actions open_stream(ConnectionId id, const protocol::Port& port, Time now);
-  /// Where a message of the stream, or of the host at a port of kind udp_dialogue, goes, as of now.
+  /// The present receivers of a stream's message, or of a message to the host at a port of kind udp_dialogue.
   std::vector<protocol::Endpoint> receivers(ConnectionId stream) const { return delivery_.receivers(stream); }
-  /// Another host goes on with the dialogue at a port of kind udp_dialogue.
+  /// Another host takes over the dialogue at a port of kind udp_dialogue.
   void hand_over(ConnectionId id, Peer to) { audience_.hand_over(id, std::move(to)); }
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
   /// The next message to write, whole; empty when there is none or one is being written.
@@ -53,7 +53,7 @@ class Sonar {
   Actions on_closed(ConnectionId id, const std::string& why, Time now, bool by_client = false);
   /// The caller had no slot for a client that connected.
   void count_refused_client() { ++data_.figures.refused_clients; }
-  /// Every connection is finished and no ping requested any more; `why` is for the log.
+  /// Finishes every connection and requests no more pings; `why` is for the log.
   Actions stop(const std::string& why);
 
   // ---- pings and datagrams
@@ -76,7 +76,7 @@ class Sonar {
 
   // ---- time
 
-  /// Everything that is due.
+  /// Does everything that is due.
   Actions on_tick(Time now);
   /// When on_tick() has something to do next.
   std::optional<Time> next_tick() const;
@@ -87,23 +87,23 @@ class Sonar {
   std::optional<Time> next_request() const;
   Actions tick_pacer(Time now) { return source_.tick(now); }
   Actions tick_conversations(Time now);
-  /// Stepped time jumps ahead.
+  /// Call it when stepped time jumps ahead.
   void skip(std::chrono::nanoseconds by);
-  /// No ping is being computed and every client has taken what it was sent.
+  /// True if no ping is being computed and every client has received all that it was sent.
   bool settled() const { return !busy() && connections().settled(); }
 
   // ---- control
 
   /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
-  /// Returns whether that was a change.
+  /// Returns whether the setting changed.
   bool set_transmit(bool on) { return source_.set_transmit(on); }
   bool transmits() const { return source_.transmits(); }
-  /// The last who changed the settings; empty = they are the initial ones.
+  /// Name of the client that last changed the settings; empty if they are the initial ones.
   const std::string& asked_by() const { return source_.asked_by(); }
   Pose pose_at(Time at) const { return data_.pose_at(at); }  // in world
   void move_mount(const Pose& mount, Time now);
-  /// Vehicle and mount of a configuration that is otherwise the same.
+  /// Uses vehicle and mount of a configuration that is otherwise the same.
   void move(const SonarConfig& config, Time now);
   void use_water(const Water& water, Time now) { source_.use_water(water, now); }
 
@@ -128,8 +128,8 @@ class Sonar {
   /// Pings that at least one client received, and pings that were made.
   std::uint64_t served() const { return data_.figures.served; }
   std::uint64_t pings() const { return data_.figures.pings; }
-  /// A ping as a client would get it now, with a number and noise that no client's ping has: nothing of the sonar changes. None
-  /// when its rule for stale poses says so.
+  /// A request for a ping as a client would get it now, but with a number and noise that no client's ping has. The sonar does not
+  /// change. nullopt if poses are stale and the rule for stale poses forbids pings.
   std::optional<PingRequest> preview_request(PingNumber number, Time at) const { return source_.preview_request(number, at); }
 
  private:

@@ -26,7 +26,7 @@ constexpr double long_ranges = 5;              // lengths of the longest range t
 // Each cure is one kind of note: a kind is reported once.
 constexpr const char* surface_cure =
     "was NED taken for ENU, or the reverse? ENU_FLU counts z upwards, NED_FRD downwards: 3 m deep is z = -3 in the one and z = 3 "
-    "in the other; say the frame that was sent";
+    "in the other; state the frame that was sent";
 constexpr const char* depth_cure =
     "the scene is less deep than that: see the origin that depths are counted from, and the unit (metres)";
 constexpr const char* exchanged_cure = "with x and y exchanged it would be in the scene: ENU_FLU has east first, NED_FRD north";
@@ -91,7 +91,7 @@ std::optional<Doubt> doubt_of_place(const Carrier& carrier, const Pose& vehicle_
                  depth_cure};
   }
   const bool exchanged = around.scene.distance_m({sonar_m->y, sonar_m->x, sonar_m->z}) <= around.longest_range_m;
-  return Doubt{subject + format(" is %.0f m from everything in the scene, and hears no further than %.0f m",
+  return Doubt{subject + format(" is %.0f m from everything in the scene, but its range is at most %.0f m",
                                 around.scene.distance_m(*sonar_m), around.longest_range_m),
                exchanged ? exchanged_cure : far_cure};
 }
@@ -281,7 +281,7 @@ std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around)
     const double length_m = shape.own.longest_m();
     if (length_m <= allowed_m || shape.is_ground) continue;
     notes.push_back({"",
-                     o.name + format(" is %.0f m long, and no sonar hears further than %.0f m", length_m, around.longest_range_m),
+                     o.name + format(" is %.0f m long, but no sonar has a range above %.0f m", length_m, around.longest_range_m),
                      std::string(huge_mesh_cure)});
   }
   return notes;

@@ -101,7 +101,7 @@ std::string World::why_bad_time(const PoseSample& sample, Time at, Time now) con
     return "WALL time stamp is " + std::to_string(seconds(at - now)) +
            " s from this computer's clock: synchronise the clocks, or send SIM or ARRIVAL time";
   if (rules_.follows && sample.of == PoseSample::Of::vehicle && sample.stamp.domain == ClockDomain::arrival)
-    return "it has no time stamp, and with clock: follow time is what poses say: send SIM or WALL time";
+    return "it has no time stamp, from which clock: follow takes the time: send SIM or WALL time";
   return {};
 }
 

@@ -16,7 +16,7 @@ class Listener {
   using Take = std::function<void(tcp::socket)>;
   using Fault = std::function<void(const std::string&)>;
 
-  /// `purpose`: which of the spare descriptors may be used; nothing: the caller asks `admission` for a slot itself. `admission`
+  /// `purpose`: which of the spare descriptors may be used; nullopt: the caller asks `admission` for a slot itself. `admission`
   /// outlives the listener.
   Listener(asio::io_context& io, Admission& admission, std::optional<Admission::Purpose> purpose)
       : admission_(admission), purpose_(purpose), acceptor_(io), reopen_timer_(io) {}
@@ -27,12 +27,12 @@ class Listener {
   /// 100 ms after stop(): Admission may pause before it looks again.
   void start(Take take, Fault fault);
   void stop();
-  /// Connections are refused as by a port that no program listens at.
+  /// Closes the socket, so that connections are refused as at a port where no program listens.
   void pause();
-  /// Accepts connections again, at the same address and port. While another program has that port it is tried again and again;
-  /// `taken` gets once why.
+  /// Accepts connections again, at the same address and port. It retries while another program has that port; then
+  /// `taken` gets the reason, once.
   void resume(Fault taken);
-  /// Also while paused.
+  /// True also while paused.
   bool is_open() const { return acceptor_.is_open() || paused_; }
   /// With the port the system chose. Port 0 = never opened.
   Endpoint at() const { return at_; }

@@ -40,7 +40,7 @@ HttpOutcome ControlHttp::open_socket(const HttpRequest& request, const SocketAct
     return answer_of(404, StatusCode::unsupported, "no such recording: recording=NAME is a file in recording.folder");
   if (view_->is_full() || !from.claim_slot()) {
     HttpAnswer full =
-        answer_of(503, StatusCode::failed, "all places of viewers are taken; limits.viewers in the configuration makes more");
+        answer_of(503, StatusCode::failed, "all slots of viewers are in use; raise limits.viewers in the configuration");
     full.why = "all " + std::to_string(services_.limits.viewers) + " places of viewers are taken: limits.viewers";
     return full;
   }

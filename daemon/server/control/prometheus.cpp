@@ -121,19 +121,20 @@ std::vector<ReasonFamily> reason_families() {
   const auto drop = [](DropReason why) {
     return [why](const DeviceFigures& f) { return f.dropped_by[static_cast<std::size_t>(why)]; };
   };
-  return {
-      {"sonard_pings_dropped_total",
-       "Pings not written whole to a client they were offered to: it was too slow, it went, we ended the connection, a fault.",
-       {{"slow", drop(DropReason::slow)},
-        {"gone", drop(DropReason::gone)},
-        {"stop", drop(DropReason::stop)},
-        {"fault", drop(DropReason::fault)}}},
-      {"sonard_ticks_skipped_total",
-       "Ticks that no ping came of: taken up too late, simulation busy, surplus trigger, poses stale.",
-       {{"late", [](const DeviceFigures& f) { return f.skipped.late; }},
-        {"busy", [](const DeviceFigures& f) { return f.skipped.busy; }},
-        {"trigger", [](const DeviceFigures& f) { return f.skipped.trigger; }},
-        {"stale", [](const DeviceFigures& f) { return f.skipped_stale; }}}}};
+  return {{"sonard_pings_dropped_total",
+           "Pings that a client did not get whole, because it was too slow, it left, sonard closed the connection, or a fault "
+           "withheld them.",
+           {{"slow", drop(DropReason::slow)},
+            {"gone", drop(DropReason::gone)},
+            {"stop", drop(DropReason::stop)},
+            {"fault", drop(DropReason::fault)}}},
+          {"sonard_ticks_skipped_total",
+           "Ticks without a ping, because they were handled too late, the simulation was busy, another trigger waited, or poses "
+           "were stale.",
+           {{"late", [](const DeviceFigures& f) { return f.skipped.late; }},
+            {"busy", [](const DeviceFigures& f) { return f.skipped.busy; }},
+            {"trigger", [](const DeviceFigures& f) { return f.skipped.trigger; }},
+            {"stale", [](const DeviceFigures& f) { return f.skipped_stale; }}}}};
 }
 
 struct TimeFamily {
@@ -143,7 +144,7 @@ struct TimeFamily {
 };
 constexpr TimeFamily time_families[] = {
     {"sonard_simulation_seconds", "Wall time of one ping's simulation.", &DeviceFigures::simulation},
-    {"sonard_tick_lateness_seconds", "From when a tick was due to when it was taken up.", &DeviceFigures::lateness},
+    {"sonard_tick_lateness_seconds", "Time from when a tick was due until it was handled.", &DeviceFigures::lateness},
     {"sonard_ping_jitter_seconds", "How far the time between two served pings is off the time between their ticks.",
      &DeviceFigures::jitter},
     {"sonard_ping_latency_seconds", "From a ping's tick to its last byte handed to the kernel, for each client.",
@@ -168,7 +169,7 @@ void write_sonars(PrometheusText& text, const DaemonFigures& figures) {
 }
 
 void write_poses(PrometheusText& text, const PoseCounters& poses) {
-  text.family("sonard_poses_total", Type::counter, "Poses received, by what became of them.");
+  text.family("sonard_poses_total", Type::counter, "Poses received, by outcome.");
   for (const auto& [outcome, count] :
        {std::pair("accepted", poses.accepted), std::pair("refused", poses.refused), std::pair("late", poses.late),
         std::pair("replaced", poses.replaced), std::pair("over_rate", poses.over_rate)})

@@ -10,14 +10,14 @@ namespace sonar {
 
 class FairTurns {
  public:
-  /// A request of that sonar has come. Who was silent has saved up nothing.
+  /// Call it when a sonar requests a ping. A sonar that was idle gets no advantage from its idle time.
   void ask(std::uint32_t sonar) {
     Account& a = accounts_[sonar];
     a.used_s = std::max(a.used_s, floor_s_);
   }
-  /// Its ping begins.
+  /// Call it when a ping of that sonar begins.
   void begin(std::uint32_t sonar) { floor_s_ = std::max(floor_s_, accounts_[sonar].used_s); }
-  /// Its ping has taken so long of the engine's time.
+  /// Call it when a ping of that sonar is finished; it took `seconds` of the engine's time.
   void end(std::uint32_t sonar, double seconds) {
     Account& a = accounts_[sonar];
     a.used_s += seconds;
@@ -30,8 +30,8 @@ class FairTurns {
   }
   bool several() const { return accounts_.size() > 1; }
 
-  /// Whether `other` goes first although the ping of `running` has been under way for `elapsed_s`: it has had less, and its ping
-  /// is done sooner than what is left of that one.
+  /// Whether a ping of `other` comes first although one of `running` has been computed for `elapsed_s`: `other` has used less
+  /// time, and its ping takes less time than the rest of the one being computed.
   bool goes_first(std::uint32_t other, std::uint32_t running, double elapsed_s) const {
     const auto a = accounts_.find(other), b = accounts_.find(running);
     if (a == accounts_.end() || b == accounts_.end() || a->second.pings == 0 || b->second.pings == 0) return false;
@@ -45,7 +45,7 @@ class FairTurns {
     std::uint64_t pings = 0;
   };
   std::map<std::uint32_t, Account> accounts_;
-  double floor_s_ = 0;  // what the one whose ping began last had had
+  double floor_s_ = 0;  // used_s of the sonar whose ping began last, when it began
 };
 
 }  // namespace sonar

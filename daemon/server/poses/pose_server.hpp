@@ -45,8 +45,8 @@ class PoseServer {
     udp::socket datagrams;
     Listener lines;  // for JSON only
   };
-  /// One TCP sender; closed by stop(), or when its place is needed and it has sent no pose, or too much, for longest. One that
-  /// has hung up has no place any more.
+  /// One TCP sender. It is closed by stop(), or if its slot is needed and it is the one that has sent no pose, or too much, for
+  /// the longest time. A sender that has disconnected has no slot.
   struct Connection {
     Connection(tcp::socket s, Sender from, std::size_t bytes_per_s, SharedRate::Part part)
         : socket(std::move(s)),
@@ -83,14 +83,14 @@ class PoseServer {
     bool has_pose = false;  // one that counts
   };
   Turn take_turn(Connection& connection, Work& work);
-  enum class Rested { goes_on, leaves_much };  // it has hung up, and has sent more than limits allow
+  enum class Rested { goes_on, leaves_much };  // leaves_much: it disconnected, and had sent more than the limits allow
   asio::awaitable<Rested> rest(Connection& connection, const Work& work);
   void take_newest(Connection& connection);
   bool drop_backlog(Connection& connection, bool pauses);
   void admit(tcp::socket socket);
 
   void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);
-  enum class LineKind { pose, other_object, not_json };  // a pose that counts; another JSON object; neither
+  enum class LineKind { pose, other_object, not_json };  // an accepted pose; another JSON object; neither
   LineKind on_line(const control::LineParser::Line& line, const Sender& sender);
 
   asio::io_context& io_;

@@ -15,7 +15,7 @@ std::vector<LogField> fields_of(const v1::RecordingStatus& status) {
 
 std::string why_without_labels(RecordingFile::Kind kind, const RecordedSonar& sonar, const Switches& switches) {
   if (kind != &RecordingFile::mcap) return "labels are recorded in MCAP only: end the name in .mcap";
-  if (sonar.has_range_images) return "range images have no labels; the file's truth holds what each column sees";
+  if (sonar.has_range_images) return "range images have no labels; the truth in the file has what each column hits";
   if (switches.mode != Mode::canonical || switches.fixed_fan > 0)
     return "labels need the canonical model: sonard was started with another mode or a fixed fan";
   return {};

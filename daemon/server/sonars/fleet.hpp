@@ -19,8 +19,8 @@ namespace sonar {
 class Fleet final : public DeviceParent {
  public:
   struct Handlers {
-    std::function<void()> on_change;                          // something stepped time, or the end, may have waited for
-    std::function<void(const Error& why)> on_engine_failure;  // the daemon cannot go on
+    std::function<void()> on_change;  // a change for which stepped time, or the end of the daemon, may wait
+    std::function<void(const Error& why)> on_engine_failure;  // the daemon must end
   };
   /// All of it outlives the fleet.
   Fleet(DeviceNetwork network, const Config& config, const World& world, Simulator& simulator, Recordings& recordings,
@@ -40,12 +40,12 @@ class Fleet final : public DeviceParent {
   struct Change {
     std::string summary;  // "front untouched, left changed, right added"
     std::vector<const Device*> opened;
-    std::vector<std::string> errors;  // sonars that could not be opened; the one before stays where it can
+    std::vector<std::string> errors;  // sonars that could not be opened; the previous one stays if it can
   };
   /// Stops, starts and keeps sonars as `next` says, whose vehicles the World must know by now.
   Change take_over(const Config& now, const Config& next);
 
-  /// Now and then: what was stopped goes when nothing of it is under way any more.
+  /// Call it periodically: it erases stopped sonars that have no work in progress.
   void sweep();
 
   const std::list<Device>& devices() const { return devices_; }

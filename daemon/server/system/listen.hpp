@@ -17,15 +17,15 @@ Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast, bool sha
 /// Multicast leaves by the network interface of that address; 0.0.0.0: by the system's choice.
 void send_multicast_from(udp::socket& socket, Ipv4 ip);
 
-/// A peer that answers nothing, be it our bytes or the probes sent while there are none, ends the connection within `limit` with
+/// If the peer answers neither our bytes nor, while there are none, probes, the connection ends within `limit` with
 /// asio::error::timed_out. Whole seconds; at least 3.
 void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit);
 
-/// The peer has hung up; what it sent before may still be unread.
+/// Whether the peer has closed the connection. Bytes that it sent before may still be unread.
 bool has_left(tcp::socket& socket);
 
-/// Whether poses from there are taken. Without ranges only this computer's: the ranges may go by a reload while the listener
-/// stays.
+/// Whether poses from an address are accepted. Without ranges only those of this computer are: a reload may remove the ranges
+/// while the listener stays.
 bool is_admitted(const std::vector<AddressRange>& allow_from, const asio::ip::address& from);
 
 asio::ip::address_v4 address_of(Ipv4 ip);

@@ -212,7 +212,7 @@ class PcapReader final : public RecordingReader {
       while (auto message = splitter.next()) ready_.push_back(std::move(*message));
       if (splitter.losses() > losses)
         damages_.add("the last message from " + text_of(from == Origin::device ? found_.device.at : place->first) + " to " +
-                     text_of(from == Origin::device ? place->first : found_.device.at) + " is not whole");
+                     text_of(from == Origin::device ? place->first : found_.device.at) + " is incomplete");
     }
     connections_.erase(place);
   }

@@ -116,7 +116,7 @@ TEST(Plausibility, NedTakenForEnuBelowTheBedAndFarAway) {
   Scene strip = bed_scene();
   strip.objects[0].in_world.position_m = {0, 500, -5};
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [500, 0, -2]}"), strip),
-              ElementsAre(AllOf(HasSubstr("m from everything in the scene, and hears no further than 40 m"),
+              ElementsAre(AllOf(HasSubstr("m from everything in the scene, but its range is at most 40 m"),
                                 HasSubstr("with x and y exchanged it would be in the scene"))));
   EXPECT_THAT(at("xyz_m: [3000, 0, -3]"), ElementsAre(HasSubstr("positions are metres from the world's 0, 0, 0")));
 }
@@ -170,10 +170,9 @@ TEST(Plausibility, AnUpsideDownMount) {
 
 TEST(Plausibility, AMeshInMillimetres) {
   const Config config = config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}");
-  EXPECT_THAT(
-      notes(config, bed_scene({box("wreck", {1200, 300, 250}, {0, 0, -5})})),
-      ElementsAre(HasSubstr("wreck is 1200 m long, and no sonar hears further than 40 m; if the file is in centimetres or "
-                            "millimetres, set scale: 0.01 or 0.001")));
+  EXPECT_THAT(notes(config, bed_scene({box("wreck", {1200, 300, 250}, {0, 0, -5})})),
+              ElementsAre(HasSubstr("wreck is 1200 m long, but no sonar has a range above 40 m; if the file is in centimetres or "
+                                    "millimetres, set scale: 0.01 or 0.001")));
   EXPECT_THAT(notes(config, bed_scene({box("wreck", {120, 30, 25}, {0, 0, -5})})), IsEmpty());
   EXPECT_THAT(notes(config, bed_scene({box("survey", {1200, 900, 12}, {0, 0, -5})})), IsEmpty()) << "ground may be long";
   Object ridge = bed_scene().objects[0];
@@ -344,7 +343,7 @@ TEST_F(RunningNotes, APoseAboveTheWaterIsLoggedOnceAndInTheStatusWhileItHolds) {
   const auto notes = daemon.status().notes();
   ASSERT_EQ(notes.size(), 1);
   EXPECT_EQ(notes[0].vehicle(), "rov");
-  EXPECT_THAT(notes[0].cure(), HasSubstr("say the frame that was sent"));
+  EXPECT_THAT(notes[0].cure(), HasSubstr("state the frame that was sent"));
   send(R"({"position":[0,0,3],"attitude":[0,0,0]})");
   EXPECT_THAT(daemon.status().notes(), IsEmpty());
   send(R"({"position":[0,0,-4],"attitude":[0,0,0]})");
