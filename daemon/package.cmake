@@ -39,7 +39,7 @@ install(FILES docs/bvtsdk.md docs/blueview.png DESTINATION ${CMAKE_INSTALL_DATAD
 install(FILES docs/protocols/blueview-link.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk/protocols COMPONENT bvtsdk)
 install(FILES scenes/sonard.yaml scenes/sonard-blueview.yaml scenes/sonard-aris.yaml scenes/sonard-3d15.yaml scenes/sonard-ping360.yaml
   scenes/sonard-surveyor.yaml scenes/sonard-omniscan.yaml scenes/sonard-ping1d.yaml
-  scenes/sonard-dvl.yaml DESTINATION ${documents}/examples COMPONENT sonard)
+  scenes/sonard-dvl.yaml scenes/sonard-m3.yaml DESTINATION ${documents}/examples COMPONENT sonard)
 install(FILES README.md CONTRIBUTING.md LICENSE DESTINATION ${documents} COMPONENT sonard)
 install(DIRECTORY tests/judge DESTINATION ${documents}/tests COMPONENT sonard PATTERN "__pycache__" EXCLUDE)  # examples of docs/judge.md
 install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT sonard PATTERN "man" EXCLUDE PATTERN "__pycache__" EXCLUDE)
@@ -47,6 +47,7 @@ install(FILES protocol/oculus/README.md DESTINATION ${documents}/protocol/oculus
 install(FILES protocol/aris/README.md DESTINATION ${documents}/protocol/aris COMPONENT sonard)
 install(FILES protocol/waterlinked/README.md DESTINATION ${documents}/protocol/waterlinked COMPONENT sonard)
 install(FILES protocol/dvl/README.md DESTINATION ${documents}/protocol/dvl COMPONENT sonard)
+install(FILES protocol/m3/README.md DESTINATION ${documents}/protocol/m3 COMPONENT sonard)
 install(FILES protocol/ping/README.md DESTINATION ${documents}/protocol/ping COMPONENT sonard)
 install(FILES protocol/control/control.proto DESTINATION ${CMAKE_INSTALL_DATADIR}/sonard/protocol/control COMPONENT sonard)
 # What pages link to beyond the documents is installed below share/sonard; symbolic links lead there from where it lies in the

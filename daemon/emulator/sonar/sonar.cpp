@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/sonar/phases.hpp"
 #include "daemon/emulator/sonar/ping_request.hpp"
 
 namespace sonar {
@@ -221,6 +222,7 @@ PingRequest Sonar::request_at(Time at, const protocol::RequestPing& aim) const {
   request.vendor_settings = aim.with ? aim.with : state_.settings;
   request.sonar_id = index_;
   request.bearings = config_.bearings;
+  request.switches.keep_beams = has_phases(request);
   request.blank = (stale && config.poses.on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
   return request;
 }
