@@ -11,7 +11,7 @@ namespace {
 // Sources: PKT, LOG: docs/protocols/m3.md.
 constexpr double elevation_deg = 30;  // recalled from the data sheet
 constexpr double elements = 64;       // PKT
-// unknown: levels. Full scale so that noise and echoes of the demo scene have the levels of PKT, in a tank, about.
+// unknown: levels. Full scale so that the strongest echoes of the demo scene have the level of those of PKT, about.
 constexpr float source_level_db = 210, full_scale_upa = 1.5e8f;
 
 SonarModel make_model() {
