@@ -106,10 +106,11 @@ set(CPACK_DEBIAN_SONARD_PACKAGE_CONTROL_EXTRA
 set(CPACK_COMPONENT_SONARD_DESCRIPTION "emulates imaging sonars on the network, from a 3D scene
 sonard holds a 3D scene, takes the pose of a vehicle, computes what a
 multibeam sonar would hear, and serves it as an Oculus, a BlueView sonar, an
-ARIS, a Sonar 3D-15, a Ping360, a Surveyor, an Omniscan, a Ping1D or a DVL:
-drivers written for the real device connect unchanged, those of BlueView with
-libraries of sonard's. With sonarctl, which listens to, looks at and steers
-sonars, and with a systemd unit, which is not started by the installation.")
+ARIS, a Sonar 3D-15, a Ping360, a Surveyor, an Omniscan, a Ping1D, a DVL or an
+M3: drivers written for the real device connect unchanged, those of BlueView
+with libraries of sonard's. With sonarctl, which listens to, looks at and
+steers sonars, and with a systemd unit, which is not started by the
+installation.")
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_NAME sonard-bvtsdk)
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_SUGGESTS sonard)
