@@ -18,6 +18,9 @@ Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::
   for (const auto& [name, value] : wanted.more) given.push_back(name);
   for (const std::string_view name : given) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    if (known.size() == 0)
+      return failure(ErrorKind::usage, std::string("--").append(name).append(" does not apply to ").append(title) +
+                                           ", whose drivers set nothing: use `sonarctl set sonar`");
     std::string all;
     for (const std::string_view other : known) all.append(all.empty() ? "--" : ", --").append(other);
     return failure(ErrorKind::usage,

@@ -5,6 +5,8 @@
 #include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/host.hpp"
 #include "protocol/host.hpp"
+#include "protocol/m3/host.hpp"
+#include "protocol/m3/m3.hpp"
 #include "protocol/oculus/host.hpp"
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/ping/host.hpp"
@@ -113,6 +115,13 @@ std::vector<Make> product_makes() {
        .own_numbers = true,
        .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
        .picture = PictureKind::waterfall},
+      {.device = &m3::vendor(),
+       .title = "an M3",
+       .request = "message",
+       .remedy = "send nothing: pings come to each driver that connects",
+       .ports = m3::host_ports,
+       .host = m3::make_host,
+       .codec = m3::codec()},
   };
 }
 

@@ -29,7 +29,8 @@ MAKES = {"oculus-m1200d": (52100, "--range", 3, "--gain", 60, "--rate", 5, "--mo
          "surveyor-240": (62312, "--range", 3, "--gain", 60, "--rate", 5),
          "omniscan-450": (51200, "--range", 3, "--gain", 60, "--rate", 5),
          "ping1d": (9090, "--range", 3, "--gain", 60, "--rate", 5),
-         "dvl-a50": (16171, "--as-it-is")}  # it pings before settings come
+         "dvl-a50": (16171, "--as-it-is"),  # it pings before settings come
+         "m3": (20001, "--as-it-is")}  # no settings come
 PINGS = 4
 LONGEST_BEACON = 142  # bytes; beacons hold the address, which differs from run to run
 PATIENCE = ("--wait", 120)
@@ -110,7 +111,7 @@ class Makes(unittest.TestCase):
                     self.assertEqual(value, expected[profile][what])
 
 
-OWN_KINDS = {"oculus-m1200d": "oculus", "aris-3000": "aris", "waterlinked-3d15": "sonar-file", "surveyor-240": "svlog", "omniscan-450": "svlog"}
+OWN_KINDS = {"oculus-m1200d": "oculus", "aris-3000": "aris", "waterlinked-3d15": "sonar-file", "surveyor-240": "svlog", "omniscan-450": "svlog", "m3": "imb"}
 
 
 class Recordings(unittest.TestCase):

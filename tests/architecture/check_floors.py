@@ -34,6 +34,7 @@ FLOORS = {
     "protocol/waterlinked": [*DEVICE, "protocol/waterlinked/"],
     "protocol/ping": [*DEVICE, "protocol/ping/"],
     "protocol/dvl": [*DEVICE, "protocol/dvl/"],
+    "protocol/m3": [*DEVICE, "protocol/m3/"],
     "protocol/blueview": [*DEVICE, "protocol/blueview/"],
     "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/wire/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],

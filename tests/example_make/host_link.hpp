@@ -133,6 +133,7 @@ class Link {
     if (id_ != 0) perform(sonar.on_closed(std::exchange(id_, 0), "closed by the client", now_, true));
     protocol::Wanted wanted;
     wanted.settings.range_m = 3;
+    if (!make_.host(wanted)) wanted = {};  // its drivers set nothing
     host_ = *make_.host(wanted);
     lost_ = served_ = false;
     last_sign_ = now_;

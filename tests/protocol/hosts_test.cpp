@@ -23,9 +23,21 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
+/// Its drivers send nothing: `sonarctl set sonar` does.
+bool sets_nothing(const Make& make) {
+  Wanted range;
+  range.settings.range_m = 3;
+  return !make.host(range);
+}
+
 Wanted all_that_is_known(const Make& make, double range_m) {
   Wanted wanted;
   wanted.settings.range_m = range_m;
+  if (sets_nothing(make)) {
+    wanted.settings.rate_hz = 5;
+    wanted.settings.gain_percent = 50;
+    return wanted;
+  }
   for (auto SettingsOverride::*setting : {&SettingsOverride::rate_hz, &SettingsOverride::gain_percent}) {
     Wanted more = wanted;
     more.settings.*setting = setting == &SettingsOverride::rate_hz ? 5 : 50;
@@ -39,7 +51,7 @@ class Talk {
  public:
   /// Streams arrive in pieces of so many bytes; 0: as they are written.
   Talk(const Make& of, const Wanted& wanted, std::size_t piece = 0, std::size_t model = 0)
-      : make(of), device(*of.device), piece_(piece), host(*of.host(wanted)) {
+      : make(of), device(*of.device), piece_(piece), host(*of.host(sets_nothing(of) ? Wanted{.as_it_is = true} : wanted)) {
     state.name = "front";
     state.id = 7001;
     state.model = device.models()[model];
@@ -48,6 +60,7 @@ class Talk {
     const ChangeSettings first = device.initial_settings(state);
     state.settings = first.vendor_settings;
     settings = first.settings;
+    if (sets_nothing(of)) apply({*device.apply_override(wanted.settings, state)});
     port_ = device.port(Port::Kind::tcp_stream);
     if (make.ports.front().kind == HostPort::Kind::udp) port_ = device.port(Port::Kind::udp_dialogue);
     if (port_ != nullptr) dialogue_ = device.converse(*port_, state, now);

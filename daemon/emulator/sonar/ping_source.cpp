@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/sonar/phases.hpp"
 #include "daemon/emulator/sonar/ping_request.hpp"
 
 namespace sonar {
@@ -142,6 +143,7 @@ PingRequest PingSource::request_at(Time at, const protocol::RequestPing& aim) co
   request.vendor_settings = aim.with ? aim.with : sonar_.state.settings;
   request.sonar_id = sonar_.index;
   request.bearings = sonar_.config.bearings;
+  request.switches.keep_beams = has_phases(request);
   request.blank = (stale && config.poses.on_stale == OnStale::blank) || !settings_.transmit || !transmits_;
   return request;
 }

@@ -326,7 +326,8 @@ TEST(Config, TheShippedExampleIsValid) {
                                       {"sonard-surveyor.yaml", "surveyor-240"},
                                       {"sonard-omniscan.yaml", "omniscan-450"},
                                       {"sonard-ping1d.yaml", "ping1d"},
-                                      {"sonard-dvl.yaml", "dvl-a50"}}) {
+                                      {"sonard-dvl.yaml", "dvl-a50"},
+                                      {"sonard-m3.yaml", "m3"}}) {
     const auto ping = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/" + file);
     ASSERT_TRUE(ping) << ping.error().text;
     EXPECT_EQ(ping->sonars.at(0).profile.model->profile, profile);

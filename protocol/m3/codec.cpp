@@ -1,0 +1,34 @@
+// The packets of an M3, for recordings. A file of its program has the packets of the stream, one behind the other.
+#include <array>
+
+#include "protocol/m3/host.hpp"
+#include "protocol/m3/models.hpp"
+#include "protocol/m3/packet.hpp"
+#include "protocol/recording/raw_dump.hpp"
+
+namespace sonar::m3 {
+namespace {
+
+std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
+  const auto packet = read_packet(message.bytes);
+  return packet ? std::optional(recording::Sender{models().front(), packet->header.front.sonar_info[0]}) : std::nullopt;
+}
+
+constexpr std::array<recording::FileKind, 1> kinds{{{
+    .ending = ".imb",
+    .name = ".imb file",
+    .holds = "packets of an M3",
+    .begins =
+        [](BytesView front) {
+          return recording::begins_with(front, {0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80});
+        },
+    .read = [](std::unique_ptr<recording::Source> source) { return recording::read_raw_dump(std::move(source), framing); },
+    .write = [](std::unique_ptr<recording::Sink> sink) { return recording::write_raw_dump(std::move(sink)); },
+    .is_raw_dump = true,
+}}};
+
+}  // namespace
+
+recording::Codec codec() { return {.framing = &framing, .files = kinds, .sender = sender_of}; }
+
+}  // namespace sonar::m3

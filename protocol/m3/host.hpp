@@ -1,0 +1,14 @@
+// The driver's end, and the part of the make that recordings need.
+#pragma once
+
+#include "protocol/host.hpp"
+#include "protocol/m3/messages.hpp"
+
+namespace sonar::m3 {
+
+inline constexpr protocol::HostPort host_ports[]{{protocol::HostPort::Kind::tcp, tcp_port}};
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+recording::Codec codec();
+
+}  // namespace sonar::m3

@@ -1,0 +1,67 @@
+#include "protocol/m3/m3.hpp"
+
+#include "protocol/m3/models.hpp"
+#include "protocol/m3/options.hpp"
+#include "protocol/m3/packet.hpp"
+#include "protocol/m3/settings.hpp"
+
+namespace sonar::m3 {
+namespace {
+
+constexpr std::array<protocol::Port, 1> port_table{{{.kind = protocol::Port::Kind::tcp_stream, .number = tcp_port}}};
+
+/// Drivers send nothing.
+class SilentDialogue final : public protocol::Dialogue {
+ public:
+  protocol::Reaction on_bytes(BytesView received, Time) override {
+    return {{protocol::Notice{std::to_string(received.size()) + " bytes, where drivers send none"}}, {}};
+  }
+  protocol::Reaction on_tick(Time, bool) override { return {}; }
+  Time next_tick() const override { return Time::max(); }
+  void on_ping_queued(Time) override {}
+};
+
+class M3Vendor final : public protocol::Vendor {
+ public:
+  std::string_view name() const override { return "m3"; }
+  std::span<const std::shared_ptr<const SonarModel>> models() const override { return m3::models(); }
+  std::span<const protocol::Port> ports() const override { return port_table; }
+  std::span<const protocol::Option> options() const override { return m3::options(); }
+  int default_max_clients() const override { return 4; }  // unknown: assumed
+  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
+                                                  const protocol::OptionValues&) const override {
+    return model;
+  }
+  protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
+  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
+                                                  const protocol::DeviceState& device) const override {
+    return m3::apply_override(wanted, device);
+  }
+  double gain_percent(const protocol::DeviceState& device) const override {
+    return m3::gain_percent(settings_from(device.settings.get()));
+  }
+  bool pings_before_first_request(const protocol::DeviceState&) const override { return true; }
+  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState&, Time) const override {
+    return std::make_unique<SilentDialogue>();
+  }
+  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
+    return std::make_shared<const protocol::Bytes>(encode_packet(ping, device));
+  }
+  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
+                                       protocol::BytesView message) const override {
+    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;
+  }
+  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
+    return locate(region, ping);
+  }
+};
+
+}  // namespace
+
+const protocol::Vendor& vendor() {
+  static const M3Vendor only;
+  return only;
+}
+
+}  // namespace sonar::m3

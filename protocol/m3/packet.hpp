@@ -1,0 +1,30 @@
+// A ping as a packet, and a packet as its parts.
+#pragma once
+
+#include <optional>
+
+#include "protocol/m3/messages.hpp"
+#include "protocol/recording/message_splitter.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::m3 {
+
+/// Boundaries of packets in a stream. The header is as long as is needed to know that the size fits beams and samples.
+extern const recording::Framing framing;
+
+Bytes encode_packet(const Ping& ping, const protocol::DeviceState& device);
+
+struct Packet {
+  DataHeader header;
+  BytesView samples;  // of the beam of the least angle first, each beam from near to far: I, Q
+
+  double start_m() const;
+  double spacing_m() const;
+};
+/// Returns nothing if it is no whole packet of complex samples.
+std::optional<Packet> read_packet(BytesView whole);
+
+std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packet);
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView packet);
+
+}  // namespace sonar::m3

@@ -1,0 +1,102 @@
+#include "protocol/m3/settings.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/sonar/water.hpp"
+#include "core/text/format.hpp"
+#include "protocol/m3/models.hpp"
+
+namespace sonar::m3 {
+namespace {
+
+constexpr double shortest_interval_s = 10.24e-6;  // PKT
+constexpr int shortest_pulse_us = 20;             // PKT
+constexpr int most_samples = 2048;                // LOG: 1681 and less; twice as many would be 2745 and more
+constexpr int samples_multiple = 4;               // PKT
+constexpr double near_per_far = 0.02;             // PKT, LOG: 0.2 of 10 m, 0.4 of 20 m
+
+}  // namespace
+
+bool HeldSettings::equals(const VendorSettings& other) const {
+  const auto* of = dynamic_cast<const HeldSettings*>(&other);
+  return of != nullptr && of->settings == settings;
+}
+
+Settings settings_from(const VendorSettings* held) {
+  const auto* of = dynamic_cast<const HeldSettings*>(held);
+  return of != nullptr ? of->settings : Settings{};
+}
+
+double near_of(double far_m) { return std::max(nearest_m, near_per_far * far_m); }
+
+Window window_of(double near_m, double far_m) {
+  Window window;
+  window.start_s = 1e-6 * std::round(1e6 * (2 * near_m / fastest_mps + transmit_s)) - transmit_s;  // PKT, LOG: whole microseconds
+  window.interval_s = shortest_interval_s;
+  window.pulse_us = shortest_pulse_us;
+  const double length_s = 2 * far_m / slowest_mps - window.start_s;
+  while (length_s > most_samples * window.interval_s) {
+    window.interval_s *= 2;
+    window.pulse_us *= 2;  // unknown: beyond 10 m
+  }
+  window.samples = samples_multiple * static_cast<int>(std::ceil(length_s / window.interval_s / samples_multiple - 1e-9));
+  return window;
+}
+
+PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
+  const Window window = window_of(near_of(settings.far_m), settings.far_m);
+  PingSettings s;
+  s.device_sound_speed_mps = static_cast<float>(true_sound_speed_mps(device.water, device.depth_m));
+  const double half_mps = static_cast<double>(s.device_sound_speed_mps) / 2;
+  s.beam_count = beam_count;
+  s.range_bin_count = window.samples;
+  s.range_start_m = window.start_s * half_mps;
+  s.range_bin_m = window.interval_s * half_mps;
+  s.range_m = s.range_start_m + s.range_bin_count * s.range_bin_m;
+  s.row_centre = 0;  // CLI: the first sample lies at the window's start
+  // -3 dB of a tone in its matched filter (docs/acoustics.md, eq. 23).
+  s.pulse_width_m = static_cast<float>((2 - std::sqrt(2.0)) * 1e-6 * window.pulse_us * half_mps);
+  s.rate_hz = settings.rate_hz;
+  s.gain_db = settings.c_db;
+  s.device_absorption_db_per_m = static_cast<float>(GainLaw{}.b / 1000.0 / 2);  // the law counts the range once
+  s.format = {.bits = 32, .max_code = 0xFFFFFFFF};
+  return s;
+}
+
+protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device) {
+  return {ping_settings(settings, device), std::make_shared<HeldSettings>(settings),
+          text::format("range %g to %g m, rate %g Hz, gain law 20 log r + 100 r / 1000 %+g dB", near_of(settings.far_m),
+                       settings.far_m, static_cast<double>(settings.rate_hz), static_cast<double>(settings.c_db))};
+}
+
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
+  const auto refused = [](std::string text) { return failure(ErrorKind::usage, std::move(text)); };
+  Settings s = settings_from(device.settings.get());
+  if (wanted.range_m) {
+    if (!(*wanted.range_m >= 1 && *wanted.range_m <= farthest_m))
+      return refused(text::format("an M3 has ranges from 1 to %g m; %g m is not valid", farthest_m, *wanted.range_m));
+    s.far_m = *wanted.range_m;
+  }
+  if (wanted.rate_hz) {
+    if (!(*wanted.rate_hz >= 0 && *wanted.rate_hz <= static_cast<double>(highest_rate_hz)))
+      return refused(text::format("an M3 pings up to %g times a second; %g Hz are not valid",
+                                  static_cast<double>(highest_rate_hz), *wanted.rate_hz));
+    s.rate_hz = static_cast<float>(*wanted.rate_hz);
+  }
+  if (wanted.gain_percent) {
+    if (!(*wanted.gain_percent >= 0 && *wanted.gain_percent <= 100)) return refused("gain_percent must be from 0 to 100");
+    s.c_db = static_cast<float>(least_c_db + (most_c_db - least_c_db) * *wanted.gain_percent / 100);
+  }
+  if (wanted.mode.value_or(0) != 0) return refused("an M3 has one mode here, 0");
+  if (wanted.beams.value_or(beam_count) != beam_count) return refused(text::format("an M3 forms %d beams", beam_count));
+  if (wanted.sample_bits.value_or(32) != 32) return refused("an M3 sends samples of 32 bits");
+  if (wanted.row_gains.value_or(false)) return refused("an M3 sends no row gains");
+  return change_to(s, device);
+}
+
+double gain_percent(const Settings& settings) {
+  return 100 * (static_cast<double>(settings.c_db) - least_c_db) / (most_c_db - least_c_db);
+}
+
+}  // namespace sonar::m3

@@ -1,0 +1,46 @@
+// Range, rate and gain, which the M3's own program sets and its drivers cannot, and the sampling window that follows from them.
+#pragma once
+
+#include <string>
+
+#include "core/sonar/phases.hpp"
+#include "core/sonar/ping_settings.hpp"
+#include "protocol/m3/messages.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::m3 {
+
+inline constexpr double transmit_s = 25e-6;  // PKT: begin of the pulse after that of the ping
+/// unknown: how far the gain law's c can be turned; half way is that of PKT.
+inline constexpr double least_c_db = -56, most_c_db = 24;
+
+struct Settings {
+  double far_m = 10;
+  float rate_hz = 15;
+  float c_db = GainLaw{}.c_db;
+  bool operator==(const Settings&) const = default;
+};
+struct HeldSettings final : PhasedSettings {
+  explicit HeldSettings(const Settings& s) : settings(s) {}
+  bool equals(const VendorSettings& other) const override;
+  Settings settings;
+};
+/// Settings{} for null.
+Settings settings_from(const VendorSettings* held);
+
+/// The near range that goes with a far one.
+double near_of(double far_m);
+
+/// When the receiver samples; `start_s` counts from the pulse's begin.
+struct Window {
+  double start_s = 0, interval_s = 0;
+  int samples = 0, pulse_us = 0;
+};
+Window window_of(double near_m, double far_m);
+
+PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
+protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+double gain_percent(const Settings& settings);
+
+}  // namespace sonar::m3
