@@ -69,8 +69,9 @@ void remark_on_places(const SceneDescription& scene, Remarks& out) {
                                 : "; centred: true brings the middle of " + far_grid->file +
                                       " to its pose, and origin: {lat, lon} places it if its coordinates are degrees or "
                                       "UTM (utm: 33N, its zone)"));
-  const auto is_above = [](const DescribedObject& o) {
-    return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > at_surface_m;
+  const auto is_above = [&](const DescribedObject& o) {
+    if (o.kind == "sea surface" || o.in_world.empty()) return false;
+    return o.in_world.low_m.z > (is_ground(o, scene) ? at_surface_m : -at_surface_m);
   };
   const auto above = names_where(scene, is_above);
   const auto grid = std::find_if(scene.objects.begin(), scene.objects.end(),
