@@ -69,8 +69,10 @@ void remark_on_places(const SceneDescription& scene, Remarks& out) {
                                 : "; centred: true brings the middle of " + far_grid->file +
                                       " to its pose, and origin: {lat, lon} places it if its coordinates are degrees or "
                                       "UTM (utm: 33N, its zone)"));
-  const auto is_above = [](const DescribedObject& o) {
-    return o.kind != "sea surface" && !o.in_world.empty() && o.in_world.low_m.z > at_surface_m;
+  const auto is_above = [&](const DescribedObject& o) {
+    if (o.kind == "sea surface" || o.in_world.empty()) return false;
+    const bool stands_on_it = !is_ground(o, scene) && o.in_world.high_m.z > at_surface_m;
+    return o.in_world.low_m.z > (stands_on_it ? -at_surface_m : at_surface_m);
   };
   const auto above = names_where(scene, is_above);
   const auto grid = std::find_if(scene.objects.begin(), scene.objects.end(),
@@ -79,7 +81,7 @@ void remark_on_places(const SceneDescription& scene, Remarks& out) {
     out.warnings.push_back("wholly above z = 0, the water's surface: " + list_of(above) +
                            (grid == scene.objects.end() ? "" : "; if " + grid->file + " has depths, set z_scale: -1"));
   const auto dry = names_where(scene, [&](const DescribedObject& o) {
-    return is_ground(o, scene) && !is_above(o) && o.in_world.low_m.z >= -at_surface_m;
+    return !o.in_world.empty() && is_ground(o, scene) && !is_above(o) && o.in_world.low_m.z >= -at_surface_m;
   });
   if (!dry.empty())
     out.warnings.push_back("ground at z = 0, the water's surface, with no water above it: " + list_of(dry) +

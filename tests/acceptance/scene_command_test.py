@@ -34,6 +34,22 @@ class SceneCommand(unittest.TestCase):
     def import_quay(self, *more):
         return self.ctl("import", WORLDS / "quay.world", "--out", self.scene, *more)
 
+    def test_a_grid_in_utm_lies_below_a_vehicle_at_the_origin_of_the_world(self):
+        cells = " ".join(["-4"] * 441)
+        (self.path / "bed.asc").write_text("ncols 21\nnrows 21\nxllcenter 499990\nyllcenter 6651401.2\ncellsize 1\n" + cells,
+                                           encoding="utf-8")
+        self.scene.write_text("objects: [{name: bed, type: heightmap, file: bed.asc, material: sand, utm: 33N}]\n", encoding="utf-8")
+        config = self.path / "sonard.yaml"
+        checked = []
+        for latitude in (60, 61):
+            place = f"quay.yaml, origin: {{lat: {latitude}, lon: 15}}}}"
+            config.write_text(CONFIG.replace("quay.yaml}", place), encoding="utf-8")
+            checked.append(run(SONARD, "check", config).stdout)
+        self.assertIn("note: bed.asc: its place is counted from world.origin, latitude 60.000000, longitude 15.000000", checked[0])
+        self.assertNotIn("from everything", checked[0])
+        self.assertIn("note: the scene is 111.4 km from world.origin; vehicles", checked[1])
+        self.assertIn("m from everything in the scene", checked[1])
+
     def test_an_imported_box_is_heard_where_its_poses_put_it(self):
         said = self.import_quay("--material", "left_rig=concrete")
         for words in ["2 shapes of 3 models", '2 lights: without an echo', 'sensor "eye"', 'plugin "winch"', "rig/rig.sdf:16", ": ok: 2 objects"]:

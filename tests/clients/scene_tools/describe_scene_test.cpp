@@ -123,7 +123,13 @@ TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
                   "every product: bed; centred: true brings the middle of utm.asc to its pose, and origin: {lat, lon}")));
 }
 
-TEST_F(DescribeScene, WarnsOfGroundAtTheSurface) {
+TEST_F(DescribeScene, WarnsOfGroundAndOfObjectsAtTheSurface) {
+  const std::string below = "objects: [{name: bed, type: plane, size_m: [40, 40], material: sand, pose: {xyz_m: [0, 0, -4]}}, ";
+  EXPECT_THAT(remarks(below + "{name: mast, type: box, size_m: [1, 1, 2], material: wood, pose: {xyz_m: [0, 0, 1]}}]\n").warnings,
+              ElementsAre("wholly above z = 0, the water's surface: mast"));
+  EXPECT_THAT(
+      remarks(below + "{name: mast, type: box, size_m: [1, 1, 2], material: wood, pose: {xyz_m: [0, 0, 0.9]}}]\n").warnings,
+      IsEmpty());
   const auto surface = ElementsAre(HasSubstr("ground at z = 0, the water's surface, with no water above it: bed; move it down"));
   files.write("flat.asc", "ncols 2\nnrows 2\ncellsize 30\n0 0 0 0\n");
   const std::string grid = "objects: [{name: bed, type: heightmap, file: flat.asc, material: sand, pose: {xyz_m: [0, 0, ";
