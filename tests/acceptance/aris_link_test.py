@@ -14,7 +14,7 @@ from aris_controller import BEACONS, COMMANDS, PING, RECEIVER, SALINITY, Beacons
 from pcap_writer import Capture
 from running_sonard import ROOT, SONARCTL, SONARD, Sonard, expect_quiet, run
 
-DISSECTOR = ROOT / "clients/wireshark/aris.lua"
+DISSECTOR = ROOT / "protocol/aris/aris.lua"
 STARBOARD, PORT = range(0, 64), range(64, 128)  # beam 0 is the right-most
 B, C = (3.9, 10), (6.9, -8)  # range m, bearing deg clockwise: points of scenes/l-targets.yaml
 

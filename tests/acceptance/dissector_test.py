@@ -1,4 +1,4 @@
-"""The Wireshark dissector (clients/wireshark/oculus.lua) under tshark: three decoders in three languages must read the same.
+"""The Wireshark dissector (protocol/oculus/oculus.lua) under tshark: three decoders in three languages must read the same.
 
 Every field of every message is held against a reader in Python (oculus_fields) and against our own decoder (dump_oculus): on a
 run recorded from sonard, on the hand-made golden messages, on captured pings of a real device where SONARD_CAPTURES names them.

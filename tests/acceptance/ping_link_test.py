@@ -15,7 +15,7 @@ import tshark as shark
 from pcap_writer import Capture
 from running_sonard import ROOT, SONARCTL, SONARD, Sonard, eventually, expect_quiet, run
 
-DISSECTOR = ROOT / "clients/wireshark/ping.lua"
+DISSECTOR = ROOT / "protocol/ping/ping.lua"
 PING360, DISCOVERY, SURVEYOR, OMNISCAN, PING1D = 12345, 30303, 62312, 51200, 9090
 B, C = (3.9, 10), (6.9, -8)  # range m, bearing deg clockwise: points of scenes/l-targets.yaml
 SIDE = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -30, 90]}"

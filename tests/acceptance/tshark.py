@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ElementTree
 
 from running_sonard import ROOT
 
-DISSECTOR = ROOT / "clients/wireshark/oculus.lua"
+DISSECTOR = ROOT / "protocol/oculus/oculus.lua"
 # Made from other fields by the dissector, or parts of one: checked by their own means.
 DERIVED = ("oculus.length", "oculus.ping.bits", "oculus.ping.firstBearing", "oculus.ping.lastBearing", "oculus.ping.bearing",
            "oculus.ping.filler", "oculus.ping.image", "oculus.ping.rowGain", "oculus.log.text", "oculus.payload", "oculus.junk")

@@ -226,7 +226,7 @@ class Images(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "rip.pcap"
             capture.write(path)
-            script = ROOT / "clients/wireshark/waterlinked.lua"
+            script = ROOT / "protocol/waterlinked/waterlinked.lua"
             lines = shark.tshark("-r", path, "-Y", "waterlinked", dissector=script)
             values = shark.tshark("-r", path, "-Y", "waterlinked", "-T", "fields", "-e", "waterlinked.kind", "-e", "waterlinked.sequence", "-e",
                                   "waterlinked.width", "-e", "waterlinked.fovHorizontal", dissector=script).splitlines()

@@ -120,13 +120,10 @@ MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|surveyor
 MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
 NAME_MAKES = {
     "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py",
-    "clients/python/sonard_client/daemon.py", "clients/python/sonard_client/judge/__main__.py",
     "clients/python/sonard_client/judge/cases.py", "clients/python/sonard_client/judge/truth.py",
-    "clients/python/sonard_client/lab.py", "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/oculus.py",
+    "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/oculus.py",
     "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py", "clients/web/src/panels/head.js",
-    "clients/wireshark/aris.lua", "clients/wireshark/oculus.lua", "clients/wireshark/ping.lua",
-    "clients/wireshark/waterlinked.lua", "daemon/commands/render/render_file.cpp", "daemon/commands/replay/replay_device.cpp",
-    "daemon/commands/replay/replay_device.hpp",
+    "daemon/commands/replay/replay_device.cpp", "daemon/commands/replay/replay_device.hpp",
 }
 CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc"}
 TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ".js", ""}

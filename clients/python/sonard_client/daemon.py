@@ -28,8 +28,8 @@ class Daemon:
     with Daemon("""
     world: {scene: demo.yaml}
     vehicles: [{name: rov}]
-    sonars: [{name: front, profile: oculus-m1200d, bind_ip: ADDRESS, status_to: [ADDRESS]}]
-    """) as sonard: OculusClient(sonard.address)
+    sonars: [{name: front, profile: PRODUCT, bind_ip: ADDRESS, status_to: [ADDRESS]}]
+    """) as sonard: drive(sonard.address)
 
     ADDRESS is replaced by a random loopback address (sonard.address), so that several daemons can run at a time. None: the demo.'''
 

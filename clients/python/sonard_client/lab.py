@@ -23,6 +23,7 @@ import threading
 import time
 from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
+from . import DEFAULT_PROFILE
 from .daemon import Daemon, DaemonFailed
 
 DEVICE, HOST, LINK = "10.77.0.2", "10.77.0.1", "sonar0"
@@ -253,7 +254,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--keep", action="store_true", help="when the command ends, keep the laboratory until Ctrl-C")
     parser.add_argument("--do", action="append", default=[], metavar="TEXT", help="L06:seconds=5,after=10; repeatable")
     parser.add_argument("--config", metavar="TEXT", help="configuration of sonard, whose sonar has bind_ip " + DEVICE)
-    parser.add_argument("--profile", metavar="TEXT", default="oculus-m1200d", help="product, without --config")
+    parser.add_argument("--profile", metavar="TEXT", default=DEFAULT_PROFILE, help="product, without --config")
     parser.add_argument("--sonard", metavar="TEXT", default=os.environ.get("SONARD", "sonard"), help="the program")
     parser.add_argument("--check", action="store_true", help="only say what this machine lacks")
     parser.add_argument("command", nargs=argparse.REMAINDER, metavar="-- COMMAND", help="runs in the host's namespace")

@@ -8,6 +8,7 @@
 #include "daemon/config/config_parts.hpp"
 #include "daemon/config/read_trajectory.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
+#include "protocol/host.hpp"
 
 namespace sonar::render {
 namespace {
@@ -203,7 +204,8 @@ bool is_scene(const Map& root) { return root.has("objects") && !root.has("scene"
 std::string what_to_do_with_a_scene(const std::filesystem::path& file) {
   const std::string scene = std::filesystem::absolute(file).lexically_normal().string();
   return file.string() + " is a scene, without a sonar. A render file names a scene and a sonar: echo '{scene: \"" + scene +
-         "\", sonar: {profile: oculus-m1200d}, poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}}' > render.yaml && "
+         "\", sonar: {profile: " + std::string(protocol::makes().front().demo_profile) +
+         "}, poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -3]}}}' > render.yaml && "
          "sonard render render.yaml --out pings (docs/render.md)";
 }
 

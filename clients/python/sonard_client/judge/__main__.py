@@ -25,7 +25,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Dict, List, Optional, Sequence
 
-from .. import lab
+from .. import DEFAULT_PROFILE, lab
 from . import markdown, report
 from .cases import CASES, Case, listing, select, torture
 
@@ -44,7 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--driver", metavar="TEXT", help="starts the driver; {ip}, {port} and {id} are filled in")
     parser.add_argument("--tap", metavar="TEXT", default="none",
                         help="json: the driver prints a JSON line a ping; ros1:TOPIC or ros2:TOPIC; none (the default)")
-    parser.add_argument("--profile", metavar="TEXT", default="oculus-m1200d", help="product")
+    parser.add_argument("--profile", metavar="TEXT", default=DEFAULT_PROFILE, help="product")
     parser.add_argument("--case", metavar="TEXT", action="append", default=[],
                         help="number (L05.2), code (L05), family (L) or name; repeatable")
     parser.add_argument("--strict", action="store_true", help="SHOULDs count too")
