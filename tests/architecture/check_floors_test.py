@@ -134,7 +134,7 @@ class Planted(unittest.TestCase):
                            ("clients/python/a.py", "# of an ARIS"), ("protocol/recording/a.cpp", 'if (name == "blueview") return;')]:
             with self.subTest(name=name):
                 self.expect(name, line + "\n", 1, "only the make's folder")
-        self.expect("daemon/commands/render/render_file.cpp", "int x;\n", 1, "take it out of NAME_MAKES")
+        self.expect("daemon/commands/replay/replay_device.cpp", "int x;\n", 1, "take it out of NAME_MAKES")
 
     def test_headers_and_sizes(self):
         found = found_in({"core/base/a.hpp": "int x;\n"})
