@@ -51,7 +51,7 @@ class Talk {
  public:
   /// Streams arrive in pieces of so many bytes; 0: as they are written.
   Talk(const Make& of, const Wanted& wanted, std::size_t piece = 0, std::size_t model = 0)
-      : make(of), device(*of.device), piece_(piece), host(*of.host(sets_nothing(of) ? Wanted{.as_it_is = true} : wanted)) {
+      : make(of), device(*of.device), piece_(piece), host(*of.host(sets_nothing(of) ? Wanted{} : wanted)) {
     state.name = "front";
     state.id = 7001;
     state.model = device.models()[model];
