@@ -22,8 +22,10 @@ constexpr int base_elevations = 48;              // docs/acoustics.md, section 2
 constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
 constexpr double side_lobe_two_way = 5.62e-3;    // -45 dB: lower side lobes are left out
 constexpr double side_step_rad = 0.19;           // between rays in them; a plane is exact between any two
-constexpr int side_bins = 64;                    // bins of the depth map on either side
-constexpr double unit_fan_over_width = 2.3;      // where there is no pattern to end it
+constexpr int side_bins = 32;                    // bins of the depth map on either side
+// Least cells in the area that a beam and a pulse cover in side lobes; cells of a power of two have up to four times as many.
+constexpr double side_cells_of_speckle = 0.22, side_cells_of_expected_power = 16;
+constexpr double unit_fan_over_width = 2.3;  // where there is no pattern to end it
 constexpr double widest_fan_rad = 1.4;
 
 double half_aperture_sine(const FrequencyMode& mode) { return std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2); }
@@ -41,6 +43,10 @@ BeamWidths beam_width_sines(const FrequencyMode& mode) {
     widths = {std::min(widths.narrowest, width), std::max(widths.widest, width)};
   }
   return widths;
+}
+
+double narrowest_beam_rad(const FrequencyMode& mode) {
+  return mode.has_own_widths() ? beam_width_sines(mode).narrowest : static_cast<double>(mode.pattern.azimuth_width_rad);
 }
 
 /// The angle at which the peaks of the two-way pattern, 1 / (pi x)^2 at x = L_v / lambda sin psi, have fallen below what is
@@ -277,8 +283,10 @@ void PingPlan::aim(CellView& view) const {
   if (fan.side_elevations == 0) return;
   view.main_elevation_rad = static_cast<float>(widest_about_axis_rad(fan.half_angle_rad));
   view.side_from_rad = static_cast<float>(fan.half_angle_rad);
-  // 20 dB down, a quarter of the cells will do.
-  view.side_coarser = expected_power ? 0 : 1;
+  // Few cells a sample of the beams will do, except where no speckle hides the places of the cells.
+  const double cells_a_sample = expected_power ? side_cells_of_expected_power : side_cells_of_speckle;
+  view.side_area_per_range_m = static_cast<float>(narrowest_beam_rad(mode) * pulse_width_m / cells_a_sample);
+  view.side_coarser = expected_power ? 0 : 2;
 }
 
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings) {
@@ -306,9 +314,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
   // The mean over speckle does not hide the random places of the cells. With smaller cells they cause only a tenth of a decibel.
   const double cell_scale = p.expected_power ? 0.4 : 1.0;
-  const double narrowest_rad =
-      mode.has_own_widths() ? beam_width_sines(mode).narrowest : static_cast<double>(mode.pattern.azimuth_width_rad);
-  p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * narrowest_rad, settings.range_m * 1.1);
+  p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * narrowest_beam_rad(mode), settings.range_m * 1.1);
   p.pulse_filter = p.noise_filter = rounded(make_noise_filter(p.pulse_shape, p.sample_time_s));
   double bandwidth_hz = p.pulse_shape.noise_bandwidth_hz();
   if (const auto width = static_cast<double>(mode.receiver.noise_width); switches.bandwidth && width != 1) {

@@ -50,7 +50,7 @@ struct Switches {
   bool conical = true;
   bool crosstalk = true;
   bool leak = true;
-  bool side_lobes = false;  // costs 10 to 30 %
+  bool side_lobes = false;  // costs up to 10 %
   bool interference = true;
   bool grain = true;
   bool bandwidth = true;

@@ -167,7 +167,19 @@ void find_roots(const Ownership& all, const TileAddress& a, const TextureField* 
   }
 }
 
-void pack(const Ownership& all, const TileAddress& a, const CellList& cells, CellTile& tile) {
+/// Scales the weights to the magnitude of their roots; returns the largest.
+float make_even(const CellList& cells) {
+  double most = 0;
+  for (int n = 0; n < cells.size; ++n) {
+    const auto re = static_cast<double>(cells.re[n]), im = static_cast<double>(cells.im[n]), size = std::sqrt(re * re + im * im);
+    const double scale = size > 0 ? cells.root[n] / size : 0;
+    cells.re[n] = static_cast<float>(re * scale), cells.im[n] = static_cast<float>(im * scale);
+    most = std::max(most, cells.root[n]);
+  }
+  return static_cast<float>(most);
+}
+
+void pack(const Ownership& all, const TileAddress& a, const CellList& cells, CellWeights weights, CellTile& tile) {
   const int n = cells.padded;
   tile.count = tile.stride = n;
   tile.data = std::make_unique_for_overwrite<std::int16_t[]>(static_cast<std::size_t>(n) * CellTile::columns);
@@ -192,7 +204,8 @@ void pack(const Ownership& all, const TileAddress& a, const CellList& cells, Cel
     normal_x[i] = normal[0], normal_y[i] = normal[1], normal_z[i] = normal[2];
   }
 
-  const float peak = cell_lanes::speckle(cells.speckle_a, cells.speckle_b, cells.root, n, cells.re, cells.im);
+  float peak = cell_lanes::speckle(cells.speckle_a, cells.speckle_b, cells.root, n, cells.re, cells.im);
+  if (weights == CellWeights::of_one_magnitude) peak = make_even(cells);
   tile.weight_unit = peak > 0 ? peak / 32767.0f : 1.0f;
   cell_lanes::pack_weights(cells.re, n, tile.weight_unit, column(CellTile::weight_re));
   cell_lanes::pack_weights(cells.im, n, tile.weight_unit, column(CellTile::weight_im));
@@ -208,7 +221,7 @@ cell_lanes::DrawKey draw_key(const TileAddress& a, std::uint32_t texture_seed, S
 }  // namespace
 
 CellTile build_tile(const TileAddress& a, const Mesh& mesh, std::span<const std::uint32_t> triangles, std::uint32_t texture_seed,
-                    Seed seed, const TextureField* texture, const TextureField* grain) {
+                    Seed seed, const TextureField* texture, const TextureField* grain, CellWeights weights) {
   const double edge = lattice::tile_edge_m(a.level);
   CellTile tile;
   tile.object = a.object;
@@ -227,7 +240,7 @@ CellTile build_tile(const TileAddress& a, const Mesh& mesh, std::span<const std:
   const CellList cells = list_cells(all);
   if (cells.size == 0) return tile;
   find_roots(all, a, texture, grain, cells);
-  pack(all, a, cells, tile);
+  pack(all, a, cells, weights, tile);
   return tile;
 }
 

@@ -17,6 +17,9 @@ namespace {
 
 constexpr double fewest_cells = 3000;  // least number for an object, with CellView::exact_small
 
+/// For the tiles of side lobes, of which one cube has all cells of a place.
+constexpr CellLevel at_all_ranges{.full_to_m = 1e9f, .fade_out_to_m = 1e9f};
+
 bool is_empty(const TileInView& t) { return t.tile->count == 0; }
 
 int coarsest_wanted(const CellView& view) {
@@ -148,6 +151,14 @@ void SurfaceCells::forget_known() {
 
 SurfaceCells::~SurfaceCells() = default;
 
+void SurfaceCells::list(Node& node, bool of_side, const TileInView& seen, Found& found) {
+  const bool built = of_side ? node.side_built : node.built;
+  const Missing missing{&node, of_side};
+  // Listed only once, even if two levels need it.
+  if (!built && (found.missing.empty() || found.missing.back() != missing)) found.missing.push_back(missing);
+  if (!built || seen.tile->count > 0) found.in_view.push_back(seen);
+}
+
 void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Found& found) {
   const CellView& view = *look.view;
   const auto object = static_cast<std::size_t>(patch.object);
@@ -155,7 +166,7 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
   const Rotation& turn = look.rotations[object];
   const Cube cube = cube_of(node.address);
   const Vec3d centre = lattice::from_permuted(cube.u, cube.v, cube.w, patch.axis);
-  const double radius = cube.half * 1.7320508075688772 * 1.0001;
+  const double radius = cube.radius();
   const Vec3d q = centre - sonar_in_object.position_m;
   const auto& m = turn.m;
   const Vec3d p{m[0][0] * q.x + m[0][1] * q.y + m[0][2] * q.z, m[1][0] * q.x + m[1][1] * q.y + m[1][2] * q.z,
@@ -178,23 +189,17 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
   const bool has_sides = !view.seen_between && view.side_from_rad < view.max_elevation_rad;
   const bool in_main = !has_sides || look.main.outside(p) <= radius;
   const bool in_side = has_sides && look.before_side.outside(p) >= -radius;
-  const int coarsest_wanted = level_of(view.levels.front());
-  bool finer =
-      (in_main && node.address.level < coarsest_wanted) || (in_side && node.address.level < coarsest_wanted - view.side_coarser);
+  bool finer = in_main && node.address.level < level_of(view.levels.front());
   for (const CellLevel& level : view.levels) {
     const bool overlaps = seen.nearest_m < level.fade_out_to_m && seen.farthest_m >= level.fade_in_from_m;
-    if (!overlaps) continue;
-    for (const bool by_side : {false, true}) {
-      if (!(by_side ? in_side : in_main)) continue;
-      const int wanted = level_of(level) - (by_side ? view.side_coarser : 0);
-      if (wanted == node.address.level) {
-        // Listed only once, even if the main fan of one level and the side lobes of another both need it.
-        if (!node.built && (found.missing.empty() || found.missing.back() != &node)) found.missing.push_back(&node);
-        if (!node.built || node.tile.count > 0) found.in_view.push_back({&node.tile, &level, q, p, patch.object, by_side});
-      } else if (wanted > node.address.level) {
-        finer = true;
-      }
-    }
+    if (!in_main || !overlaps) continue;
+    if (level_of(level) == node.address.level) list(node, false, {&node.tile, &level, q, p, patch.object, false}, found);
+    finer = finer || level_of(level) > node.address.level;
+  }
+  if (in_side) {
+    finer = finer || patch.side_level(node.address, sonar_in_object.position_m, view) > node.address.level;
+    if (patch.has_side_cells(node.address, sonar_in_object.position_m, view))
+      list(node, true, {&node.side_tile, &at_all_ranges, q, p, patch.object, true}, found);
   }
   if (!finer || node.alone) return;
   if (!node.divided.load(std::memory_order_acquire)) {
@@ -252,16 +257,19 @@ void SurfaceCells::look_through(const Look& look, std::size_t from, std::size_t 
   }
 }
 
-void SurfaceCells::build(std::vector<Node*>& missing, Parallel& pool) {
+void SurfaceCells::build(std::vector<Missing>& missing, Parallel& pool) {
   pool.for_each(missing.size(), [&](std::size_t n, int) {
-    Node& node = *missing[n];
+    Node& node = *missing[n].node;
+    const bool of_side = missing[n].of_side;
     const TileAddress& a = node.address;
     const auto material = static_cast<std::size_t>(a.material);
-    node.tile = build_tile(a, *scene_->objects[static_cast<std::size_t>(a.object)].mesh, node.triangles,
-                           scene_->materials[material].texture_seed, seed_, textures_[material].get(), grains_[material].get());
-    node.built = true;
+    (of_side ? node.side_tile : node.tile) =
+        build_tile(a, *scene_->objects[static_cast<std::size_t>(a.object)].mesh, node.triangles,
+                   scene_->materials[material].texture_seed, seed_, textures_[material].get(), grains_[material].get(),
+                   of_side ? CellWeights::of_one_magnitude : CellWeights::gaussian);
+    (of_side ? node.side_built : node.built) = true;
   });
-  for (const Node* node : missing) cached_bytes_ += node->tile.bytes();
+  for (const auto& [node, of_side] : missing) cached_bytes_ += (of_side ? node->side_tile : node->tile).bytes();
 }
 
 const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
@@ -275,7 +283,7 @@ const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Paral
     look_through(looked_, s * stretch, std::min(roots_.size(), (s + 1) * stretch), found_[s]);
   });
   in_view_.clear();
-  std::vector<Node*> missing;
+  std::vector<Missing> missing;
   for (const Found& found : found_) {
     cached_bytes_ += found.new_bytes;
     in_view_.insert(in_view_.end(), found.in_view.begin(), found.in_view.end());
@@ -303,7 +311,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
     found[v].tiles.swap(found_[v].in_view);
     found[v].sonar_from_object = looks_[v].rotations;
   });
-  std::vector<Node*> missing;
+  std::vector<Missing> missing;
   for (std::size_t v = 0; v < views.size(); ++v) {
     cached_bytes_ += found_[v].new_bytes;
     missing.insert(missing.end(), found_[v].missing.begin(), found_[v].missing.end());
@@ -328,11 +336,7 @@ void SurfaceCells::keep_within_budget() {
     for (auto& patch : patches_)
       for (auto& root : patch->roots) {
         cached_bytes_ -= SurfacePatch::forget_below(*root, now_ - age + 1);
-        if (root->built && root->last_visited <= now_ - age) {
-          cached_bytes_ -= root->tile.bytes();
-          root->tile = CellTile{};
-          root->built = false;
-        }
+        if (root->last_visited <= now_ - age) cached_bytes_ -= root->forget_tiles();
       }
   }
 }

@@ -65,8 +65,10 @@ struct CellView {
   float max_sine = 1;             // |y / r| of the outermost column
   float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first
-  // Fans with side lobes: the main part, about the array axis, and where the rest begins, whose cells are so many levels coarser.
+  // Fans with side lobes: the main part, about the array axis, and where the rest begins. Cells of a whole cube there have one
+  // level, and beyond `side_coarser` levels above the coarsest of `levels` they are no coarser.
   float main_elevation_rad = 2, side_from_rad = 2;
+  float side_area_per_range_m = 0;  // area of a cell on a surface that is grazed, over its range; a steep one has larger cells
   int side_coarser = 0;
   bool exact_small = false;  // objects of few cells get finer ones: where no speckle hides which place each has
   /// When set, stands for the bounds of the fan: between which distances a ball about a place in the sonar's axes is seen, which
@@ -81,7 +83,7 @@ struct TileInView {
   Vec3d from_sonar_object_m;  // tile centre minus sonar, object axes
   Vec3d from_sonar_m;         // the same in the sonar's axes
   int object = 0;
-  bool in_side_lobes = false;  // for its cells there; those of the fan's main part are another tile's
+  bool in_side_lobes = false;  // for its cells there, whose weights have one magnitude; those of the main part are another tile's
 };
 
 /// Cells of a view. Valid until the next call of in_view() or in_views().
@@ -140,9 +142,14 @@ class SurfaceCells {
     SurfacePatch* patch;
     Node* node;
   };
+  struct Missing {  // a tile that is not built yet
+    Node* node;
+    bool of_side;  // the tile for side lobes
+    auto operator<=>(const Missing&) const = default;
+  };
   struct Found {  // by those who look through some of the roots
     std::vector<TileInView> in_view;
-    std::vector<Node*> missing;  // nodes among them without a tile
+    std::vector<Missing> missing;
     std::size_t new_bytes = 0;
   };
   struct Look {  // a view as the cubes are compared with it
@@ -167,7 +174,8 @@ class SurfaceCells {
   /// Through the roots [from, to).
   void look_through(const Look& look, std::size_t from, std::size_t to, Found& found);
   void visit(SurfacePatch& patch, Node& node, const Look& look, Found& found);
-  void build(std::vector<Node*>& missing, Parallel& pool);
+  void list(Node& node, bool of_side, const TileInView& seen, Found& found);
+  void build(std::vector<Missing>& missing, Parallel& pool);
   void keep_within_budget();
 
   std::shared_ptr<const Scene> scene_;

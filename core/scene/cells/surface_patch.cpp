@@ -10,6 +10,8 @@ namespace sonar {
 namespace {
 
 constexpr int most_roots_along_an_axis = 16;
+constexpr double most_steep = 4;      // a steep surface's cells have at most so many times the area of a grazed one's
+constexpr int few_in_side_lobes = 2;  // levels: an object has at least a sixteenth of fewest_cells in side lobes
 
 /// The finest level at which few enough cubes cover the triangles.
 int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles, int finest) {
@@ -117,6 +119,32 @@ std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
   return bytes;
 }
 
+int SurfaceCells::SurfacePatch::side_level(const TileAddress& address, Vec3d sonar_m, const CellView& view) const {
+  const Cube cube = cube_of(address);
+  const Vec3d q = lattice::from_permuted(cube.u, cube.v, cube.w, axis) - sonar_m;
+  const double along = axis == 0 ? q.x : axis == 1 ? q.y : q.z, range = length(q);
+  // A surface across the patch's axis is met at the grazing angle whose cosine is the distance from that axis over the range.
+  const double aside = std::sqrt(std::max(range * range - along * along, 0.0));
+  const double steep = range < most_steep * aside ? range / aside : most_steep;
+  const double area = static_cast<double>(view.side_area_per_range_m) * steep * std::max(range - cube.radius() / 2, 0.0);
+  const int finest = view.levels.back().level, coarsest_seen = view.levels.front().level - view.side_coarser;
+  // Cells of the level have that area at most: 2^-2 level <= area, whose exponent is exact.
+  int exponent = 0;
+  std::frexp(area, &exponent);
+  const int by_area = area > 0 ? std::clamp((2 - exponent) >> 1, coarsest_seen, finest) : finest;
+  return std::max(by_area, view.exact_small ? coarsest : std::min(coarsest - few_in_side_lobes, finest));
+}
+
+bool SurfaceCells::SurfacePatch::has_side_cells(const TileAddress& address, Vec3d sonar_m, const CellView& view) const {
+  if (side_level(address, sonar_m, view) > address.level) return false;
+  TileAddress around = address;
+  while (--around.level >= view.levels.front().level - view.side_coarser) {
+    around.i >>= 1, around.j >>= 1, around.k >>= 1;
+    if (side_level(around, sonar_m, view) <= around.level) return false;
+  }
+  return true;
+}
+
 namespace {
 
 /// Adds the results of `of` for a cube and for the cubes inside it.
@@ -132,18 +160,13 @@ std::size_t sum_over(Node& node, const Of& of) {
 
 std::size_t SurfaceCells::SurfacePatch::fixed_bytes() const {
   std::size_t bytes = mesh->vertices.size() * sizeof(Vec3) + mesh->triangles.size() * sizeof(mesh->triangles[0]);
-  for (const auto& root : roots) bytes += root->own_bytes() - root->tile.bytes();
+  for (const auto& root : roots) bytes += root->own_bytes() - root->tile_bytes();
   return bytes;
 }
 
 std::size_t SurfaceCells::SurfacePatch::forget_tiles() {
   std::size_t freed = 0;
-  for (auto& root : roots)
-    freed += sum_over(*root, [](Node& node) {
-      const std::size_t bytes = std::exchange(node.tile, CellTile{}).bytes();
-      node.built = false;
-      return bytes;
-    });
+  for (auto& root : roots) freed += sum_over(*root, [](Node& node) { return node.forget_tiles(); });
   return freed;
 }
 

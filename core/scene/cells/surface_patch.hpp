@@ -15,6 +15,7 @@ namespace sonar {
 
 struct Cube {
   double u, v, w, half;
+  double radius() const { return half * 1.7320508075688772 * 1.0001; }  // of a ball around it
 };
 inline Cube cube_of(const TileAddress& a) {
   const double e = lattice::tile_edge_m(a.level);
@@ -26,14 +27,22 @@ inline bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lat
 struct SurfaceCells::Node {
   // Fields that every visit reads come first, side by side.
   TileAddress address;
-  std::atomic<bool> divided = false;  // children are there for those who read true
-  bool built = false, alone = false;  // alone: of SurfacePatch::raise, without cubes inside
+  std::atomic<bool> divided = false;                      // children are there for those who read true
+  bool built = false, side_built = false, alone = false;  // alone: of SurfacePatch::raise, without cubes inside
   std::atomic<std::uint64_t> last_visited = 0;
   std::array<std::unique_ptr<Node>, 8> children;  // null where no triangle goes
   std::vector<std::uint32_t> triangles;
-  CellTile tile;
+  CellTile tile, side_tile;  // side_tile: for side lobes
 
-  std::size_t own_bytes() const { return sizeof(Node) + triangles.capacity() * sizeof(std::uint32_t) + tile.bytes(); }
+  std::size_t tile_bytes() const { return tile.bytes() + side_tile.bytes(); }
+  std::size_t own_bytes() const { return sizeof(Node) + triangles.capacity() * sizeof(std::uint32_t) + tile_bytes(); }
+  /// Returns the bytes that frees.
+  std::size_t forget_tiles() {
+    const std::size_t bytes = tile_bytes();
+    tile = CellTile{}, side_tile = CellTile{};
+    built = side_built = false;
+    return bytes;
+  }
 };
 
 /// The triangles of one object that share material, dominant axis and side of the normal: one lattice.
@@ -62,6 +71,10 @@ class SurfaceCells::SurfacePatch {
   void raise(int level);
   /// Returns the bytes that the new cubes take.
   std::size_t divide(Node& node) const;
+  /// Level that the side lobes' cells in a cube should have, seen from `sonar_m`, in the object's axes.
+  int side_level(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
+  /// Whether a cube has the side lobes' cells of its place: its own level will do, and that of no cube around it.
+  bool has_side_cells(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
   /// Forgets the tiles and keeps the cubes; returns the bytes that frees.
   std::size_t forget_tiles();
   /// Forgets all cubes below `node` that were last visited before `then`; returns the bytes that frees.

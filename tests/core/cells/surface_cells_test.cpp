@@ -382,7 +382,7 @@ TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
   }
   // Also where only the side lobes want them so coarse, and beside a finer level.
   CellView sides = whole_scene(4, {-10, 0, -10});
-  sides.main_elevation_rad = 0.1f, sides.side_from_rad = 0.1f, sides.side_coarser = 2;
+  sides.main_elevation_rad = 0.1f, sides.side_from_rad = 0.1f, sides.side_area_per_range_m = 1e6f, sides.side_coarser = 2;
   SurfaceCells beside(scene, Seed{9}, 1u << 30);
   EXPECT_EQ(counted(beside, sides), counted(from_fine, whole_scene(2)));
 }

@@ -38,12 +38,23 @@ TEST(SideLobes, PointsAreHeardAllAround) {
   }
 }
 
+constexpr double tilt = 0.1, lambert_db = -20;  // nose down; strength of the beds
+
+/// A flat bed `height` below a sonar, up to six heights away.
+Sounding over_bed(const FrequencyMode& mode, double height = 2, double pulse_width_m = 0.0254) {
+  const double size = height / 2;
+  return Sounding(
+      SceneMaker()
+          .add(height_field(-size, 7 * height, -6 * height, 6 * height, size, [](double, double) { return 0.0; }), lambert_db)
+          .make(),
+      mode, native_rows(6 * height, pulse_width_m));
+}
+
 /// Expects of a bed 2 m below, nose down, the mean over beams about the middle, over blocks of rows, re the closed
 /// form.
 void expect_bed(const FrequencyMode& mode, bool side_lobes, bool speckle) {
-  constexpr double height = 2, tilt = 0.1, lambert_db = -20;
-  Sounding s(SceneMaker().add(height_field(-1, 14, -12, 12, 1, [](double, double) { return 0.0; }), lambert_db).make(), mode,
-             native_rows(12, 0.0254));
+  constexpr double height = 2;
+  Sounding s = over_bed(mode);
   s.request.switches.expected_power = !speckle;
   s.request.switches.side_lobes = side_lobes;
   s.ping_from({0, 0, height}, {0, tilt, 0});
@@ -79,21 +90,23 @@ TEST(SideLobes, ABedIsAsLoudAsTheClosedFormDownTo45Db) {
   for (const FrequencyMode& mode : {p900(), oculus_high()}) expect_bed(mode, true, false);
 }
 TEST(SideLobes, CoarserCellsKeepItsLevel) { expect_bed(p900(), true, true); }
-/// Scintillation index of samples over the bed's closed form, where the pattern is between `least_db` and -20 dB: 1 for speckle
-/// of many cells a sample.
-double scintillation(const FrequencyMode& mode, double least_db) {
-  constexpr double height = 2, tilt = 0.1, lambert_db = -20;
+
+/// Power of samples over the bed's closed form, where the pattern is between `least_db` and -20 dB: scintillation index, 1 for
+/// speckle of many cells a sample, and mean in dB.
+struct Speckle {
+  double index, mean_db;
+};
+Speckle speckle_of_bed(const FrequencyMode& mode, double least_db, double height, double pulse_width_m) {
   double sum = 0, squares = 0, n = 0;
-  Sounding s(SceneMaker().add(height_field(-1, 14, -12, 12, 1, [](double, double) { return 0.0; }), lambert_db).make(), mode,
-             native_rows(12, 0.0254));
+  Sounding s = over_bed(mode, height, pulse_width_m);
   s.request.switches.side_lobes = true;
   for (const std::uint32_t seed : {1u, 2u, 3u, 4u}) {
     s.request.seed = Seed{seed};
     s.ping_from({0, 0, height}, {0, tilt, 0});
     const reference::SeabedLevel bed(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, tilt);
-    for (int row = static_cast<int>(s.row_of_range(2.15)); row < s.row_of_range(11); ++row) {
-      const double r = s.range_of_row(row), level = two_way_db(mode, bed.psi_rad(r));
-      const double near = two_way_db(mode, bed.psi_rad(r - 0.05)), far = two_way_db(mode, bed.psi_rad(r + 0.05));
+    for (int row = static_cast<int>(s.row_of_range(1.075 * height)); row < s.row_of_range(5.5 * height); ++row) {
+      const double r = s.range_of_row(row), beside = 0.025 * height, level = two_way_db(mode, bed.psi_rad(r));
+      const double near = two_way_db(mode, bed.psi_rad(r - beside)), far = two_way_db(mode, bed.psi_rad(r + beside));
       if (level < least_db || level > -20 || std::abs(near - far) > 3 || bed.psi_rad(r) < -1.3) continue;
       for (int j = 200; j < 312; ++j, ++n) {
         const double ratio = s.power(row, j) / power_from_db(bed.db(r, s.beam_sine(j)));
@@ -102,11 +115,66 @@ double scintillation(const FrequencyMode& mode, double least_db) {
     }
   }
   const double mean = sum / n;
-  return squares / n / (mean * mean) - 1;
+  return {squares / n / (mean * mean) - 1, db(mean)};
 }
 TEST(SideLobes, CoarserCellsKeepItsSpeckle) {
   for (const FrequencyMode& mode : {p900(), oculus_high()})
-    record_oracle(24, "bed in the side lobes, scintillation index", 1, scintillation(mode, -45), 0.2, "");
+    record_oracle(24, "bed in the side lobes, scintillation index", 1, speckle_of_bed(mode, -45, 2, 0.0254).index, 0.2, "");
+}
+// Cells are as large as the beams and the pulse allow: other heights and pulses, other shapes of what a beam and a pulse cover.
+TEST(SideLobes, CoarserCellsSuitEveryRangeAndPulse) {
+  for (const auto& [height, pulse_width_m] : {std::pair{0.9, 0.0026}, {1.3, 0.01}, {5.0, 0.02}, {3.0, 0.1}}) {
+    const Speckle found = speckle_of_bed(oculus_high(), -45, height, pulse_width_m);
+    record_oracle(24, "bed in the side lobes, scintillation index", 1, found.index, 0.2, "");
+    record_oracle(8, "bed in the side lobes, speckle, mean of all ranges", 0, found.mean_db, 0.5, "dB");
+  }
+}
+
+// Without side lobes a bed begins with a step where the fan is cut off.
+TEST(SideLobes, TheBedHasNoStepAtTheEdgeOfTheFan) {
+  constexpr double height = 2;
+  Sounding s = over_bed(p900());
+  const reference::SeabedLevel bed(s.mode(), s.medium(), s.envelope_hz(), lambert_db, height, tilt);
+  double edge_m = 2 * height;
+  while (two_way_db(s.mode(), bed.psi_rad(edge_m)) > -20) edge_m -= 0.01;
+  for (const bool side_lobes : {false, true}) {
+    double before = 0, behind = 0;  // sums over the closed form, of as many samples
+    for (const std::uint32_t seed : {1u, 2u, 3u, 4u}) {
+      s.request.seed = Seed{seed};
+      s.request.switches.side_lobes = side_lobes;
+      s.ping_from({0, 0, height}, {0, tilt, 0});
+      for (double off = 0.04; off < 0.12; off += 0.01)
+        for (int j = 100; j < 412; ++j) {
+          const auto level = [&](double r) {
+            const int row = static_cast<int>(std::lround(s.row_of_range(r)));
+            return s.power(row, j) / power_from_db(bed.db(s.range_of_row(row), s.beam_sine(j)));
+          };
+          before += level(edge_m - off), behind += level(edge_m + off);
+        }
+    }
+    if (side_lobes)
+      record_oracle(8, "bed at the edge of the fan, step beyond the closed form", 0, db(behind / before), 1, "dB");
+    else
+      EXPECT_GT(db(behind / before), 10);
+  }
+}
+TEST(SideLobes, AnObstacleBelowTheFanIsThere) {
+  constexpr double range = 2.7, radius = 0.2;
+  const auto heard = [&](double psi_deg, bool side_lobes) {  // echo energy of a sphere there
+    const double psi = rad_from_deg(psi_deg);
+    Sounding s(SceneMaker().add(sphere(radius, 5), -10, {range * std::cos(psi), 0, range * std::sin(psi)}).make(), p900(),
+               native_rows(4, 0.0254));
+    s.request.switches.expected_power = true;
+    s.request.switches.side_lobes = side_lobes;
+    s.ping();
+    double sum = 0;
+    for (int row = static_cast<int>(s.row_of_range(range - 1.3 * radius)); row < s.row_of_range(range); ++row)
+      for (int j = 0; j < s.beams(); ++j) sum += s.power(row, j);
+    return sum;
+  };
+  EXPECT_EQ(heard(-50, false), 0);
+  record_oracle(no_number, "sphere in a side lobe, two-way pattern", two_way_db(p900(), rad_from_deg(-50)),
+                db(heard(-50, true) / heard(0, true)), 1, "dB");
 }
 TEST(SideLobes, SwitchedOffNothingIsHeardThere) { expect_bed(p900(), false, false); }
 
