@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <cmath>
 #include <complex>
 #include <cstdio>
 
@@ -47,8 +48,8 @@ void append_samples(const Ping& ping, bool from_starboard, Bytes& out) {
           std::complex<float> value{amplitude, 0};
           if (has_phase) {
             const std::complex<float> signal = ping.beam_signal_upa[from];
-            const float size = std::abs(signal);
-            if (size > 0) value = signal * (amplitude / size);
+            const float power = std::norm(signal);
+            if (power > 0) value = signal * (amplitude / std::sqrt(power));
           }
           std::byte* const to = out.data() + begin + sample_size * (beam * rows + k);
           put(value.real(), to);

@@ -69,6 +69,8 @@ class Link {
       }
     const bool by_udp = make.ports.front().kind == protocol::HostPort::Kind::udp;
     port_ = make.device->port(by_udp ? Kind::udp_dialogue : Kind::tcp_stream);
+    if (!make.host(wanted()))
+      if (auto changed = sonar.change(wanted().settings, "the test", now_)) perform(*std::move(changed));
     connect();
   }
 
@@ -116,6 +118,12 @@ class Link {
   std::size_t pings = 0;
 
  private:
+  static protocol::Wanted wanted() {
+    protocol::Wanted wanted;
+    wanted.settings.range_m = 3;
+    return wanted;
+  }
+
   void step_once() {
     now_ += step;
     for (int n = 0; n < 100; ++n) {
@@ -131,10 +139,8 @@ class Link {
 
   void connect() {
     if (id_ != 0) perform(sonar.on_closed(std::exchange(id_, 0), "closed by the client", now_, true));
-    protocol::Wanted wanted;
-    wanted.settings.range_m = 3;
-    if (!make_.host(wanted)) wanted = {};  // its drivers set nothing
-    host_ = *make_.host(wanted);
+    auto host = make_.host(wanted());
+    host_ = host ? *std::move(host) : *make_.host({});  // drivers of some set nothing
     lost_ = served_ = false;
     last_sign_ = now_;
     if (port_ != nullptr) {
