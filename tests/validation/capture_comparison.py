@@ -48,7 +48,6 @@ REASONS = {
     "rows 224-287, over local mean, rows apart 4": (UNKNOWN_BED, 0.3),
     "rows 288-447, over local mean, skewness": (UNKNOWN_BED, 0.4),
     "rows 448-619, over local mean, skewness": ("echoes where ours is noise", 0.3),
-    "rows 620-702, over local mean, skewness": ("as rows 448-619", 0.3),
     "changing share of the variance, rows 480-559": ("steady reverberation is not modelled", 0.9),
 }
 
