@@ -47,7 +47,7 @@ const CellStore::Held* CellStore::held(const CellTile& t) const {
   const Held& h = tiles_.at(t.data.get());
   if (!h.data) return nullptr;
   // Memory of a dropped tile may have been given to another: its other fields tell them apart.
-  const bool same = h.weight_unit == t.weight_unit && h.object == t.object && h.axis == t.axis && h.level == t.level &&
+  const bool same = h.weights_hash == t.weights_hash && h.object == t.object && h.axis == t.axis && h.level == t.level &&
                     h.count == t.count && h.centre_m.x == t.centre_m.x && h.centre_m.y == t.centre_m.y &&
                     h.centre_m.z == t.centre_m.z;
   return same ? &h : nullptr;
@@ -122,7 +122,7 @@ std::size_t CellStore::send_from(std::span<const TileInView> tiles, std::size_t 
   machine_.upload(lane, device.device, host.host, more * sizeof(std::int16_t));
   for (const std::size_t i : sent) {  // known from here on, when they are on their way
     const CellTile& t = *tiles[i].tile;
-    tiles_.put({t.data.get(), t.weight_unit, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]});
+    tiles_.put({t.data.get(), t.weights_hash, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]});
   }
   return end;
 }

@@ -31,7 +31,7 @@ class CellStore {
  private:
   struct Held {
     const std::int16_t* data = nullptr;  // where the CPU has the tile; null = a free place
-    float weight_unit = 0;  // of the strongest speckle in it: a name that no other tile of the scene has, but by chance
+    std::uint64_t weights_hash = 0;      // by chance only do other tiles have the same
     std::int32_t object = 0, axis = 0, level = 0, count = 0;
     Vec3d centre_m;
     const std::int16_t* device = nullptr;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -179,6 +180,17 @@ float make_even(const CellList& cells) {
   return static_cast<float>(most);
 }
 
+/// FNV-1a over words.
+std::uint64_t hash_of_weights(const CellTile& tile) {
+  std::uint64_t hash = 0xCBF29CE484222325u;
+  for (const CellTile::Column c : {CellTile::weight_re, CellTile::weight_im}) {
+    std::array<std::uint64_t, CellTile::block * sizeof(std::int16_t) / sizeof(std::uint64_t)> words;
+    std::memcpy(words.data(), tile.column(c), sizeof words);
+    for (const std::uint64_t word : words) hash = (hash ^ word) * 0x100000001B3u;
+  }
+  return hash;
+}
+
 void pack(const Ownership& all, const TileAddress& a, const CellList& cells, CellWeights weights, CellTile& tile) {
   const int n = cells.padded;
   tile.count = tile.stride = n;
@@ -209,6 +221,7 @@ void pack(const Ownership& all, const TileAddress& a, const CellList& cells, Cel
   tile.weight_unit = peak > 0 ? peak / 32767.0f : 1.0f;
   cell_lanes::pack_weights(cells.re, n, tile.weight_unit, column(CellTile::weight_re));
   cell_lanes::pack_weights(cells.im, n, tile.weight_unit, column(CellTile::weight_im));
+  tile.weights_hash = hash_of_weights(tile);
 }
 
 cell_lanes::DrawKey draw_key(const TileAddress& a, std::uint32_t texture_seed, Seed seed) {

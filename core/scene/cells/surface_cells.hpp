@@ -30,9 +30,10 @@ struct CellTile {
   float half_edge_m = 0;                              // half an edge of the cube
   Vec3 box_middle_m, box_half_m;                      // the box round its cells, from the centre, object axes
   float position_unit_m = 0;
-  float weight_unit = 0;  // xi * sqrt(cell area) [m] per count
-  int count = 0;          // padded to a multiple of CellTile::block
-  int stride = 0;         // int16 values per column
+  float weight_unit = 0;           // xi * sqrt(cell area) [m] per count
+  std::uint64_t weights_hash = 0;  // of the first block's weights: tells tiles apart whose memory is reused
+  int count = 0;                   // padded to a multiple of CellTile::block
+  int stride = 0;                  // int16 values per column
   std::unique_ptr<std::int16_t[]> data;
 
   static constexpr int block = 16;
