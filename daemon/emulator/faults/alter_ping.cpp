@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <utility>
 
 #include "core/sonar/range_image.hpp"
 
@@ -34,6 +36,18 @@ class Image {
   void fill(Code code) {
     for (std::size_t row = 0; row < rows_; ++row)
       for (std::size_t beam = 0; beam < beams_; ++beam) set(row, beam, code(row, beam));
+  }
+  /// Moves the signals of the beams, which messages with phases need, as the samples are moved: source(row, beam) is where they
+  /// come from; rows beyond the last have none.
+  template <class Source>
+  void move_signal(Source source) {
+    auto& signal = ping_.beam_signal_upa;
+    if (signal.size() != rows_ * beams_) return;
+    const auto before = signal;
+    for (std::size_t i = 0; i < signal.size(); ++i) {
+      const auto [row, beam] = source(i / beams_, i % beams_);
+      signal[i] = row < rows_ ? before[row * beams_ + beam] : std::complex<float>{};
+    }
   }
 
  private:
@@ -93,6 +107,7 @@ void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
     case E::mirror: {
       Ping before = ping;
       const Image old(before);
+      image.move_signal([&](std::size_t row, std::size_t beam) { return std::pair(row, old.beams() - 1 - beam); });
       return image.fill([&](std::size_t row, std::size_t beam) { return old.get(row, image.beams() - 1 - beam); });
     }
     case E::scale_range: {
@@ -102,8 +117,12 @@ void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
         });
       Ping before = ping;
       const Image old(before);
+      const auto source_of = [&](std::size_t row) {
+        return static_cast<std::size_t>((static_cast<double>(row) + 0.5) / fault.number("factor"));
+      };
+      image.move_signal([&](std::size_t row, std::size_t beam) { return std::pair(source_of(row), beam); });
       return image.fill([&](std::size_t row, std::size_t beam) {
-        const auto source = static_cast<std::size_t>((static_cast<double>(row) + 0.5) / fault.number("factor"));
+        const std::size_t source = source_of(row);
         return source < old.rows() ? old.get(source, beam) : 0;
       });
     }
@@ -132,6 +151,7 @@ void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, s
     case E::stuck:
       if (kept == nullptr || kept->samples.size() != ping.samples.size()) return;
       ping.samples = kept->samples;
+      ping.beam_signal_upa = kept->beam_signal_upa;
       ping.row_gain = kept->row_gain;
       return;
     case E::intermittent: {

@@ -1,6 +1,7 @@
 // Faults of the samples on range images: strengths and ranges are apart, and no pixel without a return gets one.
 #include "daemon/emulator/faults/alter_ping.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/sonar/range_image.hpp"
@@ -43,6 +44,47 @@ std::pair<std::uint32_t, std::uint32_t> at(const Ping& ping, std::size_t index) 
   return {pixel.strength, pixel.range};
 }
 using Pixel = std::pair<std::uint32_t, std::uint32_t>;
+
+/// Two beams by two rows of a byte, with signals of the same numbers.
+Ping with_signals() {
+  Ping ping;
+  ping.request.settings.format.bits = 8;
+  ping.request.settings.format.max_code = 255;
+  ping.beam_azimuth_rad = {0.1f, -0.1f};
+  for (const int n : {1, 2, 3, 4}) {
+    ping.samples.push_back(static_cast<std::byte>(n));
+    ping.beam_signal_upa.emplace_back(static_cast<float>(n), 0.0f);
+  }
+  return ping;
+}
+
+std::vector<float> signals_after(const std::string& kind, const std::map<std::string, std::string>& with,
+                                 const Ping* kept = nullptr) {
+  FaultRecord record;
+  record.what = kind;
+  record.with = with;
+  const auto faults = check_fault(record, true);
+  EXPECT_TRUE(faults) << faults.error().text;
+  Ping ping = with_signals();
+  alter_ping(faults->front(), {}, kept, 0, ping);
+  std::vector<float> found;
+  for (std::size_t i = 0; i < ping.samples.size(); ++i) {
+    found.push_back(ping.beam_signal_upa[i].real());
+    EXPECT_EQ(std::to_integer<int>(ping.samples[i]), static_cast<int>(found.back())) << kind << ": sample and signal " << i;
+  }
+  return found;
+}
+
+TEST(SignalFaults, SignalsOfBeamsMoveWithTheSamples) {
+  using testing::ElementsAre;
+  EXPECT_THAT(signals_after("mirrored", {}), ElementsAre(2, 1, 4, 3));
+  EXPECT_THAT(signals_after("plausible-wrong", {{"factor", "2"}}), ElementsAre(1, 2, 1, 2));
+  EXPECT_THAT(signals_after("plausible-wrong", {{"factor", "0.5"}}), ElementsAre(3, 4, 0, 0));
+  Ping kept = with_signals();
+  for (std::byte& sample : kept.samples) sample = std::byte{7};
+  for (auto& signal : kept.beam_signal_upa) signal = {7, 0};
+  EXPECT_THAT(signals_after("stuck", {}, &kept), ElementsAre(7, 7, 7, 7));
+}
 
 TEST(RangeImageFaults, StrengthsChangeAndRangesStay) {
   const Ping louder = altered("gain-step", {{"factor", "2"}, {"fraction", "0"}});
