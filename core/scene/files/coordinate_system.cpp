@@ -24,6 +24,7 @@ bool is_one_of(std::string_view word, const std::array<std::string_view, N>& wor
 constexpr std::array<std::string_view, 7> in_lengths{"PROJCS",   "PROJCRS", "PROJECTEDCRS",  "LOCAL_CS",
                                                      "LOCALCRS", "ENGCRS",  "ENGINEERINGCRS"};
 constexpr std::array<std::string_view, 6> in_degrees{"GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS", "GEODETICCRS", "GEODCS"};
+constexpr std::array<std::string_view, 3> projected{"PROJCS", "PROJCRS", "PROJECTEDCRS"};
 constexpr std::array<std::string_view, 4> of_heights{"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"};
 
 /// Datums that agree with WGS 84 within 2 m, as names of systems have them, without blanks and underscores.
@@ -39,8 +40,8 @@ std::optional<UtmZone> utm_of_name(std::string name) {
   for (const std::string_view kind : {"UTMZONE", "MGAZONE"}) {
     const std::size_t at = name.find(kind);
     if (!modern || at == name.npos) continue;
-    const std::string zone = name.substr(at + kind.size(), 3);
-    return utm_zone_from(kind == "MGAZONE" ? zone.substr(0, 2) + "S" : zone);
+    const std::size_t from = at + kind.size(), letter = std::min(name.find_first_not_of("0123456789", from), name.size());
+    return utm_zone_from(name.substr(from, letter - from) + (kind == "MGAZONE" ? "S" : name.substr(letter, 1)));
   }
   return std::nullopt;
 }
@@ -108,7 +109,8 @@ CoordinateSystem system_of_wkt(std::string_view text) {
       const std::string name = upper(text.substr(at + 1, end - at - 1));
       for (const char* mercator : {"PSEUDO-MERCATOR", "PSEUDO_MERCATOR", "MERCATOR_AUXILIARY_SPHERE", "POPULAR VISUALISATION"})
         system.web_mercator = system.web_mercator || name.find(mercator) != name.npos;
-      if (open.size() == 1 && open[0].commas == 0) system.utm = utm_of_name(name);
+      if (!system.utm && !open.empty() && open.back().commas == 0 && (open.size() == 1 || is_one_of(open.back().word, projected)))
+        system.utm = utm_of_name(name);
       at = end;
     } else if (c == '[' || c == '(') {
       if (open.size() == deepest) return system;

@@ -105,6 +105,11 @@ std::string place_text(const Geodetic& place) {
 void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodetic& middle) {
   grid.origin = options.origin ? options.origin : options.world_origin;
   if (grid.origin && !options.origin) grid.notes.push_back("its place is counted from world.origin, " + place_text(*grid.origin));
+  if (grid.origin && std::abs(grid.origin->altitude_m) >= 1)
+    grid.notes.push_back(
+        text::format("its heights are counted from z = 0, which is %.6g m above mean sea level by world.origin; if "
+                     "they are above mean sea level, put %.6g into the z of its pose",
+                     grid.origin->altitude_m, -grid.origin->altitude_m));
   if (options.origin && options.world_origin) {
     const Vec3d apart = enu_in_enu_of(*options.world_origin, *options.origin).position_m;
     const double distance_m = std::hypot(apart.x, apart.y);
@@ -147,9 +152,10 @@ Result<void> set_origin_of_zone(HeightGrid& grid, const HeightOptions& options, 
   if (!are_utm(grid.x.front(), grid.y.front()) || !are_utm(grid.x.back(), grid.y.back()))
     return failure(
         ErrorKind::bad_data,
-        text::format("its coordinates (%.7g, %.7g) are no eastings and northings of UTM, zone %s; write geographic: false "
-                     "to take them as plain metres",
-                     grid.x.front(), grid.y.front(), text_of(zone).c_str()));
+        text::format("its coordinates (%.7g, %.7g) are no eastings and northings of UTM, zone %s; %s to take them as plain "
+                     "metres",
+                     grid.x.front(), grid.y.front(), text_of(zone).c_str(),
+                     options.utm ? "take utm away" : "write geographic: false"));
   grid.zone = zone;
   choose_origin(grid, options, {});
   double far_m = 0;

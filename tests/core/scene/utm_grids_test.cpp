@@ -85,6 +85,9 @@ TEST_F(UtmGrid, TheZoneComesFromThePrjFile) {
     return zone ? text_of(*zone) : "none";
   };
   EXPECT_EQ(utm_in("COMPD_CS[\"NAD83(2011) / UTM zone 10N + NAVD88\",PROJCS[\"NAD83(2011) / UTM zone 10N\"]]"), "10N");
+  EXPECT_EQ(utm_in("COMPD_CS[\"NAD83 / UTM zone 5N + NAVD88 height\",PROJCS[\"NAD83 / UTM zone 5N\"]]"), "5N");
+  EXPECT_EQ(utm_in("COMPD_CS[\"unknown\",PROJCS[\"NAD83 / UTM zone 5N\",GEOGCS[\"NAD83\"]],VERT_CS[\"NAVD88\"]]"), "5N");
+  EXPECT_EQ(utm_in("COMPOUNDCRS[\"unknown\",PROJCRS[\"WGS 84 / UTM zone 7S\",BASEGEOGCRS[\"WGS 84\"]]]"), "7S");
   EXPECT_EQ(utm_in("PROJCS[\"GDA94 / MGA zone 55\"]"), "55S");
   EXPECT_EQ(utm_in("PROJCS[\"WGS 84 / UTM zone 4N\"]"), "4N");
   EXPECT_EQ(utm_in("PROJCS[\"WGS 84 / UTM zone 61N\"]"), "none");
@@ -131,6 +134,14 @@ TEST_F(UtmGrid, TheWorldsOriginPlacesItUnlessItHasItsOwn) {
   EXPECT_THAT(notes_of({.geographic = true, .origin = near, .world_origin = origin}), HasSubstr("10 km from world.origin"));
 }
 
+TEST_F(UtmGrid, AnOriginAboveTheSeaLeavesHeightsAsTheyAreAndSaysSo) {
+  const Geodetic lake{origin.latitude_rad, origin.longitude_rad, 3812};
+  const HeightOptions options{.utm = UtmZone{33, false}, .world_origin = lake};
+  EXPECT_THAT(notes_of(options), HasSubstr("z = 0, which is 3812 m above mean sea level by world.origin; if they are above mean "
+                                           "sea level, put -3812 into the z of its pose"));
+  EXPECT_EQ(read(options)->z_m, read({.utm = UtmZone{33, false}, .world_origin = origin})->z_m);
+}
+
 TEST_F(UtmGrid, MetresNearTheWorldsOriginInItsZoneAreProbablyThatZone) {
   EXPECT_THAT(notes_of({.world_origin = origin}), HasSubstr("if they are UTM of zone 33N: write utm: 33N to place it there"));
   EXPECT_EQ(notes_of({.world_origin = Geodetic{rad_from_deg(40), rad_from_deg(15), 0}}), "");
@@ -143,7 +154,9 @@ TEST_F(UtmGrid, WrongZonesAndOriginsAreRefused) {
   EXPECT_THAT(notes_of({.geographic = true, .utm = UtmZone{33, false}}), HasSubstr("not longitudes and latitudes"));
   text = grid_about(50'000'000, 0);
   EXPECT_THAT(notes_of({.utm = UtmZone{33, false}, .origin = origin}),
-              HasSubstr("are no eastings and northings of UTM, zone 33N"));
+              HasSubstr("are no eastings and northings of UTM, zone 33N; take utm away to take them as plain metres"));
+  files.write("g.prj", "PROJCS[\"WGS 84 / UTM zone 33N\"]");
+  EXPECT_THAT(notes_of({.origin = origin}), HasSubstr("write geographic: false to take them as plain metres"));
   text = "ncols 2\nnrows 2\nxllcenter 15\nyllcenter 60\ncellsize 0.001\n-9 -9 -9 -9\n";
   EXPECT_THAT(notes_of({.geographic = true, .utm = UtmZone{33, false}}), HasSubstr("utm is for coordinates in metres"));
 }
