@@ -1,5 +1,6 @@
 #include "protocol/m3/host.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -18,7 +19,7 @@ PolarImage picture_of(const Packet& packet) {
   image.rows = front.samples;
   image.beams = front.beams;
   image.row_spacing_m = packet.spacing_m();
-  image.start_m = packet.start_m();
+  image.start_m = std::max(0.0, packet.start_m() - 0.5 * image.row_spacing_m);  // a sample is in the middle of its row
   for (std::size_t i = image.beams; i > 0; --i)
     image.azimuth_rad.push_back(rad_from_deg(static_cast<double>(packet.header.beam_deg[i - 1])));
   image.samples.resize(image.rows * image.beams);

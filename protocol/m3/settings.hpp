@@ -6,6 +6,7 @@
 #include "core/sonar/phases.hpp"
 #include "core/sonar/ping_settings.hpp"
 #include "protocol/m3/messages.hpp"
+#include "protocol/m3/models.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::m3 {
@@ -16,7 +17,7 @@ inline constexpr double least_c_db = -56, most_c_db = 24;
 
 struct Settings {
   double far_m = 10;
-  float rate_hz = 15;
+  float rate_hz = usual_rate_hz;
   float c_db = GainLaw{}.c_db;
   bool operator==(const Settings&) const = default;
 };
