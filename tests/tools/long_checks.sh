@@ -38,10 +38,11 @@ one_by_one() {
 }
 
 if [ ${#wished[@]} -eq 0 ]; then  # what is not measured now is shown as "not run"
-  rm -f "$SONARD_RELIABILITY"/*.json
+  forget_figures || exit
 fi
 if [ ${#wished[@]} -eq 0 ] || [[ " ${wished[*]} " =~ \ (load|life|mission|page)\  ]]; then
-  setup_and_build sonard sonarctl load_test dump_oculus in_own_network || exit
+  [ ${#wished[@]} -eq 0 ] || wished+=(build)
+  step build setup_and_build sonard sonarctl load_test dump_oculus in_own_network
 fi
 step load tests/load/load.sh
 step life one_by_one life_cycle reload service dissector farm

@@ -67,6 +67,15 @@ need_packages() {
   }
 }
 
+# forget_figures: removes the figures that earlier runs left in the folder SONARD_RELIABILITY.
+forget_figures() {
+  [ "$(realpath -m "$SONARD_RELIABILITY")" != "$(realpath -m tests/reliability/by_hand)" ] || {
+    echo "SONARD_RELIABILITY is tests/reliability/by_hand, whose figures no run makes anew: name another folder" >&2
+    return 64
+  }
+  rm -f "$SONARD_RELIABILITY"/*.json
+}
+
 # Compilers at once: one a processor, but no more than the memory carries (a large file takes about 1.2 GB).
 build_jobs() {
   local processors memory_kb by_memory
