@@ -13,7 +13,7 @@
 
 namespace sonar {
 
-/// A ping as the bytes of each port, made when they are first asked for. Connections share them.
+/// A ping as the bytes of each port. The parts of a port are made when they are first asked for. Connections share them.
 class FramedPing {
  public:
   using Bytes = protocol::Bytes;

@@ -43,8 +43,7 @@ constexpr const char* mount_cure =
     "aft, set yaw 180";
 constexpr const char* origin_cure =
     "vehicles with latitudes and longitudes are placed about world.origin: does it belong to this scene? A height map in degrees "
-    "or "
-    "UTM is placed about it, without origin and centred";
+    "or UTM is placed about it, without origin and centred";
 constexpr const char* lift_cure = "move the scene down: sonarctl scene import --offset 0,0,-10, or the poses of its objects";
 
 struct Doubt {
