@@ -8,9 +8,6 @@ import tempfile
 import unittest
 
 TOOLS = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(TOOLS))
-from run_programs import in_turns  # noqa: E402  pylint: disable=wrong-import-position
-
 ROOT = TOOLS.parents[1]
 HEAVY = {"package", "page", "cuda", "bench", "levels", "compilers"}
 # A GoogleTest program as far as run_programs.py knows one.
@@ -96,11 +93,6 @@ class Programs(unittest.TestCase):
         ran = [line.partition(" ")[2] for line in (self.build / "ran").read_text().splitlines()]
         self.assertEqual(sorted(ran), ["part  of ", "part 0 of 2", "part 1 of 2"])
         self.assertFalse(self.failed.exists())
-
-    def test_take_turns_by_parts(self):
-        self.assertEqual(in_turns({"waits": 2, "fuzz": 1, "computes": 2}),
-                         [("waits", 0), ("computes", 0), ("waits", 1), ("computes", 1), ("fuzz", 0)])
-        self.assertEqual(in_turns({"fuzz": 1}), [("fuzz", 0)])
 
     def test_that_fail_are_named_with_their_cases(self):
         self.program("asserts", "GTEST", 'echo "[  FAILED  ] Suite.Asserts (3 ms)"; exit 1')

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Runs test programs, two at once a processor, and prints a line for each that passes, all output of one that fails.
+"""Runs test programs, as many at once as there are processors, and prints a line for each that passes, all output of one that fails.
 
 usage: run_programs.py BUILD_FOLDER NAME...        --list KIND... [--without KIND...] prints their names instead
 The names are of BUILD_FOLDER/tests/programs, which CMake writes: its kinds, then the program and its arguments (tests/CMakeLists.txt).
 A GoogleTest program is run in parts, by GTEST_TOTAL_SHARDS. The tests that failed are added to the file that SONARD_FAILED names.
-  SONARD_TEST_JOBS      programs or parts at once (two a processor: parts that use sockets mostly wait)
+  SONARD_TEST_JOBS      programs at once (a processor's each)
   SONARD_TEST_SECONDS   the longest a program may take (1800)
 """
 import argparse
@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 
-JOBS = int(os.environ.get("SONARD_TEST_JOBS") or 2 * os.cpu_count())
+JOBS = int(os.environ.get("SONARD_TEST_JOBS") or os.cpu_count())
 LONGEST_S = float(os.environ.get("SONARD_TEST_SECONDS") or 1800)
 
 
@@ -55,14 +55,6 @@ def run(command, part, parts):
         return ended, output.read().decode(errors="replace")
 
 
-def in_turns(parts_of):
-    """Names with the number of each part: the first parts of all programs that have several, their second parts, and so on, then
-    whole programs. Parts of a program that waits then run beside parts of programs that compute, and not beside each other."""
-    several = {name: parts for name, parts in parts_of.items() if parts > 1}
-    turns = [(name, part) for part in range(max(several.values(), default=0)) for name in several]
-    return turns + [(name, 0) for name in parts_of if name not in several]
-
-
 def run_all(programs):
     """Runs the parts of all programs; the tests that failed, each after its program."""
     parts_of = {name: JOBS if "GTEST" in kinds else 1 for name, (kinds, _) in programs.items()}
@@ -74,7 +66,7 @@ def run_all(programs):
         return name, run(programs[name][1], part, parts_of[name]), time.monotonic() - begin
 
     with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
-        waiting = [pool.submit(one, *turn) for turn in in_turns(parts_of)]
+        waiting = [pool.submit(one, name, part) for name in programs for part in range(parts_of[name])]
         for done in concurrent.futures.as_completed(waiting):
             name, (ended, output), took = done.result()
             seconds[name] += took
