@@ -34,7 +34,7 @@ std::vector<std::string> classes_of_things(const Scene& scene) {
   for (std::size_t i = 0; i < instance_count(scene); ++i)  // hidden ones too: a class has one colour in all pings
     if (i >= scene.objects.size() || !scene.objects[i].label.empty()) classes.push_back(instance_class(scene, i));
   std::ranges::sort(classes);
-  classes.erase(std::ranges::unique(classes).begin(), classes.end());
+  classes.erase(std::unique(classes.begin(), classes.end()), classes.end());
   return classes;
 }
 
