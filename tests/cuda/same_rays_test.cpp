@@ -250,7 +250,7 @@ TEST(DeviceEngine, TakesNoCellsOfAnotherSeed) {
   r.switches.side_lobes = true;
   BothEngines both(maker.make());
   std::vector<Ping> pings;
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
     r.seed = Seed{seed};
     pings.push_back(both.by_cpu(r));
     expect_same(pings.back(), both.by_device(r), "seed " + std::to_string(seed));
