@@ -1,7 +1,6 @@
-"""What .ci/run leaves out, when other_compilers.sh is skipped, and how run_programs.py and test_times.py name what failed."""
+"""What .ci/run leaves out, and how run_programs.py and test_times.py name what failed."""
 import os
 import pathlib
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -9,7 +8,7 @@ import unittest
 
 TOOLS = pathlib.Path(__file__).resolve().parent
 ROOT = TOOLS.parents[1]
-HEAVY = {"package", "page", "cuda", "bench", "levels", "compilers"}
+HEAVY = {"package", "page", "cuda", "bench", "levels"}
 # A GoogleTest program as far as run_programs.py knows one.
 PROGRAM = """#!/bin/sh
 echo "$0 part $GTEST_SHARD_INDEX of $GTEST_TOTAL_SHARDS" >>"$RAN"
@@ -25,38 +24,15 @@ class LeftOut(unittest.TestCase):
 
     def test_is_what_the_changed_files_cannot_touch(self):
         self.assertEqual(self.left_out("docs/faults.md"), HEAVY)
-        self.assertEqual(self.left_out("clients/sonarctl/listen.cpp", "docs/faults.md"), HEAVY - {"compilers"})
+        self.assertEqual(self.left_out("clients/sonarctl/listen.cpp", "docs/faults.md"), HEAVY)
         self.assertEqual(self.left_out("core/pipeline/simulate.cpp"), {"package", "page"})
         self.assertEqual(self.left_out("clients/web/main.js"), HEAVY - {"page"})
-        self.assertEqual(self.left_out("daemon/CMakeLists.txt"), HEAVY - {"package", "compilers"})
+        self.assertEqual(self.left_out("daemon/CMakeLists.txt"), HEAVY - {"package"})
 
     def test_is_nothing_when_the_build_or_the_checks_change(self):
         for file in ("CMakeLists.txt", "CMakePresets.json", ".ci/run", "test.sh", "tests/tools/setup.sh", "tests/CMakeLists.txt", ""):
             with self.subTest(file=file):
                 self.assertEqual(self.left_out("docs/faults.md", file) if file else self.left_out(), set())
-
-
-class OtherCompilers(unittest.TestCase):
-    def run_script(self, *arguments, commands=("bash", "c++", "dirname", "git", "grep", "sed", "sort")):
-        with tempfile.TemporaryDirectory() as folder:
-            for name in commands:
-                os.symlink(shutil.which(name), pathlib.Path(folder) / name)
-            return subprocess.run(["bash", TOOLS / "other_compilers.sh", *arguments], capture_output=True, text=True, check=False,
-                                  env=dict(os.environ) | {"PATH": folder})
-
-    def test_are_skipped_where_none_is_installed(self):
-        done = self.run_script("--share", "10")
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertRegex(done.stdout, r"^skipped: no other compiler is installed")
-
-    def test_that_are_named_must_be_installed(self):
-        done = self.run_script("--share", "10", "clang++-14")
-        self.assertEqual(done.returncode, 1)
-        self.assertIn("clang++-14 is not installed: apt-get install clang-14", done.stderr)
-        self.assertIn("clang++-14: FAILED", done.stdout)
-
-    def test_read_a_share_of_at_least_one_file(self):
-        self.assertEqual(self.run_script("--share", "0").returncode, 64)
 
 
 class Programs(unittest.TestCase):
