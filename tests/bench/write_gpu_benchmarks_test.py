@@ -52,7 +52,7 @@ class Page(unittest.TestCase):
             found, page = pathlib.Path(folder), pathlib.Path(folder) / "page"
             bench = [os.environ["SONARD_BENCH"], "--engine", "cuda", "--scene", "demo", "--pings", "2", "--threads", "1"]
             for cases, name in ((["--case", "P3c"], "single"), (["--case", "P10", "--reference-ms", "30"], "batches")):
-                subprocess.run([*bench, *cases, "--json", found / f"{name}.json"], check=True, timeout=250, stdout=subprocess.DEVNULL)
+                subprocess.run([*bench, *cases, "--json", found / f"{name}.json"], check=True, timeout=600, stdout=subprocess.DEVNULL)
             (found / "facts.txt").write_text("driver=none\n", encoding="utf-8")
             (found / "memcheck.txt").write_text("x\n========= ERROR SUMMARY: 0 errors\n", encoding="utf-8")
             (found / "cuda_seam_test.txt").write_text("[  PASSED  ] 2 tests.\n", encoding="utf-8")
