@@ -24,7 +24,6 @@ bool is_one_of(std::string_view word, const std::array<std::string_view, N>& wor
 constexpr std::array<std::string_view, 7> in_lengths{"PROJCS",   "PROJCRS", "PROJECTEDCRS",  "LOCAL_CS",
                                                      "LOCALCRS", "ENGCRS",  "ENGINEERINGCRS"};
 constexpr std::array<std::string_view, 6> in_degrees{"GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS", "GEODETICCRS", "GEODCS"};
-constexpr std::array<std::string_view, 3> projected{"PROJCS", "PROJCRS", "PROJECTEDCRS"};
 constexpr std::array<std::string_view, 4> of_heights{"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"};
 
 /// Datums that agree with WGS 84 within 2 m, as names of systems have them, without blanks and underscores.
@@ -109,7 +108,8 @@ CoordinateSystem system_of_wkt(std::string_view text) {
       const std::string name = upper(text.substr(at + 1, end - at - 1));
       for (const char* mercator : {"PSEUDO-MERCATOR", "PSEUDO_MERCATOR", "MERCATOR_AUXILIARY_SPHERE", "POPULAR VISUALISATION"})
         system.web_mercator = system.web_mercator || name.find(mercator) != name.npos;
-      if (!system.utm && !open.empty() && open.back().commas == 0 && (open.size() == 1 || is_one_of(open.back().word, projected)))
+      if (!system.utm && !open.empty() && open.back().commas == 0 &&
+          (open.size() == 1 || is_one_of(open.back().word, in_lengths)))
         system.utm = utm_of_name(name);
       at = end;
     } else if (c == '[' || c == '(') {
