@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/sonar/sample_code.hpp"
+
 namespace sonar {
 namespace {
 
@@ -29,11 +31,8 @@ class Levels {
         format_(ping.request.settings.format) {}
 
   double operator()(int row, int beam) const {
-    const std::size_t at = (static_cast<std::size_t>(row) * static_cast<std::size_t>(beams) + static_cast<std::size_t>(beam)) *
-                           static_cast<std::size_t>(bytes_);
-    std::uint32_t code = 0;
-    for (int i = 0; i < bytes_; ++i)
-      code |= std::to_integer<std::uint32_t>(samples_[at + static_cast<std::size_t>(i)]) << (8 * i);
+    const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(beams) + static_cast<std::size_t>(beam);
+    const std::uint32_t code = sample_code(samples_, at, static_cast<std::size_t>(bytes_));
     const double span = static_cast<double>(format_.ceiling_db) - static_cast<double>(format_.floor_db);
     return static_cast<double>(format_.floor_db) + span * code / format_.max_code;
   }

@@ -8,6 +8,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/sonar/ping.hpp"
+#include "core/sonar/sample_code.hpp"
 
 namespace sonar {
 
@@ -44,8 +45,7 @@ struct RangePixel {
 constexpr std::uint32_t range_image_max_code(std::uint32_t full_scale_strength) { return full_scale_strength << 16 | 0xFFFFu; }
 
 inline RangePixel range_pixel(const Ping& ping, std::size_t index) {
-  std::uint32_t code = 0;
-  for (std::size_t b = 0; b < 4; ++b) code |= std::to_integer<std::uint32_t>(ping.samples[4 * index + b]) << (8 * b);
+  const std::uint32_t code = sample_code(ping.samples, index, 4);
   return {code >> 16, code & 0xFFFFu};
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "control.pb.h"
+#include "core/sonar/sample_code.hpp"
 #include "foxglove.pb.h"
 #include "protocol/foxglove/ros_cdr.hpp"
 #include "protocol/wire/base64.hpp"
@@ -51,12 +52,6 @@ void add_with_imports(const pb::FileDescriptor& file, std::set<std::string>& kno
   if (!known.insert(file.name()).second) return;
   for (int i = 0; i < file.dependency_count(); ++i) add_with_imports(*file.dependency(i), known, out);
   file.CopyTo(out.add_file());
-}
-
-std::uint32_t code_at(const Bytes& samples, std::size_t at, std::size_t width) {
-  std::uint32_t code = 0;
-  for (std::size_t b = width; b-- > 0;) code = code << 8 | std::to_integer<std::uint32_t>(samples[at + b]);
-  return code;
 }
 
 fg::SceneEntity& entity(fg::SceneUpdate& update, Time at, const std::string& id, const std::string& frame) {
@@ -126,8 +121,8 @@ Image image_of(std::size_t beams, std::size_t rows, int bits, std::uint32_t max_
   const auto parts = std::make_shared<Bytes>();
   parts->reserve(image.samples->size() / width * sizeof(float));
   wire::Writer writer(*parts);
-  for (std::size_t at = 0; at + width <= image.samples->size(); at += width) {
-    const auto part = static_cast<float>(static_cast<double>(code_at(*image.samples, at, width)) / max_code);
+  for (std::size_t i = 0; i < image.samples->size() / width; ++i) {
+    const auto part = static_cast<float>(static_cast<double>(sample_code(*image.samples, i, width)) / max_code);
     writer("sample", part);
   }
   image.encoding = "32FC1";

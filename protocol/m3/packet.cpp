@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "core/base/geometry.hpp"
+#include "core/sonar/sample_code.hpp"
 #include "protocol/m3/models.hpp"
 #include "protocol/m3/options.hpp"
 #include "protocol/m3/settings.hpp"
@@ -17,12 +18,6 @@ namespace {
 
 constexpr double full_scale = 1024;  // amplitude of a sample at full scale; unknown: the unit
 constexpr std::size_t longest_body = 1 << 25;
-
-std::uint32_t code_at(const Ping& ping, std::size_t index) {
-  std::uint32_t code = 0;
-  for (std::size_t b = 0; b < 4; ++b) code |= std::to_integer<std::uint32_t>(ping.samples[4 * index + b]) << (8 * b);
-  return code;
-}
 
 void put(float value, std::byte* at) {
   const auto bits = std::bit_cast<std::uint32_t>(value);
@@ -44,7 +39,7 @@ void append_samples(const Ping& ping, bool from_starboard, Bytes& out) {
       for (std::size_t j = j0; j < std::min(beams, j0 + block); ++j)
         for (std::size_t k = k0; k < std::min(rows, k0 + block); ++k) {
           const std::size_t from = k * beams + j, beam = from_starboard ? beams - 1 - j : j;
-          const auto amplitude = static_cast<float>(per_code * code_at(ping, from));
+          const auto amplitude = static_cast<float>(per_code * sample_code(ping.samples, from, 4));
           std::complex<float> value{amplitude, 0};
           if (has_phase) {
             const std::complex<float> signal = ping.beam_signal_upa[from];

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/sonar/range_image.hpp"
+#include "core/sonar/sample_code.hpp"
 
 namespace sonar {
 namespace {
@@ -22,12 +23,7 @@ class Image {
   std::size_t rows() const { return rows_; }
   std::size_t beams() const { return beams_; }
   std::uint32_t full() const { return ping_.request.settings.format.max_code; }
-  std::uint32_t get(std::size_t row, std::size_t beam) const {
-    std::uint32_t code = 0;
-    const std::size_t at = (row * beams_ + beam) * width_;
-    for (std::size_t i = 0; i < width_; ++i) code |= std::to_integer<std::uint32_t>(ping_.samples[at + i]) << (8 * i);
-    return code;
-  }
+  std::uint32_t get(std::size_t row, std::size_t beam) const { return sample_code(ping_.samples, row * beams_ + beam, width_); }
   void set(std::size_t row, std::size_t beam, std::uint32_t code) {
     const std::size_t at = (row * beams_ + beam) * width_;
     for (std::size_t i = 0; i < width_; ++i) ping_.samples[at + i] = static_cast<std::byte>(code >> (8 * i));

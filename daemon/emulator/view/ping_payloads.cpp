@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/sonar/range_image.hpp"
+#include "core/sonar/sample_code.hpp"
 #include "protocol/foxglove/foxglove_messages.hpp"
 
 namespace sonar {
@@ -78,11 +79,8 @@ PolarImage polar_image_of(const Ping& ping) {
   image.azimuth_rad.assign(ping.beam_azimuth_rad.begin(), ping.beam_azimuth_rad.end());
   const auto bytes = static_cast<std::size_t>(s.format.bits / 8);
   image.samples.reserve(image.rows * image.beams);
-  for (std::size_t i = 0; i < image.rows * image.beams; ++i) {
-    std::uint32_t code = 0;
-    for (std::size_t b = 0; b < bytes; ++b) code |= std::to_integer<std::uint32_t>(ping.samples[i * bytes + b]) << (8 * b);
-    image.samples.push_back(static_cast<float>(code));
-  }
+  for (std::size_t i = 0; i < image.rows * image.beams; ++i)
+    image.samples.push_back(static_cast<float>(sample_code(ping.samples, i, bytes)));
   image.full_scale = static_cast<float>(s.format.max_code);
   if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear) {  // wide samples rarely come near their maximum
     std::vector<float> sorted = image.samples;
