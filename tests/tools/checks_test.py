@@ -1,4 +1,4 @@
-"""What .ci/run leaves out, and how run_programs.py and test_times.py name what failed."""
+"""What .ci/run leaves out, how setup.sh chooses a compiler, and how run_programs.py and test_times.py name what failed."""
 import os
 import pathlib
 import subprocess
@@ -33,6 +33,54 @@ class LeftOut(unittest.TestCase):
         for file in ("CMakeLists.txt", "CMakePresets.json", ".ci/run", "test.sh", "tests/tools/setup.sh", "tests/CMakeLists.txt", ""):
             with self.subTest(file=file):
                 self.assertEqual(self.left_out("docs/faults.md", file) if file else self.left_out(), set())
+
+
+class Configure(unittest.TestCase):
+    """setup.sh in a folder of its own, with stubs for the programs that it calls."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def stub(self, name, script):
+        path = self.folder / name
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+
+    def setup(self, command):
+        environment = dict(os.environ) | {"PATH": f"{self.folder}:{os.environ['PATH']}", "SONAR_WERROR": "ON"}
+        return subprocess.run(["bash", "-c", f'. "{TOOLS}/setup.sh"; need_packages() {{ echo "needs $*"; }}; {command}'], cwd=self.folder,
+                              capture_output=True, text=True, env=environment, check=False)
+
+    def configured(self, clang):
+        self.stub("clang++", clang)
+        return self.setup('configure() { echo "$*"; }; configure_sanitized asan')
+
+    def test_sanitized_programs_with_clang_and_its_warnings_as_errors(self):
+        done = self.configured("exit 0")
+        self.assertEqual((done.stdout, done.stderr), ("needs clang libclang-rt-dev\nasan -DSONAR_WERROR=ON\n", ""))
+
+    def test_sanitized_programs_with_the_default_compiler_where_clang_links_none(self):
+        done = self.configured("exit 1")
+        self.assertIn("\nasan -DCMAKE_C_COMPILER=cc -DCMAKE_CXX_COMPILER=c++ -DSONAR_WERROR=OFF\n", done.stdout)
+        self.assertIn("no clang that links sanitized programs", done.stderr)
+
+    def test_anew_when_the_compiler_changed(self):
+        self.stub("cmake", 'echo run >>ran; [ ! -f build/asan/CMakeCache.txt ] || '
+                           'echo "You have changed variables that require your cache to be deleted."')
+        cache = self.folder / "build/asan/CMakeCache.txt"
+        cache.parent.mkdir(parents=True)
+        cache.write_text("")
+        for runs in (2, 3):  # the second time nothing changed
+            self.assertEqual(self.setup("configure asan").returncode, 0)
+            self.assertFalse(cache.exists())
+            self.assertEqual(len((self.folder / "ran").read_text().split()), runs)
+
+    def test_that_fails_tells_why(self):
+        self.stub("cmake", "echo no compiler; exit 1")
+        done = self.setup("configure asan")
+        self.assertEqual((done.returncode, done.stderr), (1, "no compiler\nconfiguring preset asan failed: see above\n"))
 
 
 class Programs(unittest.TestCase):

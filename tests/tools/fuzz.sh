@@ -12,7 +12,7 @@ cd "$(dirname "$0")/../.." || exit 70
 runs=${SONARD_FUZZ_RUNS:-500000}
 longest=${SONARD_FUZZ_SECONDS:-900}
 
-need_packages "${build_packages[@]}" clang-14 libclang-rt-14-dev && configure fuzz && build fuzz fuzz_targets || exit
+need_packages "${build_packages[@]}" "${clang_packages[@]}" && configure fuzz && build fuzz fuzz_targets || exit
 names=("$@")
 if [ ${#names[@]} -eq 0 ]; then
   mapfile -t names < <(ninja -C build/fuzz -t targets all | sed -n 's/: CXX_EXECUTABLE_LINKER.*//p' | sed -n 's,^tests/fuzz/\(.*\)_fuzz$,\1,p')

@@ -34,7 +34,7 @@ programs="^acceptance\.($(IFS='|'; echo "${acceptance[*]}"))\$"
 programs+='|^load\.real_pings$|^python_client\.with_daemon$|^bvtsdk\.sequences$'
 [ "$kind" != tsan ] || programs='^bvtsdk\.sequences$'
 
-need_packages "${build_packages[@]}" && configure "$preset" || exit
+need_packages "${build_packages[@]}" && configure_sanitized "$preset" || exit
 targets=("$@")
 more=()
 if [ ${#targets[@]} -eq 0 ]; then
