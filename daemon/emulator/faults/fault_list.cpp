@@ -39,7 +39,8 @@ std::optional<FaultRefusal> Faults::why_not(const std::vector<Fault>& faults) co
   }
   const bool is_trouble = !faults.empty() && find_fault_kind(faults.front().what) == nullptr;
   if (any) return std::nullopt;
-  return FaultRefusal{Code::no_effect, (is_trouble ? "none of the kinds of " + faults.front().what + " has an effect: " : "") + why};
+  return FaultRefusal{Code::no_effect,
+                      (is_trouble ? "none of the kinds of " + faults.front().what + " has an effect: " : "") + why};
 }
 
 void Faults::add(const std::vector<Fault>& faults, bool manual, Time now, Actions& actions) {
