@@ -1,5 +1,5 @@
 // Kernel bodies that complete the columns' signals: multipath, volume reverberation, the transmitter's pattern, receiver
-// noise and leak, as simulate() does (core/pipeline/simulate.cpp), which begins with the noise: sums differ by rounding.
+// noise and leak, as simulate() does (core/pipeline/cpu/simulate.cpp), which begins with the noise: sums differ by rounding.
 #pragma once
 
 #include <cmath>

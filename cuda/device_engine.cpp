@@ -9,8 +9,8 @@
 #include <stdexcept>
 
 #include "core/pipeline/check_request.hpp"
+#include "core/pipeline/cpu/simulate.hpp"
 #include "core/pipeline/interleaved_pings.hpp"
-#include "core/pipeline/simulate.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "core/sonar/range_image.hpp"
 #include "cuda/prepare_ping.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/pipeline/arithmetic/receiver.hpp"
-#include "core/pipeline/pulses/spectral_columns.hpp"
+#include "core/pipeline/spectral_columns.hpp"
 #include "core/pipeline/volume.hpp"
 #include "core/sonar/bearings.hpp"
 #include "cuda/fan_steps.hpp"

@@ -1,5 +1,5 @@
 // Kernel bodies of pulses that have no real table: echoes to a grid, the grid's transform to sums over frequencies, those times
-// the pulse's spectrum, folded, and back to the samples (core/pipeline/pulses/spectral_columns.hpp). The two transforms between
+// the pulse's spectrum, folded, and back to the samples (core/pipeline/spectral_columns.hpp). The two transforms between
 // these steps are the machine's.
 #pragma once
 

@@ -17,7 +17,7 @@
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
 #include "core/image/sonar_picture.hpp"
-#include "protocol/recording/codec.hpp"
+#include "protocol/recorded/codec.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::protocol {

@@ -62,11 +62,14 @@ class Vendor {
       if (port.kind == kind) return &port;
     return nullptr;
   }
-  virtual std::span<const Option> options() const = 0;
+  virtual std::span<const Option> options() const { return {}; }
   virtual int default_max_clients() const = 0;
   /// The model that a device with these (complete) options emulates; asked once, when its configuration is read.
   virtual Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                          const OptionValues& options) const = 0;
+                                                          const OptionValues& options) const {
+    static_cast<void>(options);
+    return model;
+  }
   /// The settings before any client has sent some (the device's stored configuration).
   virtual ChangeSettings initial_settings(const DeviceState& device) const = 0;
   /// The settings that a client of this vendor would have requested: those that hold now (DeviceState::settings) with the
@@ -74,7 +77,10 @@ class Vendor {
   virtual Result<ChangeSettings> apply_override(const SettingsOverride& wanted, const DeviceState& device) const = 0;
   /// The gain as SettingsOverride::gain_percent has it: 0 to 100 of what a client can turn it.
   virtual double gain_percent(const DeviceState& device) const = 0;
-  virtual bool pings_before_first_request(const DeviceState& device) const = 0;
+  virtual bool pings_before_first_request(const DeviceState& device) const {
+    static_cast<void>(device);
+    return false;
+  }
   /// The settings to which the device itself changes once it has that ping, such as an automatic range. nullopt: they stay.
   virtual std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const {
     static_cast<void>(ping), static_cast<void>(device);
@@ -90,7 +96,10 @@ class Vendor {
     return std::nullopt;
   }
   /// Empty when the vendor has no beacon.
-  virtual Bytes beacon(const DeviceState& device, Time now) const = 0;
+  virtual Bytes beacon(const DeviceState& device, Time now) const {
+    static_cast<void>(device), static_cast<void>(now);
+    return {};
+  }
   /// Answers a datagram, of any bytes, at a port of kind udp_answer; each reply is one datagram to the sender.
   virtual Reaction on_datagram(const Port& port, BytesView datagram, const DeviceState& device, Time now) const {
     static_cast<void>(port), static_cast<void>(datagram), static_cast<void>(device), static_cast<void>(now);
@@ -110,8 +119,12 @@ class Vendor {
   /// A new dialogue at a port of kind tcp_stream or udp_dialogue. The state must outlive it.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
   virtual PingsBy pings_by() const { return PingsBy::stream; }
-  /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings).
-  virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const = 0;
+  /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings). Null: its
+  /// pings are datagrams only.
+  virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const {
+    static_cast<void>(ping), static_cast<void>(device);
+    return nullptr;
+  }
   /// The datagrams of a ping in order, at most 65,507 bytes each, for a port of kind udp_stream with receivers, or udp_dialogue.
   /// For one of kind tcp_stream with a gap: the parts of frame() between which it pauses.
   virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
@@ -139,6 +152,18 @@ class Vendor {
     static_cast<void>(region), static_cast<void>(ping);
     return {};
   }
+};
+
+/// A sonar that sends its pings to every client of one TCP port, from power-up on and without a request.
+class PushingVendor : public Vendor {
+ public:
+  explicit PushingVendor(std::uint16_t tcp_port) : ports_{{{.kind = Port::Kind::tcp_stream, .number = tcp_port}}} {}
+  std::span<const Port> ports() const override { return ports_; }
+  int default_max_clients() const override { return 4; }  // unknown: assumed
+  bool pings_before_first_request(const DeviceState&) const override { return true; }
+
+ private:
+  std::array<Port, 1> ports_;
 };
 
 /// Fills in defaults. Unknown names and values are errors that suggest the nearest valid one.

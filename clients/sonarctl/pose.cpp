@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "clients/sonarctl/commands.hpp"
-#include "clients/sonarctl/control/control_client.hpp"
+#include "clients/sonarctl/control_client.hpp"
 #include "clients/sonarctl/trajectory.hpp"
 #include "protocol/control/control.hpp"
 

@@ -1,27 +1,11 @@
 // sonarctl record: writes the vendor's bytes of a sonar into files, as its client, or converts a recording.
 #pragma once
 
-#include <filesystem>
-#include <map>
-#include <optional>
-#include <string>
-#include <string_view>
-
-#include "clients/sonarctl/commands.hpp"
-#include "clients/sonarctl/control/control_client.hpp"
+#include "clients/sonarctl/record_options.hpp"
+#include "core/base/result.hpp"
 
 namespace sonar::clients {
 
-struct RecordOptions {
-  SourceOptions source;                                     // a device; or source.recording, a recording of any kind
-  std::filesystem::path pcap, mcap, raw;                    // at least one, or of the next
-  std::map<std::string_view, std::filesystem::path> files;  // files of a make's own kinds, by FileKind::ending
-  double seconds = 0;                                       // 0 = no limit
-  std::uint64_t pings = 0;                                  // 0 = no limit
-  bool status = true;                                       // also record the status datagrams of the device
-  std::string status_on;                  // where to listen for status: HOST:PORT; empty = 0.0.0.0 and the make's port
-  std::optional<ControlOptions> control;  // ask this sonard for the sonar's name and poses, for the MCAP file
-};
 /// Succeeds at its limits, on Ctrl-C and at the end of a recording. In every case the files hold what was recorded.
 Result<void> record(const RecordOptions& options);
 

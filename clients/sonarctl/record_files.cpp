@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "protocol/recording/raw_dump.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 
 namespace sonar::clients {
 

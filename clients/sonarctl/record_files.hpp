@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "clients/sonarctl/record.hpp"
+#include "clients/sonarctl/record_options.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 

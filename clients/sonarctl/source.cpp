@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <thread>
 
-#include "clients/sonarctl/control/control_client.hpp"
+#include "clients/sonarctl/control_client.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 

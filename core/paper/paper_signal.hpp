@@ -10,8 +10,8 @@
 
 #include "core/base/parallel.hpp"
 #include "core/paper/paper_fan.hpp"
-#include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/form_beams.hpp"
+#include "core/pipeline/plan_tables.hpp"
 #include "core/pipeline/pulses/spectral.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 

@@ -1,10 +1,10 @@
-#include "core/pipeline/beam_mix.hpp"
-
+// How neighbouring beams are mixed: class BeamMix of core/pipeline/plan_tables.hpp.
 #include <algorithm>
 #include <cmath>
 #include <complex>
 
 #include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/plan_tables.hpp"
 
 namespace sonar {
 namespace {

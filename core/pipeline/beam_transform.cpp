@@ -1,10 +1,10 @@
-#include "core/pipeline/beam_transform.hpp"
-
+// How beams are made of all columns at once: class BeamTransformTables of core/pipeline/plan_tables.hpp.
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
 
 #include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/plan_tables.hpp"
 
 namespace sonar {
 namespace {

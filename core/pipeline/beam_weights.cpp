@@ -3,8 +3,8 @@
 #include <cmath>
 #include <memory>
 
-#include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/plan_tables.hpp"
 
 namespace sonar {
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/shared_noise.hpp"
 #include "core/sonar/range_image.hpp"
 
 namespace sonar {

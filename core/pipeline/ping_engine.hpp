@@ -14,14 +14,11 @@
 #include <vector>
 
 #include "core/base/parallel.hpp"
+#include "core/pipeline/simd/simd_level.hpp"
 #include "core/scene/scene.hpp"
 #include "core/sonar/ping.hpp"
 
 namespace sonar {
-
-/// Instruction sets the hot loops are compiled for; chosen at run time.
-enum class SimdLevel { automatic, portable, avx2, avx512, neon };
-inline constexpr std::array<std::string_view, 5> simd_level_names = {"auto", "portable", "avx2", "avx512", "neon"};
 
 struct EngineOptions {
   SimdLevel simd = SimdLevel::automatic;

@@ -8,8 +8,7 @@
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/pipeline/beam_transform.hpp"
-#include "core/pipeline/pulses/spectral_columns.hpp"
+#include "core/pipeline/spectral_columns.hpp"
 #include "core/sonar/bearings.hpp"
 
 namespace sonar {

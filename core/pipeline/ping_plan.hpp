@@ -10,13 +10,11 @@
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/kernel_math.hpp"
-#include "core/pipeline/beam_mix.hpp"
-#include "core/pipeline/beam_transform.hpp"
+#include "core/pipeline/plan_tables.hpp"
 #include "core/pipeline/pulses/pulse.hpp"
-#include "core/pipeline/pulses/spectral_columns.hpp"
-#include "core/pipeline/shared_noise.hpp"
 #include "core/pipeline/signals.hpp"
 #include "core/pipeline/simd/kernels.hpp"
+#include "core/pipeline/spectral_columns.hpp"
 #include "core/scene/cells/surface_cells.hpp"
 #include "core/sonar/ping.hpp"
 

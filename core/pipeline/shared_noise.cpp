@@ -11,6 +11,7 @@
 #include "core/pipeline/focused_array.hpp"
 #include "core/pipeline/interference.hpp"
 #include "core/pipeline/ping_plan.hpp"
+#include "core/pipeline/plan_tables.hpp"
 
 namespace sonar {
 namespace {

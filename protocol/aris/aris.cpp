@@ -26,10 +26,6 @@ class ArisVendor final : public protocol::Vendor {
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return aris::options(); }
   int default_max_clients() const override { return 1; }  // one controller at a time
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(aris::initial_settings(device), device);
@@ -42,12 +38,10 @@ class ArisVendor final : public protocol::Vendor {
     return 100 / highest_gain_db * static_cast<double>(settings_from(device.settings.get(), device).acoustics.gain_db);
   }
   protocol::PingsBy pings_by() const override { return protocol::PingsBy::datagrams; }
-  bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
   protocol::Bytes beacon(const protocol::DeviceState& device, Time) const override { return make_beacon(device); }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState& device, Time) const override {
     return make_dialogue(device);
   }
-  std::shared_ptr<const protocol::Bytes> frame(const Ping&, const protocol::DeviceState&) const override { return nullptr; }
   std::vector<protocol::Bytes> datagrams(const protocol::Port&, const Ping& ping,
                                          const protocol::DeviceState& device) const override {
     return encode_frame(ping, device, settings_from(ping.request.vendor_settings.get(), device));

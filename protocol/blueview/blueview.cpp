@@ -22,10 +22,6 @@ class BlueViewVendor final : public protocol::Vendor {
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return blueview::options(); }
   int default_max_clients() const override { return 8; }
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     const SonarSettings settings = initial_sonar_settings(device);
@@ -40,8 +36,6 @@ class BlueViewVendor final : public protocol::Vendor {
     const SonarSettings settings = settings_from(device.settings.get(), device);
     return gain_percent_from(static_cast<double>(settings.heads[static_cast<std::size_t>(settings.active_head)].gain_db));
   }
-  bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
-  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
   protocol::Reaction on_datagram(const protocol::Port&, protocol::BytesView datagram, const protocol::DeviceState& device,
                                  Time) const override {
     protocol::Reaction reaction;

@@ -6,7 +6,7 @@
 
 #include "control.pb.h"
 #include "core/base/geometry.hpp"
-#include "protocol/control/control.hpp"
+#include "protocol/control/request.hpp"
 
 namespace sonar::control {
 

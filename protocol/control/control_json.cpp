@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "protocol/control/control.hpp"
 #include "protocol/control/messages.hpp"
 #include "protocol/control/refused.hpp"
 

@@ -7,27 +7,19 @@
 namespace sonar::dvl {
 namespace {
 
-constexpr std::array<protocol::Port, 1> port_table{{{.kind = protocol::Port::Kind::tcp_stream, .number = tcp_port}}};
 constexpr auto processing_time = std::chrono::milliseconds(2);  // unknown: assumed
 
-class DvlVendor final : public protocol::Vendor {
+class DvlVendor final : public protocol::PushingVendor {
  public:
+  DvlVendor() : PushingVendor(tcp_port) {}
   std::string_view name() const override { return "dvl"; }
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return dvl::models(); }
-  std::span<const protocol::Port> ports() const override { return port_table; }
-  std::span<const protocol::Option> options() const override { return {}; }
-  int default_max_clients() const override { return 4; }  // unknown: assumed
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
   Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
                                                   const protocol::DeviceState& device) const override {
     return dvl::apply_override(wanted, device);
   }
   double gain_percent(const protocol::DeviceState&) const override { return 0; }  // the device sets its gain itself
-  bool pings_before_first_request(const protocol::DeviceState&) const override { return true; }
   std::optional<protocol::ChangeSettings> after_ping(const Ping& ping, const protocol::DeviceState& device) const override {
     const Measurement measured = measure(ping);
     Settings s = settings_from(device.settings.get());
@@ -37,7 +29,6 @@ class DvlVendor final : public protocol::Vendor {
       s.mode = next_mode(measured, s, product_of(*device.model));
     return change_to(s, device);
   }
-  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState& device,
                                                Time now) const override {
     return make_dialogue(device, now);

@@ -4,7 +4,7 @@
 #include "protocol/m3/host.hpp"
 #include "protocol/m3/models.hpp"
 #include "protocol/m3/packet.hpp"
-#include "protocol/recording/raw_dump.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 
 namespace sonar::m3 {
 namespace {

@@ -8,8 +8,6 @@
 namespace sonar::m3 {
 namespace {
 
-constexpr std::array<protocol::Port, 1> port_table{{{.kind = protocol::Port::Kind::tcp_stream, .number = tcp_port}}};
-
 /// Drivers send nothing.
 class SilentDialogue final : public protocol::Dialogue {
  public:
@@ -21,17 +19,12 @@ class SilentDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 };
 
-class M3Vendor final : public protocol::Vendor {
+class M3Vendor final : public protocol::PushingVendor {
  public:
+  M3Vendor() : PushingVendor(tcp_port) {}
   std::string_view name() const override { return "m3"; }
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return m3::models(); }
-  std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return m3::options(); }
-  int default_max_clients() const override { return 4; }  // unknown: assumed
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
   Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
                                                   const protocol::DeviceState& device) const override {
@@ -40,8 +33,6 @@ class M3Vendor final : public protocol::Vendor {
   double gain_percent(const protocol::DeviceState& device) const override {
     return m3::gain_percent(settings_from(device.settings.get()));
   }
-  bool pings_before_first_request(const protocol::DeviceState&) const override { return true; }
-  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState&, Time) const override {
     return std::make_unique<SilentDialogue>();
   }

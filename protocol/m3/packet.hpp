@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "protocol/m3/messages.hpp"
-#include "protocol/recording/message_splitter.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::m3 {

@@ -4,7 +4,6 @@
 #include <cstdio>
 
 #include "protocol/oculus/framer.hpp"
-#include "protocol/oculus/settings.hpp"
 
 namespace sonar::oculus {
 
@@ -53,33 +52,6 @@ bool HeldFire::equals(const VendorSettings& other) const {
 FireRequest fire_of(const VendorSettings* settings) {
   const auto* held = dynamic_cast<const HeldFire*>(settings);
   return held != nullptr ? held->fire : stored_fire();
-}
-
-std::string describe(const FireRequest& fire) {
-  const FireSettings& s = fire.settings;
-  const bool metres = (s.flags & flag::range_in_metres) != 0;
-  const double rate_hz = table_rate_hz(s.ping_rate);
-  char text[160];
-  std::snprintf(text, sizeof text, "mode %d, range %g %s, gain %g %%, gamma %d, ", s.mode, s.range, metres ? "m" : "%",
-                s.gain_percent, s.gamma);
-  std::string sentence = text;
-  if (rate_hz > 0) {
-    std::snprintf(text, sizeof text, "rate %g Hz", rate_hz);
-    sentence += text;
-  } else {
-    sentence += "standby";
-  }
-  if (s.sound_speed_mps == 0) {
-    sentence += ", own sound speed";
-  } else {
-    std::snprintf(text, sizeof text, ", sound speed %g m/s", s.sound_speed_mps);
-    sentence += text;
-  }
-  sentence += (s.flags & flag::beams_512) != 0 ? ", 512 beams" : ", 256 beams";
-  sentence += ", " + std::to_string(sample_format(fire).bits) + " bits";
-  sentence += ", flags " + std::to_string(s.flags) + ", version " + std::to_string(fire.version);
-  if ((s.flags & flag::network_trigger) != 0) sentence += ", network trigger";
-  return sentence;
 }
 
 }  // namespace sonar::oculus

@@ -36,7 +36,4 @@ struct HeldFire final : VendorSettings {
 /// stored_fire() for null.
 FireRequest fire_of(const VendorSettings* settings);
 
-/// "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, own sound speed, 512 beams, 8 bits, ...": for the log.
-std::string describe(const FireRequest& fire);
-
 }  // namespace sonar::oculus

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "protocol/oculus/framer.hpp"
-#include "protocol/recording/zlib.hpp"
+#include "protocol/recorded/zlib.hpp"
 
 namespace sonar::recording {
 namespace {

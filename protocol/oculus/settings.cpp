@@ -191,4 +191,31 @@ std::size_t ping_size(const PingSettings& settings) {
   return image_offset + static_cast<std::size_t>(settings.range_bin_count) * row;
 }
 
+std::string describe(const FireRequest& fire) {
+  const FireSettings& s = fire.settings;
+  const bool metres = (s.flags & flag::range_in_metres) != 0;
+  const double rate_hz = table_rate_hz(s.ping_rate);
+  char text[160];
+  std::snprintf(text, sizeof text, "mode %d, range %g %s, gain %g %%, gamma %d, ", s.mode, s.range, metres ? "m" : "%",
+                s.gain_percent, s.gamma);
+  std::string sentence = text;
+  if (rate_hz > 0) {
+    std::snprintf(text, sizeof text, "rate %g Hz", rate_hz);
+    sentence += text;
+  } else {
+    sentence += "standby";
+  }
+  if (s.sound_speed_mps == 0) {
+    sentence += ", own sound speed";
+  } else {
+    std::snprintf(text, sizeof text, ", sound speed %g m/s", s.sound_speed_mps);
+    sentence += text;
+  }
+  sentence += (s.flags & flag::beams_512) != 0 ? ", 512 beams" : ", 256 beams";
+  sentence += ", " + std::to_string(sample_format(fire).bits) + " bits";
+  sentence += ", flags " + std::to_string(s.flags) + ", version " + std::to_string(fire.version);
+  if ((s.flags & flag::network_trigger) != 0) sentence += ", network trigger";
+  return sentence;
+}
+
 }  // namespace sonar::oculus

@@ -61,4 +61,7 @@ ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& d
 /// Bytes of a ping result made with these settings.
 std::size_t ping_size(const PingSettings& settings);
 
+/// "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, own sound speed, 512 beams, 8 bits, ...": for the log.
+std::string describe(const FireRequest& fire);
+
 }  // namespace sonar::oculus

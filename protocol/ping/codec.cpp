@@ -10,7 +10,7 @@
 #include "protocol/ping/ping360.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/ping/surveyor.hpp"
-#include "protocol/recording/raw_dump.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 
 namespace sonar::ping {
 namespace {

@@ -63,7 +63,6 @@ class OmniscanVendor final : public StreamingVendor {
                                        protocol::BytesView message) const override {
     return part == protocol::Part::ping ? locate_omniscan(name, message) : std::nullopt;
   }
-  void reseal(protocol::BytesView before, protocol::Bytes& ping) const override { sonar::ping::reseal(before, ping); }
   std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
     return locate_omniscan(region, ping);
   }

@@ -48,7 +48,6 @@ class Ping1DVendor final : public StreamingVendor {
                                        protocol::BytesView message) const override {
     return part == protocol::Part::ping ? locate_ping1d(name, message) : std::nullopt;
   }
-  void reseal(protocol::BytesView before, protocol::Bytes& ping) const override { sonar::ping::reseal(before, ping); }
   std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
     return locate_ping1d(region, ping);
   }

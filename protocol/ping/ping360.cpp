@@ -54,10 +54,6 @@ class Ping360Vendor final : public protocol::Vendor {
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return ping360::options(); }
   int default_max_clients() const override { return 1; }  // the host that sent last
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(Settings{}, device);
   }
@@ -69,7 +65,6 @@ class Ping360Vendor final : public protocol::Vendor {
     return 50.0 * settings_from(device.settings.get()).ping.gain;
   }
   protocol::PingsBy pings_by() const override { return protocol::PingsBy::datagrams; }
-  bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
   /// To and fro over the half circle ahead, 10 m far unless other settings were requested.
   std::optional<ScanStep> scan_step(std::uint32_t number, const protocol::DeviceState& device) const override {
     Settings s = settings_from(device.settings.get());
@@ -84,7 +79,6 @@ class Ping360Vendor final : public protocol::Vendor {
     return ScanStep{{.head_rad = head_rad(s.ping.angle, device.options), .with = std::make_shared<HeldSettings>(s)},
                     ping_settings(s, device)};
   }
-  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
   bool is_request(const protocol::Port&, protocol::BytesView datagram) const override { return holds_frame(datagram); }
   protocol::Reaction on_datagram(const protocol::Port&, protocol::BytesView datagram, const protocol::DeviceState& device,
                                  Time) const override {
@@ -98,7 +92,6 @@ class Ping360Vendor final : public protocol::Vendor {
                                                Time now) const override {
     return make_dialogue(device, port, now);
   }
-  std::shared_ptr<const protocol::Bytes> frame(const Ping&, const protocol::DeviceState&) const override { return nullptr; }
   std::vector<protocol::Bytes> datagrams(const protocol::Port&, const Ping& ping, const protocol::DeviceState&) const override {
     const Settings s = settings_from(ping.request.vendor_settings.get());
     const Transducer& t = s.ping;

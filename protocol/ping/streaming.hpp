@@ -61,12 +61,6 @@ class StreamingVendor : public protocol::Vendor {
  public:
   int default_max_clients() const override { return 1; }
   protocol::PingsBy pings_by() const override { return protocol::PingsBy::either; }
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
-  bool pings_before_first_request(const protocol::DeviceState&) const override { return false; }
-  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
   bool is_request(const protocol::Port&, protocol::BytesView datagram) const override { return holds_frame(datagram); }
   std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
     protocol::Bytes all;
@@ -77,6 +71,7 @@ class StreamingVendor : public protocol::Vendor {
                                          const protocol::DeviceState& device) const override {
     return frames_of(ping, device);
   }
+  void reseal(protocol::BytesView before, protocol::Bytes& ping) const override { sonar::ping::reseal(before, ping); }
 
  protected:
   /// The frames of a ping, in the order they are sent.

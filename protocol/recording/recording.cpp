@@ -1,12 +1,11 @@
 #include "protocol/recording/recording.hpp"
 
-#include <algorithm>
 #include <array>
 
 #include "core/text/ipv4.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
-#include "protocol/recording/raw_dump.hpp"
 
 namespace sonar::recording {
 namespace {
@@ -86,13 +85,6 @@ Result<Recording> open_recording(const std::filesystem::path& file, const std::s
   return open_recording(std::move(*source), sonar);
 }
 
-std::optional<SentBy> sender_of(const RecordedMessage& message) {
-  if (message.from != Origin::device) return std::nullopt;
-  for (const protocol::Make& make : protocol::makes())
-    if (auto sender = make.codec.sender(message)) return SentBy{&make, std::move(*sender)};
-  return std::nullopt;
-}
-
 std::optional<SentBy> find_sender(RecordingReader& reader) {
   std::optional<SentBy> found;
   for (std::uint64_t searched = 0; !found && searched <= most_searched_bytes;) {
@@ -103,19 +95,6 @@ std::optional<SentBy> find_sender(RecordingReader& reader) {
   }
   reader.rewind();
   return found;
-}
-
-std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by) {
-  using Kind = protocol::HostPort::Kind;
-  const auto takes = [by](const protocol::HostPort& port) {
-    const bool by_udp = port.kind == Kind::udp || port.kind == Kind::udp_listen;
-    return by == Carrier::datagram ? by_udp : port.kind == Kind::tcp;
-  };
-  const auto found = std::find_if(make.ports.begin(), make.ports.end(), takes);
-  if (found != make.ports.end()) return static_cast<std::size_t>(found - make.ports.begin());
-  const protocol::Port* const dialogue = make.device->port(protocol::Port::Kind::udp_dialogue);
-  const bool by_either = by == Carrier::datagram && dialogue != nullptr && dialogue->number == make.ports.front().number;
-  return by_either ? std::optional<std::size_t>(0) : std::nullopt;
 }
 
 }  // namespace sonar::recording

@@ -6,9 +6,9 @@
 #include <memory>
 #include <string_view>
 
-#include "protocol/host.hpp"
-#include "protocol/recording/byte_source.hpp"
-#include "protocol/recording/recorded_message.hpp"
+#include "protocol/recorded/byte_source.hpp"
+#include "protocol/recorded/recorded_message.hpp"
+#include "protocol/sender.hpp"
 
 namespace sonar::recording {
 
@@ -24,15 +24,7 @@ struct Recording {
 Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});
 
-struct SentBy {
-  const protocol::Make* make = nullptr;
-  Sender sender;
-};
-/// nullopt: it is of a client, or of no make that is known.
-std::optional<SentBy> sender_of(const RecordedMessage& message);
 /// The first message of a device tells, of its first 64 MB. Rewinds the reader.
 std::optional<SentBy> find_sender(RecordingReader& reader);
-/// The port at which a host of the make takes messages of this carrier; nullopt: it takes none.
-std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by);
 
 }  // namespace sonar::recording

@@ -1,7 +1,7 @@
 // The messages and files of Water Linked sonars, for recordings.
 #include <array>
 
-#include "protocol/recording/raw_dump.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 #include "protocol/waterlinked/host.hpp"
 #include "protocol/waterlinked/models.hpp"
 #include "protocol/waterlinked/rip.hpp"

@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "protocol/recording/byte_source.hpp"
-#include "protocol/recording/recorded_message.hpp"
+#include "protocol/recorded/byte_source.hpp"
+#include "protocol/recorded/recorded_message.hpp"
 
 namespace sonar::recording {
 

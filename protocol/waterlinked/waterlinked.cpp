@@ -21,10 +21,6 @@ class WaterLinkedVendor final : public protocol::Vendor {
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return waterlinked::options(); }
   int default_max_clients() const override { return 1; }  // counts TCP streams; this sonar has none
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(waterlinked::initial_settings(device), device);
@@ -35,7 +31,6 @@ class WaterLinkedVendor final : public protocol::Vendor {
   }
   double gain_percent(const protocol::DeviceState&) const override { return 0; }  // the device sets its gain itself
   bool pings_before_first_request(const protocol::DeviceState&) const override { return true; }
-  protocol::Bytes beacon(const protocol::DeviceState&, Time) const override { return {}; }
   protocol::ResourceReply on_http(const protocol::Port&, const protocol::ResourceRequest& request,
                                   const protocol::DeviceState& device, Time now) const override {
     return answer(request, device, now);
@@ -44,7 +39,6 @@ class WaterLinkedVendor final : public protocol::Vendor {
     return nullptr;
   }
   protocol::PingsBy pings_by() const override { return protocol::PingsBy::datagrams; }
-  std::shared_ptr<const protocol::Bytes> frame(const Ping&, const protocol::DeviceState&) const override { return nullptr; }
   std::vector<protocol::Bytes> datagrams(const protocol::Port&, const Ping& ping,
                                          const protocol::DeviceState& device) const override {
     return encode_shot(ping, settings_from(ping.request.vendor_settings.get(), device), device);

@@ -10,8 +10,8 @@ import sys
 
 # What a make of sonar may include beside its own folder.
 DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/dialogue.hpp", "protocol/host.hpp",
-          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/waterfall.hpp", "protocol/wire/", "protocol/recording/byte_source.hpp", "protocol/recording/codec.hpp", "protocol/recording/message_splitter.hpp",
-          "protocol/recording/raw_dump.hpp", "protocol/recording/recorded_message.hpp", "protocol/recording/zlib.hpp"]
+          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/recorded/", "protocol/transport.hpp",
+          "protocol/vendor.hpp", "protocol/waterfall.hpp", "protocol/wire/"]
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
     "core/base": ["core/base/"],
@@ -36,7 +36,9 @@ FLOORS = {
     "protocol/dvl": [*DEVICE, "protocol/dvl/"],
     "protocol/m3": [*DEVICE, "protocol/m3/"],
     "protocol/blueview": [*DEVICE, "protocol/blueview/"],
-    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/wire/", "protocol/recording/"],
+    "protocol/recorded": ["core/base/", "core/sonar/", "protocol/wire/", "protocol/recorded/"],
+    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/sender.hpp",
+                           "protocol/wire/", "protocol/recorded/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     # Within the daemon: files of configuration < what is emulated < sockets, threads and clocks < commands.
     "daemon/config": ["core/", "protocol/", "daemon/config/"],
@@ -52,7 +54,11 @@ FLOORS = {
     "tests": [""],
 }
 # The folders in these include each other in one direction only.
-ONE_DIRECTION = r"daemon/"
+ONE_DIRECTION = r"daemon/|protocol/|core/|clients/sonarctl/|cuda/"
+# So do the components in these: a header and the sources of the same name.
+COMPONENTS_IN_ONE_DIRECTION = r"protocol/|core/pipeline/|clients/sonarctl/"
+# The list of makes includes them all, and nothing includes it.
+LISTS = {"protocol/makes.cpp"}
 # Headers that go to other people's include folders find each other by name alone.
 INSTALLED = r"clients/bvtsdk/abi\d/include/"
 # Header of a dependency -> the only files that may include it (tests may include anything).
@@ -64,7 +70,7 @@ DEPENDENCIES = {
     r"tinyxml2\.h": ["clients/scene_tools/xml_file.cpp"],
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp", "core/image/gray_png.cpp"],
     r"tiffio\.h": ["core/scene/files/geo_tiff.cpp"],
-    r"zlib\.h": ["protocol/blueview/deflate.cpp", "protocol/waterlinked/rip.cpp", "protocol/recording/zlib.cpp", "clients/bvtsdk/", "core/image/"],
+    r"zlib\.h": ["protocol/blueview/deflate.cpp", "protocol/waterlinked/rip.cpp", "protocol/recorded/zlib.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],
     r"boost/asio\.hpp": ["daemon/server/system/asio.hpp"],
     r"spdlog/|fmt/": ["daemon/", "clients/"],
@@ -74,7 +80,7 @@ DEPENDENCIES = {
         "protocol/control/", "protocol/doctor/", "daemon/server/control/control_http.cpp", "daemon/server/control/stream_connection.cpp", "daemon/server/http/operation_answer.cpp", "daemon/server/api/events.cpp",
         "daemon/server/faults/fault_log.cpp", "daemon/server/operations/fault_operations.cpp",
         "daemon/server/operations/monitoring.cpp", "daemon/server/operations/time_operations.cpp", "daemon/server/recording/recordings.cpp",
-        "daemon/server/sonars/device_control.cpp", "daemon/server/sonars/fleet.cpp", "daemon/server/view/recording_views.cpp", "daemon/server/view/view_doctor.cpp", "daemon/server/view/view_messages.cpp", "clients/sonarctl/control/control_client.cpp",
+        "daemon/server/sonars/device_control.cpp", "daemon/server/sonars/fleet.cpp", "daemon/server/view/recording_views.cpp", "daemon/server/view/view_doctor.cpp", "daemon/server/view/view_messages.cpp", "clients/sonarctl/control_client.cpp",
         "clients/sonarctl/control/control_commands.cpp", "clients/sonarctl/control/fault_commands.cpp",
         "clients/sonarctl/control/fault_text.cpp", "clients/sonarctl/control/status_text.cpp", "clients/sonarctl/doctor/check_daemon.cpp",
         "clients/sonarctl/doctor/check_sonar.cpp", "clients/sonarctl/doctor/gather.cpp", "clients/sonarctl/doctor/watch_pings.cpp",
@@ -102,9 +108,9 @@ FORBIDDEN = [
     ("thread", r"core/|protocol/|cuda/|clients/", r"core/base/parallel\.|clients/bvtsdk/core/link\.", r"\bstd::(j?thread|async)\b|\bpthread_create\b",
      "compute threads live in core/base/parallel.* only, the keep-alive thread of a link in its own file"),
     ("socket", r"core/|protocol/", None, r"#\s*include\s*<(sys/socket|netinet/|arpa/|poll|netdb)", "only daemon/ and clients/ touch sockets"),
-    ("file", r"core/|protocol/", r"core/base/(regular_file|memory_left|child_process)\.cpp|core/image/raster\.cpp|protocol/recording/byte_source\.cpp",
+    ("file", r"core/|protocol/", r"core/base/(regular_file|memory_left|child_process)\.cpp|core/image/raster\.cpp|protocol/recorded/byte_source\.cpp",
      r"\bstd::[io]?fstream\b|(?<![\w:>.])(std::|::)?fopen\s*\(|(?<![\w>])::open(at)?\s*\(|#\s*include\s*<fcntl\.h>",
-     "bytes come in as arguments; only the loaders named in this rule, and recordings through protocol/recording/byte_source.cpp, open files "
+     "bytes come in as arguments; only the loaders named in this rule, and recordings through protocol/recorded/byte_source.cpp, open files "
      "(docs/decisions/0015-recording-files-behind-two-interfaces.md)"),
     ("mutex", r"daemon/|protocol/", None, r"\bstd::(mutex|shared_mutex|recursive_mutex|condition_variable)\b",
      "work crosses threads by value and asio::post"),
@@ -199,26 +205,34 @@ def include_violations(name, code):
                 yield number, f'{floor} must not include "{header}" (floors of docs/architecture.md)'
 
 
-def circle_violations(includes):
-    """`includes`: (file, line, header). Every include that closes a circle of folders."""
+def folder_of(name):
+    return name.rpartition("/")[0]
+
+
+def component_of(name):
+    return name.rpartition(".")[0]
+
+
+def circle_violations(includes, part_of, parts):
+    """`includes`: (file, line, header). Every include that closes a circle of `parts`: part_of() of files."""
     below = {}
     for name, _, header in includes:
-        below.setdefault(name.rpartition("/")[0], set()).add(header.rpartition("/")[0])
+        below.setdefault(part_of(name), set()).add(part_of(header))
 
     def reaches(start, goal):
         seen, left = set(), [start]
         while left:
-            folder = left.pop()
-            if folder == goal:
+            part = left.pop()
+            if part == goal:
                 return True
-            left += below.get(folder, set()) - seen
-            seen.add(folder)
+            left += below.get(part, set()) - seen
+            seen.add(part)
         return False
 
     for name, number, header in includes:
-        here, there = name.rpartition("/")[0], header.rpartition("/")[0]
+        here, there = part_of(name), part_of(header)
         if here != there and reaches(there, here):
-            yield f'{name}:{number}: includes "{header}": the folders {here} and {there} include each other; give them one direction'
+            yield f'{name}:{number}: includes "{header}": the {parts} {here} and {there} include each other; give them one direction'
 
 
 def wording_violations(name, text):
@@ -263,8 +277,9 @@ def violations(root):
         if is_code:
             for number, what in [*include_violations(name, code), *wording_violations(name, text)]:
                 yield f"{name}:{number}: {what}"
-            if re.match(ONE_DIRECTION, name):
-                includes += [(name, line_of(code, m.start(1)), m[1]) for m in re.finditer(r'^#include "(daemon/[^"]+)"', code, re.M)]
+            if re.match(ONE_DIRECTION, name) and name not in LISTS:
+                includes += [(name, line_of(code, m.start(1)), m[1])
+                             for m in re.finditer(rf'^#include "((?:{ONE_DIRECTION})[^"]+)"', code, re.M)]
             if path.suffix in {".hpp", ".cuh", ".h"} and not re.search(r"^#pragma once$", text, re.M):
                 yield f"{name}:1: header without #pragma once"
             if not name.startswith("tests/") and text.count("\n") > LONGEST_FILE:
@@ -280,7 +295,9 @@ def violations(root):
             searched = code if where else text  # house rules hold in comments too
             for match in re.finditer(pattern, searched):
                 yield f"{name}:{line_of(searched, match.start())}: {rule}: \"{match.group().strip()}\"; {why}"
-    yield from circle_violations(includes)
+    yield from circle_violations(includes, folder_of, "folders")
+    within = [i for i in includes if re.match(COMPONENTS_IN_ONE_DIRECTION, i[0]) and re.match(COMPONENTS_IN_ONE_DIRECTION, i[2])]
+    yield from circle_violations(within, component_of, "components")
 
 
 def main():

@@ -35,11 +35,11 @@ class Planted(unittest.TestCase):
     def test_upward_and_sideways_includes(self):
         for name, header in [
                 ("core/base/a.hpp", "core/sonar/ping.hpp"), ("core/sonar/a.hpp", "core/scene/scene.hpp"),
-                ("core/scene/a.cpp", "core/pipeline/simulate.hpp"), ("core/pipeline/a.cpp", "protocol/vendor.hpp"),
+                ("core/scene/a.cpp", "core/pipeline/cpu/simulate.hpp"), ("core/pipeline/a.cpp", "protocol/vendor.hpp"),
                 ("core/pipeline/a.cpp", "core/text/strict_yaml.hpp"), ("core/pipeline/arithmetic/a.hpp", "core/scene/scene.hpp"),
                 ("protocol/oculus/a.cpp", "core/scene/scene.hpp"), ("protocol/oculus/a.cpp", "core/pipeline/ping_engine.hpp"),
                 ("protocol/oculus/a.cpp", "protocol/blueview/models.hpp"), ("protocol/control/a.cpp", "daemon/emulator/world/world.hpp"),
-                ("clients/sonarctl/a.cpp", "daemon/config/config.hpp"), ("clients/sonarctl/a.cpp", "core/pipeline/simulate.hpp"),
+                ("clients/sonarctl/a.cpp", "daemon/config/config.hpp"), ("clients/sonarctl/a.cpp", "core/pipeline/cpu/simulate.hpp"),
                 ("cuda/a.cu", "core/image/raster.hpp"), ("daemon/a.cpp", "clients/sonarctl/net.hpp")]:
             with self.subTest(name=name, header=header):
                 self.expect(name, f'\n#include "{header}"\n', 2, "must not include")
@@ -54,6 +54,26 @@ class Planted(unittest.TestCase):
         found = found_in(tree)
         self.assertEqual([f.split(":")[0] for f in found], sorted(tree), found)
         self.assertIn("daemon/server/control and daemon/server/http include each other", found[0])
+
+    def test_folders_and_components_of_the_protocol_include_each_other_in_one_direction(self):
+        def including(header):
+            return f'#pragma once\n#include "{header}"\n'
+        for first, second, parts in [("protocol/recording/a", "protocol/recording/pcap/b", "folders"),
+                                     ("protocol/control/a", "protocol/control/b", "components"),
+                                     ("core/pipeline/a", "core/pipeline/b", "components")]:
+            with self.subTest(first=first):
+                tree = {f"{first}.hpp": "#pragma once\n", f"{second}.hpp": including(f"{first}.hpp")}
+                self.assertEqual(found_in(tree), [])
+                found = found_in({**tree, f"{first}.cpp": f'#include "{second}.hpp"\n'})
+                self.assertEqual({f.split(":")[0] for f in found}, {f"{first}.cpp", f"{second}.hpp"}, found)
+                self.assertIn(f"the {parts} ", found[0])
+
+    def test_the_list_of_makes_closes_no_circle(self):
+        tree = {"protocol/makes.cpp": '#include "protocol/oculus/a.hpp"\n',
+                "protocol/oculus/a.hpp": '#pragma once\n#include "protocol/vendor.hpp"\n'}
+        self.assertEqual(found_in(tree), [])
+        found = found_in({**tree, "protocol/host.cpp": '#include "protocol/oculus/a.hpp"\n'})
+        self.assertTrue(any("the folders protocol and protocol/oculus " in f for f in found), found)
 
     def test_include_paths_start_at_the_root(self):
         self.expect("core/base/a.cpp", '#include "units.hpp"\n', 1, "start at the root")

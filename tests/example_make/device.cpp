@@ -92,12 +92,7 @@ class ExampleVendor final : public protocol::Vendor {
   std::string_view name() const override { return "example"; }
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return models_; }
   std::span<const protocol::Port> ports() const override { return port_table; }
-  std::span<const protocol::Option> options() const override { return {}; }
   int default_max_clients() const override { return 1; }
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
   ChangeSettings initial_settings(const DeviceState&) const override { return change_to({}); }
   Result<ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const DeviceState& device) const override {
     Settings s = settings_from(device.settings.get());
@@ -112,8 +107,6 @@ class ExampleVendor final : public protocol::Vendor {
     return change_to(s);
   }
   double gain_percent(const DeviceState& device) const override { return settings_from(device.settings.get()).gain_percent; }
-  bool pings_before_first_request(const DeviceState&) const override { return false; }
-  Bytes beacon(const DeviceState&, Time) const override { return {}; }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const DeviceState&, Time) const override {
     return std::make_unique<ExampleDialogue>();
   }

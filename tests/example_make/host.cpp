@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "protocol/recording/raw_dump.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 #include "tests/example_make/example.hpp"
 #include "tests/example_make/messages.hpp"
 

@@ -87,7 +87,7 @@ class Link {
     FaultRecord record;
     record.what = std::string(kind.code);
     const auto faults = check_fault(record, true);
-    if (!faults || !sonar.why_no_faults(*faults).empty()) return false;
+    if (!faults || sonar.why_no_faults(*faults)) return false;
     perform(sonar.add_faults(*faults, true, now_));
     return true;
   }

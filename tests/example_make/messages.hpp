@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "protocol/recording/message_splitter.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "protocol/wire/wire.hpp"
 
 namespace sonar::example_make {

@@ -12,9 +12,9 @@
 
 #include "core/image/draw_picture.hpp"
 #include "core/text/ipv4.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
-#include "protocol/recording/raw_dump.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace sonar::protocol::hosts_test {

@@ -25,7 +25,7 @@ class LeftOut(unittest.TestCase):
     def test_is_what_the_changed_files_cannot_touch(self):
         self.assertEqual(self.left_out("docs/faults.md"), HEAVY)
         self.assertEqual(self.left_out("clients/sonarctl/listen.cpp", "docs/faults.md"), HEAVY)
-        self.assertEqual(self.left_out("core/pipeline/simulate.cpp"), {"package", "page"})
+        self.assertEqual(self.left_out("core/pipeline/cpu/simulate.cpp"), {"package", "page"})
         self.assertEqual(self.left_out("clients/web/main.js"), HEAVY - {"page"})
         self.assertEqual(self.left_out("daemon/CMakeLists.txt"), HEAVY - {"package"})
 

@@ -19,7 +19,11 @@ def free_address() -> str:
 
 
 class DaemonFailed(RuntimeError):
-    """sonard exited or was not ready in time; the text contains its log."""
+    """sonard exited or was not ready in time; the text contains its log. `code`: its exit code, None while it runs."""
+
+    def __init__(self, text: str, code: Optional[int] = None):
+        super().__init__(text)
+        self.code = code
 
 
 class Daemon:
@@ -52,7 +56,7 @@ class Daemon:
                     return self
                 code = self.process.wait()
                 if code != ADDRESS_IN_USE or "ADDRESS" not in self._text:  # otherwise try another address
-                    raise DaemonFailed(f"sonard exited with code {code}:\n{self.log()}")
+                    raise DaemonFailed(f"sonard exited with code {code}:\n{self.log()}", code)
             raise DaemonFailed(f"no free address found:\n{self.log()}")
         except BaseException:
             self.__exit__()

@@ -52,7 +52,7 @@ def sonard(request: Any) -> Iterator[RunningSonard]:
         try:
             daemon.__enter__()
         except DaemonFailed as failed:
-            if f"code {ADDRESS_IN_USE}" in str(failed):
+            if failed.code == ADDRESS_IN_USE:
                 continue
             raise
         try:

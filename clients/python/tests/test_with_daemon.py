@@ -208,9 +208,10 @@ class Starting(unittest.TestCase):
         with self.assertRaisesRegex(DaemonFailed, "wrold"):
             with Daemon(config().replace("world", "wrold"), SONARD):
                 self.fail("it runs")
-        with self.assertRaisesRegex(DaemonFailed, "code 66"):
+        with self.assertRaisesRegex(DaemonFailed, "code 66") as failed:
             with Daemon("nowhere.yaml", SONARD):
                 self.fail("it runs")
+        self.assertEqual(failed.exception.code, 66)
 
     def test_stops_at_the_end_of_the_block_and_by_stop(self):
         with Daemon(config(), SONARD, ["--seed", "4"]) as daemon:

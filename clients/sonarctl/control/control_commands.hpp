@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "clients/sonarctl/control/control_client.hpp"
+#include "clients/sonarctl/control_client.hpp"
 
 namespace sonar::clients {
 

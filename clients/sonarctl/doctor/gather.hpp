@@ -2,7 +2,7 @@
 // then it connects to the sonars without one. checks.hpp interprets the facts.
 #pragma once
 
-#include "clients/sonarctl/control/control_client.hpp"
+#include "clients/sonarctl/control_client.hpp"
 #include "clients/sonarctl/doctor/facts.hpp"
 
 namespace sonar::clients::doctor {

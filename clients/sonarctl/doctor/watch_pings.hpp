@@ -1,7 +1,7 @@
 // Connects to one sonar as a driver would and measures delay, size, rate and latency of its pings. Used by gather.
 #pragma once
 
-#include "clients/sonarctl/control/control_client.hpp"
+#include "clients/sonarctl/control_client.hpp"
 #include "clients/sonarctl/doctor/probes.hpp"
 
 namespace sonar::clients::doctor {

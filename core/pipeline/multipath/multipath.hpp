@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/pipeline/multipath/multipath_scatter.hpp"
-#include "core/pipeline/pulses/spectral_columns.hpp"
+#include "core/pipeline/spectral_columns.hpp"
 #include "core/pipeline/synthesize.hpp"
 
 namespace sonar {

@@ -1,5 +1,5 @@
 // The tables of a beam transform as the kernels read them: plain pointers into BeamTransformTables, which makes and owns them
-// (core/pipeline/beam_transform.hpp).
+// (core/pipeline/plan_tables.hpp).
 #pragma once
 
 #include <cstdint>

@@ -7,8 +7,8 @@
 
 #include "core/base/random.hpp"
 #include "core/pipeline/arithmetic/kernel_math.hpp"
-#include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simd/beam_transform.hpp"
+#include "core/pipeline/simd/simd_level.hpp"
 #include "core/scene/cells/surface_cells.hpp"
 
 namespace sonar::simd {

@@ -18,11 +18,12 @@ std::uint32_t key_of_name(const std::string& name) {
 
 }  // namespace
 
-std::string Faults::why_not(const std::vector<Fault>& faults) const {
+std::optional<FaultRefusal> Faults::why_not(const std::vector<Fault>& faults) const {
+  using Code = FaultRefusal::Code;
   bool any = faults.empty();
   std::string why;
   for (const Fault& fault : faults) {
-    if (!is_for_this(fault)) return {};
+    if (!is_for_this(fault)) return std::nullopt;
     const std::string without = why_without_effect(*fault.kind, around_.vendor);
     if (without.empty()) any = true;
     if (why.empty() && !without.empty())
@@ -31,12 +32,15 @@ std::string Faults::why_not(const std::vector<Fault>& faults) const {
     for (const Entry& other : entries_) {
       if (other.over) continue;
       if (other.fault.name == fault.name)
-        return "there is a fault " + fault.name + " already; end it first, or give another name";
-      if (std::string conflict = conflict_of(fault, other.fault); !conflict.empty()) return conflict;
+        return FaultRefusal{Code::conflict, "there is a fault " + fault.name + " already; end it first, or give another name"};
+      if (std::string conflict = conflict_of(fault, other.fault); !conflict.empty())
+        return FaultRefusal{Code::conflict, std::move(conflict)};
     }
   }
   const bool is_trouble = !faults.empty() && find_fault_kind(faults.front().what) == nullptr;
-  return any ? std::string() : (is_trouble ? "none of the kinds of " + faults.front().what + " has an effect: " : "") + why;
+  if (any) return std::nullopt;
+  return FaultRefusal{Code::no_effect,
+                      (is_trouble ? "none of the kinds of " + faults.front().what + " has an effect: " : "") + why};
 }
 
 void Faults::add(const std::vector<Fault>& faults, bool manual, Time now, Actions& actions) {

@@ -52,6 +52,13 @@ struct ServeWaiting {};
 using FaultOrder = std::variant<SetListening, EndClients, ForgetSettings, RestartDevice, OverrideSettings, ApplyRequest,
                                 ChangePace, ReadClients, DropNewestPings, ReleaseHeld, StopShaping, ServeWaiting>;
 
+/// Why a sonar cannot have faults.
+struct FaultRefusal {
+  /// Its vendor has no such thing, so another sonar may take them; or a fault that it has prevents them.
+  enum class Code { no_effect, conflict } code = Code::conflict;
+  std::string text;  // a sentence
+};
+
 class Faults {
  public:
   /// All outlive it. `index` and `seed` key what is random.
@@ -66,8 +73,8 @@ class Faults {
   Faults(Around around, Time now) : around_(around), start_(now) {}
 
   // ---- what there is
-  /// Why this sonar cannot have these faults, as a sentence: its vendor has no such thing, or another fault writes the same part.
-  std::string why_not(const std::vector<Fault>& faults) const;
+  /// Why this sonar cannot have these faults; nullopt = it can.
+  std::optional<FaultRefusal> why_not(const std::vector<Fault>& faults) const;
   /// Those of `faults` that are for this sonar and take effect on it. `manual` ones end after longest_manual_fault.
   void add(const std::vector<Fault>& faults, bool manual, Time now, Actions& actions);
   /// Empty `name` = all. False: there is none of that name.
@@ -80,8 +87,6 @@ class Faults {
   };
   std::vector<Listed> list() const;
   std::size_t active_count() const;
-  /// None is listed, not even one that has ended.
-  bool empty() const { return entries_.empty(); }
   std::vector<FaultOrder> take_orders() { return std::exchange(orders_, {}); }
 
   // ---- time
@@ -95,6 +100,8 @@ class Faults {
   void begin_ping(std::uint32_t number, Time now);
   /// The ping as the device reports it: its samples and stamps.
   std::shared_ptr<const Ping> altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state, Time now);
+  /// Whether alter_datagrams() has something to do for this ping. Without it the clients of a port share the datagrams.
+  bool alters_datagrams(const Connection& stream, std::uint32_t ping) const;
   void alter_datagrams(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
   bool leaves_group() const;
   /// A message that a client is about to be sent. False: it is not sent.
@@ -149,6 +156,7 @@ class Faults {
   Entry* active(Effect effect);
   const Entry* active(Effect effect) const { return const_cast<Faults*>(this)->active(effect); }
   bool met(const Entry& entry, std::uint32_t ping) const;
+  bool frames_datagrams(const Connection& stream) const;
   bool chosen(const Fault& fault, const Connection& client) const;
   bool fires(const Entry& entry, std::uint32_t ping) const;
   void begin(Entry& entry, Time now);

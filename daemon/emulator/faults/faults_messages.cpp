@@ -144,9 +144,25 @@ void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Conne
   }
 }
 
+/// Whether the datagrams of this stream are the messages in which faults of framing change bytes.
+bool Faults::frames_datagrams(const Connection& stream) const {
+  return stream.role == Role::client || around_.vendor.pings_by() == protocol::PingsBy::datagrams;
+}
+
+bool Faults::alters_datagrams(const Connection& stream, std::uint32_t ping) const {
+  return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& e) {
+    if (!chosen(e.fault, stream)) return false;
+    if (e.fault.kind->stage == FaultStage::framing) return frames_datagrams(stream) && met(e, ping);
+    if (e.fault.kind->stage != FaultStage::datagrams) return false;
+    // older_part keeps the first part of each ping; a part that late_part holds back follows even when the fault has ended.
+    const bool keeps = e.fault.kind->effect == Effect::older_part && !e.over;
+    const bool holds = e.fault.kind->effect == Effect::late_part && !e.before.empty();
+    return keeps || holds || met(e, ping);
+  });
+}
+
 void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
-  if (stream.role == Role::client || around_.vendor.pings_by() == protocol::PingsBy::datagrams)
-    alter_bytes_of_datagrams(datagrams, stream, ping, now);
+  if (frames_datagrams(stream)) alter_bytes_of_datagrams(datagrams, stream, ping, now);
   for (Entry& e : entries_) {
     if (e.fault.kind->stage != FaultStage::datagrams || datagrams.empty() || !chosen(e.fault, stream)) continue;
     // e.before is the first part of the previous ping (older_part), or the part that waits for this ping (late_part).

@@ -97,7 +97,7 @@ std::vector<protocol::Event> Delivery::offer(Connection& to, FramedPing& framed,
 FramedPing::Datagrams Delivery::datagrams_for(Connection& to, FramedPing& framed, std::uint32_t ping, Time now) {
   const FramedPing::Datagrams& made = framed.parts(*to.port);
   if (made->empty()) return nullptr;
-  if (faults_.empty()) return made;
+  if (!faults_.alters_datagrams(to, ping)) return made;
   std::vector<protocol::Bytes> altered = *made;
   faults_.alter_datagrams(altered, to, ping, now);
   if (altered.empty()) return to.outbox.drop_offered(DropReason::fault), nullptr;

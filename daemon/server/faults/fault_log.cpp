@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "protocol/control/answers.hpp"
+#include "protocol/control/control.hpp"
 
 namespace sonar {
 

@@ -112,13 +112,13 @@ OperationResult FaultOperations::add(const control::FaultRecord& record, bool ma
     names.push_back(device.config().name);
     if (only != nullptr && only != &device) continue;
     if (!record.sonar.empty() && device.config().name != record.sonar) continue;
-    std::string why_not = device.sonar().why_no_faults(*faults);
-    if (why_not.empty())
+    std::optional<FaultRefusal> why_not = device.sonar().why_no_faults(*faults);
+    if (!why_not)
       takers.push_back(&device);
-    else if (record.sonar.empty() && why_not.find("has no effect") != std::string::npos)
-      why = std::move(why_not);  // it may have an effect on other sonars
+    else if (record.sonar.empty() && why_not->code == FaultRefusal::Code::no_effect)
+      why = std::move(why_not->text);  // it may have an effect on other sonars
     else
-      return refused(std::move(why_not));
+      return refused(std::move(why_not->text));
   }
   if (takers.empty() && !why.empty()) return refused(std::move(why));
   if (takers.empty())

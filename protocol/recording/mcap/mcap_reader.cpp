@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "protocol/recording/zlib.hpp"
+#include "protocol/recorded/zlib.hpp"
 
 namespace sonar::recording::mcap {
 namespace {

@@ -5,8 +5,8 @@
 #include <map>
 #include <memory>
 
+#include "protocol/recorded/recorded_message.hpp"
 #include "protocol/recording/mcap/mcap_records.hpp"
-#include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording::mcap {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/units.hpp"
-#include "protocol/recording/byte_source.hpp"
+#include "protocol/recorded/byte_source.hpp"
 
 namespace sonar::recording::mcap {
 

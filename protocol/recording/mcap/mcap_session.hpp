@@ -5,10 +5,10 @@
 #include <memory>
 
 #include "protocol/host.hpp"
+#include "protocol/recorded/recorded_message.hpp"
 #include "protocol/recording/mcap/mcap_json.hpp"
 #include "protocol/recording/mcap/mcap_reader.hpp"
 #include "protocol/recording/mcap/mcap_writer.hpp"
-#include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording {
 

@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "protocol/host.hpp"
-#include "protocol/recording/byte_source.hpp"
+#include "protocol/recorded/byte_source.hpp"
+#include "protocol/recorded/recorded_message.hpp"
 #include "protocol/recording/pcap/ip_packet.hpp"
-#include "protocol/recording/recorded_message.hpp"
 
 namespace sonar::recording {
 

@@ -3,11 +3,11 @@
 #include <map>
 #include <set>
 
-#include "protocol/recording/message_splitter.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "protocol/recording/pcap/packets.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/recording/pcap/tcp_stream.hpp"
-#include "protocol/recording/recording.hpp"
+#include "protocol/sender.hpp"
 
 namespace sonar::recording {
 namespace {

@@ -1,6 +1,6 @@
 // Effects of a receiver's profile and focus on beams: widths and noise against closed forms and sums over the array, and no
 // effect where they are off or not given (docs/acoustics.md, sections 5 and 6).
-#include "core/pipeline/beam_mix.hpp"
+#include "core/pipeline/plan_tables.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,8 +7,8 @@
 
 #include "core/base/random.hpp"
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
-#include "core/pipeline/beam_transform.hpp"
 #include "core/pipeline/form_beams.hpp"
+#include "core/pipeline/plan_tables.hpp"
 
 namespace sonar {
 namespace {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "core/base/units.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/pulses/pulse.hpp"

@@ -1,5 +1,5 @@
 // Column synthesis by way of the spectrum, and in time, against the direct sum of eq. (8) in double, for pulses of every shape.
-#include "core/pipeline/pulses/spectral_columns.hpp"
+#include "core/pipeline/spectral_columns.hpp"
 
 #include <gtest/gtest.h>
 

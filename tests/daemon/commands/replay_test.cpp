@@ -14,8 +14,8 @@
 #include "protocol/oculus/oculus_log.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping_log.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
-#include "protocol/recording/raw_dump.hpp"
 #include "protocol/waterlinked/messages.hpp"
 #include "protocol/waterlinked/rip.hpp"
 

@@ -103,7 +103,25 @@ std::vector<Ping> FakeEngine::run(std::span<const PingRequest> requests) {
   return pings;
 }
 
-Daemon::Daemon(DaemonSetup setup) : address_(setup.address) {
+void PingGate::allow(int pings) {
+  std::lock_guard lock(mutex_);
+  allowed_ += pings;
+  changed_.notify_all();
+}
+
+void PingGate::open() {
+  std::lock_guard lock(mutex_);
+  open_ = true;
+  changed_.notify_all();
+}
+
+void PingGate::pass() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return open_ || allowed_ > 0; });
+  if (!open_) --allowed_;
+}
+
+Daemon::Daemon(DaemonSetup setup) : address_(setup.address), gate_(setup.gate) {
   const std::string directory = ::testing::TempDir();
   std::ofstream(directory + "/scene.yaml") << "name: test\n";
   config_path_ = own_path("config.yaml");
@@ -117,6 +135,11 @@ Daemon::Daemon(DaemonSetup setup) : address_(setup.address) {
     log_text_ += line + "\n";
   };
   log_ = std::make_unique<Log>(log);
+  if (gate_)
+    setup.engine_before = [gate = gate_, before = setup.engine_before](std::uint32_t ping) {
+      gate->pass();
+      if (before) before(ping);
+    };
   const auto make_engine = [record = record_, takes = setup.engine_takes, before = setup.engine_before,
                             before_engine = setup.before_engine,
                             first = true](ScenePointer scene) mutable -> std::unique_ptr<PingEngine> {
@@ -137,6 +160,7 @@ Daemon::~Daemon() {
 }
 
 int Daemon::stop() {
+  if (gate_) gate_->open();
   app_->request_stop();
   return wait();
 }
@@ -263,7 +287,10 @@ std::optional<oculus::DecodedPing> Client::next_ping(milliseconds timeout) {
 
 bool Client::read_to_end(milliseconds timeout) {
   const auto deadline = Steady::now() + timeout;
-  while (!ended && Steady::now() < deadline) next(milliseconds(100));
+  std::vector<std::byte> raw;
+  while (!ended && Steady::now() < deadline) read_some(milliseconds(100), &raw);
+  decoder.append(raw);
+  while (decoder.next()) continue;
   return ended && !was_reset;
 }
 

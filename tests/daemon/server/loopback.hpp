@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <condition_variable>
 #include <functional>
 #include <future>
 #include <memory>
@@ -53,6 +54,23 @@ class FakeEngine final : public PingEngine {
   ScenePointer scene_;
 };
 
+/// Holds the engine until the test allows a ping, so that the daemon is never ahead of a client that reads slowly. Ticks that
+/// pass meanwhile are skipped; numbers of pings do not count them.
+class PingGate {
+ public:
+  void allow(int pings = 1);
+  /// Lets every ping pass from now on.
+  void open();
+  /// Called by the engine before each ping.
+  void pass();
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int allowed_ = 0;
+  bool open_ = false;
+};
+
 /// A few triangles: enough to be an object.
 std::shared_ptr<const Mesh> small_mesh();
 /// Objects "floor" and "box" of materials "mud" and "steel"; with `moving_object` also "crate", which moves.
@@ -67,6 +85,7 @@ struct DaemonSetup {
   AppOptions options;
   milliseconds engine_takes{0};
   FakeEngine::Before engine_before;
+  std::shared_ptr<PingGate> gate;  // null: pings are made as they are due; the daemon opens it when it stops
   bool moving_object = false;
   ScenePointer scene;                               // instead of small_scene()
   std::function<void(const Scene&)> before_engine;  // on the thread that makes an engine for a later scene
@@ -103,6 +122,7 @@ class Daemon {
 
  private:
   std::string address_, config_path_;
+  std::shared_ptr<PingGate> gate_;
   std::shared_ptr<FakeEngine::Record> record_ = std::make_shared<FakeEngine::Record>();
   std::mutex log_mutex_;
   std::string log_text_;
@@ -128,7 +148,8 @@ class Client {
   std::optional<oculus::Received> next(milliseconds timeout = patience);
   /// Skips everything but pings.
   std::optional<oculus::DecodedPing> next_ping(milliseconds timeout = patience);
-  /// Reads to the end of the stream; true = FIN, false = reset or deadline.
+  /// Reads to the end of the stream; true = FIN, false = reset or deadline. Bytes are decoded after the end: a daemon that stops
+  /// gives a client less than a second to take its last message, and decoding may take longer on a busy machine.
   bool read_to_end(milliseconds timeout = patience);
   std::vector<std::byte> read_raw(std::size_t at_least, milliseconds timeout = patience);
   void reset();           // RST

@@ -81,6 +81,7 @@ TEST(SceneChange, UnderLoadNoPingIsLostAndEachMeetsItsOwnBodies) {
   std::thread changes([&] {
     for (int i = 0; i < 4; ++i) {
       EXPECT_EQ(daemon.ask(added("whale", true)).code, Code::done);
+      EXPECT_TRUE(eventually([&, by_now = daemon.scenes().size()] { return daemon.scenes().size() > by_now + 1; }));
       control::RemoveObject gone;
       gone.object = "whale";
       EXPECT_EQ(daemon.ask(gone).code, Code::done);

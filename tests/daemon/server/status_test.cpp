@@ -78,13 +78,12 @@ TEST(Status, ComesOnceASecond) {
   Listener listener;
   DaemonSetup setup;
   setup.sonar_lines = "    status_to: ['127.0.0.1:" + std::to_string(listener.port) + "']\n";
+  const auto begin = Steady::now();  // the first is sent later, however late it is read
   Daemon daemon(setup);
-  ASSERT_TRUE(listener.next());
-  const auto begin = Steady::now();
-  for (int i = 0; i < 2; ++i) ASSERT_TRUE(listener.next());
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(listener.next());
   const auto took = Steady::now() - begin;
   EXPECT_GT(took, milliseconds(1800));
-  EXPECT_LT(took, milliseconds(10000));
+  EXPECT_LT(took, patience);
 }
 
 TEST(Status, AdvertisesAnotherAddressWhenTold) {

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "protocol/control/control.hpp"
 #include "tests/protocol/control/message_from.hpp"
 
 namespace sonar::control {

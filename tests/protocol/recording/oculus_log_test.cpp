@@ -1,7 +1,7 @@
 // Log files byte by byte as others write them.
 #include <zlib.h>
 
-#include "protocol/recording/zlib.hpp"
+#include "protocol/recorded/zlib.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::tests {

@@ -13,9 +13,9 @@
 #include "protocol/oculus/encode_ping.hpp"
 #include "protocol/oculus/fire.hpp"
 #include "protocol/oculus/oculus_log.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
-#include "protocol/recording/raw_dump.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace sonar::recording::tests {

@@ -167,9 +167,12 @@ TEST(FaultRecords, ThatNeverActAreRefused) {
 
 TEST(FaultRecords, TwoThatWriteTheSamePartAreRefused) {
   Played run(at_ping("F03", 1000));
-  const auto why = [&](const FaultRecord& r) { return run.time.sonar("front").why_no_faults(*check_fault(r, true)); };
-  EXPECT_THAT(why(record("F05")), HasSubstr("would both write the same part (payload_size)"));
-  EXPECT_THAT(why(record("G01")), HasSubstr("has no effect on the sonar front (sends no datagrams of pings)"));
+  const auto why = [&](const FaultRecord& r) { return run.time.sonar("front").why_no_faults(*check_fault(r, true)).value(); };
+  const FaultRefusal same_part = why(record("F05")), no_datagrams = why(record("G01"));
+  EXPECT_EQ(same_part.code, FaultRefusal::Code::conflict);
+  EXPECT_THAT(same_part.text, HasSubstr("would both write the same part (payload_size)"));
+  EXPECT_EQ(no_datagrams.code, FaultRefusal::Code::no_effect);
+  EXPECT_THAT(no_datagrams.text, HasSubstr("has no effect on the sonar front (sends no datagrams of pings)"));
 }
 
 // ---- every kind

@@ -133,7 +133,7 @@ TEST(ArisFaults, OfATroubleOnlyKindsWithEffectAreTaken) {
   const auto why = [&](const std::string& what) {
     FaultRecord record;
     record.what = what;
-    return talk.time.sonar("front").why_no_faults(*check_fault(record, true));
+    return talk.time.sonar("front").why_no_faults(*check_fault(record, true)).value_or(FaultRefusal{}).text;
   };
   EXPECT_EQ(why("electrical-noise"), "");
   EXPECT_EQ(

@@ -178,6 +178,7 @@ TEST(SonarInVirtualTime, AnExceptionInThePingsOfAStreamCostsThatPing) {
   const Actions faulty = ping();
   ASSERT_TRUE(std::holds_alternative<Report>(faulty.front()));
   EXPECT_EQ(std::get<Report>(faulty.front()).line.phrase, "internal fault: no such luck");
+  EXPECT_THAT(faulty, ::testing::Not(::testing::Contains(::testing::VariantWith<Reset>(::testing::_))));
   EXPECT_FALSE(sonar.next_message(10, start));
   ping();
   EXPECT_TRUE(sonar.next_message(10, start)) << "the stream goes on";
@@ -185,6 +186,107 @@ TEST(SonarInVirtualTime, AnExceptionInThePingsOfAStreamCostsThatPing) {
   const DeviceFigures f = sonar.figures();
   EXPECT_EQ(f.offered, 1u);
   EXPECT_EQ(f.dropped, 1u);
+}
+
+/// Counts how often a ping is framed, as a message and as the datagrams of each port.
+class CountingVendor final : public protocol::DelegatingVendor {
+ public:
+  using DelegatingVendor::DelegatingVendor;
+  std::vector<protocol::Bytes> datagrams(const protocol::Port& port, const Ping& ping,
+                                         const protocol::DeviceState& device) const override {
+    ++datagrams_of[&port];
+    return DelegatingVendor::datagrams(port, ping, device);
+  }
+  std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
+    ++messages;
+    return DelegatingVendor::frame(ping, device);
+  }
+  bool is_request(const protocol::Port&, protocol::BytesView) const override { return true; }
+  mutable int messages = 0;
+  mutable std::map<const protocol::Port*, int> datagrams_of;
+};
+
+/// A sonar of the made-up make with four clients: two by datagrams and two by TCP, each two at one port.
+struct FramedPings : ::testing::Test {
+  FramedPings() {
+    config.profile = {&vendor, vendor.models().front()};
+    for (const protocol::Port& port : vendor.ports()) {
+      if (port.number != testing_daemon::data_port) continue;
+      (port.kind == protocol::Port::Kind::udp_dialogue ? udp : tcp) = &port;
+    }
+    sonar.emplace(Sonar::Surroundings{time.config, time.world, nullptr}, config, 0, start);
+    for (const ConnectionId id : {1u, 2u, 3u, 4u})
+      sonar->on_connect(id, Role::client, {"client", {10, 0, 0, static_cast<std::uint8_t>(id)}, 9}, now, id < 3 ? udp : tcp);
+  }
+  /// The messages of the next ping, client by client.
+  std::vector<Outbox::Message> ping() {
+    for (bool made = false; !made;) {
+      now = *sonar->next_tick();
+      for (Action& action : sonar->on_tick(now))
+        if (auto* compute = std::get_if<ComputePing>(&action)) {
+          auto result = std::make_shared<Ping>();
+          result->request = std::move(compute->request);
+          result->samples.resize(3200);
+          sonar->on_ping({.ping = result}, now);
+          made = true;
+        }
+    }
+    std::vector<Outbox::Message> all;
+    for (const ConnectionId id : {1u, 2u, 3u, 4u}) {
+      all.push_back(sonar->next_message(id, now));
+      sonar->on_written(id, all.back(), now);
+    }
+    return all;
+  }
+  void add_fault(const std::string& what) {
+    FaultRecord record;
+    record.what = what;
+    const auto faults = check_fault(record, true);
+    ASSERT_TRUE(faults);
+    ASSERT_FALSE(sonar->why_no_faults(*faults));
+    sonar->add_faults(*faults, true, now);
+  }
+
+  VirtualTime time{yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 4}\n"))};
+  CountingVendor vendor{testing_daemon::made_up_vendor()};
+  SonarConfig config = time.config.sonars[0];
+  const protocol::Port *udp = nullptr, *tcp = nullptr;
+  std::optional<Sonar> sonar;
+  Time now = start;
+};
+
+TEST_F(FramedPings, AreFramedOnceAPort) {
+  const auto messages = ping();
+  EXPECT_EQ(vendor.messages, 1);
+  EXPECT_EQ(vendor.datagrams_of[udp], 1);
+  ASSERT_TRUE(messages[0].datagrams && messages[2].bytes);
+  EXPECT_EQ(messages[0].datagrams, messages[1].datagrams) << "shared, not copied";
+  EXPECT_EQ(messages[2].bytes, messages[3].bytes);
+}
+
+TEST_F(FramedPings, AreSharedAgainAfterAFault) {
+  add_fault("part-lost");
+  const auto during = ping();
+  EXPECT_NE(during[0].datagrams, during[1].datagrams) << "a fault may differ from client to client";
+  const auto after = ping();
+  ASSERT_TRUE(after[0].datagrams);
+  EXPECT_EQ(after[0].datagrams, after[1].datagrams) << "the fault has ended";
+}
+
+/// Latency is a matter of this computer: it does not follow the clock of the device.
+TEST(SonarInVirtualTime, LatencyIsMeasuredFromTheTrueTimeOfAPing) {
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
+  const ConnectionId client = time.connect("front");
+  FaultRecord record;
+  record.what = "T02";
+  record.with = {{"seconds", "-3600"}};
+  time.add_fault("front", record);
+  time.send(client, fire());
+  time.run(milliseconds(250));
+  const DeviceFigures f = time.sonar("front").figures();
+  ASSERT_GE(f.latency.count(), 2u);
+  EXPECT_EQ(f.latency.count(), f.sent);
+  EXPECT_LT(f.latency.sum_s(), 1) << "the device's clock is an hour behind";
 }
 
 /// A mistake in the code of one conversation.

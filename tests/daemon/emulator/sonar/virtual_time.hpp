@@ -50,7 +50,7 @@ class VirtualTime {
   void add_fault(const std::string& name, const FaultRecord& record, bool manual = true) {
     const auto faults = check_fault(record, manual);
     if (!faults) throw std::runtime_error(faults.error().text);
-    if (const std::string why = sonar(name).why_no_faults(*faults); !why.empty()) throw std::runtime_error(why);
+    if (const auto why = sonar(name).why_no_faults(*faults)) throw std::runtime_error(why->text);
     perform(sonar(name), sonar(name).add_faults(*faults, manual, now));
   }
   void end_faults(const std::string& name, const std::string& fault = {}) {

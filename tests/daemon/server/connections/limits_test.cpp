@@ -54,7 +54,7 @@ TEST(Limits, AClientThatSendsTooMuchIsReadSlowlyAndLosesNothing) {
   setup.more = "limits: {input_bytes_per_s: 8192}\n";
   Daemon daemon(setup);
   Client talks(daemon.address()), neighbour(daemon.address());
-  neighbour.fire(fire_at(PingRate::hz10, 2));  // slow enough that a busy computer skips no tick
+  neighbour.fire(fire_at(PingRate::hz2, 2));  // slow enough that a busy computer loses no ping
   ASSERT_TRUE(neighbour.next_ping());
   const auto begin = Steady::now();
   talks.send(std::string(40000, 'x'));  // 5 s worth, of which a second's may come at once
@@ -65,7 +65,7 @@ TEST(Limits, AClientThatSendsTooMuchIsReadSlowlyAndLosesNothing) {
     ASSERT_TRUE(ping);
     EXPECT_THAT(ids.add(*ping), ::testing::IsEmpty());
     if (ping->head.fixed.fire.range == 3) break;
-    ASSERT_LT(Steady::now() - begin, patience);
+    ASSERT_LT(Steady::now() - begin, 3 * patience);
   }
   EXPECT_GT(Steady::now() - begin, milliseconds(2000));
   EXPECT_EQ(ids.skipped_ids(), 0u) << "the neighbour does not notice";

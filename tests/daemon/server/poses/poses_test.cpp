@@ -166,10 +166,16 @@ TEST_F(Poses, ASilentConnectionGivesItsPlaceToANewOne) {
     senders.emplace_back(daemon.address(), json_port);
     senders.back().send(json_at_x(20));
   }
+  const auto heard = [&] {
+    const v1::PoseFigures p = daemon.status().poses();
+    return p.accepted() + p.refused() + p.late() + p.replaced() + p.over_rate();
+  };
+  ASSERT_TRUE(eventually([&] { return heard() == 32; }));
   ASSERT_TRUE(asked_from(20));
   std::this_thread::sleep_for(milliseconds(1200));
   for (Client& s : senders)
     if (&s != &senders.back()) s.send(json_at_x(21));  // all but the last
+  ASSERT_TRUE(eventually([&] { return heard() == 32 + 31; }));
   ASSERT_TRUE(asked_from(21));
   Client late(daemon.address(), json_port);
   late.send(json_at_x(22));

@@ -150,13 +150,8 @@ class MadeUpVendor final : public protocol::Vendor {
   std::string_view name() const override { return "made-up"; }
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return models_; }
   std::span<const protocol::Port> ports() const override { return port_table; }
-  std::span<const protocol::Option> options() const override { return {}; }
   int default_max_clients() const override { return 2; }
   protocol::PingsBy pings_by() const override { return protocol::PingsBy::either; }
-  Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                  const protocol::OptionValues&) const override {
-    return model;
-  }
   protocol::ChangeSettings initial_settings(const DeviceState&) const override { return settings_at(5); }
   Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
                                                   const DeviceState& device) const override {

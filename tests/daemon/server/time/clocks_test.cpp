@@ -245,11 +245,16 @@ TEST(Follow, APoseWithoutATimeIsRefused) {
 
 TEST(Follow, ASimulatorThatDoesNotWaitLosesTicksAsInRealTime) {
   DaemonSetup setup = with_clock("follow", "poses: {protobuf: '127.0.0.1:0', json: off}\n");
-  setup.engine_takes = milliseconds(20);
+  const auto gate = setup.gate = std::make_shared<PingGate>();
   Pinging p(std::move(setup));
   const std::uint16_t port = p.daemon.app().poses().protobuf().port;
   for (int i = 0; i <= 100; ++i)  // five seconds at once: 201 ticks
     send_udp("127.0.0.1", port, control::encode_pose_datagram(p.sample(0.01 * i, i * milliseconds(50))));
+  ASSERT_TRUE(eventually([&] {
+    const v1::PoseFigures poses = p.daemon.status().poses();
+    return poses.accepted() + poses.replaced() == 101;
+  }));
+  gate->open();  // the first ping took as long as it took all poses to come
   ASSERT_TRUE(eventually([&] { return p.daemon.status().now_ns() == 5'000'000'000; }));
   ASSERT_TRUE(eventually([&] {
     const auto figures = p.daemon.status().sonars().at(0).figures();

@@ -1,4 +1,4 @@
-#include "protocol/recording/message_splitter.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 
 #include <algorithm>
 

@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "protocol/recording/byte_source.hpp"
-#include "protocol/recording/message_splitter.hpp"
+#include "protocol/recorded/byte_source.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 
 namespace sonar::recording {
 

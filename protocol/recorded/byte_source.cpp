@@ -1,4 +1,4 @@
-#include "protocol/recording/byte_source.hpp"
+#include "protocol/recorded/byte_source.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>

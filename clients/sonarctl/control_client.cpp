@@ -1,4 +1,4 @@
-#include "clients/sonarctl/control/control_client.hpp"
+#include "clients/sonarctl/control_client.hpp"
 
 #include <array>
 #include <cstring>

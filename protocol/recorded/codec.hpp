@@ -11,9 +11,9 @@
 
 #include "core/base/result.hpp"
 #include "core/sonar/sonar_model.hpp"
-#include "protocol/recording/byte_source.hpp"
-#include "protocol/recording/message_splitter.hpp"
-#include "protocol/recording/recorded_message.hpp"
+#include "protocol/recorded/byte_source.hpp"
+#include "protocol/recorded/message_splitter.hpp"
+#include "protocol/recorded/recorded_message.hpp"
 
 namespace sonar::recording {
 

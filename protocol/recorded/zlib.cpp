@@ -1,4 +1,4 @@
-#include "protocol/recording/zlib.hpp"
+#include "protocol/recorded/zlib.hpp"
 
 #include <zlib.h>
 

@@ -1,4 +1,4 @@
-#include "protocol/recording/raw_dump.hpp"
+#include "protocol/recorded/raw_dump.hpp"
 
 namespace sonar::recording {
 namespace {

@@ -4,10 +4,10 @@
 
 #include "core/pipeline/changing_engine.hpp"
 #include "core/pipeline/check_request.hpp"
+#include "core/pipeline/cpu/simulate.hpp"
 #include "core/pipeline/interleaved_pings.hpp"
 #include "core/pipeline/labels.hpp"
 #include "core/pipeline/ping_engine.hpp"
-#include "core/pipeline/simulate.hpp"
 #include "core/pipeline/water_line.hpp"
 
 namespace sonar {

@@ -1,4 +1,4 @@
-#include "core/pipeline/simulate.hpp"
+#include "core/pipeline/cpu/simulate.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -5,7 +5,7 @@
 #include <array>
 #include <optional>
 
-#include "protocol/recording/recorded_message.hpp"
+#include "protocol/recorded/recorded_message.hpp"
 
 namespace sonar::recording {
 

@@ -1,4 +1,4 @@
-#include "core/pipeline/pulses/spectral_columns.hpp"
+#include "core/pipeline/spectral_columns.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,129 @@
+// Tables that a plan holds: of the beams of all columns at once, of their mixing, and of noise that channels share. Each is laid
+// out and used in the file of its step: beam_transform.cpp, beam_mix.cpp, shared_noise.cpp.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/base/parallel.hpp"
+#include "core/pipeline/arithmetic/beam_mix.hpp"
+#include "core/pipeline/arithmetic/beam_pattern.hpp"
+#include "core/pipeline/noise.hpp"
+#include "core/pipeline/signals.hpp"
+#include "core/pipeline/simd/beam_transform.hpp"
+#include "core/sonar/ping.hpp"
+
+namespace sonar {
+
+struct PingPlan;
+
+/// Beams of all columns at once: where the columns are even in the sine, the sum over columns (form_beams.hpp) is a convolution,
+/// exact by a Fourier transform across a line twice as long; beams between columns are read off by a few weights, since the
+/// response of an array varies no faster than its aperture allows. Used by form_beams() in place of wide bands of weights.
+class BeamTransformTables {
+ public:
+  /// Relative error of the reading between columns at most 2e-6 for columns up to 0.35 of a beam apart (single precision: 1e-6).
+  BeamTransformTables(const ReceivePattern& pattern, const Columns& columns, const std::vector<double>& beam_sines);
+  /// As many beams as columns, each on its column, which counts columns d away with the weight of_distance[d].
+  explicit BeamTransformTables(const std::vector<double>& of_distance);
+  BeamTransformTables(const BeamTransformTables&) = delete;
+  BeamTransformTables& operator=(const BeamTransformTables&) = delete;
+
+  const simd::BeamTransform& tables() const { return tables_; }
+  /// Floats of scratch for the kernel, 64-byte aligned.
+  std::size_t work_floats() const { return static_cast<std::size_t>(4 * tables_.quarter) * 32; }
+
+  std::size_t bytes() const;
+  /// Vector operations a group of sixteen samples takes, to compare with a band's.
+  double cost() const;
+
+ private:
+  void lay_out(int columns, int beams);
+  void plan_passes();
+  void weigh(const std::vector<double>& of_distance);
+  void point_at_tables();
+  void read_between(double aperture_in_spacings, const Columns& columns, const std::vector<double>& beam_sines);
+
+  simd::BeamTransform tables_;
+  std::vector<float> split_, response_, between_;
+  std::vector<std::vector<float>> turns_;
+  std::vector<std::int32_t> first_column_;
+};
+
+/// A table of a product at a sine, see BeamProfile; linear between its values, `top` the sine of the sector's edge.
+double at_sine(const std::vector<float>& table, double sine, double top);
+
+/// Mixes neighbouring beams: near the sonar because the array is focused only for broadside, and everywhere by a fitted share
+/// (docs/acoustics.md, section 6). A function of the plan alone.
+class BeamMix {
+ public:
+  BeamMix() = default;
+  /// Empty where beams are not even in the sine.
+  explicit BeamMix(const PingPlan& plan);
+  bool blurs() const { return !turn_m_.empty(); }
+  bool blends() const { return !own_.empty(); }
+  const std::vector<float>& turn_m() const { return turn_m_; }
+  const std::vector<float>& taps() const { return taps_; }
+  const std::vector<std::int32_t>& reach() const { return reach_; }
+  const std::vector<float>& own() const { return own_; }
+  const std::vector<float>& share() const { return share_; }
+  BeamMixView view() const;
+  std::size_t bytes() const;
+  /// Works in place; `scratch` keeps its memory. Does nothing if blurs() or blends() is false.
+  void blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector<float>& scratch) const;
+  void blend(BeamSignals& beams, std::vector<float>& scratch) const;
+
+ private:
+  void lay_out_focus(const PingPlan& plan, double spacing);
+  void lay_out_blend(const PingPlan& plan, double spacing);
+
+  std::vector<float> turn_m_, taps_, own_, share_;
+  std::vector<std::int32_t> reach_;
+  std::int32_t widest_ = 0, step_ = 1;
+  float first_range_m_ = 0, sample_m_ = 1, largest_turn_m_ = 0;
+};
+
+/// Weights of the beams for shared noise, a function of the plan alone.
+class SharedNoiseTable {
+ public:
+  static constexpr std::size_t block_samples = 32;  // kept or left out together
+  SharedNoiseTable() = default;
+  /// Empty if the receiver has none. Needs the plan's columns and the level of their noise.
+  SharedNoiseTable(const PingPlan& plan, Parallel& pool);
+  bool is_audible() const { return samples_ > 0; }
+  bool has_leak() const { return !leak_upa_.empty(); }
+  int samples() const { return samples_; }  // from the first on; at larger ranges the signal falls outside the sector
+  std::size_t parts() const { return parts_; }
+  /// Real and imaginary part, [parts][beams][2][samples]: of a signal of amplitude 1 in the channels of a group; in the last
+  /// part, in all channels.
+  std::vector<float> response() const;
+  std::size_t bytes() const {
+    return sizeof(float) * (heard_.capacity() + noise_upa_.capacity() + steady_upa_.capacity() + leak_upa_.capacity()) +
+           sizeof(std::uint32_t) * at_.capacity();
+  }
+  // In a channel. Of what is new in every ping and by group, rms [samples]; of what is not, amplitude [samples]; of the leak,
+  // amplitude [as far as it reaches].
+  const std::vector<float>& noise_upa() const { return noise_upa_; }
+  const std::vector<float>& steady_upa() const { return steady_upa_; }
+  const std::vector<float>& leak_upa() const { return leak_upa_; }
+  double noise_power(std::size_t beam, std::size_t sample) const;  // [uPa^2]; 0 beyond the samples
+  /// Draws the shared part of one ping's channels, [parts][2][samples], or its rms; without the noise, or without the leak.
+  void draw(const PingNoise& key, bool noise, bool leak, bool expected_power, std::vector<float>& shared) const;
+  /// On top of the beams.
+  void add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const;
+
+ private:
+  /// [2][block_samples] of a part in a beam, or null where it is left out.
+  const float* heard(std::size_t part, std::size_t beam, std::size_t block) const;
+  struct Block;
+  void gather(std::vector<Block>& blocks);
+
+  int samples_ = 0;
+  std::size_t parts_ = 0, beams_ = 0, blocks_ = 0;
+  std::vector<std::uint32_t> at_;  // [parts][beams][blocks]: number of the block in heard_, from 1; 0: none
+  std::vector<float> heard_;       // [received blocks][2][block_samples]
+  std::vector<float> noise_upa_, steady_upa_, leak_upa_;
+};
+
+}  // namespace sonar

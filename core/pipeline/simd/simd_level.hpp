@@ -1,0 +1,13 @@
+// The instruction sets of the hot loops.
+#pragma once
+
+#include <array>
+#include <string_view>
+
+namespace sonar {
+
+/// Instruction sets the hot loops are compiled for; chosen at run time.
+enum class SimdLevel { automatic, portable, avx2, avx512, neon };
+inline constexpr std::array<std::string_view, 5> simd_level_names = {"auto", "portable", "avx2", "avx512", "neon"};
+
+}  // namespace sonar
