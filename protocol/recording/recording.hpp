@@ -30,7 +30,8 @@ struct SentBy {
 };
 /// nullopt: it is of a client, or of no make that is known.
 std::optional<SentBy> sender_of(const RecordedMessage& message);
-/// The first message of a device tells, of its first 64 MB. Rewinds the reader.
+/// By the first message of a device that names its model, or else by its first message; both in the first 64 MB. Rewinds the
+/// reader.
 std::optional<SentBy> find_sender(RecordingReader& reader);
 /// The port at which a host of the make takes messages of this carrier; nullopt: it takes none.
 std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by);
