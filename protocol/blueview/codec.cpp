@@ -24,14 +24,14 @@ std::optional<std::size_t> length_of(wire::BytesView bytes, recording::Origin, b
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   const auto header = header_of(message.bytes);
   if (!header || message.by != recording::Carrier::stream) return std::nullopt;
-  recording::Sender sender{models().front()};
+  recording::Sender sender{.model = models().front(), .names_model = false};
   wire::Reader reader(message.bytes.size() > header_size ? wire::BytesView(message.bytes).subspan(header_size)
                                                          : wire::BytesView());
   std::uint16_t version = 0;
   reader("proto", version);
   const std::string name = header->type == FrameType::hello_ok ? read_text(reader, "model") : std::string();
   const auto found = std::find_if(models().begin(), models().end(), [&name](const auto& model) { return model->name == name; });
-  if (found != models().end()) sender.model = *found;
+  if (found != models().end()) sender = {.model = *found};
   return sender;
 }
 

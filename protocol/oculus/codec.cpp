@@ -1,4 +1,5 @@
 // The messages and files of Oculus, for recordings.
+#include <algorithm>
 #include <array>
 
 #include "protocol/oculus/decode.hpp"
@@ -36,7 +37,12 @@ std::optional<std::size_t> length_of(wire::BytesView header, Origin from, bool s
 /// The sender of a message. Only a status message has the model.
 std::optional<recording::Sender> sender_of(const RecordedMessage& message) {
   if (!framing.begins_message(message.bytes, Origin::device)) return std::nullopt;
-  return recording::Sender{models().front(), header_of(message.bytes).source};
+  const MessageHeader header = header_of(message.bytes);
+  const auto found = std::find_if(models().begin(), models().end(), [&header](const auto& model) {
+    return header.type == MessageType::status && model->part_number == header.part_number;
+  });
+  const bool is_named = found != models().end();
+  return recording::Sender{is_named ? *found : models().front(), header.source, is_named};
 }
 
 std::optional<recording::Samples> samples_of(wire::BytesView message) {

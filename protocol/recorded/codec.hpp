@@ -37,6 +37,7 @@ struct FileKind {
 struct Sender {
   std::shared_ptr<const SonarModel> model;
   std::uint32_t serial = 0;  // 0: not known
+  bool names_model = true;   // false: `model` is the first of the make, because this message names none
 };
 
 /// Samples as a message holds them: row 0 nearest, column 0 most to port, little-endian.

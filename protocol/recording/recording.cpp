@@ -87,11 +87,14 @@ Result<Recording> open_recording(const std::filesystem::path& file, const std::s
 
 std::optional<SentBy> find_sender(RecordingReader& reader) {
   std::optional<SentBy> found;
-  for (std::uint64_t searched = 0; !found && searched <= most_searched_bytes;) {
+  const auto tells_more = [&found](const SentBy& by) {
+    return !found || (by.sender.names_model && by.make == found->make && by.sender.serial == found->sender.serial);
+  };
+  for (std::uint64_t searched = 0; (!found || !found->sender.names_model) && searched <= most_searched_bytes;) {
     const auto message = reader.next();
     if (!message) break;
     searched += message->bytes.size();
-    found = sender_of(*message);
+    if (auto by = sender_of(*message); by && tells_more(*by)) found = std::move(by);
   }
   reader.rewind();
   return found;

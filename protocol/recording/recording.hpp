@@ -24,7 +24,8 @@ struct Recording {
 Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});
 
-/// The first message of a device tells, of its first 64 MB. Rewinds the reader.
+/// By the first message of a device that names its model, or else by its first message; both in the first 64 MB. Rewinds the
+/// reader.
 std::optional<SentBy> find_sender(RecordingReader& reader);
 
 }  // namespace sonar::recording

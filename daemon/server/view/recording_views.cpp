@@ -197,7 +197,7 @@ void RecordingViews::Seen::take() {
   if (!connection || connection->over()) return;
   Work& work = *work_;
   behind_ = work.is_behind || !work.is_measured;
-  if (work.player && profile_.empty()) profile_ = work.player->by().sender.model->profile;
+  if (work.player && work.player->by().sender.names_model) profile_ = work.player->by().sender.model->profile;
   if (!work.failure.empty() && std::exchange(failure_, work.failure).empty()) {
     connection->viewer().say(server_info());
     connection->wake();

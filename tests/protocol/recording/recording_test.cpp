@@ -125,6 +125,26 @@ TEST(Recording, RefusesOtherFiles) {
   EXPECT_EQ(folder.error().kind, ErrorKind::bad_data);
 }
 
+TEST(Recording, AMessageThatNamesTheModelGoesBeforeOnesThatDoNot) {
+  const auto sender_in = [](const std::vector<RecordedMessage>& messages) {
+    auto opened = open_bytes(recorded(Format::mcap, messages));
+    const auto by = opened ? find_sender(*opened->reader) : std::nullopt;
+    if (!by) throw std::runtime_error("no sender was found");
+    EXPECT_EQ(read_all(*opened->reader).size(), messages.size()) << "the reader must begin anew";
+    return by->sender;
+  };
+  const Sender named = sender_in(conversation());  // pings before the status
+  EXPECT_EQ(named.model->profile, "oculus-m1200d");
+  EXPECT_TRUE(named.names_model);
+  EXPECT_EQ(named.serial, 7001u);
+
+  std::vector<RecordedMessage> without_status = conversation();
+  std::erase_if(without_status, [](const RecordedMessage& message) { return message.by == Carrier::datagram; });
+  const Sender unnamed = sender_in(without_status);
+  EXPECT_FALSE(unnamed.names_model);
+  EXPECT_EQ(unnamed.serial, 7001u);
+}
+
 TEST(Recording, BytesBetweenMessagesAreKept) {
   std::vector<RecordedMessage> messages = conversation();
   const Bytes junk = bytes_of("S?SO what");

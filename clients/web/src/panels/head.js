@@ -23,7 +23,7 @@ export function drawHead(facts) {
   const sonars = facts.status?.sonars ?? [];
   const select = $('sonar');
   showList(select, sonars.map((s) => [s.name, s.profile]), () =>
-    sonars.map((s) => make('option', { value: s.name }, `${s.name} · ${product(s.profile)}`)));
+    sonars.map((s) => make('option', { value: s.name }, [s.name, product(s.profile)].filter(Boolean).join(' · '))));
   if (select.value !== facts.sonar) select.value = facts.sonar;
   setHidden(select, sonars.length === 0);
   const { word, dot, rate } = rateOf(facts);
