@@ -50,6 +50,12 @@ struct DeviceState {
 /// How pings reach a host: in its TCP connection, as datagrams (frame() returns null), or by either, as the host connects.
 enum class PingsBy { stream, datagrams, either };
 
+/// The distance that a range finder, such as an altimeter, measures with one ping.
+struct Distance {
+  double range_m = 0;          // in the device's metres
+  int confidence_percent = 0;  // 0 = no echo was found
+};
+
 class Vendor {
  public:
   virtual ~Vendor() = default;
@@ -84,6 +90,13 @@ class Vendor {
   /// The settings to which the device itself changes once it has that ping, such as an automatic range. nullopt: they stay.
   virtual std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const {
     static_cast<void>(ping), static_cast<void>(device);
+    return std::nullopt;
+  }
+  /// Whether its sonars are range finders: they measure one distance with each ping.
+  virtual bool measures_distance() const { return false; }
+  /// The distance in a ping, as the device reports it. nullopt: the sonar is no range finder.
+  virtual std::optional<Distance> distance_in(const Ping& ping) const {
+    static_cast<void>(ping);
     return std::nullopt;
   }
   /// The ping of that number, from 1, of a mechanical scan, as a usual host requests it. Other sonars: nothing.

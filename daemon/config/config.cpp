@@ -170,7 +170,7 @@ PoseListener read_listener(const Node& node, std::uint16_t default_port, bool ha
   return listener;
 }
 
-void read_poses(const Node& node, const std::vector<VehicleConfig>& vehicles, PoseConfig& poses) {
+void read_poses(const Node& node, const Config& config, PoseConfig& poses) {
   poses.protobuf.at = {{127, 0, 0, 1}, 14770};
   poses.json.at = {{127, 0, 0, 1}, 14771};
   if (!node.present()) return;
@@ -178,7 +178,7 @@ void read_poses(const Node& node, const std::vector<VehicleConfig>& vehicles, Po
   for (const Node& range : map.optional("allow_from").items(0, 64)) poses.allow_from.push_back(read_range(range));
   poses.protobuf = read_listener(map.optional("protobuf"), 14770, !poses.allow_from.empty());
   poses.json = read_listener(map.optional("json"), 14771, !poses.allow_from.empty());
-  poses.mavlink = read_mavlink(map.optional("mavlink"), !poses.allow_from.empty(), vehicles);
+  poses.mavlink = read_mavlink(map.optional("mavlink"), !poses.allow_from.empty(), config);
   if (poses.protobuf.enabled && poses.protobuf == poses.json && poses.json.at.port != 0)
     map.optional("json").fail("the same address as poses.protobuf; give each its own port");
   poses.extrapolate_max_s = map.optional("extrapolate_max_s").number_or(poses.extrapolate_max_s, Range::between(0, 10));
@@ -225,7 +225,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   read_objects(root.optional("objects"), files, config);
   std::size_t index = 0;
   for (const Node& item : root.required("sonars").items(1, 64)) config.sonars.push_back(read_sonar(item.map(), config, index++));
-  read_poses(root.optional("poses"), config.vehicles, config.poses);
+  read_poses(root.optional("poses"), config, config.poses);
   config.control = read_control(root.optional("control"), directory);
   config.engine = read_engine(root.optional("engine"));
   config.limits = read_limits(root.optional("limits"));

@@ -80,6 +80,7 @@ struct MavlinkConfig {
   std::uint8_t system_id = 0, component_id = 0;  // 0 = that of the first message
   bool request_rates = false;                    // ask the autopilot for its messages, rate_hz each
   double rate_hz = 50;
+  bool distance_sensor = false;  // send the distances of the vehicle's range finders
   bool operator==(const MavlinkConfig&) const = default;
 };
 struct PoseConfig {
@@ -177,6 +178,9 @@ Result<Config> parse_config(std::string_view yaml, const std::string& name, cons
 Result<void> check_time_can_pass(const Config& config);
 /// Configuration when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. Needs no files.
 Result<Config> demo_config();
+
+/// Names of the vehicle's sonars that measure a distance with each ping.
+std::vector<std::string> range_finders_of(const Config& config, const std::string& vehicle);
 
 /// Fills netmask and status_to from advertise_ip, unless the file gives them.
 void derive_addresses(SonarConfig& sonar);

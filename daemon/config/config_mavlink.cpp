@@ -39,6 +39,15 @@ std::string read_vehicle(Map& map, const std::vector<VehicleConfig>& vehicles) {
 
 }  // namespace
 
+std::vector<std::string> range_finders_of(const Config& config, const std::string& vehicle) {
+  std::vector<std::string> names;
+  for (const SonarConfig& sonar : config.sonars)
+    if (sonar.profile.vendor != nullptr && sonar.profile.vendor->measures_distance() && sonar.vehicle < config.vehicles.size() &&
+        config.vehicles[sonar.vehicle].name == vehicle)
+      names.push_back(sonar.name);
+  return names;
+}
+
 std::optional<Geodetic> read_origin(const Node& node) {
   if (!node.present()) return std::nullopt;
   Map place = node.map();
@@ -48,7 +57,8 @@ std::optional<Geodetic> read_origin(const Node& node) {
                   place.optional("alt").number_or(0, Range::between(-12000, 10000))};
 }
 
-std::vector<MavlinkConfig> read_mavlink(const Node& node, bool has_ranges, const std::vector<VehicleConfig>& vehicles) {
+std::vector<MavlinkConfig> read_mavlink(const Node& node, bool has_ranges, const Config& config) {
+  const std::vector<VehicleConfig>& vehicles = config.vehicles;
   std::vector<MavlinkConfig> links;
   if (!node.present()) return links;
   if (node.is_scalar()) {
@@ -70,6 +80,10 @@ std::vector<MavlinkConfig> read_mavlink(const Node& node, bool has_ranges, const
     link.component_id = static_cast<std::uint8_t>(map.optional("component_id").integer_or(0, 0, 255));
     link.request_rates = map.optional("request_rates").boolean_or(false);
     link.rate_hz = map.optional("rate_hz").number_or(link.rate_hz, Range::between(1, 200));
+    const Node distances = map.optional("distance_sensor");
+    link.distance_sensor = distances.boolean_or(false);
+    if (link.distance_sensor && range_finders_of(config, link.vehicle).empty() && !config.sonars.empty())
+      distances.fail("vehicle \"" + link.vehicle + "\" has no range finder; mount an altimeter on it, or set this to false");
     const bool taken = std::any_of(links.begin(), links.end(), [&](const MavlinkConfig& other) {
       return other.at.port != 0 && other.at.port == link.at.port && other.at.ip == link.at.ip;
     });

@@ -23,7 +23,7 @@ Endpoint read_endpoint(const text::Node& node, bool port_needed);
 /// `{lat, lon, alt}` of the world's origin; nullopt if absent.
 std::optional<Geodetic> read_origin(const text::Node& node);
 /// One endpoint, or a list of links. `has_ranges`: poses.allow_from is given.
-std::vector<MavlinkConfig> read_mavlink(const text::Node& node, bool has_ranges, const std::vector<VehicleConfig>& vehicles);
+std::vector<MavlinkConfig> read_mavlink(const text::Node& node, bool has_ranges, const Config& config);
 /// The plan is checked against what the sonars can do.
 FaultConfig read_faults(const text::Node& node, const std::vector<SonarConfig>& sonars, const std::filesystem::path& directory);
 /// Relative files start in `directory`.

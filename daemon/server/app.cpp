@@ -46,7 +46,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
       pose_intake_(
           world_, clock_, log_, [this] { on_change(); }, &events_, &plausibility_),
       pose_server_(io_, config_.poses, config_.limits, admission_, pose_intake_, log_),
-      mavlink_server_(io_, config_, pose_intake_, log_),
+      mavlink_server_(io_, config_, pose_intake_, log_, clock_.now()),
       fault_log_(events_, recordings_, writer_, log_),
       fleet_({io_, clock_, admission_, log_, options_.digest}, config_, world_, simulator_, recordings_, events_, fault_log_,
              {[this] { on_change(); },
@@ -54,7 +54,8 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
                 log_.error(why.text);
                 exit_code_ = exit_code(why.kind);
                 stop("the engine failed");
-              }}),
+              },
+              [this](const SonarConfig& of, const PingQueued& ping) { mavlink_server_.on_distance(of, ping); }}),
       stepper_(clock_, world_, stepped_time_, fleet_, log_, [this] { on_change(); }),
       scene_operations_(config_, changes_, pose_intake_, events_, log_, options_.load_scene),
       sonar_operations_(config_, fleet_, recordings_, log_),
@@ -74,6 +75,7 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
   mavlink_server_.inject_failures_with([this](std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
     return fault_operations_.inject(unit, type, instance);
   });
+  mavlink_server_.on_distances_wanted([this] { run_range_finders(); });
   changes_.pace_while([this] { return !clock_.stepped() && fleet_.has_clients(); });
   recordings_.use_scene(*changes_.scene());
   log_new_notes();
@@ -103,9 +105,9 @@ Result<void> App::open() {
 int App::run() {
   if (options_.handle_signals) wait_for_signal();
   pose_server_.start();
-  mavlink_server_.start();
   control_.start();
   fleet_.start();
+  mavlink_server_.start();
   fault_operations_.begin_plan();
   asio::co_spawn(
       io_, [this] { return housekeeping(); }, asio::detached);
@@ -216,6 +218,7 @@ void App::take_over(Config next) {
   if (other_water)
     for (Device& d : fleet_.devices()) d.use_water(config_.water);
   for (const Device* opened : change.opened) fault_operations_.begin_plan(opened);
+  run_range_finders();
 
   for (const std::string& error : change.errors) log_.error("reload: " + error);
   std::string listed;
@@ -225,6 +228,13 @@ void App::take_over(Config next) {
   log_.info("reloaded: " + change.summary, {{"scene", scene().name}});
   events_.publish_scene(config_.scene.name(), "reloaded: " + change.summary);
   on_change();
+}
+
+/// Range finders ping by themselves while an autopilot gets their distances.
+void App::run_range_finders() {
+  for (Device& d : fleet_.devices())
+    if (d.sonar().vendor().measures_distance())
+      d.run_itself(mavlink_server_.wants_distances(config_.vehicles[d.config().vehicle].name));
 }
 
 asio::awaitable<void> App::housekeeping() {

@@ -87,6 +87,7 @@ class App {
   bool enough_served() const;
   bool files_are_written() const { return recordings_.idle() && writer_.idle(); }
   void log_new_notes();
+  void run_range_finders();
   void wait_for_signal();
   Reload::Steps reload_steps();
   void take_over(Config next);  // takes over a reloaded configuration

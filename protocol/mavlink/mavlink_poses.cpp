@@ -48,7 +48,11 @@ std::string_view name_of(Source source) {
   return names[index_of(source)];
 }
 
-MavlinkPoses::MavlinkPoses(Settings settings, InjectFailure inject) : settings_(std::move(settings)), inject_(std::move(inject)) {
+MavlinkPoses::MavlinkPoses(Settings settings, InjectFailure inject, HasRangeFinder has_range_finder)
+    : settings_(std::move(settings)),
+      inject_(std::move(inject)),
+      has_range_finder_(std::move(has_range_finder)),
+      distances_(settings_.sends_distances) {
   self_.component = own_component;
   if (settings_.system_id != 0) self_.system = settings_.system_id;
 }
@@ -139,22 +143,42 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   return out;
 }
 
-/// Accepts one command only, addressed to this component: other components of the system have failures of their own.
+/// Accepts these commands only, addressed to this component: other components of the system have failures and messages of their
+/// own.
 void MavlinkPoses::on_command(const CommandLong& command, const Frame& frame, Reaction& out) {
   const bool is_ours = command.target_system == self_.system && command.target_component == own_component;
-  if (!is_ours || command.command != CommandLong::inject_failure) return;
+  const bool asks_for_message =
+      command.command == CommandLong::set_message_interval || command.command == CommandLong::request_message;
+  const bool asks_for_distances = asks_for_message && command.param1 == static_cast<float>(DistanceSensor::id);
+  if (!is_ours || (command.command != CommandLong::inject_failure && !asks_for_distances)) return;
   const auto unit = whole_number(command.param1), type = whole_number(command.param2), instance = whole_number(command.param3);
   CommandAck ack;
   ack.command = command.command;
   ack.target_system = frame.system;
   ack.target_component = frame.component;
-  if (!inject_)
+  if (asks_for_distances)
+    ack.result = ask_for_distances(command);
+  else if (!inject_)
     ack.result = MavResult::unsupported;
   else if (!unit || !type || *type > static_cast<std::uint32_t>(FailureType::intermittent) || !instance)
     ack.result = MavResult::denied;
   else
     ack.result = inject_(*unit, static_cast<FailureType>(*type), *instance);
   out.replies.push_back(framed(ack, self_));
+}
+
+MavResult MavlinkPoses::ask_for_distances(const CommandLong& command) {
+  if (!has_range_finder_ || !has_range_finder_()) return MavResult::unsupported;
+  if (command.command == CommandLong::request_message)
+    distances_.ask_once();
+  else if (!distances_.set_interval_us(command.param2))
+    return MavResult::denied;
+  return MavResult::accepted;
+}
+
+std::optional<Bytes> MavlinkPoses::distance_message(const DistanceSensor& measured) {
+  if (!distances_.is_due(measured)) return std::nullopt;
+  return framed(measured, self_);
 }
 
 void MavlinkPoses::add_counts(const FrameCounts& now, Reaction& out) {

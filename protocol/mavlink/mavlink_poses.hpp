@@ -12,6 +12,7 @@
 #include "core/base/geodesy.hpp"
 #include "core/base/units.hpp"
 #include "protocol/control/pose_sample.hpp"
+#include "protocol/mavlink/distances.hpp"
 #include "protocol/mavlink/frames.hpp"
 #include "protocol/mavlink/paired_poses.hpp"
 
@@ -29,6 +30,7 @@ struct Settings {
   double rate_hz = 50;
   std::optional<Geodetic> origin;  // origin of the world; needed for latitudes and longitudes
   bool needs_time = false;         // messages without a time stamp are not used
+  bool sends_distances = false;    // DISTANCE_SENSOR with every ping of a range finder, until a command changes it
   Vec3d held_m = {};               // x and y in the world, ENU, of a vehicle that sends its depth and no place
 };
 
@@ -47,6 +49,9 @@ enum class FailureType : std::uint8_t {
 inline constexpr std::uint32_t distance_sensor = 7;
 /// Carries out MAV_CMD_INJECT_FAILURE. `unit`: FAILURE_UNIT of common.xml; `instance`: 0 = all.
 using InjectFailure = std::function<MavResult(std::uint32_t unit, FailureType type, std::uint32_t instance)>;
+
+/// Whether the vehicle has a range finder, whose distances can be sent.
+using HasRangeFinder = std::function<bool()>;
 
 struct SourcedPose {
   control::PoseSample sample;
@@ -70,7 +75,8 @@ class MavlinkPoses {
   static constexpr std::chrono::nanoseconds source_silence = std::chrono::seconds(1);
 
   /// Without `inject` the command to inject a failure is answered as unsupported.
-  explicit MavlinkPoses(Settings settings, InjectFailure inject = {});
+  /// Without `has_range_finder` the commands that ask for DISTANCE_SENSOR are answered as unsupported.
+  explicit MavlinkPoses(Settings settings, InjectFailure inject = {}, HasRangeFinder has_range_finder = {});
   /// `now` never runs backwards, whatever its origin.
   Reaction on_datagram(BytesView datagram, Time now);
   /// Call several times a second. Sends heartbeats and requests, and reports the system found and the missing parts of a pose:
@@ -78,6 +84,11 @@ class MavlinkPoses {
   Reaction on_tick(Time now);
   /// Empty while poses arrive; else one sentence with everything that is missing.
   std::string health_error(Time now) const;
+
+  /// Whether distances are wanted: by the settings, or by the last command of the vehicle.
+  bool wants_distances() const { return distances_.wanted(); }
+  /// The datagram of a distance, or none if it is not wanted or the requested interval since the sensor's last one is not over.
+  std::optional<Bytes> distance_message(const DistanceSensor& measured);
 
   const FrameCounts& counts() const { return counts_; }
   std::optional<std::uint8_t> system() const { return system_; }
@@ -110,6 +121,7 @@ class MavlinkPoses {
   void clear_histories();
   void on_frame(const Frame& frame, Moment at);
   void on_command(const CommandLong& command, const Frame& frame, Reaction& out);
+  MavResult ask_for_distances(const CommandLong& command);
   void handle(const Heartbeat& m, const Frame& frame);
   void handle(const AttitudeReading& reading, Moment at);
   void handle(const LocalPositionNed& m, Moment at);
@@ -144,6 +156,8 @@ class MavlinkPoses {
 
   Settings settings_;
   InjectFailure inject_;
+  HasRangeFinder has_range_finder_;
+  DistanceRequests distances_;
   Identity self_;
   FrameCounts counts_;
   std::optional<std::uint8_t> system_;

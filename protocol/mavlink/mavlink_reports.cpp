@@ -17,7 +17,6 @@ constexpr std::chrono::nanoseconds first_reminder = std::chrono::seconds(15), lo
 
 // Values of minimal.xml and common.xml.
 constexpr std::uint8_t onboard_controller = 18, state_active = 4;
-constexpr std::uint16_t set_message_interval = 511;
 constexpr std::uint8_t ardupilot = 3, px4 = 12;
 
 std::string name_of_autopilot(std::uint8_t autopilot) {
@@ -72,7 +71,7 @@ void MavlinkPoses::request_messages(Reaction& out) {
     CommandLong command;
     command.param1 = static_cast<float>(message);
     command.param2 = static_cast<float>(1e6 / rate_hz);  // us
-    command.command = set_message_interval;
+    command.command = CommandLong::set_message_interval;
     command.target_system = *system_;
     command.target_component = autopilot_component_;
     out.replies.push_back(framed(command, self_));

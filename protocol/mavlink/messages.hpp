@@ -145,7 +145,9 @@ struct CommandLong {
   static constexpr std::uint32_t id = 76;
   static constexpr std::uint8_t crc_extra = 152;
   static constexpr std::string_view name = "COMMAND_LONG";
-  static constexpr std::uint16_t inject_failure = 420;  // MAV_CMD_INJECT_FAILURE: unit, type, instance
+  static constexpr std::uint16_t inject_failure = 420;        // MAV_CMD_INJECT_FAILURE: unit, type, instance
+  static constexpr std::uint16_t set_message_interval = 511;  // MAV_CMD_SET_MESSAGE_INTERVAL: message, interval in us
+  static constexpr std::uint16_t request_message = 512;       // MAV_CMD_REQUEST_MESSAGE: message
   float param1 = 0, param2 = 0, param3 = 0, param4 = 0, param5 = 0, param6 = 0, param7 = 0;
   std::uint16_t command = 0;
   std::uint8_t target_system = 0, target_component = 0, confirmation = 0;
@@ -180,6 +182,32 @@ template <class V, wire::Like<CommandAck> M>
 constexpr void extensions(V& visit, M& m) {
   visit("progress", m.progress), visit("result_param2", m.result_param2);
   visit("target_system", m.target_system), visit("target_component", m.target_component);
+}
+
+/// Only written, never read. Lengths in centimetres.
+struct DistanceSensor {
+  static constexpr std::uint32_t id = 132;
+  static constexpr std::uint8_t crc_extra = 85;
+  static constexpr std::string_view name = "DISTANCE_SENSOR";
+  static constexpr std::uint8_t ultrasound = 1;            // MAV_DISTANCE_SENSOR_ULTRASOUND
+  static constexpr std::uint8_t unknown_covariance = 255;  // UINT8_MAX
+  std::uint32_t boot_ms = 0;
+  std::uint16_t min_cm = 0, max_cm = 0, current_cm = 0;
+  std::uint8_t type = ultrasound, sensor = 0, orientation = 0, covariance_cm2 = unknown_covariance;
+  float horizontal_fov_rad = 0, vertical_fov_rad = 0;
+  std::array<float, 4> wxyz{};      // for orientation 100 only, else zeros
+  std::uint8_t signal_percent = 0;  // 0 = unknown, 1 = no valid signal
+};
+template <class V, wire::Like<DistanceSensor> M>
+constexpr void fields(V& visit, M& m) {
+  visit("time_boot_ms", m.boot_ms);
+  visit("min_distance", m.min_cm), visit("max_distance", m.max_cm), visit("current_distance", m.current_cm);
+  visit("type", m.type), visit("id", m.sensor), visit("orientation", m.orientation), visit("covariance", m.covariance_cm2);
+}
+template <class V, wire::Like<DistanceSensor> M>
+constexpr void extensions(V& visit, M& m) {
+  visit("horizontal_fov", m.horizontal_fov_rad), visit("vertical_fov", m.vertical_fov_rad);
+  visit("quaternion", m.wxyz), visit("signal_quality", m.signal_percent);
 }
 
 struct VisionPositionEstimate {

@@ -40,6 +40,11 @@ class Ping1DVendor final : public StreamingVendor {
     s.parameters = next;
     return change_to(s);
   }
+  bool measures_distance() const override { return true; }
+  std::optional<protocol::Distance> distance_in(const Ping& ping) const override {
+    const Echo echo = find_echo(ping);
+    return protocol::Distance{echo.range_m, echo.confidence};
+  }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,
                                                Time now) const override {
     return make_dialogue(device, port, now);

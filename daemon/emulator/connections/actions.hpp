@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -82,7 +83,8 @@ struct PingQueued {
   std::shared_ptr<const protocol::Bytes> bytes;                                // null: not sent over TCP
   std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream that has receivers
   double simulation_s = 0;
-  bool preview = false;  // for viewers of the live view alone
+  bool preview = false;                             // for viewers of the live view alone
+  std::optional<protocol::Distance> distance = {};  // of a range finder, unless a fault withholds the ping
 };
 /// A line for the log; those of one topic are limited together.
 struct Report {

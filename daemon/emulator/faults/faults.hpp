@@ -113,6 +113,9 @@ class Faults {
     std::size_t collect = 0;
   };
   Hold hold(const Connection& to, std::uint32_t ping, Time now);
+  /// Whether the sonar itself sends nothing of this ping to anyone: it is withheld, dropped, or the device is off. Faults of
+  /// links and of single clients are not meant.
+  bool withholds(std::uint32_t ping, Time now) const;
   /// Factor of the present rate; 0 = no pings.
   double rate_factor() const;
 

@@ -66,6 +66,16 @@ std::shared_ptr<const Ping> Faults::altered(const std::shared_ptr<const Ping>& p
   return changed ? changed : ping;
 }
 
+bool Faults::withholds(std::uint32_t ping, Time now) const {
+  return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& e) {
+    const Effect effect = e.fault.kind->effect;
+    if (effect == Effect::drop) return met(e, ping);
+    if (!e.active) return false;
+    return effect == Effect::withhold || effect == Effect::withhold_pings ||
+           (effect == Effect::power_cycle && seconds(now - e.since) < e.fault.number("boot-s"));
+  });
+}
+
 bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
   if (entries_.empty() || to.role == Role::observer) return true;
   for (Entry& e : entries_) {

@@ -55,6 +55,8 @@ PingQueued Delivery::queue(const PingOutcome& outcome, Time now, Requests& reque
   const auto reported = faults_.altered(outcome.ping, sonar_.state, now);
   FramedPing framed(sonar_.vendor, sonar_.state, *reported);
   PingQueued queued{outcome.ping, framed.bytes(), {}, outcome.seconds};
+  if (!faults_.withholds(static_cast<std::uint32_t>(outcome.ping->request.number), now))
+    queued.distance = sonar_.vendor.distance_in(*reported);
   for (Connection& c : audience_.all())
     audience_.guarded(c, actions, [&] {
       for (protocol::Event& event : offer(c, framed, queued, now, actions)) requests.emplace_back(&c, std::move(event));

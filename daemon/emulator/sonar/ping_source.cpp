@@ -82,16 +82,24 @@ void PingSource::override_settings(const protocol::SettingsOverride& wanted, Tim
 // ---- when pings are due
 
 bool PingSource::wants_pings() const {
+  if (runs_itself()) return true;
   return !audience_.stopping() && audience_.has_audience() && (asked_ || sonar_.vendor.pings_before_first_request(sonar_.state));
 }
 
 void PingSource::update_pacer(Time now) {
   PingSettings paced = settings_;
+  if (runs_itself()) paced.triggered = false;  // no client asks for pings
   if (const double factor = faults_.rate_factor(); factor != 1) paced.rate_hz *= static_cast<float>(factor);
   if (wants_pings())
     pacer_.configure(paced, now);
   else
     pacer_.stop();
+}
+
+void PingSource::run_itself(bool on, Time now) {
+  if (std::exchange(runs_itself_, on) == on || audience_.has_audience()) return;
+  use_initial_settings();
+  update_pacer(now);
 }
 
 std::optional<Time> PingSource::next_ping() const {
@@ -197,7 +205,7 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
   } else if (!outcome.ping) {
     actions.emplace_back(
         EngineFailed{{outcome.kind, "sonar " + sonar_.config.name + ": the ping engine failed: " + outcome.failure}});
-  } else if (!audience_.stopping() && audience_.has_audience() && !busy_unwanted_) {
+  } else if (!audience_.stopping() && (audience_.has_audience() || runs_itself_) && !busy_unwanted_) {
     return true;
   } else {
     ++figures.unwanted;

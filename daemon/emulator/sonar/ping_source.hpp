@@ -36,6 +36,10 @@ class PingSource {
   // ---- when pings are due
 
   bool wants_pings() const;
+  /// Whether the sonar pings by itself, at the rate of its settings, while it has no client.
+  void run_itself(bool on, Time now);
+  /// It does so now.
+  bool runs_itself() const { return runs_itself_ && !audience_.stopping() && !audience_.has_audience(); }
   /// The pacer runs while pings are wanted, at the requested rate times the factor of faults.
   void update_pacer(Time now);
   const Pacer& pacer() const { return pacer_; }
@@ -79,7 +83,7 @@ class PingSource {
   GainAssist gain_assist_;
   bool asked_ = false;  // settings were requested since the first client or receiver came
   std::string asked_by_;
-  bool transmits_ = true;
+  bool transmits_ = true, runs_itself_ = false;
 
   // The ping that is being computed.
   bool busy_ = false;

@@ -119,11 +119,12 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
 
 Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port) {
   Actions actions;
-  const bool had_audience = audience_.has_audience();
+  const bool had_audience = audience_.has_audience(), ran_itself = source_.runs_itself();
   Connection* const admitted = audience_.admit(id, role, std::move(peer), port, faults_.admission(), actions);
   if (admitted == nullptr) return actions;
   // After a take-over the new client starts from the stored settings if no other client is left.
-  if (had_audience && !audience_.has_audience()) source_.use_initial_settings();
+  // The first client finds the device as delivered, too.
+  if (had_audience ? !audience_.has_audience() : ran_itself && role == Role::client) source_.use_initial_settings();
   serve(*admitted, now, actions);
   return actions;
 }

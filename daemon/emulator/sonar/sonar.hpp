@@ -96,6 +96,8 @@ class Sonar {
 
   /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
+  /// The sonar pings by itself while it has no client, such as a range finder whose distances an autopilot gets.
+  void run_itself(bool on, Time now) { source_.run_itself(on, now); }
   /// Returns whether the setting changed.
   bool set_transmit(bool on) { return source_.set_transmit(on); }
   bool transmits() const { return source_.transmits(); }

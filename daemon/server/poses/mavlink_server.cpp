@@ -1,5 +1,7 @@
 #include "daemon/server/poses/mavlink_server.hpp"
 
+#include <algorithm>
+
 #include "daemon/server/system/listen.hpp"
 
 namespace sonar {
@@ -21,6 +23,7 @@ mavlink::Settings settings_of(const MavlinkConfig& link, const Config& config) {
           link.rate_hz,
           config.origin,
           config.clock == ClockMode::follow,
+          link.distance_sensor,
           held_m};
 }
 std::string text_of(const MavlinkConfig& link) { return (link.dials ? "udpout:" : "udpin:") + sonar::text_of(link.at); }
@@ -28,13 +31,14 @@ std::string text_of(const udp::endpoint& e) { return e.address().to_string() + "
 
 }  // namespace
 
-MavlinkServer::MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log)
-    : io_(io), config_(config), intake_(intake), log_(log) {}
+MavlinkServer::MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log, Time began)
+    : io_(io), config_(config), intake_(intake), log_(log), began_(began) {}
 
 Result<void> MavlinkServer::open() {
   for (const MavlinkConfig& wanted : config_.poses.mavlink) {
+    const auto has_range_finder = [this, vehicle = wanted.vehicle] { return !range_finders_of(config_, vehicle).empty(); };
     Link& link = links_.emplace_back(Link{wanted,
-                                          mavlink::MavlinkPoses(settings_of(wanted, config_), inject_),
+                                          mavlink::MavlinkPoses(settings_of(wanted, config_), inject_, has_range_finder),
                                           udp::socket(io_),
                                           asio::steady_timer(io_),
                                           std::nullopt,
@@ -56,6 +60,7 @@ Result<void> MavlinkServer::open() {
 
 void MavlinkServer::start() {
   for (Link& l : links_) {
+    look_at_wants(l);
     const auto survives = [this, &l](const std::string& fault) {
       if (!stopping_) log_fault(log_, faults_, fault, {"at", l.name});
       return !stopping_;
@@ -120,6 +125,57 @@ void MavlinkServer::on_datagram(Link& link, mavlink::BytesView bytes, const udp:
   const mavlink::Reaction reaction = link.poses.on_datagram(bytes, wire_time());
   if (reaction.from_vehicle && !link.config.dials) link.peer = from;
   act_on(link, reaction, sender, from);
+  look_at_wants(link);  // it may have held a command
+}
+
+// ---- distances
+
+bool MavlinkServer::wants_distances(const std::string& vehicle) const {
+  return std::any_of(links_.begin(), links_.end(),
+                     [&](const Link& l) { return l.config.vehicle == vehicle && l.poses.wants_distances(); });
+}
+
+void MavlinkServer::look_at_wants(Link& link) {
+  const bool wants = link.poses.wants_distances();
+  if (std::exchange(link.distances_wanted, wants) != wants && distances_wanted_) distances_wanted_();
+}
+
+void MavlinkServer::on_distance(const SonarConfig& sonar, const PingQueued& ping) {
+  if (sonar.vehicle >= config_.vehicles.size()) return;
+  const std::string& vehicle = config_.vehicles[sonar.vehicle].name;
+  const PingRequest& request = ping.ping->request;
+  const FrequencyMode& mode = ping.ping->mode();
+  mavlink::Measured measured;
+  measured.boot_ms = std::chrono::duration_cast<std::chrono::milliseconds>(request.fired_at - began_).count();
+  measured.nearest_m = static_cast<double>(mode.min_range_m);
+  measured.farthest_m = static_cast<double>(mode.max_range_m);
+  measured.horizontal_rad = static_cast<double>(mode.pattern.azimuth_width_rad);
+  measured.vertical_rad = static_cast<double>(mode.pattern.elevation_width_rad);
+  measured.sensor_in_body = sonar.mount.orientation;
+  const std::vector<std::string> all = range_finders_of(config_, vehicle);
+  measured.sensor = static_cast<std::uint8_t>(std::find(all.begin(), all.end(), sonar.name) - all.begin());
+  for (Link& link : links_) {
+    if (link.config.vehicle != vehicle || !link.poses.wants_distances()) continue;
+    error_code failed;
+    if (ping.distance) {
+      measured.range_m = ping.distance->range_m;
+      measured.confidence_percent = ping.distance->confidence_percent;
+      const auto message = link.poses.distance_message(mavlink::distance_sensor_of(measured));
+      if (!message) continue;  // the vehicle wants fewer
+      if (link.peer) link.socket.send_to(asio::buffer(*message), *link.peer, 0, failed);
+    }
+    if (ping.distance && link.peer && !failed) {
+      ++link.distances_sent;
+    } else {
+      ++link.distances_dropped;
+      const char* const why = !ping.distance ? "a fault withholds the ping"
+                              : link.peer    ? "the socket takes none"
+                                             : "no vehicle is known";
+      log_limited(log_, link.drops, LogLevel::info, link.name + ": DISTANCE_SENSOR was not sent: " + why,
+                  {{"sonar", sonar.name}, {"dropped", link.distances_dropped}, {"sent", link.distances_sent}});
+    }
+    look_at_wants(link);
+  }
 }
 
 asio::awaitable<void> MavlinkServer::tick(Link& link) {

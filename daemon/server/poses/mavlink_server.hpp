@@ -2,6 +2,8 @@
 // Owned by App, as PoseServer is; poses go into the same PoseIntake.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <list>
 #include <optional>
 #include <string>
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "daemon/config/config.hpp"
+#include "daemon/emulator/connections/actions.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
@@ -19,11 +22,18 @@ namespace sonar {
 class MavlinkServer {
  public:
   /// Links and origin are those of `config` as it is now; who may send follows it.
-  MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log);
+  /// `began`: the daemon's time from which messages count the time since boot.
+  MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log, Time began);
 
   /// Call it before open(). Sets what the command to inject a failure does, on every link. Without it the command is answered as
   /// unsupported.
   void inject_failures_with(mavlink::InjectFailure inject) { inject_ = std::move(inject); }
+  /// Call it before open(). `tell` is called when a vehicle began or ceased to want distances (wants_distances).
+  void on_distances_wanted(std::function<void()> tell) { distances_wanted_ = std::move(tell); }
+  /// Whether a link of that vehicle sends the distances of its range finders.
+  bool wants_distances(const std::string& vehicle) const;
+  /// Sends the distance of a ping to the vehicle of the sonar, a range finder.
+  void on_distance(const SonarConfig& sonar, const PingQueued& ping);
   Result<void> open();
   void start();
   void stop();
@@ -43,20 +53,25 @@ class MavlinkServer {
     asio::steady_timer timer;
     std::optional<udp::endpoint> peer;  // whom we answer
     std::string name;                   // "mavlink udpin:127.0.0.1:14551"
-    LogLimiter notices = {};
+    LogLimiter notices = {}, drops = {};
+    std::uint64_t distances_sent = 0, distances_dropped = 0;
+    bool distances_wanted = false;  // as of the last look
   };
 
   asio::awaitable<void> receive(Link& link);
   asio::awaitable<void> tick(Link& link);
   void on_datagram(Link& link, mavlink::BytesView bytes, const udp::endpoint& from);
   void act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from, const std::optional<udp::endpoint>& to);
+  void look_at_wants(Link& link);
   bool is_allowed(const Link& link, const asio::ip::address& from) const;
 
   asio::io_context& io_;
   const Config& config_;
   PoseIntake& intake_;
   Log& log_;
+  Time began_;
   mavlink::InjectFailure inject_;
+  std::function<void()> distances_wanted_;
   LogLimiter faults_;
   std::list<Link> links_;
   bool stopping_ = false;

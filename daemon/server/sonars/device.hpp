@@ -118,6 +118,11 @@ class Device final : public SessionParent {
   /// Vehicle and mount, of a configuration that is otherwise the same.
   void use_place(const SonarConfig& config) { sonar_.move(config, network_.clock.now()); }
   void use_water(const Water& water);
+  /// See Sonar::run_itself.
+  void run_itself(bool on) {
+    sonar_.run_itself(on, network_.clock.now());
+    perform({});
+  }
   void add_faults(const std::vector<Fault>& faults, bool manual) {
     perform(sonar_.add_faults(faults, manual, network_.clock.now()));
   }

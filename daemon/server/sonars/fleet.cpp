@@ -196,6 +196,7 @@ void Fleet::on_ping_queued(const Device& of, const PingQueued& queued) {
     recordings_.take(name, {now, queued.ping, queued.bytes, queued.datagrams, of.sonar().vendor().beacon(of.sonar().state(), now),
                             computed_names_[of.sonar().index()]});
   if (tap_) tap_(of, queued);
+  if (handlers_.on_distance && of.sonar().vendor().measures_distance()) handlers_.on_distance(of.config(), queued);
   if (!events_.has_listeners()) return;
   v1::Event event;
   *event.mutable_ping() = of.event_of(queued);

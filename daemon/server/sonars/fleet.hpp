@@ -21,6 +21,8 @@ class Fleet final : public DeviceParent {
   struct Handlers {
     std::function<void()> on_change;  // a change for which stepped time, or the end of the daemon, may wait
     std::function<void(const Error& why)> on_engine_failure;  // the daemon must end
+    /// A ping of a range finder; its distance is absent when a fault withholds it.
+    std::function<void(const SonarConfig& of, const PingQueued& ping)> on_distance = {};
   };
   /// All of it outlives the fleet.
   Fleet(DeviceNetwork network, const Config& config, const World& world, Simulator& simulator, Recordings& recordings,

@@ -79,6 +79,24 @@ TEST(ConfigMavlink, MistakesAreNamed) {
   EXPECT_THAT(why("{mavlink: [{endpont: 'udpin:127.0.0.1:1'}]}"), HasSubstr("endpoint"));
 }
 
+TEST(ConfigMavlink, DistancesNeedARangeFinderOnTheVehicle) {
+  const std::string link = "{mavlink: [{endpoint: 'udpout:127.0.0.1:14551', distance_sensor: true}]}";
+  EXPECT_THAT(why(link),
+              HasSubstr("poses.mavlink[0].distance_sensor: vehicle \"rov\" has no range finder; mount an altimeter on it"));
+  const std::string altimeter =
+      "world: {scene: scene.yaml}\nvehicles: [{name: rov}, {name: boat}]\nsonars:\n"
+      "  - {name: alt, profile: ping1d, bind_ip: 127.0.0.2, vehicle: rov}\nposes: {mavlink: [{vehicle: ";
+  const std::string rest = ", endpoint: 'udpout:127.0.0.1:14551', distance_sensor: true}]}\n";
+  const auto good = parse_config(altimeter + "rov" + rest, "sonard.yaml", ::testing::TempDir());
+  ASSERT_TRUE(good) << good.error().text;
+  EXPECT_TRUE(good->poses.mavlink.at(0).distance_sensor);
+  EXPECT_THAT(range_finders_of(*good, "rov"), ::testing::ElementsAre("alt"));
+  const auto other = parse_config(altimeter + "boat" + rest, "sonard.yaml", ::testing::TempDir());
+  ASSERT_FALSE(other);
+  EXPECT_THAT(other.error().text, HasSubstr("vehicle \"boat\" has no range finder"));
+  EXPECT_FALSE(parse("{mavlink: [{endpoint: 'udpout:127.0.0.1:14551'}]}")->poses.mavlink.at(0).distance_sensor);
+}
+
 TEST(ConfigMavlink, TheOriginIsRead) {
   EXPECT_FALSE(parse("{}")->origin);
   const auto c = parse("{}", "[{name: rov}]", ", origin: {lat: 90, lon: -180, alt: 12.5}");

@@ -75,6 +75,7 @@ TEST(MavlinkMessages, CrcExtraAndLengthsFollowFromTheFields) {
   expect_by_the_rule<VfrHud>(20, 20);
   expect_by_the_rule<CommandLong>(33, 33);
   expect_by_the_rule<CommandAck>(3, 10);
+  expect_by_the_rule<DistanceSensor>(14, 39);
   expect_by_the_rule<VisionPositionEstimate>(32, 117);
   expect_by_the_rule<SimState>(84, 92);
   expect_by_the_rule<AttPosMocap>(36, 120);

@@ -110,6 +110,7 @@ class VirtualTime {
   std::map<ConnectionId, Client> clients;
   std::vector<std::string> log;
   std::uint64_t pings = 0;
+  std::vector<std::optional<protocol::Distance>> distances;  // of each ping that was queued
   FaultJournal* journal = nullptr;
   std::map<const Sonar*, bool> listening;
 
@@ -146,6 +147,8 @@ class VirtualTime {
         listening[&sonar] = ports->on;
       } else if (const auto* reads = std::get_if<ReadFrom>(&action)) {
         clients[reads->connection].is_read = reads->on;
+      } else if (const auto* queued = std::get_if<PingQueued>(&action)) {
+        distances.push_back(queued->distance);
       } else if (const auto* report = std::get_if<Report>(&action)) {
         log.push_back(report->line.phrase);
       }
