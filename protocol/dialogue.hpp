@@ -42,13 +42,13 @@ struct ChangeSettings {
 };
 /// Settings override, from the control protocol or of a fault. Unset fields keep their value; all values must be finite.
 struct SettingsOverride {
-  std::optional<double> range_m, rate_hz, gain_percent;  // rate 0 = standby; gain 0 to 100 of what a client can turn it
+  std::optional<double> range_m, rate_hz, gain_percent;  // rate 0 = standby; gain: per cent of what a client can set
   std::optional<std::uint32_t> mode, beams;              // mode: index into SonarModel::modes
   std::optional<std::uint32_t> sample_bits = {};
   std::optional<bool> row_gains = {};
 };
 struct RequestPing {   // one ping now (network trigger, BlueView)
-  bool joins = false;  // a ping that is under way already will do
+  bool joins = false;  // a ping that is already under way satisfies the request, too
   /// Of a mechanical scan: the ping is fired with the sonar turned so far to port about its own z axis, and framed with `with` in
   /// place of the device's settings. Both hold until the next request.
   double head_rad = 0;
@@ -83,7 +83,7 @@ struct Delivery {
 class Dialogue {
  public:
   virtual ~Dialogue() = default;
-  /// Any split of the stream, any garbage. Never throws, never grows without bound.
+  /// Accepts the stream in pieces of any size, and any garbage. It never throws and never grows without bound.
   virtual Reaction on_bytes(BytesView received, Time now) = 0;
   /// Keep-alives and subscriptions. Called at or after next_tick(). `ping_pending`: a client has asked the device for one ping,
   /// which has not been started.

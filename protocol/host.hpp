@@ -24,7 +24,7 @@ namespace sonar::protocol {
 
 /// The settings that a user wants. Unset values: as the sonar has them, or as a usual driver sends them.
 struct Wanted {
-  bool as_it_is = false;                         // send no settings; request pings only of a make whose pings each take a request
+  bool as_it_is = false;                         // send no settings; request pings only from makes that need a request for each
   bool stamped = false;                          // prefer messages that state when a ping was fired
   SettingsOverride settings;                     // the same for every make
   std::map<std::string, std::string> more = {};  // settings of one make: name of sonarctl's option without dashes, and value
@@ -91,7 +91,7 @@ class Host {
     return {};
   }
   virtual std::optional<Time> next_tick() const { return std::nullopt; }
-  /// The caller wants a ping: of a wire where each is requested. Called whenever it waits for one.
+  /// The caller wants a ping. For protocols in which each ping is requested; called whenever the caller waits for one.
   virtual HostActions on_demand(Time now) {
     static_cast<void>(now);
     return {};
@@ -142,14 +142,14 @@ struct Make {
   std::optional<Announcement> (*announced)(BytesView beacon) = nullptr;  // nullopt: it is none; null: hosts need no beacon
   const Search* search = nullptr;                                        // null: hosts do not search
 
-  std::string_view usual_settings = {};         // that a host sends where none are wanted, as options of sonarctl: "--rate 10"
-  std::string_view driver_call = {};            // opens the sonar at {at}, where a library of ours is between
-  char own_faults = 0;                          // first letter of the kinds of faults that only this make has
-  bool each_ping_requested = false;             // by its hosts; a rate is a limit
-  bool own_numbers = false;                     // pings have numbers of their own, not those of sonard's events
-  bool scans = false;                           // pings come as fast as its head turns
-  std::string_view demo_name = {};              // NAME of `sonard --demo NAME`; empty: name()
-  std::string_view demo_profile = {};           // product of the demo; empty: the first model
+  std::string_view usual_settings = {};  // settings that a host sends if none are given, as options of sonarctl: "--rate 10"
+  std::string_view driver_call = {};     // call that opens the sonar at {at}, for makes whose drivers use a library of ours
+  char own_faults = 0;                   // first letter of the kinds of faults that only this make has
+  bool each_ping_requested = false;      // by its hosts; a rate is a limit
+  bool own_numbers = false;              // pings have numbers of their own, not those of sonard's events
+  bool scans = false;                    // pings come as fast as its head turns
+  std::string_view demo_name = {};       // NAME of `sonard --demo NAME`; empty: name()
+  std::string_view demo_profile = {};    // product of the demo; empty: the first model
   std::optional<RollPitchYaw> demo_mount = {};  // in the demo; nullopt: it looks ahead
   PictureKind picture = PictureKind::fan;
 

@@ -41,7 +41,7 @@ struct DeviceState {
   OptionValues options;                            // complete: defaults filled in by check_options
   std::shared_ptr<const VendorSettings> settings;  // now; null = Vendor::initial_settings
   std::uint32_t last_ping = 0;                     // number of the ping that was fired last
-  Time framed_at{};                                // stamp of the ping that was framed before; Time{} = there is none
+  Time framed_at{};                                // stamp of the previously framed ping; Time{} = none
   std::chrono::nanoseconds skipped{0};             // how far stamps of pings are ahead of the dialogues' time
   bool simulated_time = false;                     // it may stop while clients wait
   StoredAddress stored_address;
@@ -81,7 +81,7 @@ class Vendor {
   /// The settings that a client of this vendor would have requested: those that hold now (DeviceState::settings) with the
   /// override applied. A refusal states what the product can do.
   virtual Result<ChangeSettings> apply_override(const SettingsOverride& wanted, const DeviceState& device) const = 0;
-  /// The gain as SettingsOverride::gain_percent has it: 0 to 100 of what a client can turn it.
+  /// The gain as in SettingsOverride::gain_percent: per cent of the range in which a client can set it.
   virtual double gain_percent(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const {
     static_cast<void>(device);
@@ -144,8 +144,8 @@ class Vendor {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};
   }
-  /// Where a message has this field; of an empty `message`: as in the vendor's layout with the most fields. nullopt: there is no
-  /// such field, or the message is too short.
+  /// Where a message has this field. If `message` is empty: its place in the vendor's layout with the most fields. nullopt: there
+  /// is no such field, or the message is too short.
   virtual std::optional<Field> field(Part part, FieldName name, BytesView message) const {
     static_cast<void>(part), static_cast<void>(name), static_cast<void>(message);
     return {};

@@ -51,7 +51,7 @@ class PingStream {
   Item next(std::chrono::milliseconds patience);
   /// True when the sonar closes the connection before the first byte; waits for that byte, at most `patience`.
   bool is_rejected(std::chrono::milliseconds patience) const;
-  /// Also writes every byte received by TCP to this file. usage: of a sonar that sends pings otherwise.
+  /// Also writes every byte received by TCP to this file. Error usage: the sonar does not send its pings over TCP.
   Result<void> record_to(const std::filesystem::path& file);
 
   const protocol::Host& host() const { return *host_; }
@@ -59,7 +59,7 @@ class PingStream {
   const Endpoint& device() const { return device_; }
   /// The ends of its connection and of its datagrams, for the headers of a capture.
   recording::PcapConversation conversation() const;
-  /// "127.0.0.1:41022", our end at the first port; of http there is none.
+  /// "127.0.0.1:41022", our address at the first port; empty for HTTP.
   std::string own() const;
   /// "127.0.0.2:14750, a BlueView P900-90, serial 7001"
   std::string about() const;
@@ -97,7 +97,7 @@ class PingStream {
 };
 
 /// Ping `number` of a recording of any kind, from 0; nullopt: the first that is whole, else the last. `sonar`: selects one of
-/// several. usage: there are fewer pings.
+/// several. Error usage: there are fewer pings.
 Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar = {});
 
 /// Waits for the beacon of a device, of a make whose hosts connect to the address in it.

@@ -22,20 +22,20 @@ namespace sonar {
 
 /// Directions of the rays: angles about the array axis, and the tangent axis of the depth map.
 struct Fan {
-  double half_angle_rad = 0;  // half of the main part; the fixed fan and paths by mirrors cover no more
+  double half_angle_rad = 0;  // half the angle of the main part; the fixed fan and mirror paths cover only this part
   double reach_rad = 0;       // with the side lobes
   TangentAxis axis{};
   int bins = 0;
   std::vector<float> tangent;        // tangents of the lower edge of every bin, and of the end: bins + 1
   std::vector<float> elevation_rad;  // the base fan, from below to above
-  int side_elevations = 0;           // number at either end that lie in side lobes: not refined, shared by some columns
+  int side_elevations = 0;           // elevations at each end that lie in side lobes: not refined, shared by side_columns columns
   bool is_side(int interval) const {
     return interval < side_elevations || interval + 1 >= static_cast<int>(elevation_rad.size()) - side_elevations;
   }
 };
 
-/// A ray of the fixed fan: its elevation about the array axis, and pattern times root of the solid angle, of flat beams except
-/// for what depends on the column.
+/// A ray of the fixed fan: its elevation about the array axis. weight: pattern times the root of the solid angle; for flat beams
+/// without the factor that depends on the column.
 struct FixedFanRay {
   float elevation_rad = 0, cosine = 1, sine = 0, weight = 0;
 };
@@ -49,13 +49,13 @@ struct BeamPanel {
 /// How beams are made of columns.
 struct BeamWeightOptions {
   double dropped_energy = 1e-4;  // share of the energy outside the band: -40 dB
-  bool transform = true;         // instead of a band that is wider than a transform is long, where beams allow it
+  bool transform = true;         // where beams allow it, in place of a band that would be wider than the transform is long
 };
 struct BeamWeights {
   int half_band = 0;  // number of columns on either side that a beam sums
   std::vector<BeamPanel> panels;
   std::vector<float> weights;
-  std::shared_ptr<const BeamTransformTables> transform;  // when set: the same as the panels, then of all columns, for less
+  std::shared_ptr<const BeamTransformTables> transform;  // when set: gives the result of panels over all columns at less cost
   double weight_energy = 1;                              // sum_k W_jk^2 of a beam of the pattern's width
 };
 
@@ -80,14 +80,14 @@ struct PingPlan {
   BeamWeights beam_weights;
   double bearing_scale = 1;                  // bearing_scale_of() the request
   std::vector<float> beam_azimuth_rad;       // reported
-  std::vector<double> beam_sine;             // where the beams point, as all sines here except those of tables by reported sine
+  std::vector<double> beam_sine;             // of true directions, as all sines here but those of tables by reported sine
   std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
   int samples = 0;  // rows * samples_per_row
   double sample_spacing_m = 0;
   double start_samples = 0;    // device range of the picture's near edge, in spacings
-  double sample_offset = 0.5;  // start_samples and where in its spacing a sample lies, see PingSettings::row_centre
+  double sample_offset = 0.5;  // start_samples plus the sample's position in its spacing, see PingSettings::row_centre
   double sample_time_s = 0;    // 2 sample_spacing_m / the device's sound speed
   Pulse pulse_shape;
   double pulse_width_m = 0;       // -3 dB, in the device's metres: the settings', or a measured pulse's own
@@ -99,7 +99,7 @@ struct PingPlan {
   std::vector<CellLevel> levels;    // coarsest first
   std::vector<float> elevation;     // polynomial of the two-way pattern in sin^2(angle)
   std::vector<float> pulse_filter;  // minimum-phase taps that give white noise the pulse's correlation on this grid
-  std::vector<float> noise_filter;  // the same of the receiver's noise, whose filter may be wider
+  std::vector<float> noise_filter;  // the same for the receiver's noise, whose filter may be wider
   double column_noise_upa = 0;      // rms of one column
   NoiseProfile noise_profile;
   SharedNoiseTable shared_noise;
@@ -112,13 +112,13 @@ struct PingPlan {
   ConicalDirection direction_of(Vec3d from_sonar) const {
     return switches.conical ? conical_from_sonar(from_sonar) : flat_from_sonar(from_sonar);
   }
-  /// None beside the fan, or further from its middle than that angle: mirrors are looked at in a wider one.
+  /// nullopt: the direction is outside the fan, or farther than half_angle_rad from its middle.
   std::optional<std::size_t> column_of(const ConicalDirection& direction, double half_angle_rad) const;
-  /// How far behind the depth map a cell may lie and be seen: covers the straight lines between rays.
+  /// How far behind the depth map a cell may lie and still be visible: the map is straight between rays.
   float depth_tolerance_m() const { return depth_tolerance_in_pulses * static_cast<float>(pulse_width_m); }
   static constexpr float depth_tolerance_in_pulses = 1.5f;  // docs/acoustics.md, section 3
-  /// Largest angle about the array's axis that a fan of that half angle reaches: flat beams off the middle reach farther round it
-  /// than they rise.
+  /// Largest angle about the array's axis in a fan of that half angle. For flat beams it is larger than the half angle: off the
+  /// middle an elevation is a larger angle about the axis.
   double widest_about_axis_rad(double half_angle_rad) const;
   /// The column that is traced for a column in the side lobes.
   int side_column(int k) const { return std::min(k - k % side_columns + side_columns / 2, columns.count - 1); }

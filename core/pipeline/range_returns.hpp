@@ -1,5 +1,5 @@
 // The hits of the rays of a range image (core/pipeline/range_image.hpp): one ray passes through the middle of each cell of the
-// beam grid and a few around it; if things are thinner than the cell, many rays do.
+// beam grid and a few around it; in cells with objects thinner than a cell, many rays do.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +22,7 @@ struct RangeReturn {
   ComplexNormal speckle{1, 0};
   std::uint32_t draw = 0;  // draw for the speckle of its range cells, see RangeReturns::speckle_in()
   std::uint32_t object = BeamTruth::nothing;
-  // The same by range cells: from `first` to `last`, the power in the first, in each between, and in the last when it is another.
+  // Power by range cells `first` to `last`: of_first in the first, of_last in the last if it is a different one, of_each between.
   std::int32_t first = 0, last = 0;
   double of_first = 0, of_each = 0, of_last = 0;
   // The patch of surface: cosine of the incidence, how far its ranges are from range_m, how many of the cell's rays met it.
@@ -57,7 +57,7 @@ class RangeReturns {
   }
   /// Returns of the point targets that are not hidden.
   std::vector<PointReturn> of_points() const;
-  /// Speckle of a return in one of its range cells, where it is to have one of its own in each of them.
+  /// Speckle of a return in one range cell, for returns whose speckle differs from cell to cell.
   ComplexNormal speckle_in(const RangeReturn& r, std::ptrdiff_t cell) const {
     return draws_[(r.draw + static_cast<std::uint32_t>(cell) * 389u) % static_cast<std::uint32_t>(draws_.size())];
   }

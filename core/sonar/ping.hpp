@@ -44,7 +44,7 @@ struct Switches {
   bool specular = true;
   bool texture = true;
   bool volume = true;
-  bool multipath = false;  // costs a second look at the scene for every mirror
+  bool multipath = false;  // traces the scene once more for every mirror
   bool motion = true;
   bool doppler = true;
   bool conical = true;
@@ -58,7 +58,7 @@ struct Switches {
   bool defocus = true;
   bool shared_noise = true;
   bool truncation = true;
-  bool interleave = false;  // costs as many pings as a picture is made of
+  bool interleave = false;  // computes one ping for each ping that a picture is made of
 
   bool operator==(const Switches&) const = default;
 };
@@ -97,9 +97,9 @@ struct Twist {
   Vec3d angular_rate_radps;  // sonar axes
 };
 
-/// Base of what a vendor's protocol keeps beside PingSettings, such as the client's own request; core only carries it, so that a
-/// ping is framed with the settings it was made with; but those that are RangeImageSettings (core/sonar/range_image.hpp) make the
-/// ping a range image.
+/// Base of what a vendor's protocol keeps beside PingSettings, such as the client's own request; core does not read it: a
+/// ping is framed with the settings that it was made with. Exception: with RangeImageSettings (core/sonar/range_image.hpp) the
+/// ping is a range image.
 struct VendorSettings {
   virtual ~VendorSettings() = default;
   /// Whether a client would see no difference; both are of the same vendor.

@@ -32,8 +32,8 @@ struct BeamPattern {
 struct BeamProfile {
   std::vector<float> noise_db;       // receiver noise re (30), far from the sonar
   std::vector<float> near_noise_db;  // and at range 0; as long as noise_db
-  float near_m = 0.2f;               // the far one's share grows as 1 - e^{-r / near_m}
-  std::vector<float> blend;          // amplitude that a beam receives of either neighbour half a beam width away, re its own
+  float near_m = 0.2f;               // noise_db's share at range r is 1 - e^{-r / near_m}
+  std::vector<float> blend;          // amplitude of each neighbour, half a beam width away, in a beam, re its own
 };
 
 /// Noise that receive channels share, with opposite signs in neighbours (docs/acoustics.md, section 5).
@@ -55,7 +55,7 @@ struct ReceiverModel {
   float tvg_ceiling_db = 80;  // infinity switches it off
   float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
-  float noise_width = 1;  // -3 dB width of the noise's filter in range over the pulse's; a measured pulse's noise has the pulse's
+  float noise_width = 1;      // -3 dB width of the noise filter divided by the pulse's; with a measured pulse it is the pulse's
   float crosstalk_db = -200;  // amplitude that every channel leaks to every beam, re the channel; below -150 = none
   float leak_upa = 0;         // rms pressure of the transmitter's direct leakage, at range 0; 0 = none
   float leak_decay_db_per_m = 30;
@@ -88,7 +88,8 @@ struct FrequencyMode {
   /// listed: -3 dB width of each beam in azimuth, in its own direction; empty = pattern.azimuth_width_rad at broadside for all,
   /// which widens as 1 / cos(azimuth). The noise level is that of a beam of the pattern's width.
   std::vector<float> beam_widths_rad;
-  /// Neighbouring beams are of so many successive pings, the last beam of the first (docs/acoustics.md, section 6).
+  /// Number of successive pings that neighbouring beams come from; the last beam is from the first ping (docs/acoustics.md,
+  /// section 6).
   int interleaved_pings = 1;
   BeamPattern pattern;
   Waveform waveform;

@@ -13,7 +13,7 @@ namespace sonar::mavlink {
 /// The newest attitudes, by their own time.
 class Attitudes {
  public:
-  /// Longest step across which two are interpolated, and from which on an attitude is too old for a place.
+  /// Longest time between two attitudes that are interpolated. An attitude older than this is too old for a position.
   static constexpr std::int64_t longest_gap_ms = 1000;
   /// Limit of extrapolation of the newest attitude by its rates.
   static constexpr std::int64_t longest_carry_ms = 20;

@@ -67,7 +67,7 @@ class Decoder {
   Framer framer_{Sender::device};
 };
 
-/// The broken ones of the identities of a ping result that drivers enforce (identities.cpp).
+/// The identities that drivers enforce and this ping result violates (identities.cpp).
 std::vector<std::string> identity_violations(const DecodedPing& ping);
 /// The differences between a request and its echo that drivers check. `gain_echo` as the option.
 std::vector<std::string> echo_violations(const FireRequest& sent, const DecodedPing& ping, std::string_view gain_echo = "auto");

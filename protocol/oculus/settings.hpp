@@ -11,7 +11,7 @@
 
 namespace sonar::oculus {
 
-/// 37.5 MHz / 143, exact in the capture (M1200d mode 2). unknown: other modes; the same is used.
+/// 37.5 MHz / 143, exact in the capture (M1200d mode 2). unknown: the rate of other modes; the same is used.
 inline constexpr double row_rate_hz = 37.5e6 / 143.0;
 inline constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus issue 13: 0-100 % is 0-96 dB
 inline constexpr int row_limit = 720;             // liboculus node README, measured by its authors
@@ -31,8 +31,8 @@ double table_rate_hz(PingRate rate);
 float gamma_from_byte(std::uint8_t value);
 /// Bits, saturation, gamma and row gains that a fire message asks for.
 SampleFormat sample_format(const FireRequest& fire);
-/// The gain as echoed, per cent (docs/protocols/oculus.md, 5.5): mode 2 without flag bit 4 is mapped to 40 + 0.6 g, see option
-/// gain_echo.
+/// The gain as echoed, per cent (docs/protocols/oculus.md, 5.5): in mode 2 without flag bit 4 a gain of g is echoed as 40 + 0.6
+/// g, see option gain_echo.
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo);
 
 /// Option gain_assist: which state of flag bit 4, if any, leaves the gain to the device.

@@ -1,4 +1,4 @@
-// The plain byte stream of a device, without times: messages back to back (docs/recording.md, "Raw dumps").
+// The plain byte stream of a device, without times: messages back to back (docs/recording.md).
 #pragma once
 
 #include <memory>

@@ -37,7 +37,7 @@ class SonarStatus;
 
 class Device;
 
-/// A device's needs of the daemon beside the network; outlives it.
+/// The daemon as a device uses it, besides DeviceNetwork. It outlives the device.
 class DeviceParent {
  public:
   virtual ~DeviceParent() = default;
@@ -47,7 +47,7 @@ class DeviceParent {
   virtual void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) = 0;
   /// The device has stopped for good.
   virtual void on_stop(const Device& of, const std::string& why) = 0;
-  /// Something stepped time, or the end, may have waited for.
+  /// Something changed that stepped time or the shutdown may be waiting for.
   virtual void on_change() = 0;
   /// The daemon cannot go on.
   virtual void on_engine_failure(const Error& why) = 0;
