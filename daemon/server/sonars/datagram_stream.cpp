@@ -49,18 +49,24 @@ void DatagramStream::send_nothing_to(const Endpoint& to) {
   socket_.send_to(asio::const_buffer(), {address_of(to.ip), to.port}, 0, ignored);
 }
 
-/// Waits for the next message. A silent host is looked for after half of the permitted time and given up after all of it.
+/// Waits for the next message. A silent host is looked for four times in the second half of the permitted time, since an answer
+/// can be lost, and then given up. After a delay of the daemon it is looked for before it is given up, too.
 asio::awaitable<void> DatagramStream::wait() {
+  constexpr int most_looks = 4;
   const auto longest = parent_.longest_silence(id_);
-  wake_.expires_at(longest ? heard_at_ + (looked_ ? *longest : *longest / 2) : asio::steady_timer::time_point::max());
+  auto next_look = asio::steady_timer::time_point::max();
+  if (longest) next_look = looks_ == 0 ? heard_at_ + *longest / 2 : looked_at_ + *longest / (2 * most_looks);
+  wake_.expires_at(next_look);
   error_code ec;
   co_await wake_.async_wait(into(ec));
   if (ec || !longest) co_return;
-  const auto silent_for = std::chrono::steady_clock::now() - heard_at_;
-  if (silent_for >= *longest)
+  if (looks_ == most_looks) {
     finish("silent for " + std::to_string(longest->count() / 1000) + " s");
-  else if (silent_for >= *longest / 2 && !std::exchange(looked_, true))
-    parent_.look_for_host(id_);
+    co_return;
+  }
+  ++looks_;
+  looked_at_ = std::chrono::steady_clock::now();
+  parent_.look_for_host(id_);
 }
 
 /// False: the socket was closed before the message was whole. A receiver that is removed in the meantime gets no more parts.

@@ -26,7 +26,7 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   /// Call it when a request of the host arrived, or another sign that the host is alive.
   void heard() {
     heard_at_ = std::chrono::steady_clock::now();
-    looked_ = false;
+    looks_ = 0;
     wake_.cancel();  // the request may have set another limit of silence
   }
   ConnectionId id() const { return id_; }
@@ -42,8 +42,9 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   ConnectionId id_;
   std::chrono::nanoseconds gap_;
   asio::steady_timer wake_, pause_;
-  std::chrono::steady_clock::time_point heard_at_ = std::chrono::steady_clock::now();
-  bool finishing_ = false, looked_ = false, by_host_ = false;
+  std::chrono::steady_clock::time_point heard_at_ = std::chrono::steady_clock::now(), looked_at_;
+  int looks_ = 0;  // since then
+  bool finishing_ = false, by_host_ = false;
   std::string why_;
 };
 

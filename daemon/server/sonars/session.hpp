@@ -37,7 +37,7 @@ class SessionParent {
   virtual void on_not_sent(ConnectionId stream) = 0;
   /// A peer that sends nothing for longer is disconnected. nullopt: no limit.
   virtual std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const = 0;
-  /// The host of a stream has been silent for half of that: it may be asked for a sign.
+  /// The host of a stream has been silent for half of that or longer: it may be asked for a sign.
   virtual void look_for_host(ConnectionId stream) = 0;
   /// It ends after the message being written.
   virtual void on_finish(ConnectionId session) = 0;

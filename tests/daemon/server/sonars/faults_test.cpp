@@ -4,26 +4,17 @@
 #include "daemon/server/poses/pose_server.hpp"
 #include "daemon/server/sonars/session.hpp"
 #include "tests/daemon/server/loopback.hpp"
+#include "tests/daemon/server/sonars/session_parent.hpp"
 
 namespace sonar::testing_daemon {
 namespace {
 
 using ::testing::HasSubstr;
 
-struct ThrowingParent final : SessionParent {
-  std::string fault, why;
+struct ThrowingParent final : QuietParent {
+  std::string fault;
   void on_bytes(ConnectionId, protocol::BytesView) override { throw std::runtime_error("no such luck"); }
-  Outbox::Message next_message(ConnectionId) override { return {}; }
-  std::vector<Endpoint> receivers(ConnectionId) override { return {}; }
-  void look_for_host(ConnectionId) override {}
-  void on_sent(ConnectionId, std::size_t) override {}
-  void on_not_sent(ConnectionId) override {}
-  std::optional<milliseconds> longest_silence(ConnectionId) const override { return std::nullopt; }
-  void on_finish(ConnectionId) override {}
-  void on_written(ConnectionId, const Outbox::Message&) override {}
   void on_fault(const std::string& what) override { fault = what; }
-  void on_send_error(const Endpoint&, const std::string&) override {}
-  void on_over(ConnectionId, const std::string& reason, bool) override { why = reason; }
 };
 
 TEST(Faults, EndTheSessionTheyHappenIn) {

@@ -6,6 +6,7 @@
 #include <deque>
 
 #include "tests/daemon/server/loopback.hpp"
+#include "tests/daemon/server/sonars/session_parent.hpp"
 
 namespace sonar::testing_daemon::session_test {
 namespace {
@@ -13,31 +14,16 @@ namespace {
 using std::chrono::duration_cast;
 using ::testing::ElementsAre;
 
-struct Parent final : SessionParent {
+struct Parent final : QuietParent {
   std::deque<Outbox::Message> messages;
   int written = 0;
-  std::string why;
-  bool client_left = false;
-  void on_bytes(ConnectionId, protocol::BytesView) override {}
   Outbox::Message next_message(ConnectionId) override {
     if (messages.empty()) return {};
     Outbox::Message next = std::move(messages.front());
     messages.pop_front();
     return next;
   }
-  std::vector<Endpoint> receivers(ConnectionId) override { return {}; }
-  void look_for_host(ConnectionId) override {}
-  void on_sent(ConnectionId, std::size_t) override {}
-  void on_not_sent(ConnectionId) override {}
-  std::optional<milliseconds> longest_silence(ConnectionId) const override { return std::nullopt; }
-  void on_finish(ConnectionId) override {}
   void on_written(ConnectionId, const Outbox::Message&) override { ++written; }
-  void on_fault(const std::string& what) override { ADD_FAILURE() << what; }
-  void on_send_error(const Endpoint&, const std::string&) override {}
-  void on_over(ConnectionId, const std::string& reason, bool by_client) override {
-    why = reason;
-    client_left = by_client;
-  }
 };
 
 Outbox::Message shaped(const std::string& text, Outbox::Shape shape) {
