@@ -30,6 +30,14 @@ MESSAGES = {
                       "float[21] velocity_covariance", "uint8_t reset_counter, uint8_t estimator_type, int8_t quality"),
     "VFR_HUD": (74, "float airspeed, float groundspeed, int16_t heading, uint16_t throttle, float alt, float climb", ""),
 }
+# The same, of messages that sonard sends and never reads: without golden frames.
+SENT = {
+    "COMMAND_ACK": (77, "uint16_t command, uint8_t result",
+                    "uint8_t progress, int32_t result_param2, uint8_t target_system, uint8_t target_component"),
+    "DISTANCE_SENSOR": (132, "uint32_t time_boot_ms, uint16_t min_distance, uint16_t max_distance, uint16_t current_distance, "
+                             "uint8_t type, uint8_t id, uint8_t orientation, uint8_t covariance",
+                        "float horizontal_fov, float vertical_fov, float[4] quaternion, uint8_t signal_quality"),
+}
 CODES = {"uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i", "uint64_t": "Q", "float": "f"}
 
 
@@ -58,7 +66,7 @@ class Field:
 class Layout:
     def __init__(self, name):
         self.name = name
-        self.id, base, extensions = MESSAGES[name]
+        self.id, base, extensions = (MESSAGES | SENT)[name]
         self.base = sorted((Field(f) for f in base.split(", ")), key=lambda f: -f.size)  # stable
         self.extensions = [Field(f) for f in extensions.split(", ")] if extensions else []
         seed = name.encode() + b" "
@@ -68,7 +76,7 @@ class Layout:
         self.crc_extra = (crc & 0xFF) ^ (crc >> 8)
 
 
-LAYOUTS = {name: Layout(name) for name in MESSAGES}
+LAYOUTS = {name: Layout(name) for name in MESSAGES | SENT}
 
 
 class Speaker:

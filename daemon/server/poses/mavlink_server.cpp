@@ -143,6 +143,7 @@ void MavlinkServer::look_at_wants(Link& link) {
 void MavlinkServer::on_distance(const SonarConfig& sonar, const PingQueued& ping) {
   if (sonar.vehicle >= config_.vehicles.size()) return;
   const std::string& vehicle = config_.vehicles[sonar.vehicle].name;
+  if (!wants_distances(vehicle)) return;
   const PingRequest& request = ping.ping->request;
   const FrequencyMode& mode = ping.ping->mode();
   mavlink::Measured measured;
