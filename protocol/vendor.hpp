@@ -144,8 +144,8 @@ class Vendor {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};
   }
-  /// Where a message has this field. If `message` is empty: its place in the vendor's layout with the most fields. nullopt: there
-  /// is no such field, or the message is too short.
+  /// Where a message has this field. If `message` is empty: its place in the vendor's layout with the most fields. nullopt: the
+  /// message has no such field or is too short.
   virtual std::optional<Field> field(Part part, FieldName name, BytesView message) const {
     static_cast<void>(part), static_cast<void>(name), static_cast<void>(message);
     return {};

@@ -33,9 +33,9 @@ class DistanceRequests {
 
   bool wanted() const { return interval_us_ || once_; }
   void ask_once() { once_ = true; }
-  /// As in MAV_CMD_SET_MESSAGE_INTERVAL: -1 = none, 0 = all. False: it is no such number, and nothing changes.
+  /// As in MAV_CMD_SET_MESSAGE_INTERVAL: -1 = none, 0 = all. Any other number below 0, or NaN, returns false and changes nothing.
   bool set_interval_us(float wanted);
-  /// Whether this one is sent; counts it as sent then.
+  /// True if this one is to be sent; it then counts as sent.
   bool is_due(const DistanceSensor& measured);
 
  private:

@@ -100,7 +100,7 @@ class Faults {
   void begin_ping(std::uint32_t number, Time now);
   /// The ping as the device reports it: its samples and stamps.
   std::shared_ptr<const Ping> altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state, Time now);
-  /// Whether alter_datagrams() has something to do for this ping. Without it the clients of a port share the datagrams.
+  /// True if alter_datagrams() has something to do for this ping. Else the clients of a port share the datagrams.
   bool alters_datagrams(const Connection& stream, std::uint32_t ping) const;
   void alter_datagrams(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
   bool leaves_group() const;
@@ -113,8 +113,8 @@ class Faults {
     std::size_t collect = 0;
   };
   Hold hold(const Connection& to, std::uint32_t ping, Time now);
-  /// Whether the sonar itself sends nothing of this ping to anyone: it is withheld, dropped, or the device is off. Faults of
-  /// links and of single clients are not meant.
+  /// True if the sonar itself sends nothing of this ping to anyone: the ping is withheld or dropped, or the device is off. Faults
+  /// of links and of single clients do not count.
   bool withholds(std::uint32_t ping, Time now) const;
   /// Factor of the present rate; 0 = no pings.
   double rate_factor() const;

@@ -154,7 +154,7 @@ void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Conne
   }
 }
 
-/// Whether the datagrams of this stream are the messages in which faults of framing change bytes.
+/// True if faults of framing change bytes of this stream's datagrams.
 bool Faults::frames_datagrams(const Connection& stream) const {
   return stream.role == Role::client || around_.vendor.pings_by() == protocol::PingsBy::datagrams;
 }

@@ -36,9 +36,9 @@ class PingSource {
   // ---- when pings are due
 
   bool wants_pings() const;
-  /// Whether the sonar pings by itself, at the rate of its settings, while it has no client.
+  /// Sets whether the sonar pings by itself, at the rate of its settings, while it has no client.
   void run_itself(bool on, Time now);
-  /// It does so now.
+  /// True while it does so.
   bool runs_itself() const { return runs_itself_ && !audience_.stopping() && !audience_.has_audience(); }
   /// The pacer runs while pings are wanted, at the requested rate times the factor of faults.
   void update_pacer(Time now);

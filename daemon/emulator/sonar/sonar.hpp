@@ -109,7 +109,7 @@ class Sonar {
   void move(const SonarConfig& config, Time now);
   void use_water(const Water& water, Time now) { source_.use_water(water, now); }
 
-  /// Why this sonar cannot have these faults, as a sentence: its vendor has no such thing, or another fault writes the same part.
+  /// Why this sonar cannot have these faults; nullopt = it can.
   std::optional<FaultRefusal> why_no_faults(const std::vector<Fault>& faults) const { return faults_.why_not(faults); }
   /// Those of `faults` that are for this sonar and take effect on it.
   Actions add_faults(const std::vector<Fault>& faults, bool manual, Time now);

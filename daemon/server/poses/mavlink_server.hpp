@@ -30,7 +30,7 @@ class MavlinkServer {
   void inject_failures_with(mavlink::InjectFailure inject) { inject_ = std::move(inject); }
   /// Call it before open(). `tell` is called when a vehicle began or ceased to want distances (wants_distances).
   void on_distances_wanted(std::function<void()> tell) { distances_wanted_ = std::move(tell); }
-  /// Whether a link of that vehicle sends the distances of its range finders.
+  /// True if a link of that vehicle sends the distances of its range finders.
   bool wants_distances(const std::string& vehicle) const;
   /// Sends the distance of a ping to the vehicle of the sonar, a range finder.
   void on_distance(const SonarConfig& sonar, const PingQueued& ping);
