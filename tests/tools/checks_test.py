@@ -59,11 +59,11 @@ class Configure(unittest.TestCase):
 
     def test_sanitized_programs_with_clang_and_its_warnings_as_errors(self):
         done = self.configured("exit 0")
-        self.assertEqual((done.stdout, done.stderr), ("needs clang libclang-rt-dev\nasan -DSONAR_WERROR=ON\n", ""))
+        self.assertEqual((done.stdout, done.stderr), ("needs clang libclang-rt-dev lld\nasan -DSONAR_WERROR=ON\n", ""))
 
     def test_sanitized_programs_with_the_default_compiler_where_clang_links_none(self):
         done = self.configured("exit 1")
-        self.assertIn("\nasan -DCMAKE_C_COMPILER=cc -DCMAKE_CXX_COMPILER=c++ -DSONAR_WERROR=OFF\n", done.stdout)
+        self.assertIn("\nasan -DCMAKE_C_COMPILER=cc -DCMAKE_CXX_COMPILER=c++ -DCMAKE_EXE_LINKER_FLAGS= -DSONAR_WERROR=OFF\n", done.stdout)
         self.assertIn("no clang that links sanitized programs", done.stderr)
 
     def test_anew_when_the_compiler_changed(self):

@@ -9,9 +9,9 @@ product_packages=(
 )
 build_packages=("${product_packages[@]}" libeigen3-dev libgtest-dev libgmock-dev)
 
-# Sanitized programs and fuzzers are compiled with the system's own clang (14 on Debian 12, 19 on Debian 13), in half of g++'s time;
-# thereby a second compiler reads the tree.
-clang_packages=(clang libclang-rt-dev)
+# Sanitized programs and fuzzers are compiled with the system's own clang (14 on Debian 12, 19 on Debian 13), which takes half to
+# two thirds of g++'s time for them, and linked with lld in a quarter of the time; thereby a second compiler reads the tree.
+clang_packages=(clang libclang-rt-dev lld)
 
 # For the page of the live view; without them the daemon is built without it.
 page_packages=(esbuild libjs-three)
@@ -122,7 +122,7 @@ configure() {
 clang_sanitizes() {
   local program status
   program=$(mktemp)
-  clang++ -fsanitize=address,undefined -x c++ -o "$program" - <<<'int main() {}' >/dev/null 2>&1
+  clang++ -fsanitize=address,undefined -fuse-ld=lld -x c++ -o "$program" - <<<'int main() {}' >/dev/null 2>&1
   status=$?
   rm -f "$program"
   return $status
@@ -136,7 +136,7 @@ configure_sanitized() {
     configure "$1" -DSONAR_WERROR="${SONAR_WERROR:-OFF}"
   else
     echo "no clang that links sanitized programs (${clang_packages[*]}): $(c++ --version | head -n 1) takes its place" >&2
-    configure "$1" -DCMAKE_C_COMPILER=cc -DCMAKE_CXX_COMPILER=c++ -DSONAR_WERROR=OFF
+    configure "$1" -DCMAKE_C_COMPILER=cc -DCMAKE_CXX_COMPILER=c++ -DCMAKE_EXE_LINKER_FLAGS= -DSONAR_WERROR=OFF
   fi
 }
 
