@@ -5,7 +5,7 @@
 #include "core/pipeline/receive.hpp"
 #include "core/pipeline/truth.hpp"
 #include "core/pipeline/volume.hpp"
-#include "cuda/making_ping.hpp"
+#include "cuda/prepare_ping.hpp"
 
 namespace sonar::cuda {
 

@@ -5,7 +5,6 @@
 #include <cstring>
 
 #include "core/pipeline/interference.hpp"
-#include "cuda/making_ping.hpp"
 
 namespace sonar::cuda {
 namespace {

@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/config/load_config.hpp"
+
 namespace sonar {
 namespace {
 

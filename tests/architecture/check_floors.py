@@ -53,10 +53,8 @@ FLOORS = {
     "clients/bvtsdk": ["clients/bvtsdk/", "protocol/blueview/link.hpp"],  # loaded into foreign processes: only constants are shared
     "tests": [""],
 }
-# The folders in these include each other in one direction only.
-ONE_DIRECTION = r"daemon/|protocol/|core/|clients/sonarctl/|cuda/"
-# So do the components in these: a header and the sources of the same name.
-COMPONENTS_IN_ONE_DIRECTION = r"protocol/|core/pipeline/|clients/sonarctl/"
+# In these, folders include each other in one direction only; so do components: a header and the sources of the same name.
+ONE_DIRECTION = r"daemon/|protocol/|core/|clients/|cuda/"
 # The list of makes includes them all, and nothing includes it.
 LISTS = {"protocol/makes.cpp"}
 # Headers that go to other people's include folders find each other by name alone.
@@ -296,8 +294,8 @@ def violations(root):
             for match in re.finditer(pattern, searched):
                 yield f"{name}:{line_of(searched, match.start())}: {rule}: \"{match.group().strip()}\"; {why}"
     yield from circle_violations(includes, folder_of, "folders")
-    within = [i for i in includes if re.match(COMPONENTS_IN_ONE_DIRECTION, i[0]) and re.match(COMPONENTS_IN_ONE_DIRECTION, i[2])]
-    yield from circle_violations(within, component_of, "components")
+    in_one_folder = [i for i in includes if folder_of(i[0]) == folder_of(i[2])]  # those of several folders close a circle of folders too
+    yield from circle_violations(in_one_folder, component_of, "components")
 
 
 def main():

@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "clients/sonarctl/ping_stream.hpp"
+#include "daemon/config/load_config.hpp"
 #include "daemon/server/app.hpp"
 #include "daemon/server/engine/choose_engine.hpp"
 #include "daemon/server/system/real_time.hpp"

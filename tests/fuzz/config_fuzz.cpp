@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "daemon/config/config.hpp"
+#include "daemon/config/load_config.hpp"
 
 namespace {
 

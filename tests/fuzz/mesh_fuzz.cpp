@@ -2,6 +2,7 @@
 // byte odd: corners of polygons of any size, cut into triangles first. What comes out is a sound mesh, or a sentence.
 #include <vector>
 
+#include "core/scene/files/clean_mesh.hpp"
 #include "core/scene/shapes/polygon.hpp"
 #include "tests/fuzz/mesh_script.hpp"
 

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <thread>
 
+#include "daemon/config/load_config.hpp"
 #include "daemon/server/app.hpp"
 #include "tests/load/premade_engine.hpp"
 

@@ -8,7 +8,6 @@
 #include <new>
 
 #include "clients/bvtsdk/core/degrees.hpp"
-#include "clients/bvtsdk/core/image_filter.hpp"
 #include "clients/bvtsdk/core/sample_grid.hpp"
 
 namespace sonar::bvt {
@@ -216,7 +215,7 @@ Code Imager::make(const PolarPing& ping, ImageType type, const ImageSettings& se
                                  grid.view().bins};
       lookup_for(key)->apply(grid.view(), image.pixels.data());
     }
-    filter_image(settings.filter_flags, image);
+    filter_image(settings.filter_flags, image.height, image.width, image.pixels);
   } catch (const std::bad_alloc&) {
     image = {};
     return memory_alloc;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/bvtsdk/core/codes.hpp"
+#include "clients/bvtsdk/core/image_filter.hpp"
 #include "clients/bvtsdk/core/polar_lookup.hpp"
 #include "clients/bvtsdk/core/polar_ping.hpp"
 
@@ -25,9 +26,6 @@ enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 enum class XyBottom { sector, sonar };
 /// BVE_XY=sector or sonar; default sector.
 XyBottom xy_bottom_from_environment();
-
-/// The lowest set flag wins (verified values; chosen: applied to the finished image).
-enum FilterFlags : int { no_filter = 0, mean_3x3 = 2, mean_9x2 = 16 };
 
 struct ImageSettings {
   ImageRes resolution = ImageRes::automatic;

@@ -1,16 +1,45 @@
-// Building one tile of surface cells from the triangles that touch its cube. Pure: the same arguments give the same bytes.
+// A tile of surface cells, and how it is built from the triangles that touch its cube. Pure: the same arguments give the same
+// bytes.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
+#include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
-#include "core/scene/cells/surface_cells.hpp"
 #include "core/scene/scene.hpp"
 
 namespace sonar {
 
 class TextureField;
+
+/// Up to 16 x 16 cells (more where patches overlap) in a cube of the lattice, in one allocation of int16 columns.
+/// Positions are relative to the cube's centre. Padding cells have zero weight.
+struct CellTile {
+  int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
+  Vec3d centre_m;                                     // object coordinates
+  float half_edge_m = 0;                              // half an edge of the cube
+  Vec3 box_middle_m, box_half_m;                      // the box round its cells, from the centre, object axes
+  float position_unit_m = 0;
+  float weight_unit = 0;           // xi * sqrt(cell area) [m] per count
+  std::uint64_t weights_hash = 0;  // of the first block's weights: tells tiles apart whose memory is reused
+  int count = 0;                   // padded to a multiple of CellTile::block
+  int stride = 0;                  // int16 values per column
+  std::unique_ptr<std::int16_t[]> data;
+
+  static constexpr int block = 16;
+  static constexpr float normal_unit = 1.0f / 32767.0f;
+  enum Column { x, y, z, normal_x, normal_y, normal_z, weight_re, weight_im, columns };
+  const std::int16_t* column(Column c) const { return data.get() + static_cast<std::ptrdiff_t>(c) * stride; }
+  /// Place of a cell in the middle of the tile, from the tile's centre, which need not be on the surface. Object axes.
+  Vec3d middle_cell_m() const {
+    const auto along = [this, unit = static_cast<double>(position_unit_m)](Column c) { return unit * column(c)[count / 2]; };
+    return {along(x), along(y), along(z)};
+  }
+  std::size_t bytes() const { return static_cast<std::size_t>(stride) * columns * sizeof(std::int16_t); }
+};
 
 /// Which lattice cube, of which patch: the triangles of one object that share material, dominant axis and side.
 struct TileAddress {

@@ -8,7 +8,6 @@
 #include <tuple>
 
 #include "core/scene/cells/cell_lattice.hpp"
-#include "core/scene/cells/cell_tile.hpp"
 #include "core/scene/cells/surface_patch.hpp"
 #include "core/scene/cells/texture.hpp"
 
@@ -151,7 +150,7 @@ void SurfaceCells::forget_known() {
 
 SurfaceCells::~SurfaceCells() = default;
 
-void SurfaceCells::list(Node& node, bool of_side, const TileInView& seen, Found& found) {
+void SurfaceCells::list(CellNode& node, bool of_side, const TileInView& seen, Found& found) {
   const bool built = of_side ? node.side_built : node.built;
   const Missing missing{&node, of_side};
   // Listed only once, even if two levels need it.
@@ -159,7 +158,7 @@ void SurfaceCells::list(Node& node, bool of_side, const TileInView& seen, Found&
   if (!built || seen.tile->count > 0) found.in_view.push_back(seen);
 }
 
-void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Found& found) {
+void SurfaceCells::visit(SurfacePatch& patch, CellNode& node, const Look& look, Found& found) {
   const CellView& view = *look.view;
   const auto object = static_cast<std::size_t>(patch.object);
   const Pose& sonar_in_object = look.sonar_in_object[object];
@@ -203,7 +202,7 @@ void SurfaceCells::visit(SurfacePatch& patch, Node& node, const Look& look, Foun
   }
   if (!finer || node.alone) return;
   if (!node.divided.load(std::memory_order_acquire)) {
-    const std::lock_guard lock(dividing_[reinterpret_cast<std::uintptr_t>(&node) / sizeof(Node) % dividing_.size()]);
+    const std::lock_guard lock(dividing_[reinterpret_cast<std::uintptr_t>(&node) / sizeof(CellNode) % dividing_.size()]);
     if (!node.divided.load(std::memory_order_relaxed)) found.new_bytes += patch.divide(node);
   }
   for (const auto& child : node.children) {  // they are scattered in memory, so all are prefetched before the first
@@ -252,14 +251,14 @@ void SurfaceCells::look_through(const Look& look, std::size_t from, std::size_t 
   found.new_bytes = 0;
   const int coarsest = coarsest_wanted(*look.view);
   for (std::size_t r = from; r < to; ++r) {
-    Node& root = *roots_[r].node;
+    CellNode& root = *roots_[r].node;
     if (!root.alone || root.address.level >= coarsest) visit(*roots_[r].patch, root, look, found);
   }
 }
 
 void SurfaceCells::build(std::vector<Missing>& missing, Parallel& pool) {
   pool.for_each(missing.size(), [&](std::size_t n, int) {
-    Node& node = *missing[n].node;
+    CellNode& node = *missing[n].node;
     const bool of_side = missing[n].of_side;
     const TileAddress& a = node.address;
     const auto material = static_cast<std::size_t>(a.material);

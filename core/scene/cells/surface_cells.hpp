@@ -17,65 +17,12 @@
 #include "core/base/geometry.hpp"
 #include "core/base/parallel.hpp"
 #include "core/base/units.hpp"
+#include "core/scene/cells/cell_tile.hpp"
+#include "core/scene/cells/cell_view.hpp"
 #include "core/scene/closed_mesh.hpp"
 #include "core/scene/scene.hpp"
 
 namespace sonar {
-
-/// Up to 16 x 16 cells (more where patches overlap) in a cube of the lattice, in one allocation of int16 columns.
-/// Positions are relative to the cube's centre. Padding cells have zero weight.
-struct CellTile {
-  int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
-  Vec3d centre_m;                                     // object coordinates
-  float half_edge_m = 0;                              // half an edge of the cube
-  Vec3 box_middle_m, box_half_m;                      // the box round its cells, from the centre, object axes
-  float position_unit_m = 0;
-  float weight_unit = 0;           // xi * sqrt(cell area) [m] per count
-  std::uint64_t weights_hash = 0;  // of the first block's weights: tells tiles apart whose memory is reused
-  int count = 0;                   // padded to a multiple of CellTile::block
-  int stride = 0;                  // int16 values per column
-  std::unique_ptr<std::int16_t[]> data;
-
-  static constexpr int block = 16;
-  static constexpr float normal_unit = 1.0f / 32767.0f;
-  enum Column { x, y, z, normal_x, normal_y, normal_z, weight_re, weight_im, columns };
-  const std::int16_t* column(Column c) const { return data.get() + static_cast<std::ptrdiff_t>(c) * stride; }
-  /// Place of a cell in the middle of the tile, from the tile's centre, which need not be on the surface. Object axes.
-  Vec3d middle_cell_m() const {
-    const auto along = [this, unit = static_cast<double>(position_unit_m)](Column c) { return unit * column(c)[count / 2]; };
-    return {along(x), along(y), along(z)};
-  }
-  std::size_t bytes() const { return static_cast<std::size_t>(stride) * columns * sizeof(std::int16_t); }
-};
-
-/// Ranges in which the cells of one level (size 2^-level m) are used; neighbours cross-fade (weights add to one in power).
-struct CellLevel {
-  int level = 0;
-  float fade_in_from_m = 0, full_from_m = 0, full_to_m = 0, fade_out_to_m = 0;
-};
-
-struct DistanceSpan {
-  double nearest_m = 0, farthest_m = 0;
-};
-
-/// Outer bounds of a ping's view, in the sonar's frame.
-struct CellView {
-  Pose sonar_in_world;
-  std::span<const Pose> bodies_in_world;
-  float min_range_m = 0, max_range_m = 0;
-  float max_sine = 1;             // |y / r| of the outermost column
-  float max_elevation_rad = 1;    // half angle of the fan about the array axis
-  std::vector<CellLevel> levels;  // coarsest first
-  // Fans with side lobes: the main part, about the array axis, and where the rest begins. Cells of a whole cube there have one
-  // level, and beyond `side_coarser` levels above the coarsest of `levels` they are no coarser.
-  float main_elevation_rad = 2, side_from_rad = 2;
-  float side_area_per_range_m = 0;  // area of a cell on a surface that is grazed, over its range; a steep one has larger cells
-  int side_coarser = 0;
-  bool exact_small = false;  // objects of few cells get finer ones: where no speckle hides which place each has
-  /// When set, stands for the bounds of the fan: between which distances a ball about a place in the sonar's axes is seen, which
-  /// mirrors can make farther than it is; nothing when it is not.
-  std::function<std::optional<DistanceSpan>(Vec3d from_sonar_m, double radius_m)> seen_between;
-};
 
 /// A tile in view and where the sonar is, seen from it.
 struct TileInView {
@@ -94,7 +41,9 @@ struct CellsInView {
   std::size_t built = 0;                    // tiles that were missing, also where another view of the call wanted them too
 };
 
+class SurfacePatch;
 class TextureField;
+struct CellNode;
 
 /// Which random fields of the materials the cells carry.
 struct CellFields {
@@ -137,14 +86,12 @@ class SurfaceCells {
   std::size_t built_last_time() const { return built_; }
 
  private:
-  class SurfacePatch;
-  struct Node;
   struct Root {
     SurfacePatch* patch;
-    Node* node;
+    CellNode* node;
   };
   struct Missing {  // a tile that is not built yet
-    Node* node;
+    CellNode* node;
     bool of_side;  // the tile for side lobes
     auto operator<=>(const Missing&) const = default;
   };
@@ -174,8 +121,8 @@ class SurfaceCells {
   void prepare(const CellView& view, std::uint64_t number, Look& look) const;
   /// Through the roots [from, to).
   void look_through(const Look& look, std::size_t from, std::size_t to, Found& found);
-  void visit(SurfacePatch& patch, Node& node, const Look& look, Found& found);
-  void list(Node& node, bool of_side, const TileInView& seen, Found& found);
+  void visit(SurfacePatch& patch, CellNode& node, const Look& look, Found& found);
+  void list(CellNode& node, bool of_side, const TileInView& seen, Found& found);
   void build(std::vector<Missing>& missing, Parallel& pool);
   void keep_within_budget();
 

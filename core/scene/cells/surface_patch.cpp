@@ -30,10 +30,10 @@ int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles, in
 
 }  // namespace
 
-void SurfaceCells::SurfacePatch::plant(const std::vector<std::uint32_t>& triangles) {
+void SurfacePatch::plant(const std::vector<std::uint32_t>& triangles) {
   const int level = root_level(*mesh, triangles, finest_root);
   const double e = lattice::tile_edge_m(level);
-  std::map<std::tuple<std::int32_t, std::int32_t, std::int32_t>, std::unique_ptr<Node>> planted;
+  std::map<std::tuple<std::int32_t, std::int32_t, std::int32_t>, std::unique_ptr<CellNode>> planted;
   const auto index = [&](double x) { return static_cast<std::int32_t>(std::floor(x / e)); };
   for (const std::uint32_t t : triangles) {
     const lattice::Facet f = lattice::facet_of(*mesh, t, axis);
@@ -49,7 +49,7 @@ void SurfaceCells::SurfacePatch::plant(const std::vector<std::uint32_t>& triangl
           if (!may_touch(bounds, cube_of(a))) continue;
           auto& node = planted[{i, j, k}];
           if (!node) {
-            node = std::make_unique<Node>();
+            node = std::make_unique<CellNode>();
             node->address = a;
           }
           node->triangles.push_back(t);
@@ -58,16 +58,16 @@ void SurfaceCells::SurfacePatch::plant(const std::vector<std::uint32_t>& triangl
   for (auto& [where, node] : planted) roots.push_back(std::move(node));
 }
 
-void SurfaceCells::SurfacePatch::raise(int level) {
+void SurfacePatch::raise(int level) {
   if (roots.empty() || roots.back()->address.level <= level) return;
-  std::map<std::tuple<std::int32_t, std::int32_t, std::int32_t>, std::unique_ptr<Node>> raised;
+  std::map<std::tuple<std::int32_t, std::int32_t, std::int32_t>, std::unique_ptr<CellNode>> raised;
   for (std::size_t r = first_coarsest; r < roots.size(); ++r) {
     TileAddress a = roots[r]->address;
     --a.level;
     a.i >>= 1, a.j >>= 1, a.k >>= 1;  // rounds down, also below 0
     auto& node = raised[{a.i, a.j, a.k}];
     if (!node) {
-      node = std::make_unique<Node>();
+      node = std::make_unique<CellNode>();
       node->address = a;
       node->alone = true;
     }
@@ -81,7 +81,7 @@ void SurfaceCells::SurfacePatch::raise(int level) {
   }
 }
 
-std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
+std::size_t SurfacePatch::divide(CellNode& node) const {
   std::array<TileAddress, 8> inside;
   std::array<Cube, 8> cubes;
   for (int c = 0; c < 8; ++c) {
@@ -107,7 +107,7 @@ std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
   std::size_t bytes = 0;
   for (std::size_t c = 0; c < 8; ++c) {
     if (how_many[c] == 0) continue;
-    node.children[c] = std::make_unique<Node>();
+    node.children[c] = std::make_unique<CellNode>();
     node.children[c]->address = inside[c];
     node.children[c]->triangles.reserve(how_many[c]);
     for (std::size_t n = 0; n < touched.size(); ++n)
@@ -119,7 +119,7 @@ std::size_t SurfaceCells::SurfacePatch::divide(Node& node) const {
   return bytes;
 }
 
-int SurfaceCells::SurfacePatch::side_level(const TileAddress& address, Vec3d sonar_m, const CellView& view) const {
+int SurfacePatch::side_level(const TileAddress& address, Vec3d sonar_m, const CellView& view) const {
   const Cube cube = cube_of(address);
   const Vec3d q = lattice::from_permuted(cube.u, cube.v, cube.w, axis) - sonar_m;
   const double along = axis == 0 ? q.x : axis == 1 ? q.y : q.z, range = length(q);
@@ -135,7 +135,7 @@ int SurfaceCells::SurfacePatch::side_level(const TileAddress& address, Vec3d son
   return std::max(by_area, view.exact_small ? coarsest : std::min(coarsest - few_in_side_lobes, finest));
 }
 
-bool SurfaceCells::SurfacePatch::has_side_cells(const TileAddress& address, Vec3d sonar_m, const CellView& view) const {
+bool SurfacePatch::has_side_cells(const TileAddress& address, Vec3d sonar_m, const CellView& view) const {
   if (side_level(address, sonar_m, view) > address.level) return false;
   TileAddress around = address;
   while (--around.level >= view.levels.front().level - view.side_coarser) {
@@ -148,8 +148,8 @@ bool SurfaceCells::SurfacePatch::has_side_cells(const TileAddress& address, Vec3
 namespace {
 
 /// Adds the results of `of` for a cube and for the cubes inside it.
-template <class Node, class Of>
-std::size_t sum_over(Node& node, const Of& of) {
+template <class CellNode, class Of>
+std::size_t sum_over(CellNode& node, const Of& of) {
   std::size_t sum = of(node);
   for (auto& child : node.children)
     if (child) sum += sum_over(*child, of);
@@ -158,19 +158,19 @@ std::size_t sum_over(Node& node, const Of& of) {
 
 }  // namespace
 
-std::size_t SurfaceCells::SurfacePatch::fixed_bytes() const {
+std::size_t SurfacePatch::fixed_bytes() const {
   std::size_t bytes = mesh->vertices.size() * sizeof(Vec3) + mesh->triangles.size() * sizeof(mesh->triangles[0]);
   for (const auto& root : roots) bytes += root->own_bytes() - root->tile_bytes();
   return bytes;
 }
 
-std::size_t SurfaceCells::SurfacePatch::forget_tiles() {
+std::size_t SurfacePatch::forget_tiles() {
   std::size_t freed = 0;
-  for (auto& root : roots) freed += sum_over(*root, [](Node& node) { return node.forget_tiles(); });
+  for (auto& root : roots) freed += sum_over(*root, [](CellNode& node) { return node.forget_tiles(); });
   return freed;
 }
 
-std::size_t SurfaceCells::SurfacePatch::forget_below(Node& node, std::uint64_t then) {
+std::size_t SurfacePatch::forget_below(CellNode& node, std::uint64_t then) {
   std::size_t freed = 0;
   bool stale = node.divided;
   for (const auto& child : node.children) {

@@ -9,7 +9,8 @@
 
 #include "core/scene/cells/cell_lattice.hpp"
 #include "core/scene/cells/cell_tile.hpp"
-#include "core/scene/cells/surface_cells.hpp"
+#include "core/scene/cells/cell_view.hpp"
+#include "core/scene/scene.hpp"
 
 namespace sonar {
 
@@ -24,18 +25,18 @@ inline Cube cube_of(const TileAddress& a) {
 inline bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lattice::may_touch(f, c.u, c.v, c.w, c.half); }
 
 /// A cube of the lattice: the triangles that may own points in it, the tile of its level once wanted, the eight cubes inside.
-struct SurfaceCells::Node {
+struct CellNode {
   // Fields that every visit reads come first, side by side.
   TileAddress address;
   std::atomic<bool> divided = false;                      // children are there for those who read true
   bool built = false, side_built = false, alone = false;  // alone: of SurfacePatch::raise, without cubes inside
   std::atomic<std::uint64_t> last_visited = 0;
-  std::array<std::unique_ptr<Node>, 8> children;  // null where no triangle goes
+  std::array<std::unique_ptr<CellNode>, 8> children;  // null where no triangle goes
   std::vector<std::uint32_t> triangles;
   CellTile tile, side_tile;  // side_tile: for side lobes
 
   std::size_t tile_bytes() const { return tile.bytes() + side_tile.bytes(); }
-  std::size_t own_bytes() const { return sizeof(Node) + triangles.capacity() * sizeof(std::uint32_t) + tile_bytes(); }
+  std::size_t own_bytes() const { return sizeof(CellNode) + triangles.capacity() * sizeof(std::uint32_t) + tile_bytes(); }
   /// Returns the bytes that frees.
   std::size_t forget_tiles() {
     const std::size_t bytes = tile_bytes();
@@ -46,7 +47,7 @@ struct SurfaceCells::Node {
 };
 
 /// The triangles of one object that share material, dominant axis and side of the normal: one lattice.
-class SurfaceCells::SurfacePatch {
+class SurfacePatch {
  public:
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
@@ -54,7 +55,7 @@ class SurfaceCells::SurfacePatch {
   std::uint32_t texture_seed = 0;
   int coarsest = 0;  // level that gives the object its fewest cells, where asked for
   std::shared_ptr<const Mesh> mesh;
-  std::vector<std::unique_ptr<Node>> roots;
+  std::vector<std::unique_ptr<CellNode>> roots;
   std::size_t first_coarsest = 0;  // index of the first root with the coarsest level
 
   void set_material(const Material& m) { texture = m.texture, grain = m.grain, texture_seed = m.texture_seed; }
@@ -70,7 +71,7 @@ class SurfaceCells::SurfacePatch {
   /// reached from the planted roots.
   void raise(int level);
   /// Returns the bytes that the new cubes take.
-  std::size_t divide(Node& node) const;
+  std::size_t divide(CellNode& node) const;
   /// Level that the side lobes' cells in a cube should have, seen from `sonar_m`, in the object's axes.
   int side_level(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
   /// Whether a cube has the side lobes' cells of its place: its own level will do, and that of no cube around it.
@@ -78,7 +79,7 @@ class SurfaceCells::SurfacePatch {
   /// Forgets the tiles and keeps the cubes; returns the bytes that frees.
   std::size_t forget_tiles();
   /// Forgets all cubes below `node` that were last visited before `then`; returns the bytes that frees.
-  static std::size_t forget_below(Node& node, std::uint64_t then);
+  static std::size_t forget_below(CellNode& node, std::uint64_t then);
 };
 
 }  // namespace sonar

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <optional>
 
-#include "core/scene/files/load_mesh.hpp"
+#include "core/scene/files/clean_mesh.hpp"
 
 namespace sonar {
 

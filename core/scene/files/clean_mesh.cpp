@@ -1,8 +1,9 @@
+#include "core/scene/files/clean_mesh.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "core/scene/files/load_mesh.hpp"
 #include "core/scene/vertex_table.hpp"
 
 namespace sonar {

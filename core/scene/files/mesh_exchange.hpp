@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/scene/files/load_mesh.hpp"
+#include "core/scene/files/mesh_file.hpp"
 
 namespace sonar {
 

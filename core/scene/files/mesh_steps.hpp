@@ -1,7 +1,8 @@
 // The steps that the daemon's own readers of meshes and the importer share.
 #pragma once
 
-#include "core/scene/files/load_mesh.hpp"
+#include "core/scene/files/clean_mesh.hpp"
+#include "core/scene/files/mesh_file.hpp"
 
 namespace sonar {
 

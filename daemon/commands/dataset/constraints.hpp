@@ -1,15 +1,22 @@
 // Conditions of a drawn ping, by geometry alone: no ray is traced, so occlusion is left to the labels.
 #pragma once
 
+#include <cstdint>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "core/scene/scene.hpp"
 #include "core/sonar/ping.hpp"
-#include "daemon/commands/dataset/dataset_job.hpp"
 
 namespace sonar::dataset {
+
+struct Constraints {
+  // Names or labels of objects; above_bed also takes "sonar".
+  std::vector<std::string> in_view, above_bed, no_overlap;
+  std::string bed;  // the object that above_bed is about
+  std::uint32_t tries = 100;
+};
 
 /// By name, by the name its instances share, or by label.
 bool is_named(const Object& object, const std::string& name);

@@ -8,7 +8,6 @@
 #include "core/base/regular_file.hpp"
 #include "core/text/format.hpp"
 #include "core/text/nearest.hpp"
-#include "daemon/commands/dataset/constraints.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 
 namespace sonar::dataset {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "daemon/commands/dataset/constraints.hpp"
 #include "daemon/commands/dataset/vary.hpp"
 #include "daemon/commands/render/render_job.hpp"
 
@@ -20,13 +21,6 @@ class ShapeCache;
 namespace sonar::dataset {
 
 inline constexpr std::uint64_t most_pings = 100'000'000, most_shard_pings = 100'000;
-
-struct Constraints {
-  // Names or labels of objects; above_bed also takes "sonar".
-  std::vector<std::string> in_view, above_bed, no_overlap;
-  std::string bed;  // the object that above_bed is about
-  std::uint32_t tries = 100;
-};
 
 struct DatasetJob {
   std::string source, text;

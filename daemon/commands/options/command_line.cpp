@@ -10,6 +10,7 @@
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/text/arguments.hpp"
 #include "core/text/nearest.hpp"
+#include "daemon/config/load_config.hpp"
 #include "daemon/config/move_addresses.hpp"
 #include "daemon/config/products.hpp"
 #include "protocol/host.hpp"

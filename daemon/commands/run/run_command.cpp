@@ -7,6 +7,7 @@
 #include "daemon/commands/run/banner.hpp"
 #include "daemon/commands/run/prepare_run.hpp"
 #include "daemon/config/effective_switches.hpp"
+#include "daemon/config/load_config.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/server/app.hpp"
 #include "daemon/server/system/real_time.hpp"

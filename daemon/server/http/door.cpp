@@ -23,28 +23,6 @@ HttpAnswer socket_refusal(unsigned status, const std::string& text, const std::s
   return answer;
 }
 
-/// The words of a header that is a list.
-std::vector<std::string> words_of(std::string_view list) {
-  std::vector<std::string> words;
-  while (!list.empty()) {
-    const std::size_t end = std::min(list.find(','), list.size());
-    std::string_view word = list.substr(0, end);
-    list.remove_prefix(std::min(end + 1, list.size()));
-    const auto first = word.find_first_not_of(" \t");
-    if (first == std::string_view::npos) continue;
-    word = word.substr(first, word.find_last_not_of(" \t") - first + 1);
-    words.emplace_back(word);
-  }
-  return words;
-}
-bool names(std::string_view list, std::string_view wanted) {
-  const std::vector<std::string> words = words_of(list);
-  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
-  return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
-    return std::equal(word.begin(), word.end(), wanted.begin(), wanted.end(), [&](char a, char b) { return lower(a) == b; });
-  });
-}
-
 /// 16 bytes in base64.
 bool is_key(std::string_view key) {
   constexpr std::size_t length = 24;
@@ -67,7 +45,7 @@ std::string value_of(const std::vector<std::pair<std::string, std::string>>& que
 
 std::optional<HttpAnswer> wrong_handshake(const HttpRequest& request) {
   if (request.http_1_0) return socket_refusal(400, "a WebSocket needs HTTP/1.1");
-  if (!names(request.connection, "upgrade")) return socket_refusal(400, "a WebSocket needs Connection: Upgrade");
+  if (!header_names(request.connection, "upgrade")) return socket_refusal(400, "a WebSocket needs Connection: Upgrade");
   if (request.socket_version != "13") {
     HttpAnswer answer = socket_refusal(426, "say Sec-WebSocket-Version: 13");
     answer.headers.emplace_back("Sec-WebSocket-Version", "13");
@@ -88,8 +66,6 @@ bool shows_secret(const HttpRequest& request, const std::vector<std::pair<std::s
 }
 
 }  // namespace
-
-bool wants_socket(const HttpRequest& request) { return request.method == "GET" && names(request.upgrade, "websocket"); }
 
 void ViewSecrets::make_key() { key_ = random_digits(); }
 
@@ -113,7 +89,7 @@ std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
                                                 const ViewDoor& door, ViewSecrets::Steady::time_point now) {
   if (auto answer = wrong_handshake(request)) return *std::move(answer);
   ViewWelcome welcome;
-  for (const std::string& offered : words_of(request.socket_protocols))
+  for (const std::string& offered : words_of_header(request.socket_protocols))
     if (welcome.protocol.empty() && std::find(protocols.begin(), protocols.end(), offered) != protocols.end())
       welcome.protocol = offered;
   if (welcome.protocol.empty())

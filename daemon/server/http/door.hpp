@@ -16,9 +16,6 @@
 
 namespace sonar {
 
-/// GET with "Upgrade: websocket".
-bool wants_socket(const HttpRequest& request);
-
 /// The secrets of one run beside the token.
 class ViewSecrets {
  public:

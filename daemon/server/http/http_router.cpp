@@ -1,7 +1,6 @@
 #include "daemon/server/http/http_router.hpp"
 
 #include "core/text/decimal.hpp"
-#include "daemon/server/http/door.hpp"
 #include "daemon/server/http/page.hpp"
 
 namespace sonar {
@@ -56,6 +55,8 @@ HttpAnswer answer_of(unsigned status, StatusCode code, const std::string& text) 
   if (status == 401 || status == 403) answer.why = text;
   return answer;
 }
+
+bool wants_socket(const HttpRequest& request) { return request.method == "GET" && header_names(request.upgrade, "websocket"); }
 
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy) {
   if (auto answer = reject_host(request, policy)) return {*std::move(answer)};

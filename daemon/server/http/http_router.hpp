@@ -17,6 +17,9 @@ namespace sonar {
 /// {"code", "text"}: the body of every answer without a document.
 HttpAnswer answer_of(unsigned status, control::StatusCode code, const std::string& text);
 
+/// GET with "Upgrade: websocket".
+bool wants_socket(const HttpRequest& request);
+
 struct HttpPolicy {
   const Token& token;
   Ipv4 reached;  // our end of the connection

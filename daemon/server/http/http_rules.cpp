@@ -99,6 +99,25 @@ bool HttpDetector::speaks_http(std::span<const std::byte> received) {
   return begins_http_request(first_bytes_);
 }
 
+std::vector<std::string> words_of_header(std::string_view list) {
+  std::vector<std::string> words;
+  while (!list.empty()) {
+    const std::size_t end = std::min(list.find(','), list.size());
+    std::string_view word = list.substr(0, end);
+    list.remove_prefix(std::min(end + 1, list.size()));
+    const auto first = word.find_first_not_of(" \t");
+    if (first == std::string_view::npos) continue;
+    word = word.substr(first, word.find_last_not_of(" \t") - first + 1);
+    words.emplace_back(word);
+  }
+  return words;
+}
+
+bool header_names(std::string_view list, std::string_view wanted) {
+  const std::vector<std::string> words = words_of_header(list);
+  return std::any_of(words.begin(), words.end(), [&](const std::string& word) { return same_word(word, wanted); });
+}
+
 bool is_json(std::string_view content_type) {
   std::string_view type = cut(content_type, ';');
   while (!type.empty() && (type.back() == ' ' || type.back() == '\t')) type.remove_suffix(1);

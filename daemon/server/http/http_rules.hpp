@@ -29,6 +29,11 @@ bool host_allowed(std::string_view host, Ipv4 reached, const std::vector<std::st
 /// The same for "Origin: http://name:port": rejects cross-origin requests of browsers.
 bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std::string>& names);
 
+/// The words of a header that is a list.
+std::vector<std::string> words_of_header(std::string_view list);
+/// Whether a header that is a list has the word, in capital or small letters. `wanted` is in small letters.
+bool header_names(std::string_view list, std::string_view wanted);
+
 /// "application/json", with any parameters.
 bool is_json(std::string_view content_type);
 

@@ -13,6 +13,8 @@
 #include <new>
 
 #include "core/base/child_process.hpp"
+#include "core/scene/files/clean_mesh.hpp"
+#include "core/scene/files/load_mesh.hpp"
 #include "core/scene/files/mesh_exchange.hpp"
 #include "core/scene/import/import_limits.hpp"
 #include "tests/core/scene/temporary_files.hpp"

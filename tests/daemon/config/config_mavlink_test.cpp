@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "daemon/config/config.hpp"
+#include "daemon/config/load_config.hpp"
 #include "daemon/config/restart_keys.hpp"
 
 namespace sonar::config_mavlink_test {

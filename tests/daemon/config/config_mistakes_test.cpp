@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "daemon/config/config.hpp"
+#include "daemon/config/load_config.hpp"
 #include "daemon/config/products.hpp"
 
 namespace sonar::config_mistakes_test {

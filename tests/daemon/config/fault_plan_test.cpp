@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "daemon/config/config.hpp"
+#include "daemon/config/load_config.hpp"
 
 namespace sonar::fault_plan_test {
 namespace {

@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "core/scene/files/built_in_scenes.hpp"
-#include "daemon/config/config.hpp"
+#include "daemon/config/load_config.hpp"
 
 namespace sonar {
 namespace {

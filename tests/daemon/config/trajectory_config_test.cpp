@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "daemon/config/config.hpp"
+#include "daemon/config/load_config.hpp"
 
 namespace sonar::trajectory_config_test {
 namespace {

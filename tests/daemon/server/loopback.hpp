@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/config/load_config.hpp"
 #include "daemon/server/app.hpp"
 #include "protocol/oculus/decode.hpp"
 

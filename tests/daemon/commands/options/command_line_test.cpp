@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/config/load_config.hpp"
+
 namespace sonar {
 namespace {
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/config/load_config.hpp"
 #include "daemon/emulator/reload_plan.hpp"
 #include "daemon/emulator/sonar/sonar.hpp"
 #include "daemon/emulator/world/world_parts.hpp"

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/server/http/http_router.hpp"
+
 namespace sonar::door_test {
 namespace {
 

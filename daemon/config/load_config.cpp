@@ -1,4 +1,4 @@
-#include "daemon/config/config.hpp"
+#include "daemon/config/load_config.hpp"
 
 #include <algorithm>
 #include <set>

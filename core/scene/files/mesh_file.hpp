@@ -1,0 +1,32 @@
+// A mesh file as the scene names it, and what is read from it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/scene/shapes/terrain.hpp"
+
+namespace sonar {
+
+enum class UpAxis { y, z };
+
+struct MeshFile {
+  std::filesystem::path file;
+  double scale = 1;              // file units to metres
+  std::optional<UpAxis> up{};    // axis of the file that is up; unset: y for glTF/GLB, its own tag for DAE, z otherwise
+  std::string_view in_memory{};  // the contents, when `file` only names them and says the format
+  std::optional<std::filesystem::path> folder{};  // folder of the scene; a mesh may refer to files in it, and in its own folder
+};
+
+struct LoadedMesh {
+  CentredMesh centred;                      // Mesh::material indexes material_names
+  std::vector<std::string> material_names;  // as the file calls them; may be empty strings
+  std::uint64_t lost = 0;                   // triangles of faces that the file lists and the importer does not read
+  std::uint64_t hidden = 0;                 // triangles of parts that the scene in the file does not show
+};
+
+}  // namespace sonar
