@@ -44,6 +44,10 @@ enum class FieldName {
   connected_address,
   mac,
 };
+/// fields() of a message says with these what a field means: visit("pingId", m.ping_id, means::ping_id).
+namespace means {
+using enum FieldName;
+}
 /// The same words, in that order.
 inline constexpr std::array<std::string_view, 34> field_names{
     "magic",     "source_id",   "destination_id",    "message_type", "version",       "payload_size",

@@ -6,9 +6,12 @@
 #include <cstdint>
 #include <limits>
 
+#include "protocol/message_fields.hpp"
 #include "protocol/wire/wire.hpp"
 
 namespace sonar::aris {
+
+namespace means = protocol::means;
 
 inline constexpr std::uint32_t file_version = 0x05464444;  // "DDF", 5
 inline constexpr std::size_t padded_header_size = 1024;
@@ -67,15 +70,15 @@ struct FrameHeader {
 template <class V, wire::Like<FrameHeader> M>
 constexpr void fields(V& visit, M& m) {
   visit("FrameIndex", m.frame_index);
-  visit("FrameTime", m.frame_time_us);
-  visit("Version", m.version);
+  visit("FrameTime", m.frame_time_us, means::time);
+  visit("Version", m.version, means::version);
   visit("Status", m.status);
   visit("sonarTimeStamp", m.sonar_time_us);
   visit("calendar", m.calendar);
   visit("WindowStart", m.window_start_m);
-  visit("WindowLength", m.window_length_m);
+  visit("WindowLength", m.window_length_m, means::range);
   visit("ThresholdIntensity", m.threshold_intensity);
-  visit("ReceiverGain", m.receiver_gain_db);
+  visit("ReceiverGain", m.receiver_gain_db, means::gain);
   visit("DegC1", m.cpu_c);
   visit("DegC2", m.psu_c);
   visit("Humidity", m.humidity_percent);
@@ -83,16 +86,16 @@ constexpr void fields(V& visit, M& m) {
   visit("Battery", m.battery);
   visit("UserValues", m.user);
   visit("Motion", m.motion);
-  visit("CompassHeading", m.compass_heading_deg);
-  visit("CompassPitch", m.compass_pitch_deg);
-  visit("CompassRoll", m.compass_roll_deg);
+  visit("CompassHeading", m.compass_heading_deg, means::heading);
+  visit("CompassPitch", m.compass_pitch_deg, means::pitch);
+  visit("CompassRoll", m.compass_roll_deg, means::roll);
   visit("Latitude", m.latitude_deg);
   visit("Longitude", m.longitude_deg);
   visit("SonarPosition", m.sonar_position);
   visit("ConfigFlags", m.config_flags);
   visit("Target", m.target);
   visit("TargetFlags", m.target_flags);
-  visit("WaterTemp", m.water_c);
+  visit("WaterTemp", m.water_c, means::temperature);
   visit("TimerPeriod", m.timer_period);
   visit("SonarXYZ", m.sonar_xyz);
   visit("SonarPan", m.pan_deg);
@@ -105,35 +108,35 @@ constexpr void fields(V& visit, M& m) {
   visit("Matrix", m.matrix);
   visit("SampleRate", m.sample_rate_hz);
   visit("Accell", m.acceleration_g);
-  visit("PingMode", m.ping_mode);
+  visit("PingMode", m.ping_mode, means::beams);
   visit("FrequencyHiLow", m.frequency);
   visit("PulseWidth", m.pulse_us);
   visit("CyclePeriod", m.cycle_us);
   visit("SamplePeriod", m.sample_period_us);
   visit("TransmitEnable", m.transmit);
-  visit("FrameRate", m.frame_rate_hz);
-  visit("SoundSpeed", m.sound_speed_mps);
-  visit("SamplesPerBeam", m.samples_per_beam);
+  visit("FrameRate", m.frame_rate_hz, means::ping_rate);
+  visit("SoundSpeed", m.sound_speed_mps, means::sound_speed);
+  visit("SamplesPerBeam", m.samples_per_beam, means::rows);
   visit("Enable150V", m.high_voltage);
   visit("SampleStartDelay", m.start_delay_us);
   visit("LargeLens", m.large_lens);
   visit("TheSystemType", m.system);
-  visit("SonarSerialNumber", m.serial);
+  visit("SonarSerialNumber", m.serial, means::source_id);
   visit("EncryptedKey", m.encrypted_key);
   visit("ErrorFlags", m.error_flags);
   visit("MissedPackets", m.missed_packets);
   visit("ArisAppVersion", m.app_version);
   visit("Available2", m.available2);
-  visit("ReorderedSamples", m.reordered);
+  visit("ReorderedSamples", m.reordered, means::sample_type);
   visit("Salinity", m.salinity);
-  visit("Pressure", m.pressure_psi);
+  visit("Pressure", m.pressure_psi, means::pressure);
   visit("BatteryVoltage", m.battery_mv);
   visit("MainVoltage", m.main_mv);
   visit("SwitchVoltage", m.switched_mv);
   visit("FocusMotorMoving", m.focus_motor_moving);
   visit("VoltageChanging", m.voltage_changing);
   visit("FocusMotorFaults", m.focus_faults);
-  visit("FocusMotorStalled", m.focus_stalled);
+  visit("FocusMotorStalled", m.focus_stalled, means::ping_status);
   visit("Faults", m.faults);
   visit("FocusCurrentPosition", m.focus_position);
   visit("RotatorTargets", m.rotator_targets);

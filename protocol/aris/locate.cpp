@@ -10,45 +10,6 @@ namespace {
 using protocol::Field;
 using protocol::FieldName;
 
-std::string_view header_name(FieldName name) {
-  switch (name) {
-    case FieldName::version:
-      return "Version";
-    case FieldName::source_id:
-      return "SonarSerialNumber";
-    case FieldName::temperature:
-      return "WaterTemp";
-    case FieldName::pressure:
-      return "Pressure";
-    case FieldName::heading:
-      return "CompassHeading";
-    case FieldName::pitch:
-      return "CompassPitch";
-    case FieldName::roll:
-      return "CompassRoll";
-    case FieldName::sound_speed:
-      return "SoundSpeed";
-    case FieldName::time:
-      return "FrameTime";
-    case FieldName::sample_type:
-      return "ReorderedSamples";
-    case FieldName::rows:
-      return "SamplesPerBeam";
-    case FieldName::beams:
-      return "PingMode";
-    case FieldName::range:
-      return "WindowLength";
-    case FieldName::ping_rate:
-      return "FrameRate";
-    case FieldName::gain:
-      return "ReceiverGain";
-    case FieldName::ping_status:
-      return "FocusMotorStalled";
-    default:
-      return {};
-  }
-}
-
 constexpr std::int64_t too_hot = 0x4000, stopped_by_heat = 0x8000;  // status bits of an Oculus, as faults have them
 
 using Place = std::pair<std::size_t, std::size_t>;  // offset, size
@@ -66,7 +27,7 @@ std::optional<FramePart> first_of(BytesView first_part) {
 }  // namespace
 
 std::optional<Field> locate(FieldName name, BytesView first_part) {
-  auto found = wire::locate<FrameHeader>(header_name(name));
+  auto found = wire::locate<FrameHeader>(name);
   if (!found || first_part.empty()) return found;
   const auto part = first_of(first_part);
   if (!part || found->offset + found->size > part->header->size()) return std::nullopt;

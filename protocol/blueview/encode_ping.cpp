@@ -89,44 +89,7 @@ wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, c
 }
 
 std::optional<protocol::Field> locate(protocol::FieldName name, wire::BytesView ping) {
-  using protocol::FieldName;
-  const auto named = [&](std::string_view link_name) { return wire::locate<PingMessage>(link_name, ping); };
-  switch (name) {
-    case FieldName::magic:
-      return named("header.magic");
-    case FieldName::message_type:
-      return named("header.type");
-    case FieldName::payload_size:
-      return named("header.payload_len");
-    case FieldName::source_id:
-      return named("ping.head");
-    case FieldName::ping_id:
-      return named("ping.number");
-    case FieldName::time:
-      return named("ping.t_utc");
-    case FieldName::range:
-      return named("ping.stop");
-    case FieldName::sound_speed:
-      return named("ping.c");
-    case FieldName::range_resolution:
-      return named("ping.bin_m");
-    case FieldName::beams:
-      return named("ping.beams");
-    case FieldName::rows:
-      return named("ping.bins");
-    case FieldName::sample_type:
-      return named("ping.fmt");
-    case FieldName::pitch:
-      return named("ping.pitch");
-    case FieldName::roll:
-      return named("ping.roll");
-    case FieldName::heading:
-      return named("ping.heading");
-    case FieldName::image_size:
-      return named("ping.raw_len");
-    default:
-      return std::nullopt;
-  }
+  return wire::locate<PingMessage>(name, ping);
 }
 
 std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping) {

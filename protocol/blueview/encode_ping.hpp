@@ -43,27 +43,27 @@ struct PingHead {
 };
 template <class V, wire::Like<PingHead> M>
 constexpr void fields(V& visit, M& m) {
-  visit("head", m.head);
-  visit("number", m.number);
-  visit("t_utc", m.utc_s);
+  visit("head", m.head, means::source_id);
+  visit("number", m.number, means::ping_id);
+  visit("t_utc", m.utc_s, means::time);
   visit("tz", m.time_zone);
   visit("start", m.start_m);
-  visit("stop", m.stop_m);
-  visit("c", m.sound_speed_mps);
+  visit("stop", m.stop_m, means::range);
+  visit("c", m.sound_speed_mps, means::sound_speed);
   visit("fov_min", m.fov_min_deg);
   visit("fov_max", m.fov_max_deg);
-  visit("bin_m", m.bin_m);
-  visit("beams", m.beams);
-  visit("bins", m.bins);
-  visit("fmt", m.format);
+  visit("bin_m", m.bin_m, means::range_resolution);
+  visit("beams", m.beams, means::beams);
+  visit("bins", m.bins, means::rows);
+  visit("fmt", m.format, means::sample_type);
   visit("compression", m.compression);
   visit("nav_fields", m.nav_fields);
   visit("time", m.nav_time_s);
   visit("depth", m.depth_m);
-  visit("pitch", m.pitch_deg);
-  visit("roll", m.roll_deg);
-  visit("heading", m.heading_deg);
-  visit("raw_len", m.raw_length);
+  visit("pitch", m.pitch_deg, means::pitch);
+  visit("roll", m.roll_deg, means::roll);
+  visit("heading", m.heading_deg, means::heading);
+  visit("raw_len", m.raw_length, means::image_size);
 }
 
 /// As Vendor::field and Vendor::region, of the whole message.

@@ -10,9 +10,12 @@
 #include <variant>
 
 #include "protocol/blueview/link.hpp"
+#include "protocol/message_fields.hpp"
 #include "protocol/wire/wire.hpp"
 
 namespace sonar::blueview {
+
+namespace means = protocol::means;
 
 inline constexpr std::size_t longest_request = 70000;  // longest message of a host: fits a text of 65535 bytes
 
@@ -25,11 +28,11 @@ struct FrameHeader {
 };
 template <class V, wire::Like<FrameHeader> M>
 constexpr void fields(V& visit, M& m) {
-  visit("magic", m.magic);
-  visit("type", m.type);
+  visit("magic", m.magic, means::magic);
+  visit("type", m.type, means::message_type);
   visit("flags", m.flags);
   visit("request_id", m.request_id);
-  visit("payload_len", m.payload_length);
+  visit("payload_len", m.payload_length, means::payload_size);
 }
 
 /// Value of SET and GET: one value, or two floats for Key::range.

@@ -4,9 +4,12 @@
 #include <array>
 #include <cstdint>
 
+#include "protocol/message_fields.hpp"
 #include "protocol/wire/wire.hpp"
 
 namespace sonar::m3 {
+
+namespace means = protocol::means;
 
 using wire::Bytes;
 using wire::BytesView;
@@ -28,11 +31,11 @@ struct PacketHead {
 };
 template <class V, wire::Like<PacketHead> M>
 constexpr void fields(V& visit, M& m) {
-  visit("sync", m.sync);
-  visit("data_type", m.type);
+  visit("sync", m.sync, means::magic);
+  visit("data_type", m.type, means::message_type);
   visit("reserved", m.reserved);
   visit("reserved_words", m.reserved_words);
-  visit("body_size", m.body_size);
+  visit("body_size", m.body_size, means::payload_size);
 }
 
 struct PacketFoot {
@@ -54,7 +57,7 @@ template <class V, wire::Like<GainLaw> M>
 constexpr void fields(V& visit, M& m) {
   visit("a", m.a);
   visit("b", m.b);
-  visit("c", m.c_db);
+  visit("c", m.c_db, means::gain);
   visit("limit", m.limit_db);
 }
 
@@ -71,18 +74,18 @@ struct DataFront {
 };
 template <class V, wire::Like<DataFront> M>
 constexpr void fields(V& visit, M& m) {
-  visit("version", m.version);
-  visit("sonar_id", m.sonar_id);
-  visit("sonar_info", m.sonar_info);
-  visit("time_s", m.time_s);
+  visit("version", m.version, means::version);
+  visit("sonar_id", m.sonar_id, means::source_id);
+  visit("sonar_info", m.sonar_info, means::device_id);
+  visit("time_s", m.time_s, means::time);
   visit("time_ms", m.time_ms);
-  visit("sound_speed", m.sound_speed_mps);
-  visit("samples", m.samples);
+  visit("sound_speed", m.sound_speed_mps, means::sound_speed);
+  visit("samples", m.samples, means::rows);
   visit("near", m.near_m);
-  visit("far", m.far_m);
+  visit("far", m.far_m, means::range);
   visit("window_start", m.start_s);
   visit("window_length", m.length_s);
-  visit("beams", m.beams);
+  visit("beams", m.beams, means::beams);
   visit("processing", m.processing);
 }
 
@@ -132,7 +135,7 @@ struct DataBack {
 };
 template <class V, wire::Like<DataBack> M>
 constexpr void fields(V& visit, M& m) {
-  visit("sample_interval", m.sample_interval_s);
+  visit("sample_interval", m.sample_interval_s, means::range_resolution);
   visit("image_destination", m.image_destination);
   visit("pulse_type", m.pulse_type);
   visit("azimuth_processing", m.azimuth_processing);
@@ -143,21 +146,21 @@ constexpr void fields(V& visit, M& m) {
   visit("phase_index", m.phase_index);
   visit("images", m.images);
   visit("image_index", m.image_index);
-  visit("frequency", m.frequency_hz);
+  visit("frequency", m.frequency_hz, means::frequency);
   visit("pulse_length", m.pulse_us);
-  visit("ping_number", m.ping_number);
+  visit("ping_number", m.ping_number, means::ping_id);
   visit("filter_bandwidth", m.filter_hz);
   visit("resolution", m.resolution_m);
-  visit("ping_rate", m.ping_rate_hz);
+  visit("ping_rate", m.ping_rate_hz, means::ping_rate);
   visit("application", m.application);
   visit("pulse_name", m.pulse_name);
   visit("gain", m.gain);
-  visit("heading", m.heading_deg);
+  visit("heading", m.heading_deg, means::heading);
   visit("magnetic_variation", m.magnetic_variation_deg);
-  visit("pitch", m.pitch_deg);
-  visit("roll", m.roll_deg);
+  visit("pitch", m.pitch_deg, means::pitch);
+  visit("roll", m.roll_deg, means::roll);
   visit("depth", m.depth_m);
-  visit("temperature", m.temperature_c);
+  visit("temperature", m.temperature_c, means::temperature);
   visit("offset", m.offset_m);
   visit("rotation", m.rotation_deg);
   visit("mounting", m.mounting);
@@ -165,7 +168,7 @@ constexpr void fields(V& visit, M& m) {
   visit("longitude", m.longitude_deg);
   visit("transmit_start", m.transmit_s);
   visit("head_sensors", m.head_sensors);
-  visit("head_status", m.head_status);
+  visit("head_status", m.head_status, means::device_status);
   visit("sound_speed_source", m.sound_speed_source);
   visit("time_mode", m.time_mode);
   visit("own_heading", m.own_heading_deg);
@@ -222,9 +225,8 @@ inline constexpr std::size_t head_size = wire::wire_size<PacketHead>(), data_hea
                              foot_size = wire::wire_size<PacketFoot>(), data_front_size = wire::wire_size<DataFront>(),
                              sample_size = 8;
 static_assert(head_size == 56 && data_header_size == 8512 && foot_size == 44 && data_front_size == 76);
-static_assert(wire::locate<DataHeader>("back.ping_number")->offset == 4208);
-static_assert(wire::locate<DataHeader>("back.latitude")->offset == 4480);
-static_assert(wire::locate<DataHeader>("back.text_1")->offset == 4568);
+static_assert(wire::locate<DataHeader>(means::ping_id)->offset == 4208);
+static_assert(wire::locate<DataHeader>(means::device_status)->offset == 4501);
 inline constexpr std::size_t samples_at = head_size + data_header_size;
 
 }  // namespace sonar::m3

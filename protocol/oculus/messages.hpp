@@ -3,9 +3,12 @@
 // Layouts: docs/protocols/oculus.md and the sources named there; captured pings confirm header and version-1 result.
 #pragma once
 
+#include "protocol/message_fields.hpp"
 #include "protocol/wire/wire.hpp"
 
 namespace sonar::oculus {
+
+namespace means = protocol::means;
 
 inline constexpr std::uint16_t magic = 0x4F53;  // bytes 53 4F
 inline constexpr std::uint16_t tcp_port = 52100, status_port = 52102;
@@ -42,13 +45,13 @@ struct MessageHeader {
 };
 template <class V, wire::Like<MessageHeader> M>
 constexpr void fields(V& visit, M& m) {
-  visit("oculusId", m.oculus_id);
-  visit("srcDeviceId", m.source);
-  visit("dstDeviceId", m.destination);
-  visit("msgId", m.type);
-  visit("msgVersion", m.version);
-  visit("payloadSize", m.payload_size);
-  visit("partNumber", m.part_number);
+  visit("oculusId", m.oculus_id, means::magic);
+  visit("srcDeviceId", m.source, means::source_id);
+  visit("dstDeviceId", m.destination, means::destination_id);
+  visit("msgId", m.type, means::message_type);
+  visit("msgVersion", m.version, means::version);
+  visit("payloadSize", m.payload_size, means::payload_size);
+  visit("partNumber", m.part_number, means::part_number);
 }
 
 /// The settings that a client requests; every ping echoes the same bytes.
@@ -66,12 +69,12 @@ struct FireSettings {
 template <class V, wire::Like<FireSettings> M>
 constexpr void fields(V& visit, M& m) {
   visit("masterMode", m.mode);
-  visit("pingRate", m.ping_rate);
+  visit("pingRate", m.ping_rate, means::ping_rate);
   visit("networkSpeed", m.network_speed);
   visit("gammaCorrection", m.gamma);
   visit("flags", m.flags);
-  visit("range", m.range);
-  visit("gainPercent", m.gain_percent);
+  visit("range", m.range, means::range);
+  visit("gainPercent", m.gain_percent, means::gain);
   visit("speedOfSound", m.sound_speed_mps);
   visit("salinity", m.salinity_ppt);
 }
@@ -128,22 +131,22 @@ struct StatusMessage {
 template <class V, wire::Like<StatusMessage> M>
 constexpr void fields(V& visit, M& m) {
   visit("header", m.header);
-  visit("deviceId", m.device_id);
+  visit("deviceId", m.device_id, means::device_id);
   visit("deviceType", m.device_type);
-  visit("partNumber", m.part_number);
-  visit("status", m.status);
-  visit("firmwareVersion0", m.arm0_version);
-  visit("firmwareDate0", m.arm0_date);
-  visit("firmwareVersion1", m.arm1_version);
-  visit("firmwareDate1", m.arm1_date);
-  visit("bitfileVersion", m.bitfile_version);
-  visit("bitfileDate", m.bitfile_date);
-  visit("ipAddr", m.ip_address);
-  visit("ipMask", m.ip_mask);
-  visit("connectedIpAddr", m.connected_ip);
-  visit("macAddr", m.mac);
-  visit("temperature", m.temperature_c);
-  visit("pressure", m.pressure_bar);
+  visit("partNumber", m.part_number, means::part_number);
+  visit("status", m.status, means::device_status);
+  visit("firmwareVersion0", m.arm0_version, means::firmware);
+  visit("firmwareDate0", m.arm0_date, means::firmware);
+  visit("firmwareVersion1", m.arm1_version, means::firmware);
+  visit("firmwareDate1", m.arm1_date, means::firmware);
+  visit("bitfileVersion", m.bitfile_version, means::firmware);
+  visit("bitfileDate", m.bitfile_date, means::firmware);
+  visit("ipAddr", m.ip_address, means::address);
+  visit("ipMask", m.ip_mask, means::netmask);
+  visit("connectedIpAddr", m.connected_ip, means::connected_address);
+  visit("macAddr", m.mac, means::mac);
+  visit("temperature", m.temperature_c, means::temperature);
+  visit("pressure", m.pressure_bar, means::pressure);
 }
 
 /// Last fields of a ping result, the same in both versions except for the spare words between beams and offset.
@@ -152,9 +155,9 @@ struct ImageSizes {
 };
 template <class V, wire::Like<ImageSizes> M>
 constexpr void fields(V& visit, M& m) {
-  visit("imageOffset", m.image_offset);
-  visit("imageSize", m.image_size);
-  visit("messageSize", m.message_size);
+  visit("imageOffset", m.image_offset, means::image_offset);
+  visit("imageSize", m.image_size, means::image_size);
+  visit("messageSize", m.message_size, means::message_size);
 }
 
 /// Fixed part; bearings (i16 per beam, 0.01 deg, positive to starboard), filler and image follow.
@@ -173,17 +176,17 @@ template <class V, wire::Like<PingResultV1> M>
 constexpr void fields(V& visit, M& m) {
   visit("header", m.header);
   visit("fire", m.fire);
-  visit("pingId", m.ping_id);
-  visit("status", m.status);
-  visit("frequency", m.frequency_hz);
-  visit("temperature", m.temperature_c);
-  visit("pressure", m.pressure_bar);
-  visit("speedOfSoundUsed", m.sound_speed_mps);
-  visit("pingStartTime", m.ping_start_time);
-  visit("dataSize", m.data_size);
-  visit("rangeResolution", m.range_resolution_m);
-  visit("nRanges", m.row_count);
-  visit("nBeams", m.beam_count);
+  visit("pingId", m.ping_id, means::ping_id);
+  visit("status", m.status, means::ping_status);
+  visit("frequency", m.frequency_hz, means::frequency);
+  visit("temperature", m.temperature_c, means::temperature);
+  visit("pressure", m.pressure_bar, means::pressure);
+  visit("speedOfSoundUsed", m.sound_speed_mps, means::sound_speed);
+  visit("pingStartTime", m.ping_start_time, means::time);
+  visit("dataSize", m.data_size, means::sample_type);
+  visit("rangeResolution", m.range_resolution_m, means::range_resolution);
+  visit("nRanges", m.row_count, means::rows);
+  visit("nBeams", m.beam_count, means::beams);
   visit("sizes", m.sizes);
 }
 
@@ -207,20 +210,20 @@ constexpr void fields(V& visit, M& m) {
   visit("header", m.header);
   visit("fire", m.fire);
   visit("extension", m.extension);
-  visit("pingId", m.ping_id);
-  visit("status", m.status);
-  visit("frequency", m.frequency_hz);
-  visit("temperature", m.temperature_c);
-  visit("pressure", m.pressure_bar);
-  visit("heading", m.heading_deg);
-  visit("pitch", m.pitch_deg);
-  visit("roll", m.roll_deg);
-  visit("speedOfSoundUsed", m.sound_speed_mps);
-  visit("pingStartTime", m.ping_start_time_s);
-  visit("dataSize", m.data_size);
-  visit("rangeResolution", m.range_resolution_m);
-  visit("nRanges", m.row_count);
-  visit("nBeams", m.beam_count);
+  visit("pingId", m.ping_id, means::ping_id);
+  visit("status", m.status, means::ping_status);
+  visit("frequency", m.frequency_hz, means::frequency);
+  visit("temperature", m.temperature_c, means::temperature);
+  visit("pressure", m.pressure_bar, means::pressure);
+  visit("heading", m.heading_deg, means::heading);
+  visit("pitch", m.pitch_deg, means::pitch);
+  visit("roll", m.roll_deg, means::roll);
+  visit("speedOfSoundUsed", m.sound_speed_mps, means::sound_speed);
+  visit("pingStartTime", m.ping_start_time_s, means::time);
+  visit("dataSize", m.data_size, means::sample_type);
+  visit("rangeResolution", m.range_resolution_m, means::range_resolution);
+  visit("nRanges", m.row_count, means::rows);
+  visit("nBeams", m.beam_count, means::beams);
   visit("spare", m.spare);
   visit("sizes", m.sizes);
 }

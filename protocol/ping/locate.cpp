@@ -11,30 +11,18 @@ using protocol::FieldName;
 using protocol::Region;
 
 template <class M>
-std::optional<Field> inside(std::string_view name, std::size_t offset, BytesView message) {
+std::optional<Field> inside(FieldName name, std::size_t offset, BytesView message) {
   auto found = wire::locate<M>(name);
   if (!found) return found;
   found->offset += offset;
   return message.empty() || found->offset + found->size <= message.size() ? found : std::nullopt;
 }
 
-/// In the first frame.
-std::optional<Field> in_header(FieldName name, BytesView message) {
-  const auto of = [&](std::string_view field) { return inside<Header>(field, 0, message); };
-  switch (name) {
-    case FieldName::magic:
-      return of("start");
-    case FieldName::payload_size:
-      return of("payload_length");
-    case FieldName::message_type:
-      return of("message_id");
-    case FieldName::source_id:
-      return of("src_device_id");
-    case FieldName::destination_id:
-      return of("dst_device_id");
-    default:
-      return std::nullopt;
-  }
+/// In the header of the first frame, else in a message, whose frame begins at `offset`.
+template <class M>
+std::optional<Field> in_frame(FieldName name, std::size_t offset, BytesView frames) {
+  const auto header = inside<Header>(name, 0, frames);
+  return header ? header : inside<M>(name, offset + header_size, frames);
 }
 
 bool is_of(Id id, BytesView frame) {
@@ -42,27 +30,6 @@ bool is_of(Id id, BytesView frame) {
   wire::Reader reader(frame);
   fields(reader, header);
   return reader.ok() && header.id == id;
-}
-
-template <class M>
-std::optional<Field> of_ping360(FieldName name, BytesView frame) {
-  const auto of = [&](std::string_view field) { return inside<M>(field, header_size, frame); };
-  switch (name) {
-    case FieldName::gain:
-      return of("gain_setting");
-    case FieldName::heading:
-      return of("angle");
-    case FieldName::range_resolution:
-      return of("sample_period");
-    case FieldName::frequency:
-      return of("transmit_frequency");
-    case FieldName::rows:
-      return of("number_of_samples");
-    case FieldName::image_size:
-      return of("data_length");
-    default:
-      return std::nullopt;
-  }
 }
 
 /// Offset of the frame of that message among the frames of a ping; of no frames: 0.
@@ -100,8 +67,7 @@ std::optional<std::size_t> atof_frame(BytesView frames) {
 }  // namespace
 
 std::optional<Field> locate_ping360(FieldName name, BytesView frame) {
-  if (const auto header = in_header(name, frame)) return header;
-  return is_of(Id::auto_device_data, frame) ? of_ping360<AutoDeviceData>(name, frame) : of_ping360<DeviceData>(name, frame);
+  return is_of(Id::auto_device_data, frame) ? in_frame<AutoDeviceData>(name, 0, frame) : in_frame<DeviceData>(name, 0, frame);
 }
 
 std::optional<Place> locate_ping360(Region region, BytesView frame) {
@@ -109,56 +75,16 @@ std::optional<Place> locate_ping360(Region region, BytesView frame) {
   return one_beam(region, frame, scan ? wire::wire_size<AutoDeviceData>() : wire::wire_size<DeviceData>());
 }
 
-std::optional<Field> locate_omniscan(FieldName name, BytesView frame) {
-  if (const auto header = in_header(name, frame)) return header;
-  const auto of = [&](std::string_view field) { return inside<OsMonoProfile>(field, header_size, frame); };
-  switch (name) {
-    case FieldName::ping_id:
-      return of("ping_number");
-    case FieldName::time:
-      return of("timestamp_ms");
-    case FieldName::frequency:
-      return of("ping_hz");
-    case FieldName::range:
-      return of("length_mm");
-    case FieldName::gain:
-      return of("gain_index");
-    case FieldName::rows:
-      return of("num_results");
-    case FieldName::sound_speed:
-      return of("sos_dmps");
-    case FieldName::heading:
-      return of("transducer_heading_deg");
-    default:
-      return std::nullopt;
-  }
-}
+std::optional<Field> locate_omniscan(FieldName name, BytesView frame) { return in_frame<OsMonoProfile>(name, 0, frame); }
 
 std::optional<Place> locate_omniscan(Region region, BytesView frame) {
   return one_beam(region, frame, wire::wire_size<OsMonoProfile>());
 }
 
 std::optional<Field> locate_ping1d(FieldName name, BytesView frames) {
-  if (const auto header = in_header(name, frames)) return header;
-  auto at = frame_of(Id::ping1d_profile, frames);
-  const bool has_profile = at.has_value();
-  if (!at) at = frame_of(Id::ping1d_distance, frames);
-  if (!at) return std::nullopt;
-  const auto of = [&](std::string_view field) {
-    return has_profile ? inside<Profile>(field, *at + header_size, frames) : inside<Distance>(field, *at + header_size, frames);
-  };
-  switch (name) {
-    case FieldName::ping_id:
-      return of("ping_number");
-    case FieldName::range:
-      return of("scan_length");
-    case FieldName::gain:
-      return of("gain_setting");
-    case FieldName::rows:
-      return has_profile ? of("profile_data_length") : std::nullopt;
-    default:
-      return std::nullopt;
-  }
+  if (const auto at = frame_of(Id::ping1d_profile, frames)) return in_frame<Profile>(name, *at, frames);
+  if (const auto at = frame_of(Id::ping1d_distance, frames)) return in_frame<Distance>(name, *at, frames);
+  return inside<Header>(name, 0, frames);
 }
 
 std::optional<Place> locate_ping1d(Region region, BytesView frames) {
@@ -170,24 +96,8 @@ std::optional<Place> locate_ping1d(Region region, BytesView frames) {
 }
 
 std::optional<Field> locate_surveyor(FieldName name, BytesView frames) {
-  if (const auto header = in_header(name, frames)) return header;
   const auto at = atof_frame(frames);
-  if (!at) return std::nullopt;
-  const auto of = [&](std::string_view field) { return inside<AtofPointData>(field, *at + header_size, frames); };
-  switch (name) {
-    case FieldName::ping_id:
-      return of("ping_number");
-    case FieldName::time:
-      return of("utc_msec");
-    case FieldName::sound_speed:
-      return of("sos_mps");
-    case FieldName::frequency:
-      return of("ping_hz");
-    case FieldName::beams:
-      return of("num_points");
-    default:
-      return std::nullopt;
-  }
+  return at ? in_frame<AtofPointData>(name, *at, frames) : inside<Header>(name, 0, frames);
 }
 
 std::optional<Place> locate_surveyor(Region region, BytesView frames) {

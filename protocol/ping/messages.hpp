@@ -9,9 +9,12 @@
 #include <string_view>
 #include <vector>
 
+#include "protocol/message_fields.hpp"
 #include "protocol/wire/wire.hpp"
 
 namespace sonar::ping {
+
+namespace means = protocol::means;
 
 using wire::Bytes;
 using wire::BytesView;
@@ -82,11 +85,11 @@ struct Header {
 };
 template <class V, wire::Like<Header> M>
 constexpr void fields(V& visit, M& m) {
-  visit("start", m.start);
-  visit("payload_length", m.length);
-  visit("message_id", m.id);
-  visit("src_device_id", m.source);
-  visit("dst_device_id", m.destination);
+  visit("start", m.start, means::magic);
+  visit("payload_length", m.length, means::payload_size);
+  visit("message_id", m.id, means::message_type);
+  visit("src_device_id", m.source, means::source_id);
+  visit("dst_device_id", m.destination, means::destination_id);
 }
 
 /// The whole frame, of a device with that id to any host.
@@ -199,13 +202,13 @@ struct DeviceData {
 template <class V, wire::Like<DeviceData> M>
 constexpr void fields(V& visit, M& m) {
   visit("mode", m.mode);
-  visit("gain_setting", m.gain);
-  visit("angle", m.angle);
+  visit("gain_setting", m.gain, means::gain);
+  visit("angle", m.angle, means::heading);
   visit("transmit_duration", m.transmit_us);
-  visit("sample_period", m.period);
-  visit("transmit_frequency", m.khz);
-  visit("number_of_samples", m.samples);
-  visit("data_length", m.count);
+  visit("sample_period", m.period, means::range_resolution);
+  visit("transmit_frequency", m.khz, means::frequency);
+  visit("number_of_samples", m.samples, means::rows);
+  visit("data_length", m.count, means::image_size);
 }
 
 struct AutoTransmit {
@@ -237,17 +240,17 @@ struct AutoDeviceData {
 template <class V, wire::Like<AutoDeviceData> M>
 constexpr void fields(V& visit, M& m) {
   visit("mode", m.mode);
-  visit("gain_setting", m.gain);
-  visit("angle", m.angle);
+  visit("gain_setting", m.gain, means::gain);
+  visit("angle", m.angle, means::heading);
   visit("transmit_duration", m.transmit_us);
-  visit("sample_period", m.period);
-  visit("transmit_frequency", m.khz);
+  visit("sample_period", m.period, means::range_resolution);
+  visit("transmit_frequency", m.khz, means::frequency);
   visit("start_angle", m.start);
   visit("stop_angle", m.stop);
   visit("num_steps", m.steps);
   visit("delay", m.delay_ms);
-  visit("number_of_samples", m.samples);
-  visit("data_length", m.count);
+  visit("number_of_samples", m.samples, means::rows);
+  visit("data_length", m.count, means::image_size);
 }
 
 // ---- Surveyor 240
@@ -296,14 +299,14 @@ struct AtofPointData {
 template <class V, wire::Like<AtofPointData> M>
 constexpr void fields(V& visit, M& m) {
   visit("pwr_up_msec", m.power_up_ms);
-  visit("utc_msec", m.utc_ms);
+  visit("utc_msec", m.utc_ms, means::time);
   visit("listening_sec", m.listening_s);
-  visit("sos_mps", m.speed_mps);
-  visit("ping_number", m.ping);
-  visit("ping_hz", m.hz);
+  visit("sos_mps", m.speed_mps, means::sound_speed);
+  visit("ping_number", m.ping, means::ping_id);
+  visit("ping_hz", m.hz, means::frequency);
   visit("pulse_sec", m.pulse_s);
   visit("flags", m.flags);
-  visit("num_points", m.points);
+  visit("num_points", m.points, means::beams);
   visit("reserved", m.reserved);
 }
 struct AtofPoint {

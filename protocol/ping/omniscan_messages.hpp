@@ -37,21 +37,21 @@ struct OsMonoProfile {
 };
 template <class V, wire::Like<OsMonoProfile> M>
 constexpr void fields(V& visit, M& m) {
-  visit("ping_number", m.ping);
+  visit("ping_number", m.ping, means::ping_id);
   visit("start_mm", m.start_mm);
-  visit("length_mm", m.length_mm);
-  visit("timestamp_ms", m.power_up_ms);
-  visit("ping_hz", m.hz);
-  visit("gain_index", m.gain);
-  visit("num_results", m.results);
-  visit("sos_dmps", m.speed_dmps);
+  visit("length_mm", m.length_mm, means::range);
+  visit("timestamp_ms", m.power_up_ms, means::time);
+  visit("ping_hz", m.hz, means::frequency);
+  visit("gain_index", m.gain, means::gain);
+  visit("num_results", m.results, means::rows);
+  visit("sos_dmps", m.speed_dmps, means::sound_speed);
   visit("channel_number", m.channel);
   visit("reserved", m.reserved);
   visit("pulse_duration_sec", m.pulse_s);
   visit("analog_gain", m.analog_gain);
   visit("max_pwr_db", m.highest_db);
   visit("min_pwr_db", m.lowest_db);
-  visit("transducer_heading_deg", m.transducer_heading_deg);
+  visit("transducer_heading_deg", m.transducer_heading_deg, means::heading);
   visit("vehicle_heading_deg", m.vehicle_heading_deg);
 }
 

@@ -61,10 +61,10 @@ constexpr void fields(V& visit, M& m) {
   visit("distance", m.distance_mm);
   visit("confidence", m.confidence);
   visit("transmit_duration", m.transmit_us);
-  visit("ping_number", m.ping);
+  visit("ping_number", m.ping, means::ping_id);
   visit("scan_start", m.start_mm);
-  visit("scan_length", m.length_mm);
-  visit("gain_setting", m.gain);
+  visit("scan_length", m.length_mm, means::range);
+  visit("gain_setting", m.gain, means::gain);
 }
 
 /// Followed by `count` strengths of a byte.
@@ -74,7 +74,7 @@ struct Profile : Distance {
 template <class V, wire::Like<Profile> M>
 constexpr void fields(V& visit, M& m) {
   fields(visit, static_cast<std::conditional_t<std::is_const_v<M>, const Distance, Distance>&>(m));
-  visit("profile_data_length", m.count);
+  visit("profile_data_length", m.count, means::rows);
 }
 
 static_assert(wire::wire_size<DistanceSimple>() == 5 && wire::wire_size<Distance>() == 24 && wire::wire_size<Profile>() == 26);

@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace sonar::wire {
@@ -55,6 +56,12 @@ class Visitor {
   constexpr void operator()(std::string_view name, T& value) {
     visit(name, value);
   }
+  /// `meaning`: a value of an enum, the same for every make; locate() finds fields by it.
+  template <class T, class Meaning>
+  constexpr void operator()(std::string_view name, T& value, Meaning meaning) {
+    self().means(meaning);
+    visit(name, value);
+  }
 
  private:
   template <class T>
@@ -76,6 +83,8 @@ class Visitor {
   constexpr Self& self() { return static_cast<Self&>(*this); }
 
  protected:
+  template <class Meaning>
+  constexpr void means(Meaning) {}
   template <class A>
   constexpr void array(std::string_view name, A& values) {
     for (auto& value : values) visit(name, value);
@@ -233,37 +242,36 @@ struct Field {
   bool operator==(const Field&) const = default;
 };
 
-/// Finds the first field of a name with dots, "fire.range". An array of bytes is one field, of another array it is the first
-/// element.
-class Locator : public Visitor<Locator> {
+/// Finds the field of a meaning: the last one that has it, together with those right before it that have it too. An array of
+/// bytes is one field; of another array it is the first element.
+template <class Meaning>
+class Locator : public Visitor<Locator<Meaning>> {
  public:
-  explicit constexpr Locator(std::string_view wanted) : wanted_(wanted) {}
+  explicit constexpr Locator(Meaning wanted) : wanted_(wanted) {}
   std::optional<Field> found;
 
  private:
   friend class Visitor<Locator>;
-  constexpr void find(std::string_view name, Field::Type type, std::size_t size) {
-    if (!found && name == wanted_) found = Field{type, offset_, size};
+  constexpr void means(Meaning meaning) { is_wanted_ = meaning == wanted_; }
+  constexpr void find(Field::Type type, std::size_t size) {
+    if (!std::exchange(is_wanted_, false)) return;
+    if (found && found->offset + found->size == offset_)
+      found = Field{Field::Type::bytes, found->offset, found->size + size};
+    else
+      found = Field{type, offset_, size};
   }
   template <Scalar T>
-  constexpr void scalar(std::string_view name, const T&) {
-    find(name, std::is_floating_point_v<T> ? Field::Type::number : Field::Type::integer, sizeof(T));
+  constexpr void scalar(std::string_view, const T&) {
+    find(std::is_floating_point_v<T> ? Field::Type::number : Field::Type::integer, sizeof(T));
     offset_ += sizeof(T);
   }
   template <class A>
   constexpr void array(std::string_view name, A& values) {
-    if constexpr (sizeof(typename std::remove_const_t<A>::value_type) == 1) find(name, Field::Type::bytes, values.size());
-    Visitor::array(name, values);
+    if constexpr (sizeof(typename std::remove_const_t<A>::value_type) == 1) find(Field::Type::bytes, values.size());
+    Visitor<Locator>::array(name, values);
   }
-  template <class M>
-  constexpr void nested(std::string_view name, M& message) {
-    const std::string_view outer = wanted_;
-    const bool inside = outer.size() > name.size() && outer.substr(0, name.size()) == name && outer[name.size()] == '.';
-    wanted_ = inside ? outer.substr(name.size() + 1) : std::string_view{};
-    fields(*this, message);
-    wanted_ = outer;
-  }
-  std::string_view wanted_;
+  Meaning wanted_;
+  bool is_wanted_ = false;  // the next field
   std::size_t offset_ = 0;
 };
 
@@ -276,10 +284,11 @@ constexpr std::size_t wire_size() {
   return counter.bytes;
 }
 
-/// The place of a field; nothing if no field has that name, or `message`, if it is not empty, ends before the field does.
-template <class M>
-constexpr std::optional<Field> locate(std::string_view name, BytesView message = {}) {
-  Locator locator(name);
+/// The place of the field of that meaning (Locator); nothing if no field has it, or `message`, if it is not empty, ends before
+/// the field does.
+template <class M, class Meaning>
+constexpr std::optional<Field> locate(Meaning meaning, BytesView message = {}) {
+  Locator<Meaning> locator(meaning);
   const M layout{};
   fields(locator, layout);
   const std::optional<Field> found = locator.found;

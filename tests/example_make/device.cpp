@@ -131,14 +131,7 @@ class ExampleVendor final : public protocol::Vendor {
     return std::make_shared<const Bytes>(message(Kind::ping, payload));
   }
   std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name, BytesView ping) const override {
-    using enum protocol::FieldName;
-    constexpr std::pair<protocol::FieldName, std::string_view> names[]{
-        {magic, "header.magic"},  {message_type, "header.kind"},    {version, "header.version"}, {payload_size, "header.payload"},
-        {ping_id, "head.number"}, {time, "head.fired_us"},          {range, "head.range_mm"},    {beams, "head.beams"},
-        {rows, "head.rows"},      {frequency, "head.frequency_hz"}, {gain, "head.gain_percent"}};
-    for (const auto& [known, where] : names)
-      if (part == protocol::Part::ping && known == name) return wire::locate<PingMessage>(where, ping);
-    return {};
+    return part == protocol::Part::ping ? wire::locate<PingMessage>(name, ping) : std::nullopt;
   }
   std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, BytesView ping) const override {
     if (ping.empty()) return std::pair<std::size_t, std::size_t>{};

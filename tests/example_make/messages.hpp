@@ -3,10 +3,13 @@
 
 #include <optional>
 
+#include "protocol/message_fields.hpp"
 #include "protocol/recorded/message_splitter.hpp"
 #include "protocol/wire/wire.hpp"
 
 namespace sonar::example_make {
+
+namespace means = protocol::means;
 
 using wire::Bytes;
 using wire::BytesView;
@@ -24,10 +27,10 @@ struct Header {
 };
 template <class V, wire::Like<Header> M>
 constexpr void fields(V& visit, M& m) {
-  visit("magic", m.magic);
-  visit("kind", m.kind);
-  visit("version", m.version);
-  visit("payload", m.payload);
+  visit("magic", m.magic, means::magic);
+  visit("kind", m.kind, means::message_type);
+  visit("version", m.version, means::version);
+  visit("payload", m.payload, means::payload_size);
 }
 
 /// From the host. `accepted` returns them; `refused` has no payload.
@@ -55,13 +58,13 @@ struct PingHead {
 };
 template <class V, wire::Like<PingHead> M>
 constexpr void fields(V& visit, M& m) {
-  visit("number", m.number);
-  visit("fired_us", m.fired_us);
-  visit("range_mm", m.range_mm);
-  visit("beams", m.beams);
-  visit("rows", m.rows);
-  visit("frequency_hz", m.frequency_hz);
-  visit("gain_percent", m.gain_percent);
+  visit("number", m.number, means::ping_id);
+  visit("fired_us", m.fired_us, means::time);
+  visit("range_mm", m.range_mm, means::range);
+  visit("beams", m.beams, means::beams);
+  visit("rows", m.rows, means::rows);
+  visit("frequency_hz", m.frequency_hz, means::frequency);
+  visit("gain_percent", m.gain_percent, means::gain);
 }
 inline constexpr std::size_t header_size = wire::wire_size<Header>(), head_size = wire::wire_size<PingHead>();
 static_assert(header_size == 8 && wire::wire_size<Settings>() == 7 && head_size == 25);
