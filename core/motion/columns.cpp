@@ -14,6 +14,8 @@ namespace {
 // Allowed error of the norm of a quaternion or of a row of a matrix; a smaller error is rounding, which is repaired.
 constexpr double norm_allowed = 0.01;
 constexpr double farthest = 1e8;  // m, m/s, rad/s
+constexpr std::array<std::pair<int, std::string_view>, 4> units{
+    {{9, "seconds"}, {6, "milliseconds"}, {3, "microseconds"}, {0, "nanoseconds"}}};
 constexpr std::size_t longest_quoted = 40, longest_name = 64;
 
 /// The error in a line; empty for a valid line.
@@ -32,6 +34,27 @@ std::optional<double> number(std::string_view word) {
   const auto end = std::from_chars(word.data(), last, v);
   if (end.ec != std::errc{} || end.ptr != last || !std::isfinite(v)) return std::nullopt;
   return v;
+}
+
+/// Names of columns that other programs write.
+constexpr std::array<std::array<std::string_view, 2>, 10> other_names{{{"time", "t"},
+                                                                       {"timestamp", "t"},
+                                                                       {"stamp", "t"},
+                                                                       {"time_s", "t_s"},
+                                                                       {"time_ns", "t_ns"},
+                                                                       {"timestamp_ns", "t_ns"},
+                                                                       {"tx", "x"},
+                                                                       {"ty", "y"},
+                                                                       {"tz", "z"},
+                                                                       {"timestamp_s", "t_s"}}};
+
+std::string plain_name(std::string_view word) {
+  if (word.size() > 1 && word.front() == '"' && word.back() == '"') word = word.substr(1, word.size() - 2);
+  std::string name(word.substr(0, longest_name));
+  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
+  for (const auto& [other, ours] : other_names)
+    if (name == other) return std::string(ours);
+  return name;
 }
 
 /// The largest absolute part, to compare all three with one bound.
@@ -108,12 +131,15 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
   out.count_ = header.size();
   for (std::size_t i = 0; i < header.size(); ++i) {
     // A header may mix both sets of names.
-    const std::string_view name = header[i] == "time" || header[i] == "time_s" ? "t_s" : header[i];  // as many programs write
+    std::string name = plain_name(header[i]);
+    if (name == "t_ms" || name == "t_us") {
+      out.power_ = name == "t_ms" ? 6 : 3;
+      name = "t_s";
+    }
+    out.says_unit_ = out.says_unit_ || name == "t_s";
     std::size_t c = 0;
     while (c < columns && name != long_names[c] && name != short_names[c]) ++c;
-    if (c == columns)
-      return "unknown column " + in_quotes(header[i]) +
-             text::suggestion(header[i].substr(0, longest_name), long_names, "columns");
+    if (c == columns) return "unknown column " + in_quotes(header[i]) + text::suggestion(name, long_names, "columns");
     if (out.place_[c] >= 0) return "column " + std::string(header[i]) + " appears twice";
     out.place_[c] = static_cast<int>(i);
   }
@@ -150,10 +176,23 @@ Complaint Columns::refuse_vector(const Words& words, Column first, const char* w
   return std::nullopt;
 }
 
+void Columns::guess_unit(const Words& words) {
+  if (!has(t) || says_unit_) return;
+  const std::string_view text = word(words, t);
+  if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return;
+  // From 1973 on; seconds of that many digits are beyond every stamp.
+  if (text.size() >= 12) power_ = text.size() <= 14 ? 6 : text.size() <= 17 ? 3 : 0;
+}
+
+std::string_view Columns::unit() const {
+  const int power = has(t_ns) ? 0 : power_;
+  return std::find_if(units.begin(), units.end(), [&](const auto& unit) { return unit.first == power; })->second;
+}
+
 Complaint Columns::refuse_stamp(const Words& words, Row& out) const {
   const std::string_view text = word(words, has(t) ? t : t_ns);
-  const auto stamp = has(t) ? nanoseconds_of_seconds(text) : nanoseconds_of_nanoseconds(text);
-  if (!stamp) return not_a_number(text, has(t) ? "a time in seconds" : "a time in nanoseconds");
+  const auto stamp = nanoseconds_of(text, has(t) ? power_ : 0);
+  if (!stamp) return not_a_number(text, ("a time in " + std::string(unit())).c_str());
   out.stamp_ns = *stamp;
   return std::nullopt;
 }

@@ -38,6 +38,11 @@ class Columns {
   static Columns kitti();
 
   std::size_t count() const { return count_; }
+  /// Takes whole numbers that are beyond every time in seconds for milliseconds, microseconds or nanoseconds since 1970, unless
+  /// the header names the unit. `words`: the first line with values.
+  void guess_unit(const Words& words);
+  /// Of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
+  std::string_view unit() const;
   bool has_body() const { return has(body); }
   bool has_velocity() const { return has(vx); }
   bool has_angular_velocity() const { return has(wx); }
@@ -59,6 +64,8 @@ class Columns {
   std::string_view word(const Words& words, Column c) const { return words[static_cast<std::size_t>(place_[c])]; }
 
   std::array<int, columns> place_{};
+  int power_ = 9;  // a stamp of column t is a number of 10^power_ ns
+  bool says_unit_ = false;
   std::size_t count_ = 0;
   bool matrix_ = false;
 };

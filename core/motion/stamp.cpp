@@ -85,6 +85,7 @@ std::optional<std::int64_t> scaled_number(std::string_view text, int shift) {
 
 }  // namespace
 
+std::optional<std::int64_t> nanoseconds_of(std::string_view text, int power) { return scaled_number(text, power); }
 std::optional<std::int64_t> nanoseconds_of_seconds(std::string_view text) { return scaled_number(text, second); }
 std::optional<std::int64_t> nanoseconds_of_nanoseconds(std::string_view text) { return scaled_number(text, 0); }
 

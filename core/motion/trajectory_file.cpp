@@ -9,6 +9,7 @@
 #include "core/base/regular_file.hpp"
 #include "core/motion/columns.hpp"
 #include "core/motion/stamp.hpp"
+#include "core/text/file_kind.hpp"
 #include "core/text/nearest.hpp"
 
 namespace sonar::motion {
@@ -30,16 +31,23 @@ std::string_view trimmed(std::string_view s) {
   return s;
 }
 
-/// Written by hand, because the search functions of strings are slow for words as short as numbers.
-void split(std::string_view line, bool commas, Words& words) {
+/// Written by hand, because the search functions of strings are slow for words as short as numbers. `between`: a comma, a
+/// semicolon, or a blank, which stands for several and for tabs. A last word that is empty is none.
+void split(std::string_view line, char between, Words& words) {
+  const bool blanks = between == ' ';
   words.clear();
   for (std::size_t at = 0; at <= line.size();) {
     std::size_t end = at;
-    while (end < line.size() && !(commas ? line[end] == ',' : is_blank(line[end]))) ++end;
+    while (end < line.size() && !(blanks ? is_blank(line[end]) : line[end] == between)) ++end;
     const std::string_view word = line.substr(at, end - at);
-    if (commas || !word.empty()) words.push_back(commas ? trimmed(word) : word);
+    if (!blanks || !word.empty()) words.push_back(blanks ? word : trimmed(word));
     at = end + 1;
   }
+  if (words.size() > 1 && words.back().empty()) words.pop_back();
+}
+
+bool is_comment(std::string_view line) {
+  return line.front() == '#' || line.starts_with("//") || line.starts_with("% ") || line == "%";
 }
 
 /// Distinguishes a line of numbers from a header.
@@ -71,9 +79,10 @@ class Reader {
 
   Result<TrajectoryFile> run(std::string_view text) {
     if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
+    const char line_end = text.find('\n') == std::string_view::npos ? '\r' : '\n';
     // Reads up to the first error, because later errors mostly follow from it.
     for (std::size_t at = 0; at < text.size() && wrong_.empty();) {
-      const std::size_t end = std::min(text.find('\n', at), text.size());
+      const std::size_t end = std::min(text.find(line_end, at), text.size());
       ++line_;
       take(trimmed(text.substr(at, end - at)));
       at = end + 1;
@@ -90,18 +99,19 @@ class Reader {
 
   void take(std::string_view line) {
     if (line.empty()) return;
-    if (line.front() == '#') return take_comment(line);
+    if (is_comment(line)) return take_comment(line);
     if (columns_) {
-      split(line, commas_, words_);
+      split(line, between_, words_);
     } else {
       // The first line decides the separator and, through begin_table(), the format and the columns.
-      commas_ = line.find(',') != std::string_view::npos;
-      split(line, commas_, words_);
+      between_ = line.find(';') != line.npos ? ';' : line.find(',') != line.npos ? ',' : ' ';
+      split(line, between_, words_);
       if (begin_table()) return;
       if (!wrong_.empty()) return;
     }
     if (words_.size() != columns_->count())
       return complain(std::to_string(words_.size()) + " values instead of " + std::to_string(columns_->count()));
+    if (rows_ == 0) columns_->guess_unit(words_);
     Row row;
     if (const auto wrong = columns_->refuse(words_, row)) return complain(*wrong);
     if (format_ == Format::kitti) {
@@ -150,10 +160,16 @@ class Reader {
   Format guessed(bool numbers) {
     // Without a header commas mean EuRoC, 12 values KITTI, 8 values TUM.
     if (!numbers) return Format::csv;
-    if (commas_) return Format::euroc;
+    if (between_ != ' ') return words_.size() == 8 && has_seconds(words_.front()) ? Format::tum : Format::euroc;
     if (words_.size() == 12) return Format::kitti;
     if (words_.size() != 8) complain(std::to_string(words_.size()) + " values instead of 8 (TUM) or 12 (KITTI)");
     return Format::tum;
+  }
+
+  /// EuRoC's nanoseconds are whole numbers, or, as some programs write them, 1.4e+18.
+  static bool has_seconds(std::string_view word) {
+    constexpr std::int64_t least_ns = 100'000'000'000'000'000;  // 1973
+    return word.find('.') != word.npos && nanoseconds_of_nanoseconds(word).value_or(0) < least_ns;
   }
 
   void take_comment(std::string_view line) {
@@ -161,7 +177,7 @@ class Reader {
     // Other comments are ignored.
     if (word == std::string_view::npos) return;
     Words words;
-    split(line.substr(word + 6), false, words);
+    split(line.substr(word + 6), ' ', words);
     const auto frame = words.empty() ? std::nullopt : frame_called(words.front());
     if (!frame) return complain("the frame must be ENU_FLU or NED_FRD");
     // Frames that contradict each other are an error, because the frame of the file must not be ignored silently.
@@ -223,6 +239,7 @@ class Reader {
     file.begins_at = first;
     file.duration = last - first;
     file.replaced = replaced_;
+    file.unit = columns_->unit();
     for (Track& t : tracks_) {
       for (Ns& at : t.points.times) at -= first;
       // Converts to ENU and FLU, which all other code uses (docs/glossary.md).
@@ -243,7 +260,7 @@ class Reader {
   Format format_;
   std::optional<Frame> frame_;
   std::optional<Columns> columns_;
-  bool commas_ = false;
+  char between_ = ' ';
   Words words_;
   std::size_t line_ = 0, rows_ = 0, last_ = 0, replaced_ = 0;
   std::vector<Track> tracks_;
@@ -275,6 +292,8 @@ Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::stri
 Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options) {
   const auto text = text_of(file);
   if (!text) return tl::make_unexpected(text.error());
+  if (const auto kind = text::unusable_kind(*text); !kind.empty())
+    return failure(ErrorKind::bad_data, file.string() + ": " + std::string(kind));
   if (is_log(*text))
     return failure(
         ErrorKind::bad_data,

@@ -34,9 +34,10 @@ struct TrajectoryFile {
   std::vector<Body> bodies;  // bodies in the order of the file; at least one
   Format format = Format::csv;
   Frame frame = Frame::enu_flu;
-  Ns begins_at{0};           // the earliest stamp: what the trajectories call 0
-  Ns duration{0};            // time to the latest stamp
-  std::size_t replaced = 0;  // poses that a later line of the same stamp took the place of
+  Ns begins_at{0};                    // the earliest stamp: what the trajectories call 0
+  Ns duration{0};                     // time to the latest stamp
+  std::size_t replaced = 0;           // poses that a later line of the same stamp took the place of
+  std::string_view unit = "seconds";  // of the stamps in the file
 };
 
 /// A comment of the file says its frame: `# frame: NED_FRD`. Errors: name:line: what.

@@ -78,7 +78,9 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
   plan.file = file.text(1024);
   plan.about = text::format("%s: %s, %s, %zu poses, %.3f s", plan.file.c_str(), std::string(name_of(f.format)).c_str(),
                             std::string(name_of(f.frame)).c_str(), (*way)->size(), seconds((*way)->duration()));
-  if (f.replaced > 0) plan.about += text::format(", %zu poses replaced by the next of the same stamp", f.replaced);
+  if (f.unit != "seconds") plan.about += ", stamps in " + std::string(f.unit);
+  if (f.replaced > 0)
+    plan.about += text::format(", %zu pose%s replaced by the next of the same stamp", f.replaced, f.replaced == 1 ? "" : "s");
   return plan;
 }
 

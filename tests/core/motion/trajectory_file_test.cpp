@@ -57,6 +57,37 @@ TEST(TrajectoryFile, AnEqualStampReplacesThePose) {
   EXPECT_EQ(parsed("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n").replaced, 0u);
 }
 
+TEST(TrajectoryFile, AFirstStampBeyondSecondsTellsTheUnit) {
+  const auto of = [](const std::string& first, const std::string& second) {
+    return parsed(first + " 0 0 -3 0 0 0 1\n" + second + " 1 0 -3 0 0 0 1\n");
+  };
+  for (const auto& [first, second, unit] : {std::array{"1305031102175", "1305031102275", "milliseconds"},
+                                            std::array{"1305031102175304", "1305031102275304", "microseconds"},
+                                            std::array{"1305031102175304000", "1305031102275304000", "nanoseconds"},
+                                            std::array{"1305031102.2", "1305031102.3", "seconds"}}) {
+    const TrajectoryFile file = of(first, second);
+    EXPECT_EQ(file.unit, unit);
+    EXPECT_EQ(file.duration, milliseconds(100)) << first;
+  }
+  EXPECT_EQ(parsed("t_ms,x,y,z\n0,1,2,3\n1500,1,2,3\n").duration, milliseconds(1500));
+  EXPECT_EQ(parsed("t_us,x,y,z\n0,1,2,3\n1500,1,2,3\n").duration, std::chrono::microseconds(1500));
+  EXPECT_THAT(refusal("t_s,x,y,z\n1305031102175,1,2,3\n"), HasSubstr("\"1305031102175\" is not a time in seconds"));
+}
+
+TEST(TrajectoryFile, WhatOtherProgramsWriteIsRead) {
+  for (const char* text :
+       {"T_S;X_M;Y_M;Z_M;\n10.5;1;2;3;\n11;1;2;4;\n", "\"timestamp\",\"tx\",\"ty\",\"tz\"\n10.5,1,2,3\n11,1,2,4\n",
+        "% made by hand\n// t x y z\ntime x y z\n10.5 1 2 3\n11 1 2 4\n", "t x y z\r10.5 1 2 3\r11 1 2 4\r",
+        "10.5,1,2,3,0,0,0,1\n11.0,1,2,4,0,0,0,1\n"}) {
+    const TrajectoryFile file = parsed(text);
+    EXPECT_EQ(file.duration, milliseconds(500)) << text;
+    EXPECT_EQ(points(file).poses.back().position_m.z, 4) << text;
+    EXPECT_EQ(points(file).poses.back().orientation.w, 1) << text;
+  }
+  EXPECT_EQ(parsed("1.403636580838555648e+18,0,0,0,1,0,0,0\n").format, Format::euroc);
+  EXPECT_EQ(parsed("0,0,0,0,1,0,0,0\n5000000,0,0,0,1,0,0,0\n").duration, milliseconds(5));
+}
+
 TEST(TrajectoryFile, EveryFormatSaysTheSame) {
   const struct {
     Format format;

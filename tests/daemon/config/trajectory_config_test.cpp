@@ -60,7 +60,9 @@ TEST(TrajectoryConfig, WordsAndFiles) {
   EXPECT_EQ(plan.trajectory->duration(), seconds(60));
   std::ofstream(directory() + "/equal.tum") << "# frame: ENU_FLU\n0 0 0 -3 0 0 0 1\n1 0 0 -3 0 0 0 1\n1 1 0 -3 0 0 0 1\n";
   EXPECT_EQ(vehicle("equal.tum").plan.about,
-            "equal.tum: tum, ENU_FLU, 2 poses, 1.000 s, 1 poses replaced by the next of the same stamp");
+            "equal.tum: tum, ENU_FLU, 2 poses, 1.000 s, 1 pose replaced by the next of the same stamp");
+  std::ofstream(directory() + "/ms.tum") << "# frame: ENU_FLU\n1305031102175 0 0 -3 0 0 0 1\n1305031103175 0 0 -3 0 0 0 1\n";
+  EXPECT_EQ(vehicle("ms.tum").plan.about, "ms.tum: tum, ENU_FLU, 2 poses, 1.000 s, stamps in milliseconds");
 }
 
 TEST(TrajectoryConfig, EveryKey) {
