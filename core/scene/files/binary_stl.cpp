@@ -11,7 +11,7 @@
 namespace sonar {
 namespace {
 
-constexpr std::size_t header_bytes = 84, triangle_bytes = 50;
+constexpr std::size_t header_bytes = 84, triangle_bytes = bytes_of_stl_triangle;
 
 static_assert(std::endian::native == std::endian::little);
 template <class T>
@@ -23,14 +23,15 @@ T value_at(const char* bytes) {
 
 }  // namespace
 
-std::optional<std::uint64_t> triangles_of_binary_stl(std::FILE* file) {
+std::optional<BinaryStl> binary_stl(std::FILE* file) {
   std::array<char, header_bytes> header{};
   if (std::fseek(file, 0, SEEK_SET) != 0 || std::fread(header.data(), 1, header.size(), file) != header.size()) return {};
   const std::uint64_t count = value_at<std::uint32_t>(&header[80]);
   if (std::fseek(file, 0, SEEK_END) != 0) return {};
   const long size = std::ftell(file);
-  if (count == 0 || size < 0 || static_cast<std::uint64_t>(size) != header_bytes + triangle_bytes * count) return {};
-  return count;
+  const std::uint64_t whole = header_bytes + triangle_bytes * count;
+  if (count == 0 || size < 0 || static_cast<std::uint64_t>(size) < whole) return {};
+  return BinaryStl{count, static_cast<std::uint64_t>(size) - whole};
 }
 
 bool each_triangle_of_binary_stl(std::FILE* file, std::uint64_t count, const TriangleSink& take) {

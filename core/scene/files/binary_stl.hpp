@@ -9,8 +9,15 @@
 
 namespace sonar {
 
-/// How many triangles the file holds; nothing when its length says that it is not binary STL.
-std::optional<std::uint64_t> triangles_of_binary_stl(std::FILE* file);
+inline constexpr std::size_t bytes_of_stl_triangle = 50;
+
+struct BinaryStl {
+  std::uint64_t triangles = 0;     // as its header says
+  std::uint64_t bytes_behind = 0;  // what a program has put behind them
+};
+
+/// Nothing when the file is too short for the triangles of its header, as every text is: then it is not binary STL.
+std::optional<BinaryStl> binary_stl(std::FILE* file);
 /// Gives `count` triangles as they stand in the file, material 0. False: the file could not be read so far.
 bool each_triangle_of_binary_stl(std::FILE* file, std::uint64_t count, const TriangleSink& take);
 

@@ -16,6 +16,7 @@
 #include "core/scene/files/binary_stl.hpp"
 #include "core/scene/files/mesh_exchange.hpp"
 #include "core/scene/files/mesh_steps.hpp"
+#include "core/text/file_kind.hpp"
 
 namespace sonar {
 namespace {
@@ -100,15 +101,23 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
   static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
   if (std::find(known.begin(), known.end(), extension) == known.end())
     return bad_mesh(request, "unknown mesh format; use OBJ, STL, PLY, glTF, GLB or DAE");
-  if (on_disk && extension == ".stl")
-    if (const auto triangles = triangles_of_binary_stl(opened->get())) {
+  const std::string begin = on_disk ? read_regular(request.file, text::kind_bytes).value_or("") : std::string();
+  if (const auto kind = text::unusable_kind(begin); !kind.empty()) return bad_mesh(request, std::string(kind));
+  if (on_disk && extension == ".stl") {
+    if (const auto stl = binary_stl(opened->get())) {
       bool whole = true;
-      auto mesh = finish_mesh(request, false, *triangles, {"DefaultMaterial"}, [&](const TriangleSink& take) {
-        whole = whole && each_triangle_of_binary_stl(opened->get(), *triangles, take);
+      auto mesh = finish_mesh(request, false, stl->triangles, {"DefaultMaterial"}, [&](const TriangleSink& take) {
+        whole = whole && each_triangle_of_binary_stl(opened->get(), stl->triangles, take);
       });
       if (!whole) return bad_mesh(request, "cannot be read to its end");
+      if (mesh) mesh->lost = stl->bytes_behind / bytes_of_stl_triangle;
       return mesh;
     }
+    if (begin.find("solid") == std::string::npos)
+      return bad_mesh(request,
+                      "is no STL, or cut short: a text begins with the word solid, and a binary file has 84 bytes and 50 for "
+                      "each triangle that its header counts; export it again");
+  }
   opened->reset();
   if (auto room = check_import_memory(request, bytes); !room) return tl::make_unexpected(room.error());
   // Bytes of a triangle in PLY; other formats take more.

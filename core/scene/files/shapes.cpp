@@ -11,6 +11,7 @@
 #include "core/scene/files/height_values.hpp"
 #include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/shapes/primitives.hpp"
+#include "core/text/file_kind.hpp"
 #include "core/text/format.hpp"
 
 namespace sonar {
@@ -219,6 +220,9 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   using Read = Result<HeightGrid> (*)(const std::filesystem::path&, const HeightOptions&);
   static const std::map<std::string, Read> readers{
       {".asc", read_esri_heights}, {".xyz", read_xyz_heights}, {".tif", read_geo_tiff_heights}, {".tiff", read_geo_tiff_heights}};
+  const auto begin = read_regular(path, text::kind_bytes);
+  if (const auto kind = text::unusable_kind(begin ? *begin : std::string_view()); !kind.empty())
+    return file.fail(path.filename().string() + ": " + std::string(kind)), Shape{};
   if (!readers.contains(extension)) extension = grid_by_content(path);
   if (const auto reader = readers.find(extension); reader != readers.end()) {
     HeightOptions options{.z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000))};

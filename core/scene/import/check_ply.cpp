@@ -42,6 +42,8 @@ MeshFault check_ply(std::string_view head, std::uint64_t file_bytes) {
     if (word == "property") least += ascii ? 2 : type == "list" ? (words >> type, bytes_of(type)) : bytes_of(type);
     if (word != "element") continue;
     if (!holds()) return too_many();
+    if (type == "tristrips")
+      return "stores its faces as strips of triangles (tristrips), which are not read; export it with faces";
     element = type, least = 0, count = 0;
     words >> number;
     if (std::from_chars(number.data(), number.data() + number.size(), count).ec == std::errc::result_out_of_range ||

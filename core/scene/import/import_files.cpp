@@ -40,11 +40,12 @@ class ObjText {
     } else if (c == '\n') {
       line_begins_ = true;
       in_face_ = in_word_ = in_comment_ = false;
+    } else if (line_begins_ && is_before_words(c)) {
+      step.c = '\n';  // the importer passes over lines that begin with a blank, and over a first line with a byte order mark
     } else if (line_begins_) {
       step.begins_object = begins_object(c) && before_ == '\n';
-      after_v_ = c == 'v' && before_ == '\n';  // the importer passes over lines that begin with a blank
-      if (!is_blank(c))
-        line_begins_ = false, in_face_ = step.begins_face = c == 'f', in_word_ = true, in_vertex_ = slashed_ = false;
+      after_v_ = c == 'v' && before_ == '\n';
+      line_begins_ = false, in_face_ = step.begins_face = c == 'f', in_word_ = true, in_vertex_ = slashed_ = false;
     } else if (is_blank(c)) {
       in_word_ = false;
     } else if (in_face_ && (in_comment_ || c == '\\' || c == '#')) {
@@ -57,7 +58,8 @@ class ObjText {
       if (!in_vertex_ && slashed_) step.c = ' ';
       if (in_vertex_) slashed_ = false, step.is_index = true;
     }
-    if (c != '\r') before_ = goes_on ? ' ' : c;
+    if (c != '\r') before_ = goes_on ? ' ' : step.c == '\n' ? '\n' : c;
+    first_ = first_ && is_mark(c);
     faces_ += step.begins_face;
     return step;
   }
@@ -66,10 +68,12 @@ class ObjText {
 
  private:
   static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+  static bool is_mark(char c) { return c == '\xEF' || c == '\xBB' || c == '\xBF'; }
+  bool is_before_words(char c) const { return is_blank(c) || (first_ && is_mark(c)); }
   std::uint64_t faces_ = 0;
   char before_ = '\n';
-  bool after_v_ = false, line_begins_ = true, in_face_ = false, in_word_ = false, in_vertex_ = false, slashed_ = false,
-       in_comment_ = false;
+  bool first_ = true, after_v_ = false, line_begins_ = true, in_face_ = false, in_word_ = false, in_vertex_ = false,
+       slashed_ = false, in_comment_ = false;
 };
 
 struct ObjCounts {
