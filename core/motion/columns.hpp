@@ -41,7 +41,7 @@ class Columns {
   /// Takes whole numbers that are beyond every time in seconds for milliseconds, microseconds or nanoseconds since 1970, unless
   /// the header names the unit. `words`: the first line with values.
   void guess_unit(const Words& words);
-  /// Of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
+  /// Unit of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
   std::string_view unit() const;
   bool has_body() const { return has(body); }
   bool has_velocity() const { return has(vx); }

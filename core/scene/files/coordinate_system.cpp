@@ -1,4 +1,4 @@
-// The coordinate system of a grid by WKT, .prj files and EPSG codes: degrees or lengths, their units, and the zone of UTM.
+// The coordinate system of a grid by WKT and .prj files: degrees or lengths, their units, and the zone of UTM.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,9 +27,9 @@ constexpr std::array<std::string_view, 6> in_degrees{"GEOGCS", "GEOGCRS", "GEODC
 constexpr std::array<std::string_view, 4> of_heights{"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"};
 
 /// Datums that agree with WGS 84 within 2 m, as names of systems have them, without blanks and underscores.
-constexpr std::array<std::string_view, 13> modern_datums{"WGS84",   "WGS1984", "ETRS89",  "ETRS1989", "NAD83",
-                                                         "NAD1983", "GDA94",   "GDA1994", "GDA2020",  "SIRGAS2000",
-                                                         "SIRGAS",  "RGF93",   "NZGD2000"};
+constexpr std::array<std::string_view, 16> modern_datums{"WGS84",    "WGS1984", "ETRS89",  "ETRS1989",   "NAD83",  "NAD1983",
+                                                         "GDA94",    "GDA1994", "GDA2020", "SIRGAS2000", "SIRGAS", "RGF93",
+                                                         "NZGD2000", "JGD2000", "JGD2011", "SWEREF99"};
 
 /// From names like "WGS 84 / UTM zone 33N", "NAD_1983_UTM_Zone_10N" and "GDA94 / MGA zone 55" in capitals.
 std::optional<UtmZone> utm_of_name(std::string name) {
@@ -78,79 +78,114 @@ CoordinateSystem system_of_lines(const std::string& text) {
   return system;
 }
 
-}  // namespace
-
-CoordinateSystem system_of_wkt(std::string_view text) {
-  CoordinateSystem system;
-  struct Open {
+/// Reads WKT of versions 1 and 2: words with values and further words in brackets.
+class WktReader {
+ public:
+  CoordinateSystem read(std::string_view text) {
     std::string word;
-    int commas = 0;
-    std::string second;  // its second value
+    for (std::size_t at = 0; at < text.size(); ++at) {
+      const char c = text[at];
+      if (c == '"') {
+        const std::size_t end = std::min(text.find('"', at + 1), text.size());
+        take_name(text.substr(at + 1, end - at - 1));
+        at = end;
+      } else if (c == '[' || c == '(') {
+        if (open_.size() == deepest) break;
+        begin(upper(word));
+        word.clear();
+      } else if (c == ',' || c == ']' || c == ')') {
+        if (open_.empty()) break;
+        Open& last = open_.back();
+        if (last.commas == 1 || last.commas == 2) last.values[last.commas - 1u] = word;
+        ++last.commas;
+        word.clear();
+        if (c != ',') close();
+      } else if (c > ' ') {
+        word += c;
+      }
+    }
+    return finished();
+  }
+
+ private:
+  struct Open {
+    std::string word, name;
+    unsigned commas = 0;
+    std::array<std::string, 2> values;  // its second and third
   };
-  std::vector<Open> open;
-  constexpr std::size_t deepest = 64;
-  const auto close = [&] {
-    const Open unit = open.back();
-    open.pop_back();
-    if (unit.word != "UNIT" && unit.word != "LENGTHUNIT") return;
-    std::size_t owner = open.size();
-    while (owner > 0 && open[owner - 1].word == "AXIS") --owner;
-    const auto metres = height_number(unit.second);
-    if (owner == 0 || !metres || !is_unit(*metres)) return;
-    if (is_one_of(open[owner - 1].word, in_lengths)) system.unit_m = *metres;
-    if (is_one_of(open[owner - 1].word, of_heights)) system.height_unit_m = *metres;
-  };
-  std::string word;
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    const char c = text[at];
-    if (c == '"') {
-      const std::size_t end = std::min(text.find('"', at + 1), text.size());
-      const std::string name = upper(text.substr(at + 1, end - at - 1));
-      for (const char* mercator : {"PSEUDO-MERCATOR", "PSEUDO_MERCATOR", "MERCATOR_AUXILIARY_SPHERE", "POPULAR VISUALISATION"})
-        system.web_mercator = system.web_mercator || name.find(mercator) != name.npos;
-      if (!system.utm && !open.empty() && open.back().commas == 0 &&
-          (open.size() == 1 || is_one_of(open.back().word, in_lengths)))
-        system.utm = utm_of_name(name);
-      at = end;
-    } else if (c == '[' || c == '(') {
-      if (open.size() == deepest) return system;
-      open.push_back({upper(word), 0, {}});
-      word.clear();
-      const std::string& kind = open.back().word;  // a projected system contains a geographic one, behind its own name
-      if (!system.geographic && is_one_of(kind, in_degrees)) system.geographic = true;
-      if (!system.geographic && is_one_of(kind, in_lengths)) system.geographic = false;
-    } else if (c == ',' || c == ']' || c == ')') {
-      if (open.empty()) return system;
-      if (open.back().commas == 1) open.back().second = word;
-      ++open.back().commas;
-      word.clear();
-      if (c != ',') close();
-    } else if (c > ' ') {
-      word += c;
+  static constexpr std::size_t deepest = 64;
+
+  void begin(std::string word) {
+    const bool degrees = is_one_of(word, in_degrees), lengths = is_one_of(word, in_lengths);
+    // A projected system contains a geographic one, behind its own name.
+    if (!system_.geographic && (degrees || lengths)) {
+      system_.geographic = degrees;
+      is_projected_ = word.starts_with("PROJ");
+      system_at_ = open_.size();
+    }
+    open_.push_back({std::move(word), {}, 0, {}});
+  }
+
+  void take_name(std::string_view given) {
+    const std::string name = upper(given);
+    for (const char* mercator : {"PSEUDO-MERCATOR", "PSEUDO_MERCATOR", "MERCATOR_AUXILIARY_SPHERE", "POPULAR VISUALISATION"})
+      system_.web_mercator = system_.web_mercator || name.find(mercator) != name.npos;
+    if (open_.empty() || open_.back().commas > 0) return;
+    Open& last = open_.back();
+    last.name = name;
+    if (system_.geographic && open_.size() == system_at_ + 1) name_ = given.substr(0, longest_name);
+    if (!system_.utm && (open_.size() == 1 || is_one_of(last.word, in_lengths))) system_.utm = utm_of_name(name);
+    if (last.word == "PROJECTION" || last.word == "METHOD") {
+      std::erase_if(last.name, [](char c) { return c == ' ' || c == '_'; });
+      transverse_ = last.name == "TRANSVERSEMERCATOR" || last.name == "GAUSSKRUGER";
     }
   }
-  return system;
-}
 
-std::optional<UtmZone> utm_of_epsg(std::uint32_t code) {
-  struct Row {
-    std::uint32_t first, last;
-    UtmZone zone;  // of the first
-  };
-  static constexpr std::array<Row, 9> rows{{{32601, 32660, {1, false}},   // WGS 84
-                                            {32701, 32760, {1, true}},    //
-                                            {25828, 25838, {28, false}},  // ETRS89
-                                            {26901, 26923, {1, false}},   // NAD83
-                                            {6330, 6348, {1, false}},     // NAD83(2011)
-                                            {31965, 31976, {11, false}},  // SIRGAS 2000
-                                            {31977, 31985, {17, true}},   //
-                                            {28348, 28358, {48, true}},   // GDA94
-                                            {7846, 7859, {46, true}}}};   // GDA2020
-  for (const Row& row : rows)
-    if (code >= row.first && code <= row.last)
-      return UtmZone{row.zone.number + static_cast<int>(code - row.first), row.zone.south};
-  return std::nullopt;
-}
+  void close() {
+    const Open unit = open_.back();
+    open_.pop_back();
+    const auto first = height_number(unit.values[0]), second = height_number(unit.values[1]);
+    if (unit.word == "PARAMETER" && first) take_parameter(unit.name, *first);
+    if ((unit.word == "SPHEROID" || unit.word == "ELLIPSOID") && first && second) modern_ = is_modern_ellipsoid(*first, *second);
+    if (unit.word != "UNIT" && unit.word != "LENGTHUNIT") return;
+    std::size_t owner = open_.size();
+    while (owner > 0 && open_[owner - 1].word == "AXIS") --owner;
+    if (owner == 0 || !first || !is_unit(*first)) return;
+    if (is_one_of(open_[owner - 1].word, in_lengths)) system_.unit_m = *first;
+    if (is_one_of(open_[owner - 1].word, of_heights)) system_.height_unit_m = *first;
+  }
+
+  void take_parameter(std::string name, double value) {
+    std::erase_if(name, [](char c) { return c == ' ' || c == '_'; });
+    if (name.starts_with("LATITUDEOF")) by_.latitude_deg = value;
+    if (name == "CENTRALMERIDIAN" || name.starts_with("LONGITUDEOF")) by_.central_meridian_deg = value;
+    if (name.starts_with("SCALEFACTOR")) by_.scale = value;
+    if (name == "FALSEEASTING") by_.false_easting_m = value;
+    if (name == "FALSENORTHING") by_.false_northing_m = value;
+  }
+
+  CoordinateSystem finished() {
+    if (!system_.utm && is_projected_ && transverse_ && modern_.value_or(false) && system_.unit_m == 1)
+      system_.utm = utm_of_parameters(by_);
+    if (is_projected_ && !system_.utm && !system_.web_mercator) system_.name = name_;
+    system_.other_datum = system_.geographic.value_or(false) && !modern_.value_or(true);
+    if (system_.other_datum) system_.name = name_;
+    return system_;
+  }
+
+  static constexpr std::size_t longest_name = 80;
+  CoordinateSystem system_;
+  std::vector<Open> open_;
+  std::size_t system_at_ = 0;
+  std::string name_;
+  bool is_projected_ = false, transverse_ = false;
+  std::optional<bool> modern_;
+  TransverseMercator by_;
+};
+
+}  // namespace
+
+CoordinateSystem system_of_wkt(std::string_view text) { return WktReader().read(text); }
 
 CoordinateSystem system_by_prj(const std::filesystem::path& heights) {
   std::filesystem::path prj = heights;

@@ -13,6 +13,7 @@
 
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
+#include "core/scene/files/geo_keys.hpp"
 #include "core/scene/files/height_values.hpp"
 #include "core/text/format.hpp"
 
@@ -22,27 +23,17 @@ namespace {
 constexpr std::uint64_t most_file_bytes = std::uint64_t{2} << 30, most_block_bytes = 64 << 20;
 constexpr std::uint64_t memory_of_a_cell = 4;
 
-// Tags, and keys of the directory of keys.
+// Tags.
 enum : std::uint32_t {
   pixel_scale = 33550,
   tie_points = 33922,
   transformation = 34264,
   key_directory = 34735,
+  key_numbers = 34736,
+  key_texts = 34737,
   gdal_metadata = 42112,
   gdal_no_data = 42113,
 };
-enum : std::uint16_t {
-  model_type = 1024,
-  raster_type = 1025,
-  angular_units = 2054,
-  projected_system = 3072,
-  linear_units = 3076,
-  vertical_system = 4096,
-  vertical_units = 4099,
-};
-constexpr std::uint16_t projected = 1, geographic = 2, pixel_is_point = 2, degree = 9102, web_mercator = 3857;
-constexpr std::uint16_t metre = 9001, foot = 9002, us_survey_foot = 9003;
-
 struct CloseTiff {
   void operator()(TIFF* tiff) const { TIFFClose(tiff); }
 };
@@ -86,17 +77,6 @@ std::vector<T> values_of(TIFF* tiff, std::uint32_t tag, TIFFDataType type) {
   return values == nullptr ? std::vector<T>() : std::vector<T>(values, values + std::min<std::uint32_t>(count, 65536));
 }
 
-/// Keys with a value of their own; others are names and numbers that do not matter here.
-struct Keys {
-  explicit Keys(std::vector<std::uint16_t> given) : words(std::move(given)) {}
-  std::optional<std::uint16_t> value_of(std::uint16_t key) const {
-    for (std::size_t at = 4; at + 4 <= words.size(); at += 4)
-      if (words[at] == key && words[at + 1] == 0) return words[at + 3];
-    return std::nullopt;
-  }
-  std::vector<std::uint16_t> words;
-};
-
 struct Picture {
   std::uint32_t columns = 0, rows = 0;
   std::uint16_t bits = 1, format = SAMPLEFORMAT_UINT, samples = 1;
@@ -107,43 +87,17 @@ struct Georeference {
   double x = 0, y = 0, step_x = 0, step_y = 0;
 };
 
-/// 1 of metres and degrees.
-Result<double> length_unit(std::optional<std::uint16_t> key) {
-  switch (key.value_or(metre)) {
-    case metre:
-    case 0:
-      return 1;
-    case foot:
-      return 0.3048;
-    case us_survey_foot:
-      return 1200.0 / 3937;
-    case 9036:
-      return 1000;
-    default:
-      return failure(ErrorKind::bad_data,
-                     "is in units of length of code " + std::to_string(*key) + "; bring it to metres: gdalwarp -t_srs");
-  }
-}
-
-/// The code of the unit of systems of heights that are not in metres, of the EPSG data set 10.0.
-std::optional<std::uint16_t> unit_of_height_system(std::uint16_t system) {
-  static const std::set<std::uint16_t> in_feet{5614, 6130, 6131, 6132, 8050, 8051, 8228},
-      in_us_survey_feet{5702, 6358, 6359, 6360, 8052, 8053};
-  if (in_feet.contains(system)) return foot;
-  if (in_us_survey_feet.contains(system)) return us_survey_foot;
-  return std::nullopt;
-}
-
 /// GDAL's unit of a band. Other words, such as a sensor's, are no units of length.
 std::optional<std::uint16_t> unit_of_band(std::string_view metadata) {
   const std::string_view begin = "role=\"unittype\">";
   const std::size_t at = metadata.find(begin);
   if (at == metadata.npos) return std::nullopt;
   const std::string_view word = metadata.substr(at + begin.size(), metadata.find('<', at) - at - begin.size());
-  if (word == "ft" || word == "foot" || word == "feet" || word == "international foot") return foot;
-  if (word == "US survey foot" || word == "ftUS" || word == "us-ft") return us_survey_foot;
-  return word == "m" || word == "metre" || word == "meter" || word == "metres" || word == "meters" ? std::optional(metre)
-                                                                                                   : std::nullopt;
+  if (word == "ft" || word == "foot" || word == "feet" || word == "international foot") return unit_foot;
+  if (word == "US survey foot" || word == "ftUS" || word == "us-ft") return unit_us_survey_foot;
+  return word == "m" || word == "metre" || word == "meter" || word == "metres" || word == "meters"
+             ? std::optional<std::uint16_t>(unit_metre)
+             : std::nullopt;
 }
 
 /// Whether an item of that role has another value than the neutral one, which changes no height.
@@ -237,6 +191,9 @@ class GeoTiffReader {
     const bool known = whole ? picture_.bits == 8 || picture_.bits == 16 || picture_.bits == 32
                              : picture_.format == SAMPLEFORMAT_IEEEFP && (picture_.bits == 32 || picture_.bits == 64);
     const bool grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
+    if (grey && picture_.samples == 1 && !known)
+      return bad("has heights of " + std::to_string(picture_.bits) +
+                 " bits, which are not read; write them otherwise: gdal_translate -ot Float32");
     if (!grey || !known || (picture_.samples != 1 && planes != PLANARCONFIG_SEPARATE))
       return bad("not one band of heights but a picture; choose a band of numbers: gdal_translate -b 1 -ot Float32");
     static const std::set<std::uint16_t> codecs{COMPRESSION_NONE,    COMPRESSION_LZW,      COMPRESSION_ADOBE_DEFLATE,
@@ -256,25 +213,12 @@ class GeoTiffReader {
     // Heights that are not what the cells hold would be wrong by a factor without a word.
     if (has_other(metadata, "role=\"scale\">", 1) || has_other(metadata, "role=\"offset\">", 0))
       return bad("stores heights with a scale or an offset; write the heights themselves: gdal_translate -unscale -ot Float32");
-    const Keys keys(values_of<std::uint16_t>(tiff_, key_directory, TIFF_SHORT));
-    const auto model = keys.value_of(model_type);
-    if (model == geographic) {
-      raw_.system.geographic = true;
-      if (const auto unit = keys.value_of(angular_units); unit.value_or(degree) != degree)
-        return bad("has angles that are not in degrees; bring it to them: gdalwarp -t_srs EPSG:4326");
-    } else if (model == projected) {
-      raw_.system.geographic = false;
-      raw_.system.web_mercator = keys.value_of(projected_system) == web_mercator;
-      raw_.system.utm = utm_of_epsg(keys.value_of(projected_system).value_or(0));
-    }
-    auto of_heights = unit_of_band(metadata);
-    if (!of_heights) of_heights = keys.value_of(vertical_units);
-    if (!of_heights) of_heights = unit_of_height_system(keys.value_of(vertical_system).value_or(0));
-    const auto height_unit = length_unit(of_heights);
-    if (!height_unit) return tl::make_unexpected(height_unit.error());
-    const auto unit = length_unit(model == projected ? keys.value_of(linear_units) : std::nullopt);
-    if (!unit) return tl::make_unexpected(unit.error());
-    raw_.system.unit_m = *unit, raw_.system.height_unit_m = *height_unit;
+    const auto texts = values_of<char>(tiff_, key_texts, TIFF_ASCII);
+    const GeoKeys keys(values_of<std::uint16_t>(tiff_, key_directory, TIFF_SHORT),
+                       values_of<double>(tiff_, key_numbers, TIFF_DOUBLE), std::string(texts.begin(), texts.end()));
+    auto system = system_of_keys(keys, unit_of_band(metadata));
+    if (!system) return tl::make_unexpected(system.error());
+    raw_.system = *std::move(system);
 
     Georeference place;
     const auto scale = values_of<double>(tiff_, pixel_scale, TIFF_DOUBLE),
@@ -286,12 +230,12 @@ class GeoTiffReader {
       if (matrix[1] != 0 || matrix[4] != 0) return bad("is turned against its axes; straighten it: gdalwarp");
       place = {matrix[3], matrix[7], matrix[0], matrix[5]};
     } else if (const auto beside = world_file()) {
-      if (!model) raw_.system = system_by_prj(file_);
+      if (!raw_.system.geographic) raw_.system = system_by_prj(file_);
       return check(*beside);
     } else {
       return bad("has no coordinates (no GeoTIFF); give it some: gdal_translate -a_ullr WEST NORTH EAST SOUTH");
     }
-    if (keys.value_of(raster_type) != pixel_is_point)  // the corner of the first cell, not its middle
+    if (keys.value_of(GeoKeys::raster_type) != GeoKeys::pixel_is_point)  // the corner of the first cell, not its middle
       place.x += 0.5 * place.step_x, place.y += 0.5 * place.step_y;
     return check(place);
   }

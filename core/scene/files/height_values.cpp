@@ -8,6 +8,7 @@
 #include "core/base/regular_file.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
+#include "core/text/printable.hpp"
 
 namespace sonar {
 namespace {
@@ -95,6 +96,27 @@ void bring_to_metres(RawHeights& raw, double z_scale, std::vector<std::string>& 
                   (raw.system.height_unit_m == 1 && unit_m < 1 && std::abs(z_scale) == 1
                        ? text::format("; heights stay as they are: set z_scale: %.6g if they are in these units too", unit_m)
                        : ""));
+}
+
+/// German eastings are often written with the number of their zone before them: 32500000.
+void take_off_zone(RawHeights& raw, UtmZone zone, std::vector<std::string>& notes) {
+  constexpr double a_million_m = 1e6;
+  const auto has_it = [&](double x) { return std::floor(x / a_million_m) == zone.number; };
+  if (!has_it(raw.x.front()) || !has_it(raw.x.back())) return;
+  for (double& x : raw.x) x -= zone.number * a_million_m;
+  notes.push_back(text::format("its eastings begin with %d, the number of their zone, which is taken off", zone.number));
+}
+
+/// For a system whose latitudes and longitudes are not known here, or only roughly.
+std::string note_of_system(const CoordinateSystem& system) {
+  const std::string name = text::printable(system.name);
+  return system.other_datum
+             ? "its degrees, of " + name +
+                   ", are taken as those of WGS 84, from which they may be some 100 m away; convert them: gdalwarp "
+                   "-t_srs EPSG:4326 IN OUT.tif"
+             : "its coordinates, of " + name +
+                   ", are taken as plain metres, with the scale of that projection; to place it by latitude and "
+                   "longitude: gdalwarp -t_srs EPSG:4326 IN OUT.tif";
 }
 
 std::string place_text(const Geodetic& place) {
@@ -247,6 +269,12 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   const auto zone = options.utm || options.geographic ? options.utm : raw.system.utm;
   if (geographic && zone && options.utm)
     return failure(ErrorKind::bad_data, "utm is for coordinates in metres, and these are degrees; take it away");
+  if (zone) take_off_zone(raw, *zone, grid.notes);
+  if (options.origin && !geographic && !zone && !raw.system.name.empty())
+    return failure(ErrorKind::bad_data, "origin is for a grid in degrees or UTM, and this is in " +
+                                            text::printable(raw.system.name) +
+                                            "; bring it to degrees (gdalwarp -t_srs EPSG:4326 IN OUT.tif), or take origin away");
+  if (!raw.system.name.empty() && !options.geographic && !options.utm) grid.notes.push_back(note_of_system(raw.system));
   if (options.origin && !geographic && !zone)
     return failure(ErrorKind::bad_data,
                    "origin is for a grid in degrees or UTM; write geographic: true or utm: 33N (its zone) if it is one, else "

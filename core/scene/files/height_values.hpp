@@ -40,6 +40,14 @@ struct CoordinateSystem {
   bool web_mercator = false;  // its metres are longer than metres on the ground
   /// On a datum that agrees with WGS 84 within 2 m.
   std::optional<UtmZone> utm = {};
+  /// What the file calls it; empty for systems without a name, and for places on the ground alone.
+  std::string name = {};
+  bool other_datum = false;  // degrees that may be some 100 m from those of WGS 84
+};
+
+/// The parameters of a transverse Mercator projection, in metres on an ellipsoid like that of WGS 84.
+struct TransverseMercator {
+  double latitude_deg = 0, central_meridian_deg = 0, scale = 1, false_easting_m = 0, false_northing_m = 0;
 };
 
 /// As a file has them.
@@ -62,5 +70,11 @@ CoordinateSystem system_by_prj(const std::filesystem::path& heights);
 CoordinateSystem system_of_wkt(std::string_view text);
 /// The zone of a projected system of the EPSG data set; empty for other projections, and for older datums.
 std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
+/// Whether that code of the EPSG data set is one of latitudes and longitudes within 2 m of WGS 84.
+bool agrees_with_wgs84(std::uint32_t code);
+/// Whether it is GRS 80 or that of WGS 84, as all datums since about 1980 have them.
+bool is_modern_ellipsoid(double semi_major_m, double inverse_flattening);
+/// The zone; its false easting may have the number of the zone before it, as 32500000.
+std::optional<UtmZone> utm_of_parameters(const TransverseMercator& by);
 
 }  // namespace sonar

@@ -503,7 +503,8 @@ TEST(EsriGrid, LengthsOfItsPrjBecomeMetres) {
   grid = read("PROJCS[\"P\",UNIT[\"km\",1000]]");
   ASSERT_TRUE(grid) << grid.error().text;
   EXPECT_NEAR(grid->x.back(), 1010e3, 1e-6);
-  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("in units of 1000 m, become metres"), HasSubstr("are no data")));
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("in units of 1000 m, become metres"), HasSubstr("of P, are taken"),
+                                                  HasSubstr("are no data")));
 }
 
 TEST(HeightGrid, TooManyTrianglesAreRefused) {

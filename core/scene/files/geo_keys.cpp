@@ -1,0 +1,150 @@
+#include "core/scene/files/geo_keys.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace sonar {
+namespace {
+
+enum Key : std::uint16_t {
+  model_type = 1024,
+  citation = 1026,
+  geographic_system = 2048,
+  geographic_citation = 2049,
+  angular_units = 2054,
+  ellipsoid = 2056,
+  semi_major_axis = 2057,
+  inverse_flattening = 2059,
+  projected_system = 3072,
+  projected_citation = 3073,
+  projection = 3074,
+  method = 3075,
+  linear_units = 3076,
+  natural_origin_longitude = 3080,
+  natural_origin_latitude = 3081,
+  false_easting = 3082,
+  false_northing = 3083,
+  natural_origin_scale = 3092,
+  vertical_system = 4096,
+  vertical_units = 4099,
+};
+constexpr std::uint16_t projected = 1, geographic = 2, geocentric = 3, degree = 9102, user_defined = 32767;
+constexpr std::uint16_t web_mercator = 3857, old_web_mercator = 3785, transverse_mercator = 1;
+constexpr std::uint16_t numbers_tag = 34736, texts_tag = 34737;
+
+/// 1 of metres and degrees.
+Result<double> length_unit(std::optional<std::uint16_t> key) {
+  switch (key.value_or(unit_metre)) {
+    case unit_metre:
+    case 0:
+      return 1;
+    case unit_foot:
+      return 0.3048;
+    case unit_us_survey_foot:
+      return 1200.0 / 3937;
+    case 9036:
+      return 1000;
+    default:
+      return failure(ErrorKind::bad_data,
+                     "is in units of length of code " + std::to_string(*key) + "; bring it to metres: gdalwarp -t_srs");
+  }
+}
+
+/// The code of the unit of systems of heights that are not in metres, of the EPSG data set 10.0.
+std::optional<std::uint16_t> unit_of_height_system(std::uint16_t system) {
+  static const std::set<std::uint16_t> in_feet{5614, 6130, 6131, 6132, 8050, 8051, 8228},
+      in_us_survey_feet{5702, 6358, 6359, 6360, 8052, 8053};
+  if (in_feet.contains(system)) return unit_foot;
+  if (in_us_survey_feet.contains(system)) return unit_us_survey_foot;
+  return std::nullopt;
+}
+
+std::optional<std::uint16_t> code_of(const GeoKeys& keys, std::uint16_t key) {
+  const auto code = keys.value_of(key);
+  return code == user_defined || code == 0 ? std::nullopt : code;
+}
+
+/// "EPSG:27700", or what the file calls it.
+std::string name_by(std::optional<std::uint16_t> code, const GeoKeys& keys, std::uint16_t own_citation) {
+  if (code) return "EPSG:" + std::to_string(*code);
+  const std::string own = keys.text_of(own_citation), of_all = keys.text_of(citation);
+  return !own.empty() ? own : !of_all.empty() ? of_all : "a system of its own";
+}
+
+/// Nothing if the keys say neither the datum nor the ellipsoid.
+std::optional<bool> has_modern_datum(const GeoKeys& keys) {
+  if (const auto code = code_of(keys, geographic_system)) return agrees_with_wgs84(*code);
+  if (const auto code = code_of(keys, ellipsoid)) return *code == 7019 || *code == 7030;
+  const auto axis = keys.number_of(semi_major_axis), flattening = keys.number_of(inverse_flattening);
+  return axis && flattening ? std::optional(is_modern_ellipsoid(*axis, *flattening)) : std::nullopt;
+}
+
+/// The zone by the code of the system, else by that of its projection, else by its parameters.
+std::optional<UtmZone> utm_of_keys(const GeoKeys& keys) {
+  if (const auto code = code_of(keys, projected_system)) return utm_of_epsg(*code);
+  if (!has_modern_datum(keys).value_or(false)) return std::nullopt;
+  if (const auto code = code_of(keys, projection); code && *code >= 16001 && *code <= 16160)
+    return utm_of_epsg(*code + (32601 - 16001u));
+  if (keys.value_of(method) != transverse_mercator) return std::nullopt;
+  const auto number = [&](std::uint16_t key) { return keys.number_of(key).value_or(0); };
+  return utm_of_parameters({number(natural_origin_latitude), number(natural_origin_longitude), number(natural_origin_scale),
+                            number(false_easting), number(false_northing)});
+}
+
+}  // namespace
+
+std::optional<GeoKeys::Place> GeoKeys::place_of(std::uint16_t key) const {
+  for (std::size_t at = 4; at + 4 <= words_.size(); at += 4)
+    if (words_[at] == key) return Place{words_[at + 1], words_[at + 2], words_[at + 3]};
+  return std::nullopt;
+}
+
+std::optional<std::uint16_t> GeoKeys::value_of(std::uint16_t key) const {
+  const auto place = place_of(key);
+  return place && place->tag == 0 ? std::optional(place->at) : std::nullopt;
+}
+
+std::optional<double> GeoKeys::number_of(std::uint16_t key) const {
+  const auto place = place_of(key);
+  return place && place->tag == numbers_tag && place->at < numbers_.size() ? std::optional(numbers_[place->at]) : std::nullopt;
+}
+
+std::string GeoKeys::text_of(std::uint16_t key) const {
+  const auto place = place_of(key);
+  if (!place || place->tag != texts_tag || place->at >= texts_.size()) return {};
+  constexpr std::size_t longest = 80;
+  const std::string text = texts_.substr(place->at, std::min<std::size_t>(place->count, longest));
+  return text.substr(0, text.find_first_of(std::string("|\0", 2)));
+}
+
+Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::uint16_t> height_unit) {
+  CoordinateSystem system;
+  const auto model = keys.value_of(model_type);
+  if (model == geocentric)
+    return failure(ErrorKind::bad_data, "has geocentric coordinates; bring them to degrees: gdalwarp -t_srs EPSG:4326");
+  if (model == geographic) {
+    system.geographic = true;
+    if (const auto unit = keys.value_of(angular_units); unit.value_or(degree) != degree)
+      return failure(ErrorKind::bad_data, "has angles that are not in degrees; bring it to them: gdalwarp -t_srs EPSG:4326");
+    system.other_datum = !has_modern_datum(keys).value_or(true);
+    if (system.other_datum) system.name = name_by(code_of(keys, geographic_system), keys, geographic_citation);
+  } else if (model == projected) {
+    system.geographic = false;
+    const auto code = code_of(keys, projected_system);
+    system.web_mercator = code == web_mercator || code == old_web_mercator;
+    system.utm = utm_of_keys(keys);
+    const bool is_named = code || keys.value_of(method) || !keys.text_of(projected_citation).empty();
+    if (is_named && !system.utm && !system.web_mercator) system.name = name_by(code, keys, projected_citation);
+  }
+  if (!height_unit) height_unit = keys.value_of(vertical_units);
+  if (!height_unit) height_unit = unit_of_height_system(keys.value_of(vertical_system).value_or(0));
+  const auto of_heights = length_unit(height_unit);
+  if (!of_heights) return tl::make_unexpected(of_heights.error());
+  const auto of_lengths = length_unit(model == projected ? keys.value_of(linear_units) : std::nullopt);
+  if (!of_lengths) return tl::make_unexpected(of_lengths.error());
+  if (*of_lengths != 1) system.utm.reset();  // its parameters, too, are in that unit
+  system.unit_m = *of_lengths, system.height_unit_m = *of_heights;
+  return system;
+}
+
+}  // namespace sonar

@@ -1,0 +1,44 @@
+// The keys of a GeoTIFF (OGC 19-008r4, annex B), which say the coordinate system of its cells. They are read without libtiff.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "core/scene/files/height_values.hpp"
+
+namespace sonar {
+
+class GeoKeys {
+ public:
+  enum : std::uint16_t { raster_type = 1025 };
+  static constexpr std::uint16_t pixel_is_point = 2;
+
+  /// The values of the tags 34735, 34736 and 34737; of a file that is wrong, any.
+  GeoKeys(std::vector<std::uint16_t> directory, std::vector<double> numbers, std::string texts)
+      : words_(std::move(directory)), numbers_(std::move(numbers)), texts_(std::move(texts)) {}
+
+  std::optional<std::uint16_t> value_of(std::uint16_t key) const;
+  std::optional<double> number_of(std::uint16_t key) const;
+  std::string text_of(std::uint16_t key) const;
+
+ private:
+  struct Place {
+    std::uint16_t tag, count, at;
+  };
+  std::optional<Place> place_of(std::uint16_t key) const;
+  std::vector<std::uint16_t> words_;
+  std::vector<double> numbers_;
+  std::string texts_;
+};
+
+/// `height_unit`: the code of the unit that the file names elsewhere. Errors lack the file's name.
+Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::uint16_t> height_unit);
+
+/// Codes of units of length.
+enum : std::uint16_t { unit_metre = 9001, unit_foot = 9002, unit_us_survey_foot = 9003 };
+
+}  // namespace sonar

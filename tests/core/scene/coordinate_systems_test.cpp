@@ -1,0 +1,135 @@
+// Coordinate systems as files name them: codes and keys of GeoTIFF, WKT of .prj files, and what a note says of unknown ones.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/scene/files/geo_keys.hpp"
+#include "tests/core/scene/temporary_files.hpp"
+
+namespace sonar::coordinate_systems_test {
+namespace {
+
+using ::testing::HasSubstr;
+using tests::TemporaryFiles;
+
+std::string zone_text(const std::optional<UtmZone>& zone) { return zone ? text_of(*zone) : "none"; }
+
+TEST(CoordinateSystems, CodesOfUtmOnModernDatums) {
+  for (const auto& [code, zone] : {std::pair{2959u, "18N"},                                   // NAD83(CSRS)
+                                   {3156u, "9N"},           {22710u, "10N"}, {3717u, "10N"},  // NAD83(NSRS2007)
+                                   {3740u, "10N"},                                            // NAD83(HARN)
+                                   {3750u, "4N"},           {6339u, "10N"},                   // NAD83(2011)
+                                   {3372u, "59N"},          {3044u, "32N"},                   // ETRS89, north before east
+                                   {3045u, "33N"},          {3006u, "33N"},                   // SWEREF99 TM
+                                   {3067u, "35N"},          {4647u, "32N"},                   // eastings that begin with the zone
+                                   {5650u, "33N"},          {3100u, "54N"},                   // JGD2000
+                                   {6691u, "54N"},                                            // JGD2011
+                                   {6210u, "23N"},                                            // SIRGAS 2000
+                                   {5396u, "26S"},          {31985u, "25S"}, {7846u, "46S"}, {2134u, "59S"}, {9391u, "35N"}})
+    EXPECT_EQ(zone_text(utm_of_epsg(code)), zone) << code;
+  for (const std::uint32_t other : {7804u, 2100u, 3405u, 3395u, 27700u, 23033u, 65535u})
+    EXPECT_FALSE(utm_of_epsg(other)) << other;
+  for (const std::uint32_t modern : {4326u, 4979u, 4258u, 4269u, 4617u, 4152u, 4759u, 6318u, 4283u, 7844u, 4612u, 6668u, 4674u})
+    EXPECT_TRUE(agrees_with_wgs84(modern)) << modern;
+  for (const std::uint32_t old : {4267u, 4230u, 4314u, 4301u, 4322u, 0u}) EXPECT_FALSE(agrees_with_wgs84(old)) << old;
+}
+
+constexpr const char* transverse =
+    "PROJECTION[\"Transverse_Mercator\"],PARAMETER[\"False_Easting\",500000.0],PARAMETER[\"False_Northing\",10000000.0],"
+    "PARAMETER[\"Central_Meridian\",15.0],PARAMETER[\"Scale_Factor\",0.9996],PARAMETER[\"Latitude_Of_Origin\",0.0],";
+
+std::string wkt(const std::string& name, const std::string& ellipsoid, const std::string& projection) {
+  return "PROJCS[\"" + name + "\",GEOGCS[\"g\",DATUM[\"d\",SPHEROID[" + ellipsoid + "]],UNIT[\"Degree\",0.0174532925199433]]," +
+         projection + "UNIT[\"Meter\",1.0]]";
+}
+const std::string grs80 = "\"GRS_1980\",6378137.0,298.257222101", bessel = "\"Bessel\",6377397.155,299.1528128";
+
+TEST(CoordinateSystems, WktIsUtmByItsParametersWhateverItsName) {
+  EXPECT_EQ(zone_text(system_of_wkt(wkt("mine", grs80, transverse)).utm), "33S");
+  EXPECT_EQ(zone_text(system_of_wkt("PROJCRS[\"mine\",BASEGEOGCRS[\"g\",DATUM[\"d\",ELLIPSOID[\"WGS 84\",6378137,298.257223563,"
+                                    "LENGTHUNIT[\"metre\",1]]]],CONVERSION[\"c\",METHOD[\"Transverse Mercator\"],"
+                                    "PARAMETER[\"Latitude of natural origin\",0],PARAMETER[\"Longitude of natural origin\",-123],"
+                                    "PARAMETER[\"Scale factor at natural origin\",0.9996],PARAMETER[\"False easting\",500000],"
+                                    "PARAMETER[\"False northing\",0]],LENGTHUNIT[\"metre\",1]]")
+                          .utm),
+            "10N");
+  const auto old = system_of_wkt(wkt("MGI / old", bessel, transverse));
+  EXPECT_EQ(zone_text(old.utm), "none");
+  EXPECT_EQ(old.name, "MGI / old");
+  std::string other(transverse);
+  other.replace(other.find("0.9996"), 6, "0.9999");
+  EXPECT_EQ(zone_text(system_of_wkt(wkt("mine", grs80, other)).utm), "none");
+  EXPECT_EQ(system_of_wkt("LOCAL_CS[\"pier\",UNIT[\"metre\",1]]").name, "");
+  const auto degrees = system_of_wkt("GEOGCS[\"DHDN\",DATUM[\"d\",SPHEROID[" + bessel + "]],UNIT[\"Degree\",0.017]]");
+  EXPECT_TRUE(degrees.other_datum);
+  EXPECT_EQ(degrees.name, "DHDN");
+  EXPECT_FALSE(system_of_wkt("GEOGCS[\"WGS 84\",DATUM[\"d\",SPHEROID[" + grs80 + "]]]").other_datum);
+  EXPECT_FALSE(system_of_wkt("GEOGCS[\"WGS 84\"]").other_datum) << "without an ellipsoid";
+}
+
+/// Keys with values of their own, numbers, and one text.
+GeoKeys keys(const std::vector<std::array<std::uint16_t, 2>>& values,
+             const std::vector<std::pair<std::uint16_t, double>>& numbers = {}, const std::string& citation = "") {
+  std::vector<std::uint16_t> words{1, 1, 0, 0};
+  std::vector<double> all;
+  for (const auto& [key, value] : values) words.insert(words.end(), {key, 0, 1, value});
+  for (const auto& [key, value] : numbers) {
+    words.insert(words.end(), {key, 34736, 1, static_cast<std::uint16_t>(all.size())});
+    all.push_back(value);
+  }
+  if (!citation.empty()) words.insert(words.end(), {3073, 34737, static_cast<std::uint16_t>(citation.size() + 1), 0});
+  return {words, all, citation + "|more"};
+}
+
+TEST(CoordinateSystems, GeoKeysOfOnesOwnAreUtmByProjectionOrParameters) {
+  const auto of = [](const GeoKeys& k) { return system_of_keys(k, std::nullopt).value(); };
+  EXPECT_EQ(zone_text(of(keys({{{1024, 1}, {2048, 4258}, {3072, 32767}, {3074, 16033}}})).utm), "33N");
+  EXPECT_EQ(zone_text(of(keys({{{1024, 1}, {2056, 7019}, {3072, 32767}, {3074, 16133}}})).utm), "33S");
+  EXPECT_EQ(zone_text(of(keys({{{1024, 1}, {2048, 4314}, {3072, 32767}, {3074, 16033}}})).utm), "none") << "DHDN";
+  const std::vector<std::pair<std::uint16_t, double>> by{
+      {2057, 6378137}, {2059, 298.257222101}, {3080, 15}, {3081, 0}, {3082, 500000}, {3083, 0}, {3092, 0.9996}};
+  EXPECT_EQ(zone_text(of(keys({{{1024, 1}, {3072, 32767}, {3075, 1}}}, by)).utm), "33N");
+  EXPECT_EQ(zone_text(of(keys({{{1024, 1}, {3072, 32767}, {3075, 1}, {3076, 9002}}}, by)).utm), "none") << "feet";
+  const auto equal_area = of(keys({{{1024, 1}, {3072, 32767}, {3075, 10}}}, by, "my own"));
+  EXPECT_EQ(zone_text(equal_area.utm), "none");
+  EXPECT_EQ(equal_area.name, "my own");
+  EXPECT_EQ(of(keys({{{1024, 1}, {3072, 27700}}})).name, "EPSG:27700");
+  EXPECT_EQ(of(keys({{{1024, 1}}})).name, "") << "plain metres";
+  EXPECT_TRUE(of(keys({{{1024, 2}, {2048, 4267}}})).other_datum);
+  EXPECT_FALSE(of(keys({{{1024, 2}, {2048, 4326}}})).other_datum);
+  EXPECT_FALSE(of(keys({{{1024, 2}}})).other_datum);
+  EXPECT_THAT(system_of_keys(keys({{{1024, 3}}}), std::nullopt).error().text, HasSubstr("geocentric"));
+  for (std::uint16_t at = 0; at < 8; ++at)  // places outside of the numbers and texts
+    (void)of(GeoKeys({1, 1, 0, 1, 3073, 34737, 60000, at, 2057, 34736, 1, at}, {}, "x"));
+}
+
+struct UnknownSystem : ::testing::Test {
+  TemporaryFiles files;
+  std::string said(const std::string& prj, const HeightOptions& options, const std::string& x = "400000") {
+    files.write("g.prj", prj);
+    const auto grid = read_esri_heights(
+        files.write("g.asc", "ncols 2\nnrows 2\nxllcorner " + x + "\nyllcorner 6650000\ncellsize 10\n-1 -2 -3 -4\n"), options);
+    std::string all;
+    if (!grid) return grid.error().text;
+    for (const std::string& note : grid->notes) all += note + ". ";
+    return all;
+  }
+};
+
+TEST_F(UnknownSystem, IsNamedWithTheCommandThatConvertsIt) {
+  const std::string prj = wkt("British_National_Grid", bessel, transverse);
+  EXPECT_THAT(said(prj, {}), HasSubstr("of British_National_Grid, are taken as plain metres"));
+  EXPECT_THAT(said(prj, {}), HasSubstr("gdalwarp -t_srs EPSG:4326"));
+  EXPECT_EQ(said(prj, {.geographic = false}), "");
+  EXPECT_THAT(said(prj, {.origin = Geodetic{1, 0, 0}}), HasSubstr("this is in British_National_Grid; bring it to degrees"));
+  EXPECT_THAT(said(wkt("a\x1b[31m", bessel, transverse), {}), HasSubstr("a\\x1b[31m"));
+}
+
+TEST_F(UnknownSystem, EastingsMayBeginWithTheirZone) {
+  const HeightOptions options{.utm = UtmZone{32, false}, .origin = Geodetic{rad_from_deg(60), rad_from_deg(7.2), 0}};
+  EXPECT_THAT(said("", options, "32400000"), HasSubstr("begin with 32, the number of their zone"));
+  EXPECT_EQ(said("", options), "");
+  EXPECT_THAT(said("", options, "33400000"), HasSubstr("no eastings and northings of UTM"));
+}
+
+}  // namespace
+}  // namespace sonar::coordinate_systems_test
