@@ -1,4 +1,4 @@
-"""Every field of every Oculus message, by hand from the tables of docs/protocols/oculus.md, under the dissector's filter names.
+"""Every field of every Oculus message, by hand from the sources of docs/protocols/oculus.md, under the dissector's filter names.
 
 Shares nothing with the C++ code nor with the dissector; what oculus_reader.Ping reads too is compared with it.
 """

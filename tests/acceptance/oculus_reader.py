@@ -1,4 +1,4 @@
-"""A second reader of the Oculus stream, typed from the tables of docs/protocols/oculus.md. Shares nothing with the C++ code."""
+"""A second reader of the Oculus stream, typed by hand from the sources of docs/protocols/oculus.md. Shares nothing with the C++ code."""
 import math
 import socket
 import struct

@@ -1,4 +1,4 @@
-"""Byte layout of Oculus messages, written from the tables of docs/protocols/oculus.md; shares no code with sonard.
+"""Byte layout of Oculus messages, typed by hand from the public sources of docs/protocols/oculus.md; shares no code.
 
 All numbers are little-endian and packed. Lengths in messages are checked here before use.
 """
