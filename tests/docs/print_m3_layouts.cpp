@@ -102,10 +102,11 @@ const Meanings data{
 }  // namespace
 
 int main() {
-  std::cout << "# M3: layout of a packet\n\nLittle-endian. \"=\" is the value of the real packet (PKT) and ours; where \"PKT\" and "
-               "\"here\" stand, they differ. Rotators are 0. Sources: docs/protocols/m3.md.\n\n## Head\n\n"
-            << layout_table<PacketHead>(head) << "## Data header, from offset 56 of the packet\n\n"
-            << layout_table<DataHeader>(data) << "Then the samples.\n\n## Foot, the last 44 bytes\n\n"
-            << layout_table<PacketFoot>(foot);
+  std::cout
+      << "# M3: layout of a packet\n\nLittle-endian. \"=\" is the value of the real packet (PKT) and ours; where \"PKT\" and "
+         "\"here\" stand, they differ. Rotators are 0. Sources: docs/protocols/m3.md.\n\n## Head\n\n"
+      << layout_table<PacketHead>(head) << "## Data header, from offset 56 of the packet\n\n"
+      << layout_table<DataHeader>(data) << "Then the samples.\n\n## Foot, the last 44 bytes\n\n"
+      << layout_table<PacketFoot>(foot);
   return std::cout.flush() ? 0 : 1;
 }

@@ -87,22 +87,21 @@ std::string rest_of_ping(std::size_t fixed) {
 }  // namespace
 
 int main() {
-  std::cout << "# Oculus: layouts of the messages\n\nLittle-endian, byte-packed, the vendor's names. What they mean for a "
-               "client: docs/protocols/oculus.md; tags such as ENS: docs/decisions/0025-oculus-evidence.md.\n\n"
-            << "## Header of every message\n\n"
-            << layout_table<MessageHeader>(header) << "## Fire message (0x15), versions 0 to 2\n\n"
-            << layout_table<FireMessageV2>(fire, {"header."}) << "## Status (0x01)\n\n"
-            << layout_table<StatusMessage>(status, {"header."}) << "## Ping result (0x23), versions 0 and 1\n\n"
-            << layout_table<PingResultV1>(
-                   with(both_results, {{"pingStartTime", "a counter; option `ping_start_time_unit`"}}), {"header.", "fire."})
-            << rest_of_ping(ping_v1_size) << "## Ping result (0x23), version 2\n\n"
-            << layout_table<PingResultV2>(with(both_results, {{"heading", "deg"},
-                                                              {"pitch", "deg"},
-                                                              {"roll", "deg"},
-                                                              {"pingStartTime", "s since power-up"},
-                                                              {"spare", "0"}}),
-                                          {"header.", "fire.", "extension."})
-            << rest_of_ping(ping_v2_size) << "## User configuration (0x55)\n\n"
-            << layout_table<UserConfigMessage>(user_config, {"header."});
+  std::cout
+      << "# Oculus: layouts of the messages\n\nLittle-endian, byte-packed, the vendor's names. What they mean for a "
+         "client: docs/protocols/oculus.md; tags such as ENS: docs/decisions/0025-oculus-evidence.md.\n\n"
+      << "## Header of every message\n\n"
+      << layout_table<MessageHeader>(header) << "## Fire message (0x15), versions 0 to 2\n\n"
+      << layout_table<FireMessageV2>(fire, {"header."}) << "## Status (0x01)\n\n"
+      << layout_table<StatusMessage>(status, {"header."}) << "## Ping result (0x23), versions 0 and 1\n\n"
+      << layout_table<PingResultV1>(with(both_results, {{"pingStartTime", "a counter; option `ping_start_time_unit`"}}),
+                                    {"header.", "fire."})
+      << rest_of_ping(ping_v1_size) << "## Ping result (0x23), version 2\n\n"
+      << layout_table<PingResultV2>(
+             with(both_results,
+                  {{"heading", "deg"}, {"pitch", "deg"}, {"roll", "deg"}, {"pingStartTime", "s since power-up"}, {"spare", "0"}}),
+             {"header.", "fire.", "extension."})
+      << rest_of_ping(ping_v2_size) << "## User configuration (0x55)\n\n"
+      << layout_table<UserConfigMessage>(user_config, {"header."});
   return std::cout.flush() ? 0 : 1;
 }

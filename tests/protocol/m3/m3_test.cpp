@@ -180,7 +180,7 @@ TEST(M3Settings, AreRefusedWhereTheProductHasNone) {
   EXPECT_EQ(refusal({.range_m = 150, .rate_hz = 0, .gain_percent = 0, .mode = 0, .beams = 128}), "taken");
 }
 
-/// A packet of 3 beams of 2 samples, typed from the tables of docs/protocols/m3.md.
+/// A packet of 3 beams of 2 samples, typed by hand (docs/protocols/m3.md).
 class Typed {
  public:
   Typed() : bytes_(56 + 8512 + 8 * 3 * 2 + 44) {
