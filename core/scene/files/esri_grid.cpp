@@ -54,7 +54,10 @@ Result<Header> read_header(Words& words) {
   };
   while (true) {
     const std::string_view word = words.next();
-    if (word.empty() || height_number(word)) {
+    const bool is_whole =
+        found.contains("ncols") && found.contains("nrows") && (found.contains("cellsize") || found.contains("dy"));
+    const bool is_name = !word.empty() && ((word[0] | 32) >= 'a' && (word[0] | 32) <= 'z');
+    if (word.empty() || height_number(word) || (is_whole && !is_name)) {
       words.rewind(word);
       break;
     }
@@ -63,11 +66,11 @@ Result<Header> read_header(Words& words) {
     static constexpr std::array<const char*, 10> keys{"ncols",     "nrows",    "xllcorner", "yllcorner", "xllcenter",
                                                       "yllcenter", "cellsize", "dx",        "dy",        "nodata_value"};
     if (std::none_of(keys.begin(), keys.end(), [&](const char* k) { return key == k; })) {
-      return bad("\"" + key + "\" is not a header word of an ESRI ASCII grid");
+      return bad(word_text(key) + " is not a header word of an ESRI ASCII grid");
     }
     const std::string_view value = words.next();
     const auto number = height_number(value);
-    if (!number || (std::isnan(*number) && key != "nodata_value")) return bad(key + " needs a number");
+    if (!number || (std::isnan(*number) && key != "nodata_value")) return bad(key + " needs a number, not " + word_text(value));
     if (key == "nodata_value") h.no_data = value;
     found[key] = *number;
   }
@@ -112,7 +115,7 @@ Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const He
       return bad(where + "the grid ends after " + std::to_string(i) + " of " + std::to_string(rows * columns) + " heights");
     }
     const auto number = height_number(word);
-    if (!number) return bad(where + "\"" + std::string(word.substr(0, 40)) + "\" is not a height");
+    if (!number) return bad(where + word_text(word) + " is not a height");
     const auto z = values.height_of(*number);
     if (!z) return bad(where + "the height " + std::string(word.substr(0, 40)) + " is beyond 1e7 m");
     raw.z.push_back(*z);

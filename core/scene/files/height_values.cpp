@@ -209,12 +209,21 @@ void hint_at_zone(HeightGrid& grid, const Geodetic& world_origin) {
 }  // namespace
 
 bool is_nan_word(std::string_view word) {
-  // printf's, those of Microsoft's C, of R, of databases, of numpy's masked arrays
-  static constexpr std::array<std::string_view, 10> words{"nan",    "NaN", "NAN",  "nan(ind)", "1.#QNAN",
-                                                          "1.#IND", "NA",  "null", "NULL",     "--"};
+  // printf's, those of Microsoft's C, of R, of databases, of Python, of numpy's masked arrays
+  static constexpr std::array<std::string_view, 16> words{"nan", "NaN",  "NAN",  "nan(ind)", "1.#QNAN", "1.#IND",
+                                                          "NA",  "null", "NULL", "None",     "none",    "--",
+                                                          "inf", "Inf",  "INF",  "Infinity"};
   const auto is_word = [](std::string_view w) { return std::find(words.begin(), words.end(), w) != words.end(); };
   if (is_word(word)) return true;
   return (word.starts_with('-') || word.starts_with('+')) && is_word(word.substr(1));
+}
+
+std::string word_text(std::string_view word) {
+  constexpr std::size_t longest = 40;
+  const std::size_t comma = word.find(',');
+  const bool decimal = comma != word.npos && comma > 0 && comma + 1 < word.size();
+  return '"' + text::printable(word.substr(0, longest)) + '"' +
+         (decimal ? " (numbers have a decimal point, and blanks between them)" : "");
 }
 
 std::optional<double> height_number(std::string_view s) {

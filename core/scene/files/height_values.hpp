@@ -14,6 +14,8 @@ namespace sonar {
 /// The number of a grid file, which may have zeros before it ("007"); nan is one too.
 std::optional<double> height_number(std::string_view word);
 bool is_nan_word(std::string_view word);
+/// A word that is no number, for an error text.
+std::string word_text(std::string_view word);
 /// The byte order mark that may precede the first word of a text in UTF-8.
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
@@ -40,7 +42,7 @@ struct CoordinateSystem {
   bool web_mercator = false;  // its metres are longer than metres on the ground
   /// On a datum that agrees with WGS 84 within 2 m.
   std::optional<UtmZone> utm = {};
-  /// What the file calls it; empty for systems without a name, and for places on the ground alone.
+  /// The name that the file gives it; empty for systems without a name, and for places on the ground alone.
   std::string name = {};
   bool other_datum = false;  // degrees that may be some 100 m from those of WGS 84
 };

@@ -223,7 +223,11 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   const auto begin = read_regular(path, text::kind_bytes);
   if (const auto kind = text::unusable_kind(begin ? *begin : std::string_view()); !kind.empty())
     return file.fail(path.filename().string() + ": " + std::string(kind)), Shape{};
-  if (!readers.contains(extension)) extension = grid_by_content(path);
+  if (!readers.contains(extension)) {
+    static constexpr std::array<std::string_view, 4> of_tables{".csv", ".txt", ".dat", ".pts"};  // points, unless it is a grid
+    const bool table = std::find(of_tables.begin(), of_tables.end(), extension) != of_tables.end();
+    if (extension = grid_by_content(path); extension.empty() && table) extension = ".xyz";
+  }
   if (const auto reader = readers.find(extension); reader != readers.end()) {
     HeightOptions options{.z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000))};
     const bool centred = options.centred = keys.optional("centred").boolean_or(false);

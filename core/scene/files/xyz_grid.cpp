@@ -19,9 +19,11 @@ struct Point {
   float z;
 };
 
-/// Up to three words between blanks, commas or semicolons; how many there are at least.
-std::size_t split(std::string_view line, std::array<std::string_view, 3>& words) {
-  constexpr std::string_view between = " \t,;\r";
+constexpr std::size_t most_columns = 16;
+using Line = std::array<std::string_view, most_columns>;
+
+/// Words between blanks, commas or semicolons, without quotes; how many of them there are, up to those that fit.
+std::size_t split(std::string_view line, Line& words, std::string_view between = " \t,;\r\"") {
   std::size_t count = 0;
   for (std::size_t at = line.find_first_not_of(between); at != std::string_view::npos && count < words.size();) {
     const std::size_t end = std::min(line.find_first_of(between, at), line.size());
@@ -64,43 +66,75 @@ std::size_t index_on(const std::vector<double>& axis, double v) {
   return static_cast<std::size_t>(std::clamp(std::round((v - axis.front()) / (axis.back() - axis.front()) * last), 0.0, last));
 }
 
-/// Whether names of columns put north before east: "lat lon depth".
-bool begins_with_north(const std::array<std::string_view, 3>& names) {
-  const auto is_one_of = [](std::string_view name, std::initializer_list<std::string_view> begins) {
-    return std::any_of(begins.begin(), begins.end(), [&](std::string_view begin) {
-      return name.size() >= begin.size() &&
-             std::equal(begin.begin(), begin.end(), name.begin(), [](char a, char b) { return a == (b | 32); });
-    });
+/// Where a line has east, north and the height.
+struct Order {
+  std::size_t x = 0, y = 1, z = 2;
+  bool depth = false;  // as the column is called
+  std::size_t last() const { return std::max({x, y, z}); }
+};
+
+/// By names of columns, such as "lat lon depth" and "id,x,y,z"; the first three if they are other names.
+Order order_by(const Line& names, std::size_t count) {
+  using Begins = std::initializer_list<std::string_view>;
+  const auto column = [&](Begins begins, std::size_t otherwise) {
+    const auto is_it = [&](std::string_view name) {
+      return std::any_of(begins.begin(), begins.end(), [&](std::string_view begin) {
+        return name.size() >= begin.size() &&
+               std::equal(begin.begin(), begin.end(), name.begin(), [](char a, char b) { return a == (b | 32); });
+      });
+    };
+    const auto found = std::find_if(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(count), is_it);
+    return found == names.begin() + static_cast<std::ptrdiff_t>(count) ? otherwise
+                                                                       : static_cast<std::size_t>(found - names.begin());
   };
-  return is_one_of(names[0], {"lat", "y", "north"}) && is_one_of(names[1], {"lon", "lng", "x", "east"});
+  Order order{column({"lon", "lng", "x", "east"}, count), column({"lat", "y", "north"}, count),
+              column({"z", "dep", "elev", "height", "alt", "bathy", "topo"}, count), false};
+  if (order.x == count || order.y == count) return {};
+  if (order.z == count) order.z = count == 3 ? 3 - order.x - order.y : 2;
+  const bool distinct = order.x != order.y && order.x != order.z && order.y != order.z && order.last() < count;
+  if (!distinct) return {};
+  order.depth = (names[order.z].front() | 32) == 'd';
+  return order;
 }
 
-Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values) {
+/// Three numbers as "500000,5 6650000,5 -10,2" and "500000,5;6650000,5;-10,2", which would be six.
+bool has_decimal_commas(std::string_view line) {
+  Line words;
+  const std::size_t count = split(line, words, " \t;\r\"");
+  const auto is_decimal = [](std::string_view word) {
+    const std::size_t comma = word.find(',');
+    return comma != word.npos && comma > 0 && comma + 1 < word.size();
+  };
+  return count >= 3 && std::any_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count), is_decimal);
+}
+
+Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values, Order& order) {
   std::vector<Point> points;
-  std::array<std::string_view, 3> words;
+  Line words;
   std::size_t line = 0;
-  bool north_first = false;
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::size_t count = split(text.substr(at, end - at), words);
+    const std::string_view this_line = text.substr(at, end - at);
+    const std::size_t count = split(this_line, words);
     at = end + 1, ++line;
-    if (count == 0 || words[0].front() == '#') continue;
-    const auto x = height_number(words[0]), y = count > 1 ? height_number(words[1]) : x,
-               z = count > 2 ? height_number(words[2]) : x;
-    if (points.empty() && !x && count == 3) {  // names of columns
-      north_first = begins_with_north(words);
-      continue;
-    }
+    if (count == 0 || words[0].front() == '#' || words[0].starts_with("//")) continue;
     const auto bad = [&](const std::string& what) {
       return failure(ErrorKind::bad_data, "line " + std::to_string(line) + ": " + what);
     };
-    if (count < 3 || !x || !y || !z) return bad("three numbers are needed, x y z");
+    if (points.empty() && count >= 3 && !height_number(words[0]) && !height_number(words[1])) {
+      order = order_by(words, count);
+      continue;
+    }
+    if (points.empty() && has_decimal_commas(this_line)) return bad("numbers have a decimal comma; write points");
+    if (count <= order.last()) return bad("three numbers are needed, x y z");
+    const auto x = height_number(words[order.x]), y = height_number(words[order.y]), z = height_number(words[order.z]);
+    if (!x || !y || !z) return bad("three numbers are needed, x y z");
     if (!(std::abs(*x) <= 1e8 && std::abs(*y) <= 1e8)) return bad("the point is farther than 1e8 m away");
     const auto height = values.height_of(*z);
-    if (!height) return bad("the height " + std::string(words[2].substr(0, 40)) + " is beyond 1e7 m");
+    if (!height) return bad("the height " + std::string(words[order.z].substr(0, 40)) + " is beyond 1e7 m");
     if (points.size() >= max_mesh_triangles / 2) return bad("more than 10 million points; use a coarser grid");
-    points.push_back(north_first ? Point{*y, *x, *height} : Point{*x, *y, *height});
+    points.push_back({*x, *y, *height});
   }
   return points;
 }
@@ -113,7 +147,8 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
   if (!text) return tl::make_unexpected(text.error());
   if (text->size() > most_xyz_bytes) return bad("larger than 1 GiB; cut it or use a coarser grid");
   HeightValues values("-9999");
-  const auto points = points_of(*text, values);
+  Order order;
+  const auto points = points_of(*text, values, order);
   if (!points) return bad(points.error().text);
   RawHeights raw{.system = system_by_prj(file)};
   const auto axis_of = [&](double Point::*coordinate) {
@@ -140,8 +175,11 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
     raw.z[at] = p.z;
   }
   raw.fill_values = values.fill_values();
+  const bool positive = std::none_of(raw.z.begin(), raw.z.end(), [](float z) { return z < 0; });
   auto grid = finish_heights(std::move(raw), options);
   if (!grid) return bad(grid.error().text);
+  if (order.depth && positive && options.z_scale > 0)
+    grid->notes.push_back("its column of depths has no negative value: set z_scale: -1 if they count down from the surface");
   if (again > 0) grid->notes.push_back(text::format("%zu points have the position of an earlier point, and replaced it", again));
   return grid;
 }

@@ -132,6 +132,9 @@ TEST(EsriGrid, WrongFilesAreRefusedWithTheirLine) {
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 x"), HasSubstr("line 5: \"x\" is not a height"));
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ndx 1\n1 2 3 4"), HasSubstr("cellsize is missing"));
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ndy 1\n1 2 3 4"), HasSubstr("dx is missing"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\nxllcorner 0,5\n"), HasSubstr("xllcorner needs a number, not \"0,5\" (numbers have a"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n*\x1b[2J 2 3 4"), HasSubstr("line 4: \"*\\x1b[2J\" is not a height"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n-1,-2\n-3,-4"), HasSubstr("\"-1,-2\" (numbers have a decimal point, and"));
   EXPECT_THAT(refusal("ncols nan\nnrows 2\ncellsize 1\n1 2 3 4"), HasSubstr("ncols needs a number"));
   EXPECT_THAT(refusal("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 1e9"), HasSubstr("beyond 1e7 m"));
   const auto missing = read_esri_heights("no/grid.asc", {});
@@ -426,6 +429,27 @@ TEST(XyzGrid, NamesOfColumnsMayPutNorthFirst) {
   const auto usual = read_xyz_heights(files.write("g.xyz", "lon lat depth\n100 1 -1\n100 2 -2\n110 1 -4\n"), {});
   ASSERT_TRUE(usual) << usual.error().text;
   EXPECT_EQ(usual->x, (std::vector<double>{100, 110}));
+}
+
+TEST(XyzGrid, ColumnsAreFoundByTheirNames) {
+  TemporaryFiles files;
+  const auto read = [&](const std::string& text) { return read_xyz_heights(files.write("p.csv", text), {}); };
+  for (const char* text :
+       {"id,x,y,z\n1,0,0,-1\n2,10,0,-2\n3,0,20,-3\n4,10,20,-4\n", "// by hand\nz;x;y\n-1;0;0\n-2;10;0\n-3;0;20\n-4;10;20\n",
+        "\"Northing\",\"Easting\",\"Elevation\"\n0,0,-1\n0,10,-2\n20,0,-3\n20,10,-4\n",
+        "0 0 -1 9 9\n10 0 -2 9 9\n0 20 -3 9 9\n10 20 -4 9 9\n"}) {
+    const auto grid = read(text);
+    ASSERT_TRUE(grid) << text << grid.error().text;
+    EXPECT_EQ(grid->x, (std::vector<double>{0, 10})) << text;
+    EXPECT_EQ(grid->y, (std::vector<double>{0, 20})) << text;
+    EXPECT_EQ(grid->z_m, (std::vector<float>{-1, -2, -3, -4})) << text;
+  }
+  const auto depths = read("x y depth\n0 0 1\n10 0 2\n0 20 3\n10 20 4\n");
+  ASSERT_TRUE(depths);
+  EXPECT_THAT(depths->notes, ::testing::ElementsAre(HasSubstr("set z_scale: -1")));
+  for (const char* text : {"0,5 0,5 -1,5\n", "0,5;0,5;-1,5\n", "500000,5\t0\t-1\n"})
+    EXPECT_THAT(read(text).error().text, HasSubstr("line 1: numbers have a decimal comma")) << text;
+  EXPECT_TRUE(read("0, 0, -1\n10, 0, -2\n0, 20, -3\n10, 20, -4\n")) << "commas between numbers";
 }
 
 TEST(XyzGrid, FineStepsFarAwayStayInTheirCells) {
