@@ -76,6 +76,13 @@ class Daemon:
         """Output of sonard so far."""
         return self._log_path.read_text(encoding="utf-8", errors="replace")
 
+    def ended(self) -> str:
+        """How sonard ended: "killed by SIGSEGV", "with exit code 70"; empty while it runs."""
+        code = self.process.poll()
+        if code is None:
+            return ""
+        return f"killed by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+
     def stop(self, timeout_s: float = 20.0) -> int:
         """Stops sonard by SIGTERM and returns its exit code."""
         if self.process.poll() is None:

@@ -629,6 +629,7 @@ class Waiting(unittest.TestCase):
         """happens_s: times after the start at which something happens."""
         scene, clock = mock.Mock(), Clock(stalls)
         scene.driver.poll.return_value = None
+        scene.sonard.ended.return_value = ""
         scene.driver.samples = []
         began = clock.now
 

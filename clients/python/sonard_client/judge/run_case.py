@@ -68,8 +68,18 @@ def _with_sonard(spec: Dict[str, Any], folder: pathlib.Path, laboratory: Optiona
     sonard = Daemon(config, spec["sonard"], [] if laboratory else ["--offset", str(offset)])
     try:
         with sonard:
-            result = _with_driver(spec, case, folder, laboratory, sonard, address, 8088 + 10 * offset)
-            sonard.stop()
+            try:
+                result = _with_driver(spec, case, folder, laboratory, sonard, address, 8088 + 10 * offset)
+            except (OSError, ValueError, http.client.HTTPException):
+                if not sonard.ended():
+                    raise
+                result = {}
+            # Whatever the driver did then, it had no sonar.
+            how, log = sonard.ended(), sonard.log()
+            if how:
+                result = {"ran": False, "why": f"sonard ended during the case, {how}: {_last_line(log)}", "text": log[-4000:]}
+            else:
+                sonard.stop()
             (folder / "sonard.log").write_text(sonard.log(), encoding="utf-8")
             return result
     except DaemonFailed as why:
@@ -191,7 +201,7 @@ def _case(scene: Scene, case: Case) -> Dict[str, Any]:
     watched_until = time.monotonic()
     seen = _observe(scene, case, began, ended, watched_until)
     verdict = judge(seen, case.must, case.should, case.notice)
-    if verdict.recovery == "NEVER" and (seen.exit_code is None or seen.exit_code == 0):
+    if verdict.recovery == "NEVER" and not scene.sonard.ended() and (seen.exit_code is None or seen.exit_code == 0):
         seen.restarted_well = _restart(scene)
         verdict = judge(seen, case.must, case.should, case.notice)
     driver.stop()

@@ -147,7 +147,7 @@ class Scene:
                 sum(len(c.fires) for c in wire.connections) if wire else 0)
 
     def wait(self, until: Callable[[], bool], timeout_s: float, moves: Optional[Callable[[], object]] = None) -> bool:
-        """Waits for a condition; ends early when the driver ends or takes too much memory. With `moves` the time counts anew, up
+        """Waits for a condition; ends early when the driver or sonard ends, or the driver takes too much memory. With `moves` the time counts anew, up
         to six times it, whenever their value changes: a busy computer is slow, and a driver that does nothing is stuck."""
         began = time.monotonic()
         deadline, before = began + timeout_s, moves() if moves else None
@@ -160,7 +160,7 @@ class Scene:
                 return True
             if looked >= deadline:
                 return False
-            if self.driver.poll() is not None:
+            if self.driver.poll() is not None or self.sonard.ended():
                 return until()
             if self.driver.samples and self.driver.samples[-1].resident_mib > _MOST_MIB:
                 self.say(f"stopped: {self.driver.samples[-1].resident_mib:.0f} MiB resident")
