@@ -41,13 +41,15 @@ struct PingFacts {
 /// A ping as a host decoded it.
 struct HostPing {
   PingFacts facts;
-  std::function<Result<PolarImage>()> picture;    // for a mechanical scan: the sector as scanned so far
-  bool is_whole = true;                           // for a picture of many pings: there are enough of them
+  std::function<Result<PolarImage>()> picture;  // for a mechanical scan: the sector as scanned so far
+  /// A picture of many pings, one scan line each: how many it has, and how many make it whole.
+  std::size_t lines = 1, whole_lines = 1;
   std::vector<std::string> errors = {};           // errors of identities and sequence
   std::vector<std::string> echo_mismatches = {};  // settings that do not have the requested value yet
   std::optional<double> fired_s = {};             // by the clock of the device
   /// What people look at; unset: a fan of `picture`.
   std::function<SonarPicture()> drawing = {};
+  bool is_whole() const { return lines >= whole_lines; }
 };
 /// Draws a ping of any make.
 Result<SonarPicture> drawing_of(const HostPing& ping);
@@ -154,6 +156,10 @@ struct Make {
   PictureKind picture = PictureKind::fan;
 
   std::string_view name() const { return device->name(); }
+  /// The unit of a rate of pings: a ping of some natures is one line of the picture.
+  std::string_view rate_unit() const {
+    return picture == PictureKind::sweep || picture == PictureKind::waterfall ? "lines/s" : "Hz";
+  }
   std::string_view name_in_demo() const { return demo_name.empty() ? name() : demo_name; }
 };
 /// The rows of makes.cpp.

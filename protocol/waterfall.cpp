@@ -30,7 +30,8 @@ void Waterfall::add(Line line, double start_m, double row_m, HostPing& ping) {
   row_m_ = row_m;
   lines_.push_front(std::make_shared<const Line>(std::move(line)));
   if (lines_.size() > waterfall_rows) lines_.pop_back();
-  ping.is_whole = lines_.size() >= waterfall_fewest_rows;
+  ping.lines = lines_.size();
+  ping.whole_lines = waterfall_fewest_rows;
   ping.drawing = [lines = lines_, start_m, row_m] { return picture_of(lines, start_m, row_m); };
 }
 

@@ -6,6 +6,7 @@
 #include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/source.hpp"
+#include "clients/sonarctl/waiting.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -21,7 +22,8 @@ std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_
 
 class Listener {
  public:
-  Listener(const ListenOptions& options, OpenedStream opened) : options_(options), start_(opened.connected_at) {
+  Listener(const ListenOptions& options, OpenedStream opened)
+      : options_(options), start_(opened.connected_at), waits_(options.source, opened.stream, opened.observes) {
     use(std::move(opened.stream));
   }
 
@@ -60,7 +62,9 @@ class Listener {
 
   Result<void> run_once() {
     while (!finished()) {
-      const PingStream::Item item = stream_->next(patience(options_, seconds_since(start_), seconds_since(last_message_)));
+      const PingStream::Item item =
+          stream_->next(waits_.patience(patience(options_, seconds_since(start_), seconds_since(last_message_))));
+      waits_.look(item.ping.has_value());
       if (item.what == Wait::closed) return failure(ErrorKind::io, closed_text(item.error));
       if (item.what == Wait::data) {
         last_message_ = Clock::now();
@@ -122,6 +126,7 @@ class Listener {
   Outage outage_;
   PingLog log_;
   Clock::time_point start_, last_message_ = Clock::now();
+  FirstPingWait waits_;
   std::optional<HostPing> last_ping_;
   std::optional<double> first_ping_after_s_;
 };
@@ -152,13 +157,12 @@ Result<void> report(const ListenOptions& options, const Listener& listener) {
 
 Result<void> listen(const ListenOptions& given) {
   ListenOptions options = given;
-  const Result<Endpoint> device = find_device(options.source, !options.json);
-  if (!device) return tl::unexpected(device.error());
-  auto opened = open_stream(options.source, *device);
+  auto opened = connect(options.source, !options.json);
   if (!opened) return tl::unexpected(opened.error());
   if (!options.record.empty())
     if (Result<void> recording = opened->stream.record_to(options.record); !recording) return recording;
   if (!options.json) std::printf("connected to %s\n", opened->stream.about().c_str());
+  std::fflush(stdout);
   Listener listener(options, *std::move(opened));
   const Result<void> ran = listener.run();
   const Result<void> reported = report(options, listener);

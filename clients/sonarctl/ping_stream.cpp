@@ -25,6 +25,7 @@ using Kind = protocol::HostPort::Kind;
 constexpr auto probe_patience = 300ms;         // for each make, while the make is not known
 constexpr auto answer_patience = 3000ms;       // minimum for a sonar that is there: it may be computing
 constexpr auto connect_patience = 2000ms;      // for streams, before other kinds of ports are tried
+constexpr auto longest_pause = 160ms;          // between attempts
 constexpr int receive_buffer_bytes = 4 << 20;  // a few pings
 constexpr const char* is_sonard_there = ". Is sonard running there? Its banner names the address of each sonar";
 
@@ -92,6 +93,7 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
   if (make != nullptr)
     if (auto host = make->host(wanted); !host) return tl::unexpected(host.error());  // before the sonar is disturbed
   Error failed;
+  auto pause = 20ms;
   for (bool is_last = false;;
        is_last = Clock::now() >= deadline) {  // the streams once more after the others, which may take long
     if (!streams.empty()) {
@@ -118,7 +120,8 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
       if (is_over(stream) || (by_http && make != nullptr)) return stream;  // in a search another web server may be there
       if (streams.empty()) failed = stream.error();
     }
-    ::poll(nullptr, 0, 20);  // no busy loop: a port that refuses answers at once
+    ::poll(nullptr, 0, static_cast<int>(pause.count()));  // no busy loop: a port that refuses answers at once
+    pause = std::min(2 * pause, longest_pause);
   }
 }
 
@@ -354,7 +357,7 @@ Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std:
   std::optional<HostPing> last;
   std::size_t count = 0;
   while (auto found = pings->next()) {
-    if (number ? count++ == *number : found->ping.is_whole) return std::move(found->ping);
+    if (number ? count++ == *number : found->ping.is_whole()) return std::move(found->ping);
     last = std::move(found->ping);
   }
   if (last && !number) return *std::move(last);

@@ -9,6 +9,7 @@
 #include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/record_files.hpp"
 #include "clients/sonarctl/source.hpp"
+#include "clients/sonarctl/waiting.hpp"
 #include "core/text/ipv4.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/recording/recording.hpp"
@@ -49,13 +50,14 @@ Result<Steering> ask_sonard(const ControlOptions& options, const Endpoint& devic
 class Recorder {
  public:
   Recorder(const RecordOptions& options, PingStream stream, std::optional<Socket> status, std::optional<Steering> steering,
-           RecordFiles& files)
+           RecordFiles& files, const FirstPingWait& waits)
       : options_(options),
         stream_(std::move(stream)),
         device_ip_(stream_.conversation().device.address),
         status_(std::move(status)),
         steering_(std::move(steering)),
-        files_(files) {}
+        files_(files),
+        waits_(waits) {}
 
   Result<void> run() {
     while (!enough()) {
@@ -95,6 +97,7 @@ class Recorder {
       if (Result<void> written = files_.write(message); !written) return written;
       last_ = std::max(last_, message.at);
     }
+    waits_.look(item.ping.has_value());
     return item.ping ? files_.write_ping(last_, *item.ping) : Result<void>{};
   }
 
@@ -144,6 +147,7 @@ class Recorder {
   std::optional<Socket> status_;
   std::optional<Steering> steering_;
   RecordFiles& files_;
+  FirstPingWait waits_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double last_heard_s_ = 0;
   Time last_ = unix_now();  // time of the latest recorded message
@@ -184,12 +188,13 @@ Result<void> record_device(const RecordOptions& options) {
   if (!opened) return tl::unexpected(opened.error());
   PingStream& stream = opened->stream;
   const std::string at = text_from(stream.device());
+  const FirstPingWait waits(source, stream, opened->observes);
   auto status = listen_to_status(options, stream.make());
   auto files = RecordFiles::create(options, stream.make(), stream.conversation(), steering ? steering->sonar : "sonar");
   if (!files) return tl::unexpected(files.error());
   std::printf("connected to %s\n", at.c_str());
   std::fflush(stdout);
-  Recorder recorder(options, std::move(stream), std::move(status), std::move(steering), *files);
+  Recorder recorder(options, std::move(stream), std::move(status), std::move(steering), *files, waits);
   const Result<void> ran = recorder.run();
   const double took_s = recorder.seconds();
   const Result<void> closed = files->close();

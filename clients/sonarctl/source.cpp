@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "clients/sonarctl/control_client.hpp"
+#include "clients/sonarctl/waiting.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 
@@ -58,17 +59,19 @@ Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device
 }
 
 Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
-  const Result<Endpoint> device = find_device(source, false);
-  if (!device) return tl::unexpected(device.error());
-  auto opened = open_stream(source, *device);
+  auto opened = connect(source, false);
   if (!opened) return tl::unexpected(opened.error());
   PingStream* const stream = &opened->stream;
   auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
-  std::optional<std::chrono::steady_clock::time_point> whole_by;
+  PictureProgress progress(source.picture_limit_s);
+  std::optional<HostPing> last;
+  FirstPingWait waits(source, *stream, opened->observes);
   bool received = !stream->host().counts();  // without counts, other messages look like junk
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
-    PingStream::Item item = stream->next(std::clamp(left, std::chrono::milliseconds(0), std::chrono::milliseconds(500)));
+    PingStream::Item item =
+        stream->next(std::clamp(left, std::chrono::milliseconds(0), waits.patience(std::chrono::milliseconds(500))));
+    waits.look(item.ping.has_value());
     print_notices(item.notices);
     if (item.what == Wait::closed)
       return failure(ErrorKind::io,
@@ -85,13 +88,15 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
     received = received || item.what == Wait::data;
     if (!item.ping) continue;
     const auto now = std::chrono::steady_clock::now();
-    if (!whole_by) whole_by = now + milliseconds_from(source.picture_limit_s);
-    if (!item.ping->is_whole && now < *whole_by && (!of_samples || item.ping->picture())) {
+    if (!item.ping->is_whole() && !progress.is_over(now) && (!of_samples || item.ping->picture())) {
       give_up = now + milliseconds_from(source.silence_limit_s);
+      if (const auto line = progress.line_at(*item.ping, now)) print_notices({*line});
+      last = std::move(item.ping);
       continue;
     }
     if (item.ping->echo_mismatches.empty() || ++stale > stale_pings) return *std::move(item.ping);
   }
+  if (last) return *std::move(last);
   return failure(ErrorKind::io, "interrupted before a ping arrived");
 }
 
@@ -163,12 +168,21 @@ Error silence(const SourceOptions& source, const PingStream& stream, bool receiv
 
 Result<Endpoint> find_device(const SourceOptions& source, bool say) {
   if (!source.discover) return source.device;
-  auto found = discover(std::chrono::seconds(5));
+  constexpr std::chrono::seconds patience{5};
+  std::fprintf(stderr, "sonarctl: waiting for the status broadcast of a sonar, at most %d s\n",
+               static_cast<int>(patience.count()));
+  auto found = discover(patience);
   if (!found) return tl::unexpected(found.error());
   if (say) std::printf("status from device %u at %s\n", found->announced.device_id, text_from(found->device).c_str());
   if (const auto& wrong = found->announced.complaints; !wrong.empty())
     return failure(ErrorKind::bad_data, "the status datagram: " + wrong.front());
   return found->device;
+}
+
+Result<OpenedStream> connect(const SourceOptions& source, bool say) {
+  const Result<Endpoint> device = find_device(source, say);
+  if (!device) return tl::unexpected(device.error());
+  return open_stream(source, *device);
 }
 
 Result<HostPing> fetch_ping(const SourceOptions& source, std::optional<std::size_t> number, bool of_samples) {

@@ -26,6 +26,9 @@ struct OpenedStream {
 /// for observers; then with a note on standard error.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
+/// find_device() and open_stream().
+Result<OpenedStream> connect(const SourceOptions& source, bool say);
+
 /// When the pings stopped. A connection without pings is no return of the device: by UDP one can always be opened.
 class Outage {
  public:

@@ -3,6 +3,7 @@
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/terminal.hpp"
 #include "clients/sonarctl/view_caption.hpp"
+#include "clients/sonarctl/waiting.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -66,8 +67,11 @@ class LiveView {
   static constexpr std::size_t most_notices = 20;
 
  public:
-  LiveView(const ViewOptions& options, PingStream stream)
-      : options_(options), stream_(std::move(stream)), painter_(options.style) {}
+  LiveView(const ViewOptions& options, OpenedStream opened)
+      : options_(options),
+        waits_(options.source, opened.stream, opened.observes),
+        stream_(std::move(opened.stream)),
+        painter_(options.style) {}
 
   /// Succeeds when interrupted, after the requested pings, or when the output was closed. A run without an end connects again
   /// when the device has gone.
@@ -106,7 +110,8 @@ class LiveView {
     double heard_s = now_s();
     bool received = !stream_->host().counts();  // without counts, other messages look like junk
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
-      PingStream::Item item = stream_->next(std::chrono::milliseconds(500));
+      PingStream::Item item = stream_->next(waits_.patience(std::chrono::milliseconds(500)));
+      waits_.look(item.ping.has_value());
       lost_ = item.what == Wait::closed || (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s);
       if (item.what == Wait::closed)
         return failure(ErrorKind::io, "the device ended the connection" + (item.error.empty() ? "" : ": " + item.error) +
@@ -146,6 +151,7 @@ class LiveView {
   }
 
   const ViewOptions& options_;
+  FirstPingWait waits_;
   std::optional<PingStream> stream_;
   PicturePainter painter_;
   ViewCaption figures_;
@@ -155,11 +161,9 @@ class LiveView {
 };
 
 Result<void> view_live(const ViewOptions& options) {
-  const Result<Endpoint> device = find_device(options.source, false);
-  if (!device) return tl::unexpected(device.error());
-  auto opened = open_stream(options.source, *device);
+  auto opened = connect(options.source, false);
   if (!opened) return tl::unexpected(opened.error());
-  const Result<void> ran = LiveView(options, std::move(opened->stream)).run();
+  const Result<void> ran = LiveView(options, *std::move(opened)).run();
   if (!options.terminal && terminal_facts().is_terminal) std::puts("");
   return ran;
 }

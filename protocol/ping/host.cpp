@@ -206,9 +206,9 @@ struct Turn {
   double row_m = 0;
   std::vector<std::shared_ptr<const Line>> lines = std::vector<std::shared_ptr<const Line>>(grads);
 
-  bool lacks(std::size_t from, std::size_t to) const {
-    return std::any_of(lines.begin() + static_cast<std::ptrdiff_t>(from), lines.begin() + static_cast<std::ptrdiff_t>(to),
-                       [](const auto& line) { return line == nullptr; });
+  std::size_t lines_ahead() const {
+    return static_cast<std::size_t>(
+        std::count_if(lines.begin() + first, lines.begin() + end, [](const auto& line) { return line != nullptr; }));
   }
   /// The half ahead, as long as only that half was scanned.
   PolarImage shown() const {
@@ -274,7 +274,8 @@ class Ping360Host final : public PingHost {
     ping.drawing = [turn = turn_, head_rad = bearing_rad(beam)] {
       return SonarPicture{.kind = PictureKind::sweep, .image = turn.shown(), .head_rad = head_rad};
     };
-    ping.is_whole = !turn_.lacks(Turn::first, Turn::end);
+    ping.lines = turn_.lines_ahead();
+    ping.whole_lines = sector;
     return ping;
   }
 

@@ -356,6 +356,8 @@ class Tools(unittest.TestCase):
                 picture = pathlib.Path(folder) / "fan.png"
                 viewed = run(SONARCTL, "view", at, "--png", picture, "--range", 4)
                 self.assertEqual((viewed.returncode, picture.exists()), (0, True), viewed.stderr)
+                of_many = profile != "surveyor-240"
+                self.assertEqual(bool(re.search(r"the picture has \d+ of \d\d\d scan lines", viewed.stderr)), of_many, viewed.stderr)
 
 
 @unittest.skipIf(shark.why_not(), shark.why_not())

@@ -109,6 +109,17 @@ class View(unittest.TestCase):
         except (OSError, EOFError, AssertionError):
             pass
 
+    def test_a_wait_for_the_first_ping_is_told(self):
+        with Sonard(arguments=["--clock", "lockstep"]) as daemon, tempfile.TemporaryDirectory() as folder:
+            for command in (("listen",), ("listen", "--json"), ("view", "--live", "--png", f"{folder}/a.png"), ("view", "--png", f"{folder}/b.png"),
+                            ("record", "--raw", f"{folder}/c")):
+                with self.subTest(command), subprocess.Popen([SONARCTL, command[0], daemon.address, *command[1:]], stdout=subprocess.DEVNULL,
+                                                             stderr=subprocess.PIPE, text=True) as waits:
+                    said = waits.stderr.readline()
+                    waits.terminate()
+                    waits.stderr.read()
+                    self.assertRegex(said, rf"connected to {daemon.address}:52100, .*; asked for pings; waiting for the first one, at most 10 s")
+
     def test_contradictions_are_named(self):
         for arguments, word in [((), "--term"), (("--term", "--live", "--from-raw", "x"), "--ping"),
                                 (("--term", "--pings", "3"), "--live")]:

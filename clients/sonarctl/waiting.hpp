@@ -1,0 +1,48 @@
+// Lines on standard error about what a command waits for: none waits in silence.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include "clients/sonarctl/commands.hpp"
+
+namespace sonar::clients {
+
+/// The wait for the first ping. Its line is printed once it lasts longer than a moment.
+class FirstPingWait {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds moment{300};
+
+  /// `observes`: nothing was requested.
+  FirstPingWait(const SourceOptions& source, const PingStream& stream, bool observes, Clock::time_point now = Clock::now());
+  /// `most`, or less if the line may be due before.
+  std::chrono::milliseconds patience(std::chrono::milliseconds most, Clock::time_point now = Clock::now()) const;
+  /// To be called after each wait, with whether a ping came.
+  void look(bool has_ping, Clock::time_point now = Clock::now());
+
+ private:
+  std::string line_;  // empty: it was printed, or is no longer needed
+  Clock::time_point due_;
+};
+
+/// The growth of a picture of many pings.
+class PictureProgress {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  explicit PictureProgress(double limit_s) : limit_s_(limit_s) {}
+  /// A line to print: with the first ping, then every two seconds. `ping` is not whole.
+  std::optional<std::string> line_at(const HostPing& ping, Clock::time_point now);
+  /// Whether the picture is to be taken as it is.
+  bool is_over(Clock::time_point now) const;
+
+ private:
+  double limit_s_;
+  std::optional<Clock::time_point> begin_;
+  Clock::time_point said_;
+  std::size_t first_lines_ = 0;
+};
+
+}  // namespace sonar::clients
