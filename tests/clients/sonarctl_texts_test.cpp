@@ -96,6 +96,19 @@ TEST(StatusText, NamesEverything) {
     EXPECT_THAT(text, HasSubstr(part));
 }
 
+TEST(StatusText, HasTheMeasuredRateBesideTheOneThatIsSet) {
+  const auto text_of = [](const std::string& sonar) {
+    return text_from(control::message_from<v1::DaemonStatus>("sonars { range_m: 10 pinging: true " + sonar + " }"));
+  };
+  EXPECT_THAT(text_of(R"(profile: "oculus-m1200d" rate_hz: 10 figures { made_hz: 7.24 })"),
+              HasSubstr("  10 Hz, measured 7.2 Hz  gain"));
+  EXPECT_THAT(text_of(R"(profile: "oculus-m1200d" rate_hz: 10)"), HasSubstr("  10 Hz  gain")) << "none was measured yet";
+  EXPECT_THAT(text_of(R"(profile: "ping360" rate_hz: 1000 on_request: true figures { made_hz: 14 })"),
+              HasSubstr("  on request, measured 14.0 lines/s  gain"));
+  EXPECT_THAT(text_of(R"(profile: "omniscan-450" preview: true figures { made_hz: 5 })"),
+              HasSubstr("  standby, preview 5.0 lines/s  gain"));
+}
+
 TEST(StatusText, TellsEvents) {
   const auto told = [](const std::string& event) { return text_from(control::message_from<v1::Event>(event)); };
   EXPECT_EQ(told(R"(client { sonar: "front" client: "10.0.0.9:4000" connected: true })"),

@@ -5,7 +5,7 @@
 #include "clients/sonarctl/control/fault_text.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/vendor.hpp"
+#include "protocol/host.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -23,10 +23,18 @@ std::string duration_text(double seconds) {
 
 std::string line(const char* name, const std::string& text) { return format("%-9s ", name) + text + "\n"; }
 
+/// As it is set, and as it is measured.
+std::string rate_text(const v1::SonarStatus& s) {
+  std::string text = s.rate_hz() <= 0 ? "standby" : s.on_request() ? "on request" : format("%g Hz", s.rate_hz());
+  const double made_hz = s.figures().made_hz();
+  if (made_hz <= 0) return text;
+  const std::string unit(protocol::make_of_profile(s.profile()).rate_unit());
+  return text + (s.preview() ? ", preview " : ", measured ") + format("%.1f ", made_hz) + unit;
+}
+
 std::string settings_text(const v1::SonarStatus& s) {
   std::string text = text::frequency_text(s.frequency_hz()) + format("  %g m", s.range_m());
-  text += s.rate_hz() > 0 ? format("  %g Hz", s.rate_hz()) : std::string("  standby");
-  text += format("  gain %.3g dB  %u beams x %u rows", s.gain_db(), s.beams(), s.rows());
+  text += "  " + rate_text(s) + format("  gain %.3g dB  %u beams x %u rows", s.gain_db(), s.beams(), s.rows());
   if (!s.transmits()) text += "  transmitter off";
   return text + (s.pinging() ? "" : "  not pinging");
 }

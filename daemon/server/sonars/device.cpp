@@ -383,6 +383,11 @@ void Device::carry_out(const Closed& action) {
   }
 }
 
+void Device::carry_out(const PingQueued& action) {
+  made_.add(action.ping->request.fired_at);
+  parent_.on_ping_queued(*this, action);
+}
+
 void Device::carry_out(const Report& action) {
   LogLimiter& limiter = limiters_[static_cast<std::size_t>(action.topic)];
   log_limited(network_.log, limiter, action.line.level, action.line.phrase, action.line.fields);

@@ -13,6 +13,7 @@
 
 #include "core/base/result.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/emulator/connections/recent_rate.hpp"
 #include "daemon/emulator/sonar/sonar.hpp"
 #include "daemon/emulator/view/preview.hpp"
 #include "daemon/server/connections/listener.hpp"
@@ -187,7 +188,7 @@ class Device final : public SessionParent {
   void carry_out(const Reset& action);
   void carry_out(const Closed& action);
   void carry_out(const Announce&) { beacon_.send_now(); }
-  void carry_out(const PingQueued& action) { parent_.on_ping_queued(*this, action); }
+  void carry_out(const PingQueued& action);
   void carry_out(const Report& action);
   void carry_out(const EngineFailed& action) { parent_.on_engine_failure(action.why); }
 
@@ -197,6 +198,7 @@ class Device final : public SessionParent {
   const std::vector<std::string>& hosts_;  // names by which HTTP may be called
   Sonar sonar_;
   Preview preview_;
+  RecentRate made_;
   std::list<TcpPort> tcp_ports_;
   Listener observer_listener_;
   Beacon beacon_;

@@ -75,6 +75,7 @@ v1::SonarStatus Device::status(Time now) const {
   s.set_transmits(sonar_.transmits());
   s.set_range_m(settings.range_m);
   s.set_rate_hz(static_cast<double>(settings.rate_hz));
+  s.set_on_request(settings.triggered);
   s.set_gain_db(static_cast<double>(settings.gain_db));
   s.set_frequency_hz(static_cast<double>(mode.centre_hz));
   s.set_beams(static_cast<std::uint32_t>(settings.beam_count));
@@ -97,6 +98,7 @@ v1::SonarStatus Device::status(Time now) const {
   if (gone_) *s.mutable_gone() = message_of(*gone_);
   if (searched_) *s.mutable_searched() = message_of(*searched_);
   fill(*s.mutable_figures(), figures());
+  s.mutable_figures()->set_made_hz(made_.hz(now));
   return s;
 }
 

@@ -35,12 +35,23 @@ double seconds_left(const Device& device, const std::string& fault, Time now) {
   return std::ceil(left * 10) / 10;
 }
 
+/// Whether the product takes a value of this setting. Products that set their rate or gain themselves refuse every value.
+bool takes(const Device& device, std::optional<double> protocol::SettingsOverride::*setting, double value) {
+  protocol::SettingsOverride wanted;
+  wanted.*setting = value;
+  return device.config().profile.vendor->apply_override(wanted, device.sonar().state()).has_value();
+}
+
 void add_sonar(std::vector<Parameter>& all, const Device& device, bool has_preview) {
   const PingSettings& s = device.sonar().settings();
   const std::string at = "/" + device.config().name + "/";
   all.push_back({at + "range_m", s.range_m});
-  all.push_back({at + "rate_hz", static_cast<double>(s.rate_hz)});
-  all.push_back({at + "gain_percent", device.config().profile.vendor->gain_percent(device.sonar().state())});
+  const auto rate_hz = static_cast<double>(s.rate_hz);
+  using Setting = protocol::SettingsOverride;
+  if (takes(device, &Setting::rate_hz, rate_hz > 0 ? rate_hz : 1) || takes(device, &Setting::rate_hz, 0))
+    all.push_back({at + "rate_hz", rate_hz});
+  const double gain_percent = device.config().profile.vendor->gain_percent(device.sonar().state());
+  if (takes(device, &Setting::gain_percent, gain_percent)) all.push_back({at + "gain_percent", gain_percent});
   if (device.config().profile.model->modes.size() > 1) all.push_back({at + "mode", std::int64_t{s.mode}});
   all.push_back({at + "beams", std::int64_t{s.beam_count}});
   all.push_back({at + "transmit", device.sonar().transmits()});

@@ -12,12 +12,29 @@
 #include <set>
 #include <sstream>
 
+#include "daemon/emulator/connections/recent_rate.hpp"
 #include "daemon/server/control/prometheus.hpp"
 
 namespace sonar {
 namespace {
 
 using ::testing::HasSubstr;
+
+TEST(RecentRate, IsThatOfTheLastSecondsAndZeroOnceThePingsHaveStopped) {
+  RecentRate rate;
+  const Time begin{std::chrono::seconds(1000)};
+  EXPECT_EQ(rate.hz(begin), 0) << "no ping was made";
+  for (int i = 0; i <= 200; ++i) rate.add(begin + i * std::chrono::milliseconds(10));
+  const Time quick_end = begin + std::chrono::seconds(2);
+  EXPECT_DOUBLE_EQ(rate.hz(quick_end), 100);
+  EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::milliseconds(1900)), 100) << "it may be between two pings";
+  EXPECT_EQ(rate.hz(quick_end + std::chrono::milliseconds(2100)), 0);
+  for (int i = 1; i <= 10; ++i) rate.add(quick_end + i * std::chrono::seconds(1));
+  EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::seconds(10)), 1) << "what was before is forgotten";
+  rate.add(quick_end + std::chrono::seconds(40));
+  rate.add(quick_end + std::chrono::seconds(60));
+  EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::seconds(70)), 0.05) << "pings rarely";
+}
 
 TEST(Histogram, ATimeOnABoundBelongsBelowIt) {
   Histogram h;
