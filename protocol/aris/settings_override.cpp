@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "protocol/aris/settings.hpp"
+#include "protocol/limits.hpp"
 
 namespace sonar::aris {
 namespace {
@@ -37,12 +38,9 @@ Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, con
 Result<void> set_range(Settings& s, double range_m, const protocol::DeviceState& device) {
   const PingSettings now = ping_settings(s, device);
   const double speed = static_cast<double>(now.device_sound_speed_mps), end_m = product_of(*device.model).window_end_m;
-  if (!(range_m > now.range_start_m) || range_m > end_m) {
-    char text[160];
-    std::snprintf(text, sizeof text, "%s shows up to %g m and starts at %.2f m; %g m is not valid", device.model->name.c_str(),
-                  end_m, now.range_start_m, range_m);
-    return refused(text);
-  }
+  const double low_m = now.range_start_m + 1e-6 * shortest_period_us * least_samples * speed / 2;
+  if (const std::string why = protocol::range_complaint(range_m, device.model->name, low_m, end_m); !why.empty())
+    return refused(why);
   Acoustics& a = s.acoustics;
   const double window_us = 2e6 * (range_m - now.range_start_m) / speed;
   const double finest_us = std::ceil(window_us / most_samples), coarsest_us = std::floor(window_us / least_samples);
@@ -65,11 +63,11 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Acoustics& a = s.acoustics;
   if (wanted.rate_hz) {
     if (*wanted.rate_hz < 1 || *wanted.rate_hz > highest_rate_hz)
-      return refused("an ARIS has 1 to 15 frames a second; a controller stops it");
+      return refused("the rate of an ARIS is 1 to 15 Hz; a controller stops it");
     a.frame_rate_hz = static_cast<float>(*wanted.rate_hz);
   }
+  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
-    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
     a.gain_db = static_cast<float>(highest_gain_db * *wanted.gain_percent / 100);
   }
   if (wanted.sample_bits && *wanted.sample_bits != 8)

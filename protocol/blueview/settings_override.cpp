@@ -6,11 +6,14 @@
 
 #include "protocol/blueview/head_settings.hpp"
 #include "protocol/blueview/models.hpp"
+#include "protocol/limits.hpp"
 
 namespace sonar::blueview {
 namespace {
 
 constexpr double half_gain_db = 48;  // assumed: 0 to 100 % turn the gain adjustment from -48 to 48 dB, as an Oculus' 96 dB
+
+constexpr double least_window_m = 0.01;
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
@@ -23,13 +26,10 @@ Result<void> set(SonarSettings& all, Key key, const Value& value, const protocol
 Result<void> set_range(SonarSettings& all, double range_m, const protocol::DeviceState& device) {
   const FrequencyMode& mode = device.model->modes[static_cast<std::size_t>(all.active_head)];
   const double start_m = static_cast<double>(all.heads[static_cast<std::size_t>(all.active_head)].start_m);
-  if (range_m <= std::max(start_m, static_cast<double>(mode.min_range_m)) || range_m > static_cast<double>(mode.max_range_m)) {
-    char text[192];
-    std::snprintf(text, sizeof text, "%s has a range of %g to %g m with this head and starts at %g m; %g m is not valid",
-                  device.model->name.c_str(), static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m),
-                  start_m, range_m);
-    return refused(text);
-  }
+  const std::string why = protocol::range_complaint(range_m, device.model->name + " with this head",
+                                                    std::max(start_m + least_window_m, static_cast<double>(mode.min_range_m)),
+                                                    static_cast<double>(mode.max_range_m), "stop_range");
+  if (!why.empty()) return refused(why);
   return set(all, Key::stop_range, static_cast<float>(range_m), device);
 }
 
@@ -58,8 +58,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     if (auto r = set_range(all, *wanted.range_m, device); !r) return tl::make_unexpected(r.error());
   if (wanted.rate_hz)
     if (auto r = set_rate(all, *wanted.rate_hz, device); !r) return tl::make_unexpected(r.error());
+  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
-    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
     if (auto r = set(all, Key::gain, gain_db_from(*wanted.gain_percent), device); !r) return tl::make_unexpected(r.error());
   }
   if (wanted.beams) {

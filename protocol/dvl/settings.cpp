@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/text/format.hpp"
+#include "protocol/limits.hpp"
 
 namespace sonar::dvl {
 
@@ -75,8 +75,9 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   const auto refused = [&](const std::string& text) { return failure(ErrorKind::usage, "a " + (product.name + (" " + text))); };
   Settings s = settings_from(device.settings.get());
   if (wanted.range_m) {
-    if (!(*wanted.range_m > 0 && *wanted.range_m <= product.highest_m))
-      return refused(text::format("reaches altitudes of up to %g m; %g m is not valid", product.highest_m, *wanted.range_m));
+    const std::string why =
+        protocol::range_complaint(*wanted.range_m, std::string("a ") + product.name, 0.05, product.highest_m, "range_mode");
+    if (!why.empty()) return failure(ErrorKind::usage, why);
     allow_modes(range_mode_for(*wanted.range_m, product), s);
   }
   if (wanted.rate_hz && *wanted.rate_hz != 0)

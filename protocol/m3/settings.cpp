@@ -5,6 +5,7 @@
 
 #include "core/sonar/water.hpp"
 #include "core/text/format.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/m3/models.hpp"
 
 namespace sonar::m3 {
@@ -74,8 +75,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   const auto refused = [](std::string text) { return failure(ErrorKind::usage, std::move(text)); };
   Settings s = settings_from(device.settings.get());
   if (wanted.range_m) {
-    if (!(*wanted.range_m >= 1 && *wanted.range_m <= farthest_m))
-      return refused(text::format("an M3 has ranges from 1 to %g m; %g m is not valid", farthest_m, *wanted.range_m));
+    if (const std::string why = protocol::range_complaint(*wanted.range_m, "an M3", 1, farthest_m); !why.empty())
+      return refused(why);
     s.far_m = *wanted.range_m;
   }
   if (wanted.rate_hz) {
@@ -84,8 +85,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
                                   static_cast<double>(highest_rate_hz), *wanted.rate_hz));
     s.rate_hz = static_cast<float>(*wanted.rate_hz);
   }
+  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
-    if (!(*wanted.gain_percent >= 0 && *wanted.gain_percent <= 100)) return refused("gain_percent must be from 0 to 100");
     s.c_db = static_cast<float>(least_c_db + (most_c_db - least_c_db) * *wanted.gain_percent / 100);
   }
   if (wanted.mode.value_or(0) != 0) return refused("an M3 has one mode here, 0");

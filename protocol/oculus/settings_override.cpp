@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "protocol/limits.hpp"
 #include "protocol/oculus/fire.hpp"
 #include "protocol/oculus/settings.hpp"
 
@@ -31,7 +32,6 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   FireRequest fire = fire_of(device.settings.get());
   FireSettings& asked = fire.settings;
   const SonarModel& model = *device.model;
-  char text[160];
   if (wanted.mode) {
     if (*wanted.mode >= model.modes.size())
       return refused(model.name + " has " + std::to_string(model.modes.size()) + " mode(s), counted from 0; no mode " +
@@ -40,21 +40,19 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   }
   if (wanted.range_m) {
     const FrequencyMode& mode = model.modes[static_cast<std::size_t>(mode_index(model, asked.mode))];
-    if (*wanted.range_m < static_cast<double>(mode.min_range_m) || *wanted.range_m > static_cast<double>(mode.max_range_m)) {
-      std::snprintf(text, sizeof text, "the range of %s is %g to %g m in mode %s, not %g m", model.name.c_str(),
-                    static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m), mode.name.c_str(),
-                    *wanted.range_m);
-      return refused(text);
-    }
+    const std::string why =
+        protocol::range_complaint(*wanted.range_m, model.name + " in mode " + mode.name, static_cast<double>(mode.min_range_m),
+                                  static_cast<double>(mode.max_range_m));
+    if (!why.empty()) return refused(why);
     set(asked, flag::range_in_metres, true);
     asked.range = *wanted.range_m;
   }
+  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.rate_hz) {
-    if (*wanted.rate_hz < 0) return refused("a ping rate must be 0 (standby) or above");
     asked.ping_rate = *wanted.rate_hz == 0 ? PingRate::standby : nearest_rate(*wanted.rate_hz);
   }
+  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
-    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
     asked.gain_percent = *wanted.gain_percent;
   }
   if (wanted.beams) {

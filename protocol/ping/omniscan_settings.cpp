@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "core/base/geometry.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/ping/one_beam.hpp"
 
 namespace sonar::ping::omniscan {
@@ -14,6 +15,7 @@ namespace {
 constexpr double db_per_gain = 6;  // unknown: assumed, like full scale and the source level
 constexpr int most_gain = 7;
 constexpr double longest_m = 150;
+constexpr std::uint32_t least_length_mm = 100;
 constexpr double processing_s = 0.01;
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
@@ -65,7 +67,8 @@ Settings settings_from(const VendorSettings* held) {
 }
 
 std::string complaint(const OsPingParams& p) {
-  if (p.length_mm < 100 || 1e-3 * p.start_mm + 1e-3 * p.length_mm > longest_m) return "length_mm is from 100, its end to 150000";
+  if (p.length_mm < least_length_mm || 1e-3 * p.start_mm + 1e-3 * p.length_mm > longest_m)
+    return "length_mm is from 100, its end to 150000";
   if (p.gain < -1 || p.gain > most_gain) return "gain_index is not in -1..7";
   if (p.results < 200 || p.results > 1200) return "num_results is not in 200..1200";
   if (!(p.pulse_part >= 0 && p.pulse_part <= 1)) return "pulse_len_percent is not in 0..1";
@@ -103,14 +106,19 @@ protocol::ChangeSettings change_to(const Settings& settings) {
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   Settings s = settings_from(device.settings.get());
   OsPingParams& p = s.parameters;
-  if (wanted.range_m)
-    p.length_mm = static_cast<std::uint32_t>(std::lround(std::clamp(1000 * *wanted.range_m - p.start_mm, 0.0, 1e6)));
+  if (wanted.range_m) {
+    const double low_m = 1e-3 * (p.start_mm + least_length_mm);
+    const std::string why = protocol::range_complaint(*wanted.range_m, "an Omniscan", low_m, longest_m, "start_mm + length_mm");
+    if (!why.empty()) return refused(why);
+    p.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - p.start_mm;
+  }
+  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
     if (p.enable != 0) p.period_ms = static_cast<std::uint32_t>(std::lround(std::clamp(1000 / *wanted.rate_hz, 1.0, 30000.0)));
   }
+  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
-    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
     p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
   }
   if (const std::string why = one_beam_complaint(wanted, "an Omniscan", 16); !why.empty()) return refused(why);

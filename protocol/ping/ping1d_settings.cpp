@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "core/base/geometry.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/ping/one_beam.hpp"
 
 namespace sonar::ping::ping1d {
@@ -109,15 +110,20 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Settings s = settings_from(device.settings.get());
   Parameters& p = s.parameters;
   if (wanted.range_m) {
-    p.range.length_mm = static_cast<std::uint32_t>(std::lround(std::clamp(1000 * *wanted.range_m - p.range.start_mm, 0.0, 1e6)));
+    const double low_m = 1e-3 * (p.range.start_mm + least_length_mm);
+    const std::string why =
+        protocol::range_complaint(*wanted.range_m, "a Ping1D", low_m, 1e-3 * most_mm, "scan_start + scan_length");
+    if (!why.empty()) return refused(why);
+    p.range.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - p.range.start_mm;
     p.mode_auto = 0;
   }
+  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
     if (p.enable != 0) p.interval_ms = static_cast<std::uint16_t>(std::lround(std::clamp(1000 / *wanted.rate_hz, 1.0, 30000.0)));
   }
+  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
-    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
     p.gain = static_cast<std::uint8_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
     p.mode_auto = 0;
   }

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "core/base/geometry.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/ping/conversation.hpp"
 #include "protocol/ping/one_beam.hpp"
 
@@ -13,6 +14,7 @@ namespace sonar::ping::ping360 {
 namespace {
 
 constexpr double sample_unit_s = 25e-9;
+constexpr int shortest_period = 80, longest_period = 40000;    // of samples, in units
 constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn in 2.4 s
 constexpr double db_per_gain = 6;                              // unknown: assumed
 constexpr double fastest_hz = 1000;                            // hosts set the rhythm
@@ -95,7 +97,7 @@ std::string complaint(const Transducer& t) {
                        {"angle", t.angle, 0, grads},  // hosts send 400 for 0
 
                        {"transmit_duration", t.transmit_us, 1, 1000},
-                       {"sample_period", t.period, 80, 40000},
+                       {"sample_period", t.period, shortest_period, longest_period},
                        {"transmit_frequency", t.khz, 500, 1000},
                        {"number_of_samples", t.samples, 200, 1200}});
 }
@@ -154,14 +156,16 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Settings s = settings_from(device.settings.get());
   if (wanted.range_m) {
     const double speed = true_sound_speed_mps(device.water, device.depth_m);
-    const double period = 2 * *wanted.range_m / speed / sample_unit_s / s.ping.samples;
-    if (!(period >= 80 && period <= 40000))
-      return refused("a Ping360 samples every 2 to 1000 us: that range does not fit its samples");
-    s.ping.period = static_cast<std::uint16_t>(std::lround(period));
+    const double period_m = s.ping.samples * sample_unit_s * speed / 2;  // range by unit of the sample period
+    const std::string why = protocol::range_complaint(*wanted.range_m, "a Ping360", shortest_period * period_m,
+                                                      longest_period * period_m, "sample_period x number_of_samples");
+    if (!why.empty()) return refused(why);
+    s.ping.period = static_cast<std::uint16_t>(std::lround(*wanted.range_m / period_m));
   }
-  if (wanted.rate_hz) return refused("a Ping360 pings as its host asks, and as fast as its head turns");
+  if (wanted.rate_hz)
+    return refused("the rate of a Ping360 cannot be set: its host asks for each line, as fast as its head turns");
+  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
-    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
     s.ping.gain = static_cast<std::uint8_t>(std::lround(*wanted.gain_percent / 50));
   }
   if (const std::string why = one_beam_complaint(wanted, "a Ping360", 8); !why.empty()) return refused(why);

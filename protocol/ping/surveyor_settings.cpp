@@ -7,17 +7,19 @@
 
 #include "core/base/geometry.hpp"
 #include "core/sonar/detections.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/ping/conversation.hpp"
 
 namespace sonar::ping::surveyor {
 namespace {
 
-constexpr int beams = 64, directions = 16;  // directions: as many as receive elements
-constexpr double swath_deg = 80;            // recalled, like the width along the track and the number of elements
-constexpr double beam_width_deg = 7;        // that of 16 elements half a wavelength apart
-constexpr double above_db = 15;             // unknown: assumed
-constexpr double usual_end_m = 20;          // assumed for end 0, which the device sets by the bottom itself
-constexpr double db_per_gain = 0.4;         // unknown: assumed
+constexpr int beams = 64, directions = 16;         // directions: as many as receive elements
+constexpr double swath_deg = 80;                   // recalled, like the width along the track and the number of elements
+constexpr double beam_width_deg = 7;               // that of 16 elements half a wavelength apart
+constexpr double above_db = 15;                    // unknown: assumed
+constexpr double usual_end_m = 20;                 // assumed for end 0, which the device sets by the bottom itself
+constexpr double longest_m = 200, least_m = 0.01;  // end of the range; length of the range
+constexpr double db_per_gain = 0.4;                // unknown: assumed
 constexpr auto processing = std::chrono::milliseconds(10);
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
@@ -83,7 +85,7 @@ Settings settings_from(const VendorSettings* held) {
 }
 
 std::string complaint(const PingParameters& p) {
-  if (p.start_mm < 0 || p.end_mm < 0 || end_m(p) > 200) return "start_mm and end_mm are from 0 to 200000";
+  if (p.start_mm < 0 || p.end_mm < 0 || end_m(p) > longest_m) return "start_mm and end_mm are from 0 to 200000";
   if (p.start_mm >= 1000 * end_m(p)) return "start_mm is not before end_mm";
   if (!(p.speed_mps >= 1000 && p.speed_mps <= 2000)) return "sos_mps is not in 1000..2000";
   if (p.gain < -1 || p.gain > 100) return "gain_index is not in -1..100";
@@ -124,13 +126,19 @@ protocol::ChangeSettings change_to(const Settings& settings) {
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   Settings s = settings_from(device.settings.get());
   PingParameters& p = s.parameters;
-  if (wanted.range_m) p.end_mm = static_cast<std::int32_t>(std::lround(1000 * std::clamp(*wanted.range_m, 0.0, 1e6)));
+  if (wanted.range_m) {
+    const double low_m = 1e-3 * p.start_mm + least_m;
+    const std::string why = protocol::range_complaint(*wanted.range_m, "a Surveyor", low_m, longest_m, "end_mm");
+    if (!why.empty()) return refused(why);
+    p.end_mm = static_cast<std::int32_t>(std::lround(1000 * *wanted.range_m));
+  }
+  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
     if (p.enable != 0) p.period_ms = static_cast<std::int16_t>(std::lround(std::clamp(1000 / *wanted.rate_hz, 1.0, 30000.0)));
   }
+  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
-    if (*wanted.gain_percent < 0 || *wanted.gain_percent > 100) return refused("gain_percent must be from 0 to 100");
     p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent));
   }
   if (wanted.mode && *wanted.mode != 0) return refused("a Surveyor has one mode, 0");

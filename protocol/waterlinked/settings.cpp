@@ -1,8 +1,8 @@
 #include "protocol/waterlinked/settings.hpp"
 
 #include <algorithm>
-#include <cstdio>
 
+#include "protocol/limits.hpp"
 #include "protocol/waterlinked/options.hpp"
 
 namespace sonar::waterlinked {
@@ -93,17 +93,14 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     return refused("Sonar 3D-15 has 2 mode(s), counted from 0; no mode " + std::to_string(*wanted.mode));
   s.mode = wanted.mode.value_or(static_cast<std::uint32_t>(s.mode));
   if (wanted.range_m) {
-    if (!(*wanted.range_m >= s.range_min_m + least_window_m && *wanted.range_m <= longest_range_m)) {
-      char text[120];
-      std::snprintf(text, sizeof text, "Sonar 3D-15 shows up to %g m and starts at %g m; %g m is not valid", longest_range_m,
-                    s.range_min_m, *wanted.range_m);
-      return refused(text);
-    }
+    const std::string why =
+        protocol::range_complaint(*wanted.range_m, "a Sonar 3D-15", s.range_min_m + least_window_m, longest_range_m);
+    if (!why.empty()) return refused(why);
     s.range_max_m = *wanted.range_m;
   }
+  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.rate_hz) {
     const double most = static_cast<double>(mode_rows()[s.mode].rate_hz);
-    if (!(*wanted.rate_hz >= 0)) return refused("a rate must be 0 or above");
     s.acoustics = *wanted.rate_hz > 0;
     s.rate_hz = *wanted.rate_hz < most ? *wanted.rate_hz : 0;
   }

@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <regex>
+#include <string>
+
 #include "protocol/oculus/fire.hpp"
 #include "protocol/vendor.hpp"
 #include "tests/protocol/blueview/blueview_testing.hpp"
@@ -22,15 +25,39 @@ struct Override : protocol::SettingsOverride {
 };
 Override set() { return {}; }
 
-protocol::DeviceState oculus_device() {
-  const auto profile = protocol::find_profile("oculus-m1200d");
+protocol::DeviceState device_of(std::string_view name) {
+  const auto profile = protocol::find_profile(name);
   protocol::DeviceState d;
   d.model = profile->model;
   d.options = *protocol::check_options(*profile->vendor, {});
   d.settings = profile->vendor->initial_settings(d).vendor_settings;
   return d;
 }
+protocol::DeviceState oculus_device() { return device_of("oculus-m1200d"); }
 const protocol::Vendor& oculus() { return *protocol::vendors().front(); }
+
+TEST(Overrides, OfEachProductAreRefusedInTheWordsOfTheirSettingsWithThePermittedRange) {
+  const std::regex ends("the range of .* is ([0-9.e+]+) to ([0-9.e+]+) m.*, not ([-0-9.e+]+) m.*");
+  for (const protocol::Vendor* vendor : protocol::vendors())
+    for (const auto& model : vendor->models()) {
+      SCOPED_TRACE(model->profile);
+      const protocol::DeviceState device = device_of(model->profile);
+      const auto why = [&](const protocol::SettingsOverride& asked) {
+        const auto change = vendor->apply_override(asked, device);
+        return change ? std::string() : change.error().text;
+      };
+      std::smatch found;
+      for (const double wrong_m : {-1.0, 1e6}) {
+        const std::string refusal = why(set().range(wrong_m));
+        ASSERT_TRUE(std::regex_match(refusal, found, ends)) << refusal;
+        EXPECT_EQ(why(set().range(1.001 * std::stod(found[1]))), "");
+        EXPECT_EQ(why(set().range(0.999 * std::stod(found[2]))), "");
+        EXPECT_EQ(std::stod(found[3]), wrong_m);
+      }
+      EXPECT_THAT(why(set().gain(300)), testing::AnyOf(HasSubstr("the gain is 0 to 100 %, not 300 %"), HasSubstr("own gain")));
+      EXPECT_THAT(why(set().rate(-1)), HasSubstr("rate"));
+    }
+}
 
 TEST(OculusOverride, IsTheFireMessageThatADriverWouldHaveSent) {
   protocol::DeviceState device = oculus_device();
@@ -106,7 +133,7 @@ TEST(OculusOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
   EXPECT_THAT(why(set().of_mode(2)), HasSubstr("2 mode(s)"));
   EXPECT_THAT(why(set().with_beams(300)), HasSubstr("256 or 512"));
   EXPECT_THAT(why(set().gain(101)), HasSubstr("0 to 100"));
-  EXPECT_THAT(why(set().rate(-1)), HasSubstr("0 (standby) or above"));
+  EXPECT_THAT(why(set().rate(-1)), HasSubstr("the rate is 0 Hz, standby, or above"));
   EXPECT_THAT(why(set().bits(24)), HasSubstr("8 or 16 bits"));
 }
 
@@ -131,8 +158,8 @@ TEST(BlueViewOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
     const auto change = blueview::vendor().apply_override(asked, device);
     return change ? "" : change.error().text;
   };
-  EXPECT_THAT(why(set().range(1000)), HasSubstr("has a range of"));
-  EXPECT_THAT(why(set().range(1)), HasSubstr("starts at 2 m"));
+  EXPECT_THAT(why(set().range(1000)), HasSubstr("not 1000 m (stop_range)"));
+  EXPECT_THAT(why(set().range(1)), HasSubstr("is 2.01 to"));
   EXPECT_THAT(why(set().rate(0)), HasSubstr("no standby"));
   EXPECT_THAT(why(set().of_mode(1)), HasSubstr("1 mode(s)"));
   EXPECT_THAT(why(set().with_beams(256)), HasSubstr("512 beams"));

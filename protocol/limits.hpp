@@ -1,0 +1,33 @@
+// Refusals of wanted settings that all makes share: in the words and units of SettingsOverride; the wire's own field in brackets.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/text/format.hpp"
+#include "protocol/dialogue.hpp"
+
+namespace sonar::protocol {
+
+/// "the range of a Surveyor is 0.01 to 200 m, not 400 m (end_mm)"; empty when `range_m` is from `low_m` to `high_m`. `of`: "a
+/// Surveyor".
+inline std::string range_complaint(double range_m, std::string_view of, double low_m, double high_m,
+                                   std::string_view field = {}) {
+  if (range_m >= low_m && range_m <= high_m) return {};
+  return "the range of " + std::string(of) + text::format(" is %.4g to %.4g m, not %g m", low_m, high_m, range_m) +
+         (field.empty() ? std::string() : " (" + std::string(field) + ")");
+}
+
+/// The refusal of gain_percent; empty when there is none, or a valid one.
+inline std::string gain_complaint(const SettingsOverride& wanted) {
+  if (!wanted.gain_percent || (*wanted.gain_percent >= 0 && *wanted.gain_percent <= 100)) return {};
+  return text::format("the gain is 0 to 100 %%, not %g %% (gain_percent)", *wanted.gain_percent);
+}
+
+/// The refusal of a rate by a sonar that has a standby; empty when there is none, or a valid one.
+inline std::string rate_complaint(const SettingsOverride& wanted) {
+  if (!wanted.rate_hz || *wanted.rate_hz >= 0) return {};
+  return text::format("the rate is 0 Hz, standby, or above, not %g Hz (rate_hz)", *wanted.rate_hz);
+}
+
+}  // namespace sonar::protocol
