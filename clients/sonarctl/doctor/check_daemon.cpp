@@ -42,8 +42,9 @@ void check_control(const Facts& facts, std::vector<Finding>& findings) {
                       ""});
   for (const SonarFacts& sonar : facts.sonars)
     if (!serves(status, sonar))
-      findings.push_back({Level::warn, "control", "that sonard does not serve " + sonar.at.host,
-                          "give the control stream of the sonard that does with --control"});
+      findings.push_back({Level::warn, "control",
+                          "that sonard does not serve " + sonar.at.host + "; it serves " + served_by(status),
+                          "examine one of these, or give the control stream of the sonard that does with --control"});
   if (!status.engine().empty()) findings.push_back({Level::ok, "engine", "trace backend: " + status.engine(), ""});
 }
 
@@ -104,6 +105,20 @@ void check_clocks(const ControlFacts& control, std::vector<Finding>& findings) {
 }
 
 }  // namespace
+
+std::string served_by(const v1::DaemonStatus& status) {
+  std::string all;
+  for (const v1::SonarStatus& sonar : status.sonars()) {
+    std::string at = sonar.listens().empty() ? sonar.advertised() : sonar.listens();
+    for (const v1::SonarAddress& address : sonar.addresses())
+      if (!address.sonar_speaks_first()) {
+        at = address.protocol() + " " + address.address();
+        break;
+      }
+    all += (all.empty() ? "" : ", ") + sonar.name() + " at " + at;
+  }
+  return all.empty() ? "no sonar" : all;
+}
 
 void check_daemon(const Facts& facts, std::vector<Finding>& findings) {
   check_control(facts, findings);

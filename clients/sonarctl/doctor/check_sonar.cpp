@@ -41,10 +41,7 @@ const ReceivedStatus* status_from(const Facts& facts, const std::string& host) {
 class SonarChecks {
  public:
   SonarChecks(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings)
-      : facts_(facts),
-        sonar_(sonar),
-        findings_(findings),
-        at_((sonar.make->ports.front().kind == protocol::HostPort::Kind::udp ? "udp " : "tcp ") + text_from(sonar.at)) {
+      : facts_(facts), sonar_(sonar), findings_(findings), at_((is_by_udp() ? "udp " : "tcp ") + text_from(sonar.at)) {
     if (facts.sonars.size() > 1) prefix_ = (sonar.name.empty() ? sonar.at.host : sonar.name) + ": ";
   }
 
@@ -66,6 +63,7 @@ class SonarChecks {
     findings_.push_back({level, check, prefix_ + text, cure});
   }
 
+  bool is_by_udp() const { return sonar_.make->ports.front().kind == protocol::HostPort::Kind::udp; }
   bool answers() const { return sonar_.stream.outcome >= Outcome::closed_without_a_byte || !sonar_.clients.empty(); }
 
   /// Images go by UDP, and no client connects for them. So only the status of the daemon shows them.
@@ -141,7 +139,8 @@ class SonarChecks {
                    sonar_.at.host + " is busy: " + joined(sonar_.clients) + " is connected; not connecting" + stats_of_daemon(),
                    "");
       case Outcome::refused:
-        return add(Level::fail, "ping", at_ + " refuses the connection: no program listens there", where_else());
+        return add(Level::fail, "ping", at_ + (is_by_udp() ? "" : " refuses the connection") + ": no program listens there",
+                   where_else());
       case Outcome::unreachable:
         return add(Level::fail, "ping", at_ + " does not answer: " + s.error, way_there());
       case Outcome::closed_without_a_byte:
@@ -193,9 +192,21 @@ class SonarChecks {
                  text + ": with clock: " + clock() + " time stops until " +
                      (clock() == "lockstep" ? "a client requests a step" : "the next pose comes"),
                  clock() == "lockstep" ? "advance it meanwhile: sonarctl step 0.1 --count 20" : "start the sender of poses");
+    if (const std::string rivals = clients_beside_us(); !rivals.empty())
+      return add(Level::warn, "ping", text + ": " + rivals + " began to ask it at the same time, and gets its pings",
+                 "run the doctor once more: it leaves a busy sonar to its driver");
     add(Level::fail, "ping", text,
         s.asked ? "is the computer overloaded, or sonard stopped (SIGSTOP, a debugger)? See its log"
                 : "its client requested standby or single pings; sonarctl status shows the settings");
+  }
+
+  /// Those that connected while this check waited.
+  std::string clients_beside_us() const {
+    std::vector<std::string> rivals;
+    if (sonar_.reported)
+      for (const v1::ClientStatus& client : sonar_.reported->clients())
+        if (client.address() != sonar_.stream.own && client.pings_written() > 0) rivals.push_back(client.address());
+    return joined(rivals);
   }
 
   /// The clock mode that the daemon reports: "realtime", "stepped", ...; empty without a daemon.
@@ -210,16 +221,18 @@ class SonarChecks {
     for (const ReceivedStatus& received : facts_.status.received)
       if (received.advertised != sonar_.at.host)
         return "a status broadcast names a sonar at " + received.advertised + ": sonarctl doctor " + received.advertised;
+    const auto& status = facts_.control.status;
+    if (status && status->sonars_size() > 0)
+      return "the sonard at " + text_from(facts_.control.at) + " serves " + served_by(*status) + ": sonarctl doctor ADDRESS";
     if (sonar_.on_this_host)
       return "start it: sonard serves its demo on 127.0.0.2 (sonard --help lists those of other makes), sonard FILE the sonars "
-             "of a "
-             "configuration";
+             "of a configuration";
     return "start sonard on that computer; its banner names the address of each sonar";
   }
 
   std::string way_there() const {
     if (sonar_.on_this_host)
-      return "a firewall on this computer may drop tcp " + std::to_string(sonar_.at.port) + " (nft list ruleset)";
+      return "a firewall on this computer may drop " + at_.substr(0, 4) + std::to_string(sonar_.at.port) + " (nft list ruleset)";
     return "the address is not on this host: if sonard should serve it here, add it: ip addr add " + sonar_.at.host +
            "/24 dev eth0; if it is another computer, check that it is on, its network and its firewall";
   }
@@ -336,7 +349,7 @@ class SonarChecks {
                  "");
     const bool is_asked_hz = s.asked && s.asked_hz > 0;
     const double expected_hz = is_asked_hz ? s.asked_hz : sonar_.reported && !sonar_.make->scans ? sonar_.reported->rate_hz() : 0;
-    std::string text = "rate " + format("%.1f", s.rate_hz) + " Hz";
+    std::string text = "rate " + format("%.1f ", s.rate_hz) + std::string(sonar_.make->rate_unit());
     if (expected_hz > 0) text += (sonar_.make->each_ping_requested ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
     text += latency_text();
     const bool slow = expected_hz > 0 && s.rate_hz < 0.85 * expected_hz;

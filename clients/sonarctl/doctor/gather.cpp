@@ -42,11 +42,11 @@ class Gathering {
     ask_http(*http);
     given->host = ipv4_of(given->host).value_or(given->host);  // examine() reports a name without an address
     const DiscoveryQuestion search(facts_.address_given ? std::vector{given->host} : std::vector<std::string>{});
-    const auto sockets = tcp_sockets();
+    const auto sockets = tcp_sockets(), by_udp = udp_sockets();
     const auto programs = programs_by_socket();
-    note_daemons(sockets, programs);
+    note_daemons(sockets, by_udp, programs);
     find_sonars(*given, search);
-    for (SonarFacts& sonar : facts_.sonars) examine(sonar, sockets, programs);
+    for (SonarFacts& sonar : facts_.sonars) examine(sonar, sockets, by_udp, programs);
     listen_to_all();
     search.receive_answers(facts_.found, Steady::now());
     facts_.kernel_ports = kernel_ports();
@@ -96,12 +96,16 @@ class Gathering {
   }
 
   /// The sonard processes that listen on ports of sonars.
-  void note_daemons(const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
-    for (const SocketLine& socket : sockets) {
-      if (socket.state != listening || make_at(socket.local_port) == nullptr) continue;
+  void note_daemons(const std::vector<SocketLine>& sockets, const std::vector<SocketLine>& by_udp,
+                    const std::map<std::uint64_t, Program>& programs) {
+    const auto note = [&](const SocketLine& socket) {
       PortHolder holder = holder_of(socket, programs);
       if (holder.program == "sonard") facts_.daemons.push_back(std::move(holder));
-    }
+    };
+    for (const SocketLine& socket : sockets)
+      if (socket.state == listening && make_at(socket.local_port) != nullptr) note(socket);
+    for (const SocketLine& socket : by_udp)
+      if (const Make* const make = make_at(socket.local_port); make != nullptr && is_by_udp(*make)) note(socket);
   }
 
   void find_sonars(const Endpoint& given, const DiscoveryQuestion& search) {
@@ -184,7 +188,10 @@ class Gathering {
         sonar.clients.push_back(received.client);
   }
 
-  void examine(SonarFacts& sonar, const std::vector<SocketLine>& sockets, const std::map<std::uint64_t, Program>& programs) {
+  static bool is_by_udp(const Make& make) { return make.ports.front().kind == protocol::HostPort::Kind::udp; }
+
+  void examine(SonarFacts& sonar, const std::vector<SocketLine>& sockets, const std::vector<SocketLine>& by_udp,
+               const std::map<std::uint64_t, Program>& programs) {
     const auto ip = ipv4_of(sonar.at.host);
     if (!ip) {
       sonar.unresolved = ip.error().text;
@@ -193,9 +200,10 @@ class Gathering {
     sonar.at.host = *ip;
     sonar.on_this_host = is_on_this_host(*ip);
     sonar.in_our_network = is_in_our_network(*ip);
-    for (const SocketLine& socket : sockets) {
+    for (const SocketLine& socket : is_by_udp(*sonar.make) ? by_udp : sockets) {
       const bool here = socket.local_host == *ip || socket.local_host == "0.0.0.0" || socket.local_host == "[::]";
-      if (sonar.on_this_host && here && socket.state == listening && socket.local_port == sonar.at.port)
+      const bool waits = socket.state == listening || is_by_udp(*sonar.make);
+      if (sonar.on_this_host && here && waits && socket.local_port == sonar.at.port)
         sonar.listeners.push_back(holder_of(socket, programs));
     }
     if (left_until(deadline_) < 500ms) {

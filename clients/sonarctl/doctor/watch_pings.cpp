@@ -105,13 +105,14 @@ class Watch {
 };
 
 /// The outcome of a failed connection or greeting.
-Outcome outcome_of(const Error& error, const Endpoint& at, const Make& make) {
+Outcome outcome_of(const Error& error, const SonarFacts& sonar) {
   using Kind = protocol::HostPort::Kind;
-  const Kind first = make.ports.front().kind;
+  const Kind first = sonar.make->ports.front().kind;
   if (error.kind == ErrorKind::io) return Outcome::closed_without_a_byte;
   if (error.kind == ErrorKind::bad_data) return Outcome::no_ping;
   const bool by_tcp = first == Kind::tcp || first == Kind::http;
-  return by_tcp && refuses(at) ? Outcome::refused : Outcome::unreachable;
+  const bool is_refused = by_tcp ? refuses(sonar.at) : sonar.on_this_host && sonar.listeners.empty();
+  return is_refused ? Outcome::refused : Outcome::unreachable;
 }
 
 void set_latency(SonarFacts& sonar, const std::vector<double>& delays_s, ControlFacts& clocks) {
@@ -137,7 +138,7 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
       PingStream::open(sonar.at, sonar.make, wanted, std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
   if (!stream) {
     facts.error = stream.error().text;
-    facts.outcome = outcome_of(stream.error(), sonar.at, *sonar.make);
+    facts.outcome = outcome_of(stream.error(), sonar);
     return;
   }
   facts.own = stream->own();
