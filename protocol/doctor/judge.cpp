@@ -129,7 +129,7 @@ class SonarJudge {
     const v1::Visit &gone = sonar_.gone(), &searched = sonar_.searched();
     std::string last;
     if (!gone.address().empty())
-      last = "; the last one, " + gone.address() + ", left at " + utc_text(gone.utc_ns()) + ": " + reason_of(gone);
+      last = "; the last driver, " + gone.address() + ", left at " + utc_text(gone.utc_ns()) + ": " + reason_of(gone);
     const bool by_http = make_.ports.front().kind == protocol::HostPort::Kind::http;  // no driver stays connected
     const std::string cure =
         by_http ? std::string(make_.remedy) + ", of " + sonar_.advertised() : "point a driver at " + where_to_connect(sonar_);
@@ -227,7 +227,8 @@ class SonarJudge {
             ? (f.simulation_ms() * static_cast<double>(f.pings()) - then.simulation_ms() * static_cast<double>(then.pings())) /
                   made
             : f.simulation_ms();
-    const bool skips = f.skipped_ticks() > then.skipped_ticks() && made < enough_of_rate * sonar_.rate_hz() * past_s_;
+    const bool skips =
+        !sonar_.on_request() && f.skipped_ticks() > then.skipped_ticks() && made < enough_of_rate * sonar_.rate_hz() * past_s_;
     const std::string rates = format("%.1f of %g Hz", made / past_s_, sonar_.rate_hz());
     if (skips && ms * sonar_.rate_hz() > 1000 * enough_of_rate)
       add(Level::warn, "rate", sonar_.name() + " makes " + rates + ": computing takes " + format("%.0f ms", ms), less_to_compute);
@@ -316,9 +317,11 @@ void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere,
 
 }  // namespace
 
-bool has_driver(const v1::DaemonStatus& status) {
-  return std::any_of(status.sonars().begin(), status.sonars().end(),
-                     [](const v1::SonarStatus& sonar) { return !sonar.clients().empty(); });
+bool looks_elsewhere(const v1::DaemonStatus& status) {
+  return std::none_of(status.sonars().begin(), status.sonars().end(),
+                      [](const v1::SonarStatus& sonar) { return !sonar.clients().empty(); }) &&
+         std::none_of(status.faults().begin(), status.faults().end(),
+                      [](const v1::FaultStatus& fault) { return fault.state() == "active"; });
 }
 
 std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere) {
@@ -326,7 +329,7 @@ std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* 
   check_faults(now, findings);
   check_clock(now, before, findings);
   for (const v1::SonarStatus& sonar : now.sonars()) SonarJudge(now, sonar, before, findings).run();
-  if (!has_driver(now)) check_elsewhere(now, elsewhere, findings);
+  if (looks_elsewhere(now)) check_elsewhere(now, elsewhere, findings);
   check_poses(now, findings);
   if (before != nullptr && now.poses().late() > before->poses().late())
     findings.push_back(

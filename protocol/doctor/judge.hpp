@@ -9,8 +9,8 @@
 
 namespace sonar::doctor {
 
-/// Connection attempts of programs on the daemon's computer: they show a driver on a wrong address. Read only while no driver is
-/// connected.
+/// Connection attempts of programs on the daemon's computer: they show a driver on a wrong address. Read only while
+/// looks_elsewhere().
 struct Elsewhere {
   std::vector<SocketLine> tcp;
   std::uint64_t refused = 0;  // connections, in the last seconds
@@ -20,6 +20,7 @@ struct Elsewhere {
 /// null = none.
 std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere = {});
 
-bool has_driver(const v1::DaemonStatus& status);
+/// No driver is connected, and no fault acts, which may refuse the connections of a driver at the right address.
+bool looks_elsewhere(const v1::DaemonStatus& status);
 
 }  // namespace sonar::doctor

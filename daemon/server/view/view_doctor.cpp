@@ -31,8 +31,7 @@ ViewPayloadPointer ViewDoctor::newest() {
 
 ViewPayloadPointer ViewDoctor::news() {
   if (newest() == said_) return nullptr;
-  const ViewPayloadPointer before = std::exchange(said_, newest_);
-  return before != nullptr && *before->pieces.front().bytes == *said_->pieces.front().bytes ? nullptr : said_;
+  return said_ = newest_;
 }
 
 void ViewDoctor::look() {
@@ -48,7 +47,7 @@ void ViewDoctor::look() {
 }
 
 doctor::Elsewhere ViewDoctor::look_elsewhere() {
-  if (doctor::has_driver(*last_)) {
+  if (!doctor::looks_elsewhere(*last_)) {
     failed_.clear();
     return {};
   }

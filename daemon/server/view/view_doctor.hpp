@@ -1,5 +1,6 @@
 // The channel `/doctor` of the live view: the causes that keep drivers from getting pings (protocol/doctor/judge.hpp). They are
-// checked every two seconds while a viewer has subscribed, and sent when they change. Owned by ViewFeed. I/O thread only.
+// checked and sent every two seconds while a viewer has subscribed: their age is that of the check. Owned by ViewFeed. I/O thread
+// only.
 #pragma once
 
 #include <chrono>
@@ -24,7 +25,7 @@ class ViewDoctor {
 
   /// The findings for a new subscriber, no older than the period. Null: there is no status.
   ViewPayloadPointer newest();
-  /// The same, null when all who have subscribed know it.
+  /// The same, null when all who have subscribed have it.
   ViewPayloadPointer news();
 
  private:

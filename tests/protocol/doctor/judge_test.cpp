@@ -75,7 +75,7 @@ TEST(Judge, NoDriverConnected) {
   EXPECT_THAT(
       trouble(with(R"(gone { address: "10.0.0.7:1" why: "closed by the client" utc_ns: 3723000000000 ago_s: 500 })"), "driver")
           .text,
-      HasSubstr("the last one, 10.0.0.7:1, left at 01:02:03 UTC: closed by the client"));
+      HasSubstr("the last driver, 10.0.0.7:1, left at 01:02:03 UTC: closed by the client"));
 }
 
 TEST(Judge, OneThatSearchedButDidNotConnect) {
@@ -103,6 +103,9 @@ TEST(Judge, OneOnAWrongAddress) {
   EXPECT_THAT(texts_of({{ours, web}, 3}), testing::Contains(HasSubstr("3 connections of programs of this computer failed")));
   EXPECT_EQ(trouble(judge(with(""), nullptr, {{tries}, 0}), "address").cure, "point the driver at 127.0.0.2, TCP port 52100");
   EXPECT_THAT(troubles(judge(with(pinging + driver), nullptr, {{tries}, 3})), IsEmpty());
+  const auto refused_by_fault =
+      troubles(judge(with("", R"(faults { name: "power-cycle.1" state: "active" })"), nullptr, {{}, 288}));
+  EXPECT_THAT(refused_by_fault, testing::Not(testing::Contains(HasSubstr("connections of programs"))));
 }
 
 TEST(SocketTable, FailedAttempts) {
