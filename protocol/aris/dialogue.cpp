@@ -72,6 +72,7 @@ class ArisDialogue final : public protocol::Dialogue {
     Command command;
     if (!protobuf::read(message, command))
       return notice(reaction, "ignored a command of " + std::to_string(message.size()) + " bytes that cannot be read");
+    if (command.type != CommandType::set_acoustics) report_refusals(reaction);
     switch (command.type) {
       case CommandType::set_date_time:
         return on_date_time(command, now, reaction);
@@ -80,7 +81,7 @@ class ArisDialogue final : public protocol::Dialogue {
       case CommandType::set_stream:
         return on_stream(command);
       case CommandType::set_acoustics:
-        return on_acoustics(command, reaction);
+        return on_acoustics(command);
       case CommandType::set_salinity:
         return on_salinity(command, reaction);
       case CommandType::set_telephoto:
@@ -135,10 +136,19 @@ class ArisDialogue final : public protocol::Dialogue {
     changed_ = true;
   }
 
-  void on_acoustics(const Command& command, Reaction& reaction) {
+  /// A host that does not know the product sends settings for several of them, one after the other. Refusals are reported when
+  /// none of these was accepted: with the next other command, such as the keep-alive of each second.
+  void on_acoustics(const Command& command) {
     const Verdict verdict = apply(settings_, command.acoustics.value_or(Acoustics{}), device_);
-    if (!verdict.refusal.empty()) notice(reaction, "refused acoustic settings: " + verdict.refusal);
+    accepts_ |= verdict.refusal.empty();
+    if (!verdict.refusal.empty() && refusals_.size() < notices_per_call) refusals_.push_back(verdict.refusal);
     changed_ = true;
+  }
+  void report_refusals(Reaction& reaction) {
+    if (!accepts_)
+      for (const std::string& refusal : refusals_) notice(reaction, "refused acoustic settings: " + refusal);
+    accepts_ = false;
+    refusals_.clear();
   }
 
   void on_salinity(const Command& command, Reaction& reaction) {
@@ -168,7 +178,9 @@ class ArisDialogue final : public protocol::Dialogue {
   std::shared_ptr<const VendorSettings> seen_;                 // the device's, at the last call
   std::deque<std::shared_ptr<const VendorSettings>> waiting_;  // commanded since, oldest first
   std::uint32_t first_ping_;
-  bool streaming_ = false;  // this controller has set a receiver
+  bool streaming_ = false;             // this controller has set a receiver
+  std::vector<std::string> refusals_;  // of acoustic settings since the last other command
+  bool accepts_ = false;               // other such settings were accepted
   CommandFramer framer_;
   Settings settings_;  // as of this call
   bool changed_ = false;

@@ -4,6 +4,7 @@
 #include <deque>
 
 #include "protocol/aris/dialogue.hpp"
+#include "protocol/aris/host.hpp"
 #include "tests/protocol/aris/aris_testing.hpp"
 
 namespace sonar::aris {
@@ -128,13 +129,35 @@ TEST(ArisDialogue, RefusedSettingsChangeNothingButTheCookie) {
   EXPECT_EQ(talk.receivers.at(0), (protocol::Endpoint{{239, 0, 0, 42}, 56444}));
   talk.say(tests::set_acoustics(tests::acoustics(1)));
   const PingSettings before = talk.settings;
+  Command keep_alive;
+  keep_alive.type = CommandType::ping;
+  keep_alive.ping.emplace();
+  talk.say(keep_alive);
   Acoustics bad = tests::acoustics(2);
   bad.ping_mode = 1;
   talk.say(tests::set_acoustics(bad));
+  talk.say(keep_alive);
   EXPECT_EQ(talk.settings, before);
   EXPECT_EQ(talk.held().invalid, 2u);
   EXPECT_EQ(talk.held().applied, 1u);
   EXPECT_THAT(talk.notices.at(0), HasSubstr("ping mode 1"));
+}
+
+TEST(ArisDialogue, AHostThatAsksForTheSettingsOfEachProductIsNotComplainedAbout) {
+  for (const auto& model : vendor().models()) {
+    Talk talk(model->profile.c_str());
+    const auto host = make_host({});
+    ASSERT_TRUE(host);
+    const std::uint16_t own[] = {4000, 4001};
+    const auto carry_out = [&](const protocol::HostActions& actions) {
+      for (const protocol::HostAction& action : actions)
+        if (const auto* send = std::get_if<protocol::HostSend>(&action)) talk.say(send->bytes);
+    };
+    carry_out((*host)->on_open(own, tests::at_s(0)));
+    carry_out((*host)->on_tick(tests::at_s(1)));
+    EXPECT_GT(talk.settings.rate_hz, 0) << model->profile;
+    EXPECT_THAT(talk.notices, testing::IsEmpty()) << model->profile;
+  }
 }
 
 TEST(ArisDialogue, SalinityFocusClockAndLens) {
