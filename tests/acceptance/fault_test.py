@@ -51,8 +51,10 @@ class Faults(unittest.TestCase):
         self.assertNotIn("cut", self.listed())
         socket.create_connection((self.daemon.address, 52100), 10).close()
         self.refuses(65, ("remove", "cut"), 'no fault "cut"')
-        self.does("add", "silent-open")
-        self.does("remove", "silent-open")  # by the word, for it has no name of its own
+        for name in ("silent-open", "L05"):  # by the word or the code of its kind, for it has no name of its own
+            self.does("add", "silent-open")
+            self.assertRegex(self.does("list"), r"(?m)^silent-open +L05 ")
+            self.does("remove", name)
 
     def test_every_part_of_a_record_reaches_the_daemon(self):
         self.does("add", "F01", "--with", "bytes=1", "--with", "fill=zero", "--at", "ping=200", "--sonar", "front", "--client", "newest",

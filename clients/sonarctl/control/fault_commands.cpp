@@ -109,7 +109,7 @@ void add_add(CLI::App& fault, FaultArguments& a) {
   number_to("--count", r.lasts.count, "how often it begins")->check(whole_number(1));
   add.add_option("--sonar", r.sonar, "name of the sonar (default: all)");
   add.add_option("--client", r.client, "newest, oldest, an ordinal, an address or a prefix 10.0.0.0/8 (default: all)");
-  add.add_option("--name", r.name, "its name (default: the code)");
+  add.add_option("--name", r.name, "its name (default: FAULT)");
 }
 
 }  // namespace

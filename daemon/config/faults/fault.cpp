@@ -104,7 +104,7 @@ class Check {
 
   Fault of_kind(const FaultKind& kind, const std::map<std::string, std::string>& with, double default_s) {
     Fault fault;
-    fault.name = record_.name.empty() ? std::string(kind.code) : record_.name;
+    fault.name = record_.name.empty() ? record_.what : record_.name;
     fault.what = record_.what;
     fault.kind = &kind;
     fault.sonar = record_.sonar;

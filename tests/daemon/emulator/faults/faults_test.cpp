@@ -143,6 +143,10 @@ TEST(FaultRecords, AreRefusedWithWhatIsWrongAndWhatIsPossible) {
   EXPECT_EQ(text(r), "accepted");
 }
 
+TEST(FaultRecords, WithoutANameHaveTheOneTheyWereAskedForBy) {
+  for (const char* asked : {"L05", "silent-open"}) EXPECT_EQ(check_fault(record(asked), true)->front().name, asked);
+}
+
 TEST(FaultRecords, ThatNeverActAreRefused) {
   const auto text = [](const FaultRecord& r) {
     const auto faults = check_fault(r, true);

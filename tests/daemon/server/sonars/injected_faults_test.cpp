@@ -127,7 +127,7 @@ TEST_F(InjectedFaults, AreInStatusMetricsEventsAndTheJournalFile) {
   daemon.on_io_thread([&] { metrics = daemon.app().operations().metrics(); });
   EXPECT_THAT(metrics, HasSubstr("sonard_faults_active{sonar=\"front\"} 1\n"));
   EXPECT_THAT(metrics, HasSubstr("sonard_fault_injections_total{kind=\"P01\"} "));
-  EXPECT_THAT(daemon.log_text(), HasSubstr("fault P01: The image repeats while numbers advance."));
+  EXPECT_THAT(daemon.log_text(), HasSubstr("fault stuck: The image repeats while numbers advance.  sonar=front  kind=P01"));
 }
 
 TEST(PlannedFaults, BeginWithTheDaemonAndFillTheJournal) {
