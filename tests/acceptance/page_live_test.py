@@ -228,6 +228,16 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("document.body.dataset.situation === 'fine'")
             self.assert_quiet(page, url_of(daemon))
 
+    def test_a_scan_has_lines_a_second(self):
+        with Sonard(profile="ping360", mount="{frame: FLU, xyz_m: [0, 0, 0]}") as daemon:
+            page = self.open(daemon)
+            page.wait("document.body.dataset.situation === 'no-client'")
+            page.click("#notice-button")
+            page.wait("/^\\d+\\.\\d lines\\/s$/.test(document.querySelector('#rate').innerText) && document.querySelector('#measured').innerText.endsWith(' lines/s')")
+            self.assertIsNone(page.run("document.querySelector('[name=\"/front/rate_hz\"]')"), "its host sets the rhythm")
+            self.assertNotIn("1000", page.text("#settings"))
+            self.assert_quiet(page, url_of(daemon))
+
     def test_the_page_records(self):
         with Sonard(mount=MOUNT, more="recording: {folder: .}") as daemon, Driver(daemon.address, range_m=2, beams=256):
             page = self.open(daemon)

@@ -36,6 +36,14 @@ STATES = {  # of the mock -> the page's name of it, what the user reads, the but
 }
 
 
+# Settings whose field something else is painted over.
+COVERED_SETTINGS = """[...document.querySelectorAll('#setting-rows :is(input, select)')].filter((e) => {
+  e.scrollIntoView({ block: 'nearest' });
+  const r = e.getBoundingClientRect();
+  return document.elementFromPoint(r.left + r.width / 2, r.top + r.height / 2) !== e;
+}).map((e) => e.name)"""
+
+
 def ping_about(ping, full_scale=254):
     """A ping of the Python client as the mock wants it: (samples, description)."""
     rows, beams = ping.samples.shape
@@ -274,6 +282,46 @@ class Page(PageChecks, unittest.TestCase):
         self.assertEqual(page.text("#freeze"), "Go on", "the page's own keys again")
         self.assertEqual(self.mock.set_calls, [])
         self.mock.parameters["/front/range_m"] = 10.0
+
+    def test_settings_are_two_presses_away(self):
+        """By a key and by a link for those who use Tab; on phones they are in another tab."""
+        for width, way in ((1440, ("r",)), (1440, ("Tab", "Tab", "Enter")), (390, ("r",))):
+            with self.subTest(width=width, way=way):
+                page = self.open(width, 844)
+                page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
+                for key in way:
+                    page.press(key)
+                self.assertEqual(page.run("document.activeElement.name"), "/front/range_m")
+                self.assertTrue(page.run("document.activeElement.offsetWidth > 0 && document.activeElement.getBoundingClientRect().bottom <= innerHeight"))
+                page.press("Escape")
+                page.press("?")
+                self.assertIn("to the settings", page.text("#help-keys"))
+                page.close()
+
+    def test_a_refusal_covers_no_other_setting(self):
+        for width in (1600, 390):
+            with self.subTest(width=width):
+                page = self.open(width, 844)
+                page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
+                page.press("r")
+                for key in "400":
+                    page.press(key)
+                page.press("Enter")
+                page.wait("document.querySelector('#refusal').innerText.includes('range_m must be')")
+                self.assertEqual(page.run("document.querySelector('#refusal').previousSibling.innerText.trim().split(/\\s/)[0]"), "range")
+                self.assertEqual(page.run(COVERED_SETTINGS), [])
+                self.picture(page, f"refusal-{width}")
+                page.close()
+
+    def test_a_rate_on_request_is_measured(self):
+        self.mock.state("on request")
+        page = self.open()
+        page.wait("/^9|^10/.test(document.querySelector('#measured')?.innerText)")
+        page.wait("/^(9|10)\\.\\d Hz$/.test(document.querySelector('#rate').innerText)")
+        self.assertIn("rate, at most", page.text("#setting-rows"))
+        self.assertNotIn("1000 Hz", page.run("document.body.innerText"))
+        self.mock.state("standby")
+        page.wait("document.querySelector('[name=\"/front/rate_hz\"]').placeholder === 'standby' && !document.querySelector('[name=\"/front/rate_hz\"]').value")
 
     def test_numbers_are_true(self):
         page = self.open()

@@ -142,6 +142,18 @@ class Recordings(PageChecks, unittest.TestCase):
                     page.close()
 
     @unittest.skipIf(WHY_NOT, WHY_NOT)
+    def test_a_recording_without_pings_is_not_offered(self):
+        with demo("oculus"), Browser() as browser:
+            page = self.opened(browser.open(f"http://{HTTP}:8088/", 1600, 1000))
+            shown(page)
+            page.press_mouse("#record")
+            page.wait("document.querySelector('#record').innerText === 'Stop recording' && document.querySelector('#recordings li')")
+            page.press_mouse("#record")
+            page.wait("document.querySelector('#recordings').innerText.includes('no pings: nothing to play')")
+            self.assertIsNone(page.run("document.querySelector('#recordings a')"))
+            page.close()
+
+    @unittest.skipIf(WHY_NOT, WHY_NOT)
     def test_the_page_says_that_previews_are_not_recorded(self):
         with demo("oculus"), Browser() as browser:
             page = self.opened(browser.open(f"http://{HTTP}:8088/", 1600, 1000))

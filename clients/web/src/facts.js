@@ -77,11 +77,23 @@ export class Facts {
   get preview() {
     return !this.listened && Boolean(this.sonarStatus?.preview || this.of('preview'));
   }
+  /// The rate that the sonar is to have; 0 when its host asks for each ping.
+  get wantedRate() {
+    const sonar = this.sonarStatus;
+    return sonar?.on_request ? 0 : sonar?.rate_hz ?? 0;
+  }
+  /// A ping of some natures is one line of the picture.
+  get linesByPing() {
+    return ['sweep', 'waterfall'].includes(this.pictureKind);
+  }
+  get rateUnit() {
+    return this.linesByPing ? 'lines/s' : 'Hz';
+  }
   /// Pings are made at less than the rate, by an engine that is busy for a good part of the time. A sonar whose host asks for each
   /// ping has a rate that none reaches.
   get isSlow() {
     const sonar = this.sonarStatus;
-    const wanted = sonar?.rate_hz ?? 0;
+    const wanted = this.wantedRate;
     return Boolean(this.realtime && wanted > 0 && this.rate < 0.9 * wanted && this.rate * (sonar.figures?.simulation_ms ?? 0) > 300);
   }
   /// The vehicle that carries the sonar: by the frames, else the only one.

@@ -178,6 +178,14 @@ function showTab(tab) {
   if (tab === 'log') $('log').scrollTop = $('log').scrollHeight;  // the newest line
 }
 
+function toSettings() {
+  if (document.body.dataset.max !== '0') maximise('0');
+  showTab('clients');
+  const field = document.querySelector('#setting-rows :is(input, select):not(:disabled)') ?? $('settings');
+  field.focus();
+  field.select?.();
+}
+
 function maximise(pane) {
   document.body.dataset.max = document.body.dataset.max === pane ? '0' : pane;
   for (const button of document.querySelectorAll('.maximise')) button.setAttribute('aria-pressed', String(button.dataset.pane === document.body.dataset.max));
@@ -210,6 +218,7 @@ $('freeze').onclick = freeze;
 $('theme').onclick = toggleTheme;
 $('help-button').onclick = () => $('help').showModal();
 $('record').onclick = () => toggleRecording(facts, steering.call);
+$('skip-settings').onclick = (event) => (event.preventDefault(), toSettings());
 $('sonar').onchange = () => (facts.select($('sonar').value), choose());
 $('clear-faults').onclick = () => steering.set('/faults/clear_all', true);
 for (const button of $('tabs').children) button.onclick = () => showTab(button.dataset.tab);
@@ -226,6 +235,7 @@ listenToKeys([
   [['g'], 'g', 'range rings', () => fan.toggleRings()],
   [['1', '2', '0'], '1 2 0', 'fan alone, scene alone, both', (key) => maximise(key)],
   [['e'], 'e', 'to the faults', () => (showTab('faults'), document.querySelector('#troubles button:not(:disabled)')?.focus())],
+  [['r'], 'r', 'to the settings, range first', toSettings],
   [['t'], 't', 'light or dark', toggleTheme],
   [['?'], '?', 'this list; Esc closes it', () => $('help').showModal()],
 ]);

@@ -56,12 +56,11 @@ export function situationOf(facts, connection) {
   const standing = stands(facts);
   if (standing) return standing;
   if (sonar.rate_hz === 0 && sonar.clients.length > 0) {
-    const who = sonar.asked_by || (sonar.clients.length === 1 ? sonar.clients[0].address : '');
     return {
       kind: 'standby',
       picture: 'dim',
-      text: who ? `Standby: ${host(who)} set the rate to 0.` : 'Standby: the rate is 0.',
-      button: { label: 'Ask for 10 Hz', parameter: `/${sonar.name}/rate_hz`, value: 10 },
+      text: sonar.asked_by ? `Standby: ${host(sonar.asked_by)} set the rate to 0.` : 'Standby: no driver has asked for pings yet.',
+      button: facts.parameters.has(`/${sonar.name}/rate_hz`) && { label: 'Ask for 10 Hz', parameter: `/${sonar.name}/rate_hz`, value: 10 },
     };
   }
   return null;
@@ -80,7 +79,7 @@ export function badgesOf(facts) {
     const since = facts.staleSince ? ` for ${fixed(now_s() - facts.staleSince, 1)} s` : ' since before this page opened';
     out.push({ text: `no pose${since}; ${vehicle.name} stands where it was`, level: 'warning', title: '' });
   }
-  const wanted = sonar.rate_hz;
+  const wanted = facts.wantedRate;
   if (sonar.pinging && facts.isSlow && sonar.figures?.simulation_ms > 900 / wanted)
     out.push({ text: `${short(facts.rate, 1)} of ${short(wanted, 1)} Hz: computing takes ${short(sonar.figures.simulation_ms, 0)} ms`, level: 'warning', title: 'the engine is slower than the rate asked for' });
   const age_s = facts.ping ? now_s() - facts.ping.at : 0;

@@ -98,7 +98,7 @@ class MockDaemon:
             if name == "fault":
                 self.faults = {"thin-tether": time.time() + 20}
             self.parameters["/front/transmit"] = name != "transmit off"
-            self.parameters["/front/rate_hz"] = 0.0 if name == "standby" else 10.0
+            self.parameters["/front/rate_hz"] = {"standby": 0.0, "on request": 1000.0}.get(name, 10.0)
             self.parameters["/front/preview"] = False
             self.frozen_ns = 41_600_000_000
             for viewer in list(self.viewers):
@@ -145,8 +145,9 @@ class MockDaemon:
                             "range_m": self.parameters["/front/range_m"], "rate_hz": self.parameters["/front/rate_hz"],
                             "gain_db": 67.2, "frequency_hz": 2.1e6, "beams": 512,
                             "rows": description["settings"]["rows"], "transmits": self.parameters["/front/transmit"],
-                            "clients": clients,
-                            "figures": {"pings": self.made, "simulation_ms": 138 if self.name == "slow engine" else 22.5,
+                            "clients": clients, "asked_by": DRIVER if self.name == "standby" else "",
+                            "on_request": self.name == "on request",
+                            "figures": {"pings": self.made, "made_hz": self.made_hz if self.pinging else 0, "simulation_ms": 138 if self.name == "slow engine" else 22.5,
                                         "latency_ms_p50": 26.2, "latency_ms_p99": 40}}],
                 "vehicles": [{"name": "rov", "source": "" if self.name == "follow" else "trajectory survey.csv",
                               "stale": self.name == "no pose" and time.time() - self.position_at > 1, "trajectory": trajectory}],

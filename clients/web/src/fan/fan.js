@@ -16,6 +16,7 @@ const kinds = {  // names of the pictures that sonard draws
   sweep: 'sweep',
   'range image': 'range image: near is bright',
   waterfall: 'waterfall: the newest ping on top',
+  fan: 'fan',
 };
 const empty_grid = { rows: 500, beams: 2, spacing_m: 0.02, start_m: 0, range_m: 10, azimuth_rad: [Math.PI / 6, -Math.PI / 6] };
 

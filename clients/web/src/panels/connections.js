@@ -83,7 +83,7 @@ function drawHistory(canvas, facts) {
   g.clearRect(0, 0, width, height);
   const style = getComputedStyle(canvas);
   const points = facts.history.filter((h) => h.rate !== undefined);
-  const asked = facts.sonarStatus?.rate_hz ?? 0;
+  const asked = facts.wantedRate;
   const top = Math.max(asked, ...points.map((p) => p.rate), 1) * 1.15;
   const y = (rate) => height - 2 - (rate / top) * (height - 4);
   g.fillStyle = style.getPropertyValue('--line');

@@ -4,13 +4,15 @@ import { dash, fixed, frequency } from '../numbers.js';
 
 function rateOf(facts) {
   const sonar = facts.sonarStatus;
+  if (facts.connection === 'open' && facts.recordingFailure) return { word: 'no recording', dot: 'error', rate: '' };
   if (facts.connection !== 'open' || !sonar) return { word: { lost: 'lost', token: 'token wanted' }[facts.connection] ?? 'connecting', dot: 'error', rate: dash };
   if (facts.recording) return { word: 'recording', dot: 'note', rate: '' };
-  if (facts.preview) return { word: 'preview', dot: 'note', rate: facts.drawn.rate === undefined ? dash : `${fixed(facts.drawn.rate, 1)} Hz` };
+  const measured = (rate) => (rate === undefined ? dash : `${fixed(rate, 1)} ${facts.rateUnit}`);
+  if (facts.preview) return { word: 'preview', dot: 'note', rate: measured(facts.linesByPing ? facts.rate : facts.drawn.rate) };
   if (!facts.listened) return { word: 'no driver', dot: 'warning', rate: '' };
-  if (sonar.rate_hz === 0) return { word: 'standby', dot: 'warning', rate: '0 Hz' };
+  if (sonar.rate_hz === 0) return { word: 'standby', dot: 'warning', rate: '' };
   if (!sonar.pinging) return { word: 'silent', dot: 'warning', rate: dash };
-  return { word: 'pinging', dot: facts.isSlow ? 'warning' : 'ok', rate: facts.rate === undefined ? dash : `${fixed(facts.rate, 1)} Hz` };
+  return { word: 'pinging', dot: facts.isSlow ? 'warning' : 'ok', rate: measured(facts.rate) };
 }
 
 /// The product's short name: "oculus-m1200d" -> "M1200d".

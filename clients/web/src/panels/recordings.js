@@ -19,10 +19,13 @@ export function toggleRecording(facts, call) {
   else call('/sonard/start_recording', { file: newName(facts.sonar), sonar: facts.sonar });
 }
 
-/// For recordings of earlier runs only the size is known.
+/// Of earlier runs only the size is known.
+const isEmpty = (r) => !r.running && Boolean(r.sonar) && !r.pings;
+
 function about(r, facts) {
   if (r.running && r.sonar === facts.sonar && !facts.listened) return 'waits for a driver, such as sonarctl listen: previews are not recorded';
   const size = `${fixed(r.bytes / 1e6, 1)} MB`;
+  if (isEmpty(r)) return `${r.sonar} · no pings: nothing to play · ${r.why || 'ended'}`;
   return r.sonar ? `${r.sonar} · ${whole(r.pings)} pings · ${size} · ${r.running ? 'running' : r.why || 'ended'}` : size;
 }
 
@@ -32,6 +35,6 @@ export function drawRecordings(facts) {
   setText($('record'), one ? 'Stop recording' : 'Record');
   $('record').setAttribute('aria-pressed', String(Boolean(one)));
   $('record').disabled = !facts.maySteer || facts.connection !== 'open' || !facts.sonar;
-  showList($('recordings'), [all, facts.sonar, facts.listened], () => all.map((r) => make('li', {}, r.running ? make('b', { title: r.file }, nameOf(r)) : make('a', { href: `/?recording=${encodeURIComponent(nameOf(r))}`, title: `Play ${r.file}` }, `▶ ${nameOf(r)}`),
+  showList($('recordings'), [all, facts.sonar, facts.listened], () => all.map((r) => make('li', {}, r.running || isEmpty(r) ? make('b', { title: r.file }, nameOf(r)) : make('a', { href: `/?recording=${encodeURIComponent(nameOf(r))}`, title: `Play ${r.file}` }, `▶ ${nameOf(r)}`),
     make('small', {}, ` ${about(r, facts)}`))));
 }

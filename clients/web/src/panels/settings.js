@@ -4,7 +4,7 @@ import { dash, fixed, short } from '../numbers.js';
 
 const numbers = [
   { name: 'range_m', label: 'range', unit: 'm', step: 'any' },
-  { name: 'rate_hz', label: 'rate', unit: 'Hz', step: 'any' },
+  { name: 'rate_hz', label: 'rate', unit: 'Hz', step: 'any', zero: 'standby' },
   { name: 'gain_percent', label: 'gain', unit: '%', step: 1 },
 ];
 const water = [
@@ -39,7 +39,9 @@ function choiceRow(label, name, choices, steering) {
 
 function rowsOf(facts, steering) {
   const of = (name) => `/${facts.sonar}/${name}`;
-  const rows = numbers.filter((s) => facts.parameters.has(of(s.name))).map((s) => numberRow(s, of(s.name), steering));
+  const atMost = facts.sonarStatus?.on_request;
+  const rows = numbers.filter((s) => facts.parameters.has(of(s.name))).map((s) => numberRow(s.name === 'rate_hz' && atMost ? { ...s, label: 'rate, at most' } : s, of(s.name), steering));
+  rows.splice(facts.parameters.has(of('rate_hz')) ? 2 : 1, 0, plainRow('rate, measured', make('b', { id: 'measured' })));
   const yesNo = [{ value: true, text: 'on' }, { value: false, text: 'off' }];
   const modes = [{ value: 0, text: 'low frequency' }, { value: 1, text: 'high frequency' }];
   const mode = facts.of('mode');
@@ -50,19 +52,22 @@ function rowsOf(facts, steering) {
   return rows;
 }
 
+const plainRow = (label, value) => make('div', { class: 'setting' }, make('span', {}, label), value);
+
 /// Without parameters (an older daemon, or none yet): the values of the status, read only.
 function plainRows(sonar) {
   const rows = [['range', `${short(sonar?.range_m)} m`], ['rate', `${short(sonar?.rate_hz)} Hz`], ['gain', `${fixed(sonar?.gain_db, 0)} dB`]];
-  return rows.map(([label, text]) => make('div', { class: 'setting' }, make('span', {}, label), make('b', {}, sonar ? text : dash)));
+  return rows.map(([label, text]) => plainRow(label, make('b', {}, sonar ? text : dash)));
 }
 
 export function drawSettings(facts, steering) {
   const box = $('setting-rows');
   const names = [...facts.parameters.keys()].filter((n) => n.startsWith(`/${facts.sonar}/`) || n.startsWith('/water/'));
   const able = facts.maySteer && facts.connection === 'open';
-  showList(box, [facts.sonar, names, names.length ? facts.of('mode') > 1 : facts.sonarStatus?.range_m], () => {
+  showList(box, [facts.sonar, names, Boolean(facts.sonarStatus?.on_request), names.length ? facts.of('mode') > 1 : facts.sonarStatus?.range_m], () => {
     return names.length ? rowsOf(facts, steering) : plainRows(facts.sonarStatus);
   });
+  if ($('measured')) setText($('measured'), facts.recording ? dash : `${fixed(facts.sonarStatus?.figures?.made_hz, 1)} ${facts.rateUnit}`);
   for (const field of box.querySelectorAll('input, select')) {
     field.disabled = !able;
     field.title = able ? '' : 'this page may only look';
