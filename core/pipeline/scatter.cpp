@@ -14,30 +14,6 @@ namespace {
 /// 1 / length of a ramp [1/m]; a ramp without length becomes a step.
 float per_metre(float from, float to) { return to > from ? 1.0f / (to - from) : 1e9f; }
 
-/// The columns that the box around a tile's cells can reach: u = y / r (y / h for flat beams) over it, to second order.
-void find_columns(const CellTile& tile, Vec3d centre_from_sonar_m, const Rotation& sonar_from_object, const PingPlan& plan,
-                  PreparedTile& out) {
-  // All columns, unless the box is small compared with its distance; then u is nearly linear over the box.
-  out.first_column = 0, out.last_column = plan.columns.count;
-  const Vec3d half = to_double(tile.box_half_m), c = centre_from_sonar_m + sonar_from_object * to_double(tile.box_middle_m);
-  const double from_axis = plan.switches.conical ? length(c) : std::sqrt(c.x * c.x + c.y * c.y);
-  const double radius = length(half), nearest = from_axis - radius;
-  if (nearest < radius) return;
-  const double sine = c.y / from_axis;
-  // The gradient of u, in object axes; its second derivatives are at most 3 / r^2.
-  const double along = -sine / from_axis;
-  const Vec3d gradient = (1 / from_axis) * (transposed(sonar_from_object) *
-                                            Vec3d{along * c.x, 1 + along * c.y, plan.switches.conical ? along * c.z : 0});
-  // First order: |du| <= sum |du/dx_i| half_i; second order: radius^2 / 2 times the bound 3 / r^2.
-  const double spread = std::abs(gradient.x) * half.x + std::abs(gradient.y) * half.y + std::abs(gradient.z) * half.z +
-                        1.5 * radius * radius / (nearest * nearest) + 1e-6;
-  // Column k spans u = first_sine - (k -+ 1/2) spacing: rounded outwards, a column too many costs little.
-  const double from = (plan.columns.first_sine - (sine + spread)) / plan.columns.spacing + 0.5;
-  const double to = (plan.columns.first_sine - (sine - spread)) / plan.columns.spacing + 1.5;
-  out.first_column = static_cast<int>(std::clamp(std::floor(from), 0.0, static_cast<double>(plan.columns.count)));
-  out.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(plan.columns.count)));
-}
-
 PreparedTile prepare(const PingContext& context, const TileInView& t, const Rotation& seen_from_object,
                      const BubbleLayer& bubbles, float turned_away) {
   const PingScalars& s = context.scalars;
@@ -97,7 +73,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
     const Vec3 moved = to_float(at.moved_m);
     seen.seen_place[0] = moved.x, seen.seen_place[1] = moved.y, seen.seen_place[2] = moved.z;
   }
-  find_columns(tile, at.from_sonar_m, sonar_from_object, context.plan, out);
+  find_reach(context, sonar_from_object, at.from_sonar_m, seen_from_object, t.from_sonar_m, out);
   return out;
 }
 

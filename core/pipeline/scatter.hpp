@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/pipeline/hidden_tiles.hpp"
 #include "core/pipeline/ping_context.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/ping_scalars.hpp"
@@ -17,12 +18,6 @@
 #include "core/scene/ray_scene.hpp"
 
 namespace sonar {
-
-/// A tile with this ping's constants, and the columns it can reach.
-struct PreparedTile {
-  simd::TileSeen seen;
-  int first_column = 0, last_column = 0;  // half-open
-};
 
 /// The scattering law of every material of the scene, at this ping's frequency.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& scalars);

@@ -35,6 +35,8 @@ struct Workspace::Buffers {
   struct PerWorker {
     FanScratch fan;
     DepthMap seen;
+    FarthestSeen farthest;
+    std::vector<std::uint32_t> in_sight;  // tiles of the group
     std::vector<FanHit> hits;
     Echoes echoes;
     VolumeScratch volume;
@@ -289,10 +291,12 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
   trace(last, map_last);
   watch.lap(Stage::trace);
   const simd::GroupView group = make_group_view(plan_, scalars_, mine.seen, first, last);
-  const auto& wanted = w_.tiles_by_group[static_cast<std::size_t>(first / group_columns_)];
+  mine.farthest.shape(mine.seen);
+  mine.farthest.leave_out_hidden(w_.tiles, w_.tiles_by_group[static_cast<std::size_t>(first / group_columns_)], group,
+                                 mine.in_sight);
   // scatter() stops when its buffer is full; the tiles' order stays.
-  for (std::size_t next = 0; next < wanted.size();) {
-    next = scatter(w_.tiles, wanted, next, group, kernels_, mine.echoes);
+  for (std::size_t next = 0; next < mine.in_sight.size();) {
+    next = scatter(w_.tiles, mine.in_sight, next, group, kernels_, mine.echoes);
     mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
     watch.lap(Stage::scatter);
     sum_pulses(first, mine);
