@@ -140,12 +140,20 @@ inline constexpr int most_fixed_rays = 100000;  // a column
 enum class EngineDevice { cpu, cuda, automatic };
 inline constexpr std::array<std::string_view, 3> engine_device_names = {"cpu", "cuda", "auto"};
 
+/// Parts of the model that a product has: the canonical model, with the side lobes of its elevation pattern. A sonar without a
+/// profile has those of Switches, so that a closed form of its main lobe holds.
+inline constexpr Switches product_switches = [] {
+  Switches s;
+  s.side_lobes = true;
+  return s;
+}();
+
 struct EngineConfig {
   int threads = 0;      // 0 = all cores
   int io_priority = 0;  // 1 to 99: the I/O thread is scheduled in real time (SCHED_FIFO); 0 = as usual
   EngineDevice device = EngineDevice::cpu;
   SimdLevel simd = SimdLevel::automatic;
-  Switches switches;
+  Switches switches = product_switches;
 };
 
 struct Config {

@@ -116,8 +116,9 @@ protocol::OptionValues read_options(const Node& node, const protocol::Vendor& ve
   return all;
 }
 
-EngineConfig read_engine(const Node& node) {
+EngineConfig read_engine(const Node& node, const Switches& defaults) {
   EngineConfig engine;
+  engine.switches = defaults;
   if (!node.present()) return engine;
   Map map = node.map();
   engine.threads = static_cast<int>(map.optional("threads").integer_or(0, 0, 256));

@@ -37,7 +37,7 @@ std::string why_no_water(const Water& water, bool allow_hot);
 /// Complete: defaults are filled in. `others_too`: options that only other vendors have are checked and kept (products.hpp
 /// reports them).
 protocol::OptionValues read_options(const text::Node& node, const protocol::Vendor& vendor, bool others_too = false);
-EngineConfig read_engine(const text::Node& node);
+EngineConfig read_engine(const text::Node& node, const Switches& defaults = product_switches);
 LimitConfig read_limits(const text::Node& node);
 
 }  // namespace sonar

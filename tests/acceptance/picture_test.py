@@ -62,7 +62,9 @@ class Picture(unittest.TestCase):
 
     def test_the_near_field_is_quiet_and_noise_rises_with_range(self):
         figures = self.figures["range"]
-        self.assertGreater(figures["first_echo_row"], 100, "the bed is first met beyond 2 m")
+        # The sonar is 1.9 m above the bed, which has relief. The main lobe meets it at 3.9 m, row 174, a side lobe straight below.
+        self.assertGreater(figures["first_echo_row"], 80, "nothing is nearer than the bed below")
+        self.assertLess(figures["first_echo_row"], 100, "a side lobe hears the bed below")
         self.assertLess(figures["near_field_mean"], 15)
         self.assertGreater(figures["last_50_rows_mean"], figures["near_field_mean"])
 

@@ -11,7 +11,7 @@ import write_benchmarks
 def result(case, threads, rate):
     return {"case": case, "scene": "local-search", "threads": threads, "description": case + " described", "engine": "cpu, avx512, 2 threads, Embree",
             "triangles": 202692, "pings_per_second": rate, "median_ms": 1e3 / rate, "min_ms": 900 / rate, "processor_ms": 5.0,
-            "thread_ms": {"trace": 3.34, "scatter": 3.8, "frame": 0.0}}
+            "thread_ms": {"trace": 3.34, "scatter": 3.8, "frame": 0.0}, "switches": {"side_lobes": True}}
 
 
 TIMES = {"min_ms": 1.0, "median_ms": 2.0, "p90_ms": 3.0, "p99_ms": 4.0, "max_ms": 5.0}
@@ -29,6 +29,12 @@ class Page(unittest.TestCase):
         tables = write_benchmarks.tables(report)
         self.assertIn("50 %", tables, "1.9 ms of the prototype against 3.8")
         self.assertIn("| P1, 1 thread: P1 described | 100.0 | 333 times the paper's |", tables)
+
+    def test_rates_without_side_lobes_are_told(self):
+        report = {"processor": "test", "results": [result("P1", 2, 80)]}
+        self.assertNotIn("side lobes off", write_benchmarks.page(report))
+        report["results"][0]["switches"] = {"side_lobes": False}
+        self.assertRegex(write_benchmarks.page(report), r"### avx512: test, .*; side lobes off\n")
 
     def test_first_pings_hold_by_time_and_by_ratio(self):
         for late, holds, verdict in ((-20.0, True, "| holds |"), (60.0, True, "**missed**"), (10.0, False, "**missed**")):

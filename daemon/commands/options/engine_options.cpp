@@ -14,7 +14,6 @@ using text::whole_number;
 
 void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
   constexpr const char* parts = "Parts of the model (a configuration may override these defaults)";
-  const Switches defaults;
   app.add_option("--seed", given.seed, "seed of speckle and noise (default 1)")->check(whole_number())->envname("SONARD_SEED");
   app.add_option("--simd", given.simd, "instruction set of the hot loops (default auto)")
       ->check(one_of({simd_level_names.begin(), simd_level_names.end()}))
@@ -31,7 +30,7 @@ void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
   for (std::size_t i = 0; i < named_switches.size(); ++i) {
     const NamedSwitch& part = named_switches[i];
     app.add_option(option_of(part), given.switches[i],
-                   std::string(part.meaning) + " (default " + (defaults.*part.is_on ? "on)" : "off)"))
+                   std::string(part.meaning) + " (default " + (product_switches.*part.is_on ? "on)" : "off)"))
         ->check(one_of({"on", "off"}))
         ->group(parts);
   }

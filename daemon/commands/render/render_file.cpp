@@ -126,7 +126,8 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   root.optional("about").text_or("", 4096);
   job.config.water = read_water(root.optional("water"));
   job.config.seed = root.optional("seed").unsigned_integer_or(1);
-  job.config.engine = read_engine(root.optional("engine"));
+  const bool is_product = root.optional("sonar").map().has("profile");
+  job.config.engine = read_engine(root.optional("engine"), is_product ? product_switches : Switches{});
   read_path(root.optional("poses"), folder, job);
   const Node scene_node = root.required("scene");
   read_sonar(root.optional("sonar"), job);

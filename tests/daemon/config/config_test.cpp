@@ -67,7 +67,7 @@ TEST(Config, EveryPartOfTheModelIsSwitchedByItsNameAndNothingElse) {
     for (const bool on : {true, false}) {
       const auto c = parse(std::string(least) + "{" + part.name + (on ? ": on}" : ": off}"));
       ASSERT_TRUE(c) << c.error().text;
-      Switches expected;
+      Switches expected = product_switches;
       expected.*part.is_on = on;
       EXPECT_EQ(c->engine.switches, expected) << part.name;
     }

@@ -66,7 +66,7 @@ TEST(CommandLine, APlanOfFaultsNeedsArming) {
 
 TEST(CommandLine, SwitchesOfTheModelReachTheEngine) {
   const Switches given = overridden({"run", "x.yaml", "--expected-power", "--fixed-fan", "16"}).engine.switches;
-  Switches expected;
+  Switches expected = product_switches;
   expected.expected_power = true;
   expected.fixed_fan = 16;
   EXPECT_EQ(given, expected);
@@ -78,7 +78,7 @@ TEST(CommandLine, EveryNamedPartIsSwitchedByItsNameAndNothingElse) {
       SCOPED_TRACE(part.name);
       // The file says the opposite, so that only this option can have done it.
       const std::string file = std::string("{") + part.name + (on ? ": off}" : ": on}");
-      Switches expected;
+      Switches expected = product_switches;
       expected.*part.is_on = on;
       EXPECT_EQ(overridden({"run", "x.yaml", option_of(part), on ? "on" : "off"}, file).engine.switches, expected);
     }
