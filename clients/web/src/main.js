@@ -23,7 +23,8 @@ import { activeTroubles, titleOf } from './panels/faults.js';
 const test = Number(new URLSearchParams(location.search).get('test'));  // for tests: width of the fan, without rings
 const look = makeRemembered('look', { theme: '', tab: 'fan' });
 
-const scene_waits_ms = 1500;
+const scene_waits_s = 1.5;  // for the first picture, from the connection on
+const scene_waits_for_pings_s = 10;  // when a picture is being computed
 
 const facts = new Facts();
 const connection = new Connection({
@@ -60,7 +61,7 @@ const connection = new Connection({
 });
 connection.open();  // answers come once all below is there
 const refusals = new Refusals();
-const fan = new Fan(facts, test);
+const fan = new Fan(facts, test, () => choose());
 let scene = null;
 
 const steering = {
@@ -108,6 +109,7 @@ function choose() {
   // The daemon does not name the objects that were removed meanwhile.
   if (!document.hidden && !connection.topics.has('/scene')) scene?.removeObjects();
   connection.want(topics);
+  if (connection.subscriptions.size > 0) setTimeout(() => !fan.drawn && fan.prepare());
 }
 
 /// Called once for each sonar that makes range images and each connection.
@@ -145,7 +147,14 @@ function announce() {
   setText($('announce'), text);
 }
 
-/// The scene's meshes and shaders would delay the first picture, with a software renderer by a second: it begins after that one.
+/// The scene's meshes and shaders would delay the first picture, with a software renderer by seconds: it begins after that one, or
+/// when none is to be expected.
+function sceneMayBegin() {
+  if (facts.drawnPings > 0) return true;  // it was painted before this frame
+  if (facts.connection !== 'open' || !facts.status) return false;
+  const expected = facts.previews || facts.preview || facts.listened;
+  return performance.now() / 1000 - facts.openedAt > (expected ? scene_waits_for_pings_s : scene_waits_s);
+}
 function beginScene() {
   scene = new Scene(facts, fan);
   setHidden($('no-scene'), !scene.missing);
@@ -154,7 +163,7 @@ function beginScene() {
 }
 
 function frame() {
-  const begins = facts.drawnPings > 0 || performance.now() > scene_waits_ms;  // the picture was painted before this frame
+  const begins = sceneMayBegin();
   fan.show(facts.ping);
   if (scene) scene.draw();
   else if (begins) beginScene();

@@ -21,13 +21,15 @@ const kinds = {  // names of the pictures that sonard draws
 const empty_grid = { rows: 500, beams: 2, spacing_m: 0.02, start_m: 0, range_m: 10, azimuth_rad: [Math.PI / 6, -Math.PI / 6] };
 
 export class Fan {
-  constructor(facts, exact) {
+  /// `onMissing`: called when it turns out that there is no WebGL2.
+  constructor(facts, exact, onMissing) {
     this.facts = facts;
+    this.onMissing = onMissing;
     this.exact = exact;  // for tests: the layout of `sonarctl view --png --no-rings`, so many pixels wide; else 0
     this.canvas = $('fan');
     this.drawnCanvas = $('drawn');
     this.marks = $('fan-marks');
-    this.painter = makeFanPainter(this.canvas);
+    this.painter = undefined;  // until prepare(); null: there is no WebGL2
     this.remembered = makeRemembered('fan', { map: 'copper', rings: true });
     this.gain = 1;
     this.gamma = 1;
@@ -41,9 +43,17 @@ export class Fan {
     this.marks.addEventListener('pointerleave', () => this.point(null));
   }
 
+  /// Begins the browser's graphics, which takes seconds beside other work: called once the first picture was asked for, which is
+  /// computed meanwhile.
+  prepare() {
+    if (this.painter !== undefined) return;
+    this.painter = makeFanPainter(this.canvas);
+    if (!this.painter) this.onMissing();
+  }
+
   /// sonard draws the picture: it is no fan, or there is no WebGL2.
   get drawn() {
-    return !this.painter || Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
+    return this.painter === null || Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
   }
 
   useMap(name) {
@@ -84,6 +94,7 @@ export class Fan {
       return this.redraw();
     }
     if (ping.about) return this.showDrawn(ping);
+    this.prepare();
     this.shape = '';
     const geometry = ping.geometry;
     if (geometry !== this.geometry) {
