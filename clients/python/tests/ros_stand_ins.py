@@ -58,6 +58,7 @@ class Ros:
         ros = self
         self.parameters, self.declared = parameters, {}
         self.logged, self.subscribed, self.timers, self.published, self.quality = [], {}, [], {}, {}
+        self.steady_timers, self.is_ok = [], True
         self.now_ns, self.transform, self.spin, self.shut_down = 0, None, lambda node: None, 0
 
         class Node:
@@ -76,8 +77,8 @@ class Ros:
                 sent = ros.published.setdefault(topic, [])
                 return types.SimpleNamespace(publish=sent.append)
 
-            def create_timer(self, period_s, call):
-                ros.timers.append((period_s, call))
+            def create_timer(self, period_s, call, clock=None):
+                (ros.timers if clock is None else ros.steady_timers).append((period_s, call))
 
             def get_clock(self):
                 return types.SimpleNamespace(now=lambda: types.SimpleNamespace(nanoseconds=ros.now_ns))
@@ -103,7 +104,8 @@ class Ros:
             ros.shut_down += 1
 
         made = {"rclpy": {"init": lambda: None, "spin": lambda node: ros.spin(node), "try_shutdown": shut,
-                          "time": types.SimpleNamespace(Time=object)},
+                          "ok": lambda: ros.is_ok, "time": types.SimpleNamespace(Time=object)},
+                "rclpy.clock": {"Clock": Recorded, "ClockType": types.SimpleNamespace(STEADY_TIME="steady")},
                 "rclpy.node": {"Node": Node}, "rclpy.qos": {"qos_profile_sensor_data": 5, "QoSProfile": Recorded,
                               "DurabilityPolicy": types.SimpleNamespace(TRANSIENT_LOCAL="transient local")},
                 "rclpy.executors": {"ExternalShutdownException": ExternalShutdown},

@@ -365,6 +365,32 @@ class TheEnd(unittest.TestCase):
         for spin in (None, interrupt):
             self.assertEqual(self.end(spin, odometry="/odom"), (0, ""))
 
+    def test_a_wake_that_came_too_early_is_made_good_by_a_steady_clock(self):
+        ros = Ros(odometry="/odom", use_sim_time=True)
+
+        def spin(node):
+            self.assertLessEqual(ros.steady_timers[0][0], 1)
+            ros.steady_timers[0][1]()
+            raise ExternalShutdown
+        ros.spin = spin
+        with ros.module() as module:
+            self.assertEqual(module.main(), 0)
+
+    def test_errors_of_rclpy_after_the_end_are_none(self):
+        for is_ok in (False, True):
+            ros = Ros(odometry="/odom")
+
+            def spin(node, ros=ros, is_ok=is_ok):
+                ros.is_ok = is_ok
+                raise RuntimeError("the context is invalid")
+            ros.spin = spin
+            with ros.module() as module:
+                if is_ok:
+                    self.assertRaises(RuntimeError, module.main)
+                else:
+                    self.assertEqual(module.main(), 0)
+            self.assertEqual(ros.shut_down, 1)
+
     def test_a_wrong_parameter_is_one_sentence(self):
         for parameters, words in (({}, "parameter odometry: nothing to do"),
                                   ({"odometry": "/odom", "tf_rate_hz": 0.0}, "parameter tf_rate_hz: 0 is not"),

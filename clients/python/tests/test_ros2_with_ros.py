@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 from common import SONARD, config
@@ -81,6 +82,15 @@ class WithRos(unittest.TestCase):
                 self.assertEqual(process.wait(PATIENCE_S), 0, said())
                 self.assertNotIn("Traceback", said())
                 self.assertNotIn("rosout", said())
+
+    def test_a_signal_at_any_moment_ends_the_node(self):
+        for wait_s in (0.0, 0.001, 0.003, 0.01, 0.03, 0.1):  # since its first line, while the executor is made and waits
+            process, said = self.start("odometry:=/odom")
+            self.spin_until(lambda said=said: "poses from" in said())
+            time.sleep(wait_s)
+            process.send_signal(signal.SIGTERM)
+            self.assertEqual(process.wait(PATIENCE_S), 0, said())
+            self.assertNotIn("Traceback", said())
 
     def test_wrong_parameters_are_one_sentence(self):
         for parameters, name in (((), "odometry"), (("odometry:=/odom", "tf_rate_hz:=0.0"), "tf_rate_hz"),

@@ -13,6 +13,8 @@ import rclpy
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.clock import Clock as RosClock
+from rclpy.clock import ClockType
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
@@ -26,6 +28,7 @@ from .conversions import Unusable, json_line, name_in_topic, scan_of, stamp_ns, 
 from .parameters import PARAMETERS, BadParameter, checked
 from .polling import StatusPoll
 
+WAKE_S = 0.5  # how long the end may be unnoticed
 SAME = 1e-6  # tolerance for a mount: metres, and parts of a quaternion
 
 
@@ -82,9 +85,10 @@ class Bridge(Node):
     def close(self) -> None:
         for helper in self.helpers:
             helper.stop()
+        deadline = time.monotonic() + 2  # for all together; the program's end ends those that wait for an answer
         for helper in self.helpers:
             if helper.is_alive():
-                helper.join(2.0)
+                helper.join(max(0.0, deadline - time.monotonic()))
         self.socket.close()
 
     def warn(self, text: str) -> None:
@@ -247,12 +251,19 @@ def main() -> int:
     node = None
     try:
         node = Bridge()
+        # At a signal rclpy wakes its executor and then ends the context. An executor that is quicker waits again, for the next
+        # message or for ever. A clock that no simulation stops wakes it.
+        node.create_timer(WAKE_S, lambda: None, clock=RosClock(clock_type=ClockType.STEADY_TIME))
         rclpy.spin(node)
     except BadParameter as error:
         print(f"sonard_bridge: {error}", file=sys.stderr)
         return 2
     except (KeyboardInterrupt, ExternalShutdownException):  # Ctrl-C; SIGTERM, as systemd and containers send it
         pass
+    except Exception:
+        if rclpy.ok():
+            raise
+        # The signal came while rclpy made the node or its next wait, which then fail in various ways.
     finally:
         if node is not None:
             node.close()
