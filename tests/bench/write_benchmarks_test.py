@@ -64,7 +64,7 @@ class Page(unittest.TestCase):
                             for where in (Path(folder), Path(folder) / "tables"))
             for svg in ("benchmarks-rates.svg", "benchmarks-curves.svg"):
                 self.assertTrue(ElementTree.parse(Path(folder) / svg).getroot().tag.endswith("svg"))
-        for words in ("p99 4.00 ms", "processor ms: +23 % |  | +10 % | **missed** |", "1 dropped | 40 %, no drop | 15 % | **missed** |", "**different bytes**",
+        for words in ("p99 4.00 ms", "median ratio +23 % |  | +10 % | **missed** |", "1 dropped | 40 %, no drop | 15 % | **missed** |", "**different bytes**",
                       "the next ping 2.0 ms | 500 ms | 60 ms | goal |", "before the run 5.5"):
             self.assertIn(words, page)
         for words in ("31.000 %", "| 500 |", "400: 5.00 ms"):
