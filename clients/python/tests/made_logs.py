@@ -92,6 +92,7 @@ MAVLINK = {
     "HEARTBEAT": (0, 50, "IBBBBB", ""), "ATTITUDE": (30, 39, "Iffffff", ""), "ATTITUDE_QUATERNION": (31, 246, "Ifffffff", "ffff"),
     "LOCAL_POSITION_NED": (32, 185, "Iffffff", ""), "GLOBAL_POSITION_INT": (33, 104, "IiiiihhhH", ""),
     "GPS_GLOBAL_ORIGIN": (49, 39, "iii", "Q"), "VFR_HUD": (74, 20, "ffffhH", ""),
+    "SCALED_PRESSURE": (29, 115, "Iffh", "h"), "SCALED_PRESSURE2": (137, 195, "Iffh", "h"),
     "VISION_POSITION_ESTIMATE": (102, 158, "Qffffff", "21fB"),
     "SIM_STATE": (108, 32, "21f", "ii"), "ATT_POS_MOCAP": (138, 109, "Qfffffff", "21f"),
     "ODOMETRY": (331, 91, "Q3f4f3f3f168xBB", "BBb"),

@@ -291,6 +291,23 @@ class WithoutHorizontalPosition(WithFolder):
         with self.assertRaisesRegex(ConvertError, "lacks attitudes"):
             self.convert(self.telemetry(("GLOBAL_POSITION_INT",)))
 
+    def test_a_pressure_sensor_in_the_water(self):
+        def log(message, hpa_of):
+            out = bytearray()
+            for step in range(20):
+                t, _, _, down, *angles = made.moment(step)
+                ms, stamp = round(1000 * t) + 25000, round(1e6 * (1_700_000_000 + t)).to_bytes(8, "big")
+                out += stamp + made.mavlink_frame("ATTITUDE", (ms, *angles, 0, 0, 0))
+                out += stamp + made.mavlink_frame(message, (ms, hpa_of(down), 0, 2100, 0))
+                out += stamp + made.mavlink_frame("SCALED_PRESSURE", (ms, 1008, 0, 3500, 0))  # in the hull
+            return bytes(out)
+        hpa_per_m = 100.518  # 1025 kg/m3 x 9.80665 m/s2
+        track = self.convert(log("SCALED_PRESSURE2", lambda down: 1013.25 + hpa_per_m * down))
+        self.assertIn("it is that of SCALED_PRESSURE2 in sea water", self.warned.pop(0))
+        self.assert_held(track, range(20), t0=25)
+        with self.assertRaisesRegex(ConvertError, "lacks positions and depths"):
+            self.convert(log("SCALED_PRESSURE2", lambda down: 1012.0))  # never in the water
+
     def test_depths_before_the_vehicles_clock_is_known(self):
         """VFR_HUD has no time; that of receipt would be decades after the vehicle's start."""
         first = (1_699_999_999_000_000).to_bytes(8, "big") + made.mavlink_frame("VFR_HUD", (0, 0, -1, 0, 0, 0))
@@ -627,6 +644,12 @@ class Corrupted(WithFolder):
                            (b"FMT, 128, 89, FMT, BBnNZ, Type\n", "as text; give the .bin"), (b"PK\x03\x04..", "unzip")):
             with self.subTest(data[:8]), self.assertRaisesRegex(ConvertError, said):
                 format_of(self.file(data))
+
+    def test_results_of_a_download_that_went_wrong(self):
+        for name, content, says in (("a.tlog", b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
+                                    ("a.db3", b"<!DOCTYPE html><html>", "a web page")):
+            with self.assertRaisesRegex(ConvertError, says):
+                format_of(self.file(content, name))
 
     def test_a_database_changed_anywhere(self):
         whole = made.db3(self.folder / "whole", RecordingsOfRos2.TOPICS).read_bytes()

@@ -29,6 +29,8 @@ _OTHERS = (
     (b"#ROSBAG V1", "a ROS 1 bag of an old format; rewrite it: rosbag migrate {} NEW.bag"),
     (b"FMT, 128, ", "a dataflash log as text; give the .bin file that it was made from"),
     (b"\x89HDF\r\n", "HDF5, as .mat files of MATLAB 7.3 are; write its poses as CSV (docs/poses.md)"),
+    (b"version https://git-lfs", "a pointer of Git LFS, not the file itself; fetch that: git lfs pull"),
+    (b"<!DOCTYPE html", "a web page, not the file itself; was the download refused? Fetch it again"),
     (b"MATLAB 5.0", "a MATLAB file; write its poses as CSV (docs/poses.md)"),
 )
 
@@ -58,7 +60,7 @@ def format_of(path: pathlib.Path) -> str:
                         (ulog.MAGIC, "ulog")):
         if head.startswith(magic):
             return name
-    if frame_length(head, STAMP_BYTES) is not None or path.suffix == ".tlog":
+    if frame_length(head, STAMP_BYTES) is not None or (path.suffix == ".tlog" and not _described(path, head)):
         return "tlog"
     if b"$" in head and b"," in head and all(byte < 128 for byte in head):
         return "nmea"

@@ -27,8 +27,10 @@ def _names(text: str) -> Tuple[str, ...]:
 
 _SIM_STATE = ("q1 q2 q3 q4 roll pitch yaw xacc yacc zacc xgyro ygyro zgyro lat lon alt std_dev_horz std_dev_vert vn ve vd "
               "lat_int lon_int")
+_PRESSURE = "time_boot_ms press_abs press_diff temperature temperature_press_diff"
 MESSAGES: Dict[int, Message] = {
     0: Message("HEARTBEAT", 50, "I5B", "", _names("custom_mode type autopilot base_mode system_status mavlink_version")),
+    29: Message("SCALED_PRESSURE", 115, "I2fh", "h", _names(_PRESSURE)),
     30: Message("ATTITUDE", 39, "I6f", "", _names("time_boot_ms roll pitch yaw rollspeed pitchspeed yawspeed")),
     31: Message("ATTITUDE_QUATERNION", 246, "I7f", "4f",
                 _names("time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed offset1 offset2 offset3 offset4")),
@@ -38,7 +40,9 @@ MESSAGES: Dict[int, Message] = {
     74: Message("VFR_HUD", 20, "4fhH", "", _names("airspeed groundspeed alt climb heading throttle")),
     102: Message("VISION_POSITION_ESTIMATE", 158, "Q6f", "84xB", _names("time_usec x y z roll pitch yaw reset_counter")),
     108: Message("SIM_STATE", 32, "21f", "2i", _names(_SIM_STATE)),
+    137: Message("SCALED_PRESSURE2", 195, "I2fh", "h", _names(_PRESSURE)),
     138: Message("ATT_POS_MOCAP", 109, "Q7f", "84x", _names("time_usec q1 q2 q3 q4 x y z")),
+    143: Message("SCALED_PRESSURE3", 131, "I2fh", "h", _names(_PRESSURE)),
     331: Message("ODOMETRY", 91, "Q13f168xBB", "BBb",
                  _names("time_usec x y z q1 q2 q3 q4 vx vy vz rollspeed pitchspeed yawspeed frame_id child_frame_id "
                         "reset_counter estimator_type quality")),

@@ -17,6 +17,9 @@ STAMP_BYTES = 8
 RESTART_S = 5.0  # a smaller step back is a delayed frame, not a restart
 SILENCE_S = 5.0  # after this, another component with the same message is used, as in the daemon
 FULL = ("ODOMETRY", "SIM_STATE", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE")
+PRESSURES = ("SCALED_PRESSURE2", "SCALED_PRESSURE3", "SCALED_PRESSURE")  # the first is the outer sensor of a BlueROV2
+SURFACE_HPA, HPA_PER_M = 1013.25, 1025 * 9.80665 / 100
+IN_WATER_HPA = 1100.0  # higher than any barometer in air
 ATTITUDES, POSITIONS = ("ATTITUDE_QUATERNION", "ATTITUDE"), ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
 
 
@@ -94,6 +97,7 @@ class _Vehicle:
         self.attitudes: Dict[str, Stream[Quaternion]] = {}
         self.positions: "Dict[str, Stream]" = {}
         self.depths: Dict[str, Stream[float]] = {}  # down [m], of messages without a fix
+        self.pressures: Dict[str, Stream[float]] = {}  # [hPa]
         self.is_submarine = False
         self.origin: Optional[Geodetic] = None
         self.unsupported: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id
@@ -119,6 +123,10 @@ class _Vehicle:
         # Attitude and position are paired by the vehicle's clock if both have it, else by time of receipt.
         t = self._since_start(1e-3 * fields["time_boot_ms"], logged.received_s) if "time_boot_ms" in fields else \
             1e-6 * fields["time_usec"] if fields.get("time_usec") else logged.received_s
+        if name in PRESSURES:
+            if math.isfinite(fields["press_abs"]):
+                self.pressures.setdefault(name, []).append((t, fields["press_abs"]))
+            return
         if name == "VFR_HUD":  # without a time; above the surface of submarines, above sea level or the home of others
             if math.isfinite(fields["alt"]) and self._boot is not None:  # else its time since start is not known yet
                 now = self._before_s + self._boot[0] + logged.received_s - self._boot[1]
@@ -184,9 +192,17 @@ class _Vehicle:
 
     def sources(self) -> List[Source]:
         pairs = [(n, n) for n in FULL[:2]] + [(a, p) for p in POSITIONS for a in ATTITUDES] + [(n, n) for n in FULL[2:]]
-        depths = self.depths.get("GLOBAL_POSITION_INT") or (self.depths.get("VFR_HUD") if self.is_submarine else None) or []
+        depths = self.depths.get("GLOBAL_POSITION_INT") or (self.depths.get("VFR_HUD") if self.is_submarine else None) or \
+            [(t, (hpa - SURFACE_HPA) / HPA_PER_M) for t, hpa in self.pressures.get(self.pressure_of_depth, [])]
         return [Source(a if a == p else f"{a}+{p}", self.attitudes.get(a, []), self.positions.get(p, [])) for a, p in pairs] + \
             [depth_source(a, self.attitudes.get(a, []), depths) for a in ATTITUDES]
+
+    @property
+    def pressure_of_depth(self) -> str:
+        """The message of a sensor that was in the water, where no message has the depth; empty if there is none."""
+        if self.depths.get("GLOBAL_POSITION_INT") or (self.is_submarine and self.depths.get("VFR_HUD")):
+            return ""
+        return next((name for name in PRESSURES if any(hpa > IN_WATER_HPA for _, hpa in self.pressures.get(name, []))), "")
 
     @property
     def weight(self) -> int:
@@ -234,6 +250,9 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
         warn("several components send the same message; using the first, and another one after "
              f"{SILENCE_S:.0f} s of silence: {'; '.join(choices)}")
     wanted = chosen(vehicle.sources(), source, str(path))
+    if wanted.held and vehicle.pressure_of_depth:
+        warn(f"no message has the depth; it is that of {vehicle.pressure_of_depth} in sea water (1025 kg/m3) below "
+             f"{SURFACE_HPA:g} hPa")
     if wanted.name == "ODOMETRY" and vehicle.heading_is_local:
         warn("ODOMETRY is in a local frame that may not point north; x is used as north")
     if vehicle.restarts:
