@@ -81,8 +81,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   }
   if (wanted.rate_hz) {
     if (!(*wanted.rate_hz >= 0 && *wanted.rate_hz <= static_cast<double>(highest_rate_hz)))
-      return refused(text::format("an M3 pings up to %g times a second; %g Hz are not valid",
-                                  static_cast<double>(highest_rate_hz), *wanted.rate_hz));
+      return refused(
+          text::format("the rate of an M3 is 0 to %g Hz, not %g Hz", static_cast<double>(highest_rate_hz), *wanted.rate_hz));
     s.rate_hz = static_cast<float>(*wanted.rate_hz);
   }
   if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);

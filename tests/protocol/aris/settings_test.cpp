@@ -148,7 +148,7 @@ TEST(ArisOverride, IsWhatAControllerWouldHaveSet) {
   protocol::SettingsOverride wanted;
   wanted.beams = 100;
   EXPECT_THAT(why(wanted), HasSubstr("64 or 128"));
-  EXPECT_THAT(why({30, {}, {}, {}, {}}), HasSubstr("up to 20 m"));
+  EXPECT_THAT(why({30, {}, {}, {}, {}}), HasSubstr("to 20 m, not 30 m"));
   EXPECT_THAT(why({{}, 0, {}, {}, {}}), HasSubstr("1 to 15"));
   EXPECT_THAT(why({{}, {}, 101, {}, {}}), HasSubstr("0 to 100"));
   EXPECT_THAT(why({{}, {}, {}, 9u, {}}), HasSubstr("4 mode(s)"));
