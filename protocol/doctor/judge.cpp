@@ -37,15 +37,17 @@ std::string addresses_of(const v1::SonarStatus& sonar) {
   return all;
 }
 
-/// "127.0.0.2, TCP port 52100"; of a sonar without streams its address.
+/// "127.0.0.2, TCP port 52100"; only its address when it is controlled by HTTP.
 std::string where_to_connect(const v1::SonarStatus& sonar) {
-  const std::size_t colon = sonar.listens().rfind(':');
+  std::string at = sonar.listens();
+  for (const v1::SonarAddress& address : sonar.addresses())
+    if (at.empty() && !address.sonar_speaks_first() && address.protocol() == "udp") at = address.address();
+  const std::size_t colon = at.rfind(':');
   if (colon == std::string::npos) return sonar.advertised();
-  const std::string host = sonar.listens().substr(0, colon);
+  const std::string host = at.substr(0, colon);
   const protocol::Make& make = protocol::make_of_profile(sonar.profile());
   const bool by_udp = make.ports.front().kind == protocol::HostPort::Kind::udp;
-  return (host == "0.0.0.0" ? sonar.advertised() : host) + (by_udp ? ", UDP port " : ", TCP port ") +
-         sonar.listens().substr(colon + 1);
+  return (host == "0.0.0.0" ? sonar.advertised() : host) + (by_udp ? ", UDP port " : ", TCP port ") + at.substr(colon + 1);
 }
 
 const v1::SonarStatus* find(const v1::DaemonStatus* in, const std::string& name) {

@@ -222,7 +222,11 @@ class SonarChecks {
       if (received.advertised != sonar_.at.host)
         return "a status broadcast names a sonar at " + received.advertised + ": sonarctl doctor " + received.advertised;
     const auto& status = facts_.control.status;
-    if (status && status->sonars_size() > 0)
+    const bool is_served_here =
+        status && std::any_of(status->sonars().begin(), status->sonars().end(), [this](const auto& sonar) {
+          return sonar.advertised() == sonar_.at.host || sonar.listens() == text_from(sonar_.at);
+        });
+    if (status && status->sonars_size() > 0 && !is_served_here)
       return "the sonard at " + text_from(facts_.control.at) + " serves " + served_by(*status) + ": sonarctl doctor ADDRESS";
     if (sonar_.on_this_host)
       return "start it: sonard serves its demo on 127.0.0.2 (sonard --help lists those of other makes), sonard FILE the sonars "

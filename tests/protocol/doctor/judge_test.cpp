@@ -78,6 +78,16 @@ TEST(Judge, NoDriverConnected) {
       HasSubstr("the last driver, 10.0.0.7:1, left at 01:02:03 UTC: closed by the client"));
 }
 
+TEST(Judge, ADriverByUdpIsPointedAtItsPort) {
+  const Finding f =
+      trouble(judge(control::message_from<v1::DaemonStatus>(R"(clock: "realtime" sonars { name: "scan" profile: "ping360"
+      advertised: "127.0.0.3" addresses { protocol: "udp" address: "127.0.0.3:12345" }
+      addresses { protocol: "udp" address: "127.0.0.3:30303" } })"),
+                    nullptr),
+              "driver");
+  EXPECT_EQ(f.cure, "point a driver at 127.0.0.3, UDP port 12345");
+}
+
 TEST(Judge, OneThatSearchedButDidNotConnect) {
   const auto texts = troubles(judge(with(R"(searched { address: "10.0.0.7:1" utc_ns: 3723000000000 ago_s: 5 })"), nullptr));
   ASSERT_EQ(texts.size(), 2u);
