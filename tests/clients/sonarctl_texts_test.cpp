@@ -105,8 +105,8 @@ TEST(StatusText, HasTheMeasuredRateBesideTheOneThatIsSet) {
   EXPECT_THAT(text_of(R"(profile: "oculus-m1200d" rate_hz: 10)"), HasSubstr("  10 Hz  gain")) << "none was measured yet";
   EXPECT_THAT(text_of(R"(profile: "ping360" rate_hz: 1000 on_request: true figures { made_hz: 14 })"),
               HasSubstr("  on request, measured 14.0 lines/s  gain"));
-  EXPECT_THAT(text_of(R"(profile: "omniscan-450" preview: true figures { made_hz: 5 })"),
-              HasSubstr("  standby, preview 5.0 lines/s  gain"));
+  EXPECT_THAT(text_of(R"(profile: "omniscan-450" rate_hz: 10 figures { made_hz: 9.96 })"),
+              HasSubstr("  10 Hz, measured 10.0 lines/s  gain"));
 }
 
 TEST(StatusText, TellsEvents) {

@@ -29,7 +29,7 @@ std::string rate_text(const v1::SonarStatus& s) {
   const double made_hz = s.figures().made_hz();
   if (made_hz <= 0) return text;
   const std::string unit(protocol::make_of_profile(s.profile()).rate_unit());
-  return text + (s.preview() ? ", preview " : ", measured ") + format("%.1f ", made_hz) + unit;
+  return text + format(", measured %.1f ", made_hz) + unit;
 }
 
 std::string settings_text(const v1::SonarStatus& s) {
