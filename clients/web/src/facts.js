@@ -31,6 +31,7 @@ export class Facts {
     this.clientPings = new Counters();
     this.clientBytes = new Counters();
     this.drawn = new Counter();
+    this.numbered = new Counter();  // numbers of the pings: the rate at which they are made
     this.drawnPings = 0;
     this.received = new Counter();
     this.receivedBytes = 0;
@@ -85,6 +86,10 @@ export class Facts {
   /// A ping of some natures is one line of the picture.
   get linesByPing() {
     return ['sweep', 'waterfall'].includes(this.pictureKind);
+  }
+  /// The measured rate of the pings; the sonar does not count previews.
+  get madeRate() {
+    return this.preview ? this.numbered.rate : this.sonarStatus?.figures?.made_hz;
   }
   get rateUnit() {
     return this.linesByPing ? 'lines/s' : 'Hz';
@@ -158,6 +163,7 @@ export class Facts {
 
   pingEvent(event, ns) {
     this.events.set(ns, event);
+    this.numbered.add(now_s(), event.number);
     if (this.events.size > recent_pings) this.events.delete(this.events.keys().next().value);
     if (this.ping?.ns === ns) this.count(this.ping, event);
   }
@@ -230,6 +236,7 @@ export class Facts {
     this.sonar = sonar;
     this.ping = null;
     this.history = [];
+    this.numbered = new Counter();
     this.lastNumber = Infinity;
     this.missed = 0;
   }

@@ -53,7 +53,7 @@ function drawBearings(g, polar, layout, port, starboard) {
     g.stroke();
   }
   const marks = [];
-  for (let d = Math.ceil(degrees(Math.max(starboard, -3.1)) / step) * step; d <= degrees(port) + 1e-6; d += step) marks.push((d * Math.PI) / 180);
+  for (let d = Math.ceil(degrees(Math.max(starboard, -3.1)) / step - 1e-6) * step; d <= degrees(port) + 1e-6; d += step) marks.push((d * Math.PI) / 180);
   g.textAlign = 'center';
   for (const azimuth of marks) {
     const tick = 5 * layout.metres_per_pixel;

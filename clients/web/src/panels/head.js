@@ -8,7 +8,7 @@ function rateOf(facts) {
   if (facts.connection !== 'open' || !sonar) return { word: { lost: 'lost', token: 'token wanted' }[facts.connection] ?? 'connecting', dot: 'error', rate: dash };
   if (facts.recording) return { word: 'recording', dot: 'note', rate: '' };
   const measured = (rate) => (rate === undefined ? dash : `${fixed(rate, 1)} ${facts.rateUnit}`);
-  if (facts.preview) return { word: 'preview', dot: 'note', rate: measured(facts.linesByPing ? facts.rate : facts.drawn.rate) };
+  if (facts.preview) return { word: 'preview', dot: 'note', rate: measured(facts.madeRate) };
   if (!facts.listened) return { word: 'no driver', dot: 'warning', rate: '' };
   if (sonar.rate_hz === 0) return { word: 'standby', dot: 'warning', rate: '' };
   if (!sonar.pinging) return { word: 'silent', dot: 'warning', rate: dash };

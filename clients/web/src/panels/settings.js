@@ -67,7 +67,7 @@ export function drawSettings(facts, steering) {
   showList(box, [facts.sonar, names, Boolean(facts.sonarStatus?.on_request), names.length ? facts.of('mode') > 1 : facts.sonarStatus?.range_m], () => {
     return names.length ? rowsOf(facts, steering) : plainRows(facts.sonarStatus);
   });
-  if ($('measured')) setText($('measured'), facts.recording ? dash : `${fixed(facts.sonarStatus?.figures?.made_hz, 1)} ${facts.rateUnit}`);
+  if ($('measured')) setText($('measured'), facts.recording ? dash : `${fixed(facts.madeRate, 1)} ${facts.rateUnit}`);
   for (const field of box.querySelectorAll('input, select')) {
     field.disabled = !able;
     field.title = able ? '' : 'this page may only look';
