@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <utility>
 
 #include "core/pipeline/check_request.hpp"
 #include "core/sonar/range_image.hpp"
@@ -110,14 +111,15 @@ double LabelWork::noise_of(int row, std::size_t beam) const {
   return power + context_->plan.shared_noise.noise_power(beam, sample);
 }
 
-void LabelWork::add_cells(const simd::GroupView& group, Echoes& scratch) {
+void LabelWork::begin_group(const simd::GroupView& group) {
   const Scene& scene = context_->scene();
   const PingPlan& plan = context_->plan;
   const auto g = static_cast<std::size_t>(group.first_column / group_columns_);
   const std::vector<std::uint32_t>& wanted = (*by_group_)[g];
   Group& mine = groups_[g];
   std::vector<Part>& parts = mine.parts;
-  std::vector<std::size_t> part_of(scene.objects.size(), SIZE_MAX);
+  std::vector<std::size_t>& part_of = mine.part_of;
+  part_of.assign(scene.objects.size(), SIZE_MAX);
   const int beside = plan.taps / 2 + 1;
   // The box of ranges and columns that the tiles of each object can reach.
   const auto samples_of = [&](const PreparedTile& t) {
@@ -157,40 +159,58 @@ void LabelWork::add_cells(const simd::GroupView& group, Echoes& scratch) {
     p.seen.assign(counted, 0.0);
     p.open.assign(counted, 0.0);
   }
-  // The same cells as the picture's, in the same order, without their speckle: what is expected of them.
-  simd::GroupView expected = group;
-  expected.expected_power = true;
-  simd::GroupView open = expected;
-  open.inverse_depth = open.depth_slope = nothing_.data();
-  for (const std::uint32_t i : wanted) {
-    const PreparedTile& tile = (*tiles_)[i];
-    const std::size_t part = part_of[static_cast<std::size_t>(tile.seen.tile->object)];
-    if (part == SIZE_MAX) continue;
-    add_tile(tile, parts[part], mine.by_sample[part], expected, false, scratch);
-    if (!parts[part].open.empty()) add_tile(tile, parts[part], mine.by_sample[part], open, true, scratch);
-  }
-  for (std::size_t i = 0; i < mine.used; ++i) spread(parts[i], mine.by_sample[i]);
 }
 
-void LabelWork::add_tile(const PreparedTile& tile, Part& part, std::vector<float>& by_sample, const simd::GroupView& group,
-                         bool is_open, Echoes& scratch) const {
-  if (scratch.capacity() < tile.seen.tile->count) scratch.reserve(tile.seen.tile->count);
-  const int count = context_->kernels.scatter_tile(tile.seen, group, scratch.at(0));
-  const int samples = part.last_sample - part.first_sample;
-  for (int i = 0; i < count; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const int column = scratch.column[at] - part.first_column;
-    const float sample = scratch.sample[at] - static_cast<float>(part.first_sample), power = scratch.re[at];
-    const int n = static_cast<int>(sample);
-    if (column < 0 || column >= part.columns || !(sample >= 0) || n + 1 >= samples) continue;
-    if (!part.open.empty()) (is_open ? part.open : part.seen)[static_cast<std::size_t>(column)] += static_cast<double>(power);
-    if (is_open) continue;
-    // Between the two samples beside it: the pulse is put there at once for all of them.
-    float* place = by_sample.data() + static_cast<std::ptrdiff_t>(column) * samples + n;
-    const float later = power * (sample - static_cast<float>(n));
-    place[0] += power - later;
-    place[1] += later;
+void LabelWork::add_cells(const simd::GroupView& group, Echoes& echoes) {
+  Group& mine = groups_[static_cast<std::size_t>(group.first_column / group_columns_)];
+  const float* powers = group.expected_power ? echoes.re.data() : echoes.power.data();
+  int from = 0;
+  for (const Echoes::Run& run : echoes.runs) {
+    const int first = std::exchange(from, run.end);
+    const std::size_t which = mine.part_of[static_cast<std::size_t>((*tiles_)[run.tile].seen.tile->object)];
+    if (which == SIZE_MAX) continue;
+    Part& part = mine.parts[which];
+    const int samples = part.last_sample - part.first_sample;
+    for (auto i = static_cast<std::size_t>(first); i < static_cast<std::size_t>(run.end); ++i) {
+      const int column = echoes.column[i] - part.first_column;
+      const float sample = echoes.sample[i] - static_cast<float>(part.first_sample), power = powers[i];
+      const int n = static_cast<int>(sample);
+      if (column < 0 || column >= part.columns || !(sample >= 0) || n + 1 >= samples) continue;
+      if (!part.seen.empty()) part.seen[static_cast<std::size_t>(column)] += static_cast<double>(power);
+      // Between the two samples beside it: the pulse is put there at once for all of them.
+      float* place = mine.by_sample[which].data() + static_cast<std::ptrdiff_t>(column) * samples + n;
+      const float later = power * (sample - static_cast<float>(n));
+      place[0] += power - later;
+      place[1] += later;
+    }
   }
+  echoes.runs.clear();
+}
+
+void LabelWork::finish_group(const simd::GroupView& group, Echoes& scratch) {
+  const auto g = static_cast<std::size_t>(group.first_column / group_columns_);
+  Group& mine = groups_[g];
+  // Without their speckle: what is expected of them.
+  simd::GroupView open = group;
+  open.expected_power = true;
+  open.inverse_depth = open.depth_slope = nothing_.data();
+  for (const std::uint32_t i : (*by_group_)[g]) {
+    const CellTile& tile = *(*tiles_)[i].seen.tile;
+    const std::size_t which = mine.part_of[static_cast<std::size_t>(tile.object)];
+    if (which == SIZE_MAX || mine.parts[which].open.empty()) continue;
+    Part& part = mine.parts[which];
+    if (scratch.capacity() < tile.count) scratch.reserve(tile.count);
+    const int count = context_->kernels.scatter_tile((*tiles_)[i].seen, open, scratch.at(0));
+    for (std::size_t e = 0; e < static_cast<std::size_t>(count); ++e) {
+      const int column = scratch.column[e] - part.first_column;
+      const float sample = scratch.sample[e] - static_cast<float>(part.first_sample);
+      if (column < 0 || column >= part.columns || !(sample >= 0) ||
+          static_cast<int>(sample) + 1 >= part.last_sample - part.first_sample)
+        continue;
+      part.open[static_cast<std::size_t>(column)] += static_cast<double>(scratch.re[e]);
+    }
+  }
+  for (std::size_t i = 0; i < mine.used; ++i) spread(mine.parts[i], mine.by_sample[i]);
 }
 
 /// Eq. 8 in power: every echo as long as the pulse; then the mean of each row, and the transmitter's pattern.

@@ -29,8 +29,13 @@ class LabelWork {
              const std::vector<std::vector<std::uint32_t>>& by_group, int group_columns);
   /// Notes occlusions in columns [first, last), which the fan has just traced. Any thread, each column once.
   void note_shadows(const FanScratch& fan, int first, int last);
-  /// The energy of the group that begins at `group.first_column`, from its cells once more. Any thread, each group once.
-  void add_cells(const simd::GroupView& group, Echoes& scratch);
+  /// Makes room for the group that begins at `group.first_column`. Any thread, each group once.
+  void begin_group(const simd::GroupView& group);
+  /// Adds the energy of the cells that the picture is made of, with their `power`; forgets whose they are. Any number of times a
+  /// group.
+  void add_cells(const simd::GroupView& group, Echoes& echoes);
+  /// Adds what the group's objects with a label would send if nothing were in the way. After the last add_cells().
+  void finish_group(const simd::GroupView& group, Echoes& scratch);
   PingLabels finish(std::span<const PointEcho> points);
 
  private:
@@ -49,8 +54,6 @@ class LabelWork {
   };
   struct Point;  // an echo without surface: where its energy is
 
-  void add_tile(const PreparedTile& tile, Part& part, std::vector<float>& by_sample, const simd::GroupView& group, bool is_open,
-                Echoes& scratch) const;
   void spread(Part& part, const std::vector<float>& by_sample) const;
   static int row_of(double sample, int per_row);
   void keep_weights();
@@ -76,6 +79,7 @@ class LabelWork {
     std::vector<Part> parts;                    // the first `used` are of this ping; all keep their memory
     std::vector<std::vector<float>> by_sample;  // values of each part: [columns][samples], before the pulse
     std::size_t used = 0;
+    std::vector<std::size_t> part_of;  // by object; SIZE_MAX: none
     std::span<const Part> of_this_ping() const { return std::span(parts).first(used); }
   };
   std::vector<Group> groups_;

@@ -177,7 +177,9 @@ std::size_t scatter(const std::vector<PreparedTile>& tiles, std::span<const std:
       if (echoes.count > 0) break;
       echoes.reserve(seen.tile->count);
     }
-    echoes.count += kernels.scatter_tile(seen, group, echoes.at(echoes.count));
+    const int heard = kernels.scatter_tile(seen, group, echoes.at(echoes.count));
+    echoes.count += heard;
+    if (echoes.keeps_power && heard > 0) echoes.runs.push_back({wanted[from], echoes.count});
   }
   return from;
 }

@@ -11,6 +11,7 @@ void Echoes::reserve(int capacity) {
   re.resize(n);
   im.resize(n);
   column.resize(n);
+  if (keeps_power) power.resize(n);
 }
 
 void Echoes::add(float at_sample, std::complex<float> amplitude, int in_column) {

@@ -51,12 +51,24 @@ struct Echoes {
   explicit Echoes(int capacity = 0) { reserve(capacity); }
   void reserve(int capacity);
   int capacity() const { return static_cast<int>(column.size()) - 16; }  // kernels may write one vector past the end
-  simd::EchoArrays at(int index) { return {sample.data() + index, re.data() + index, im.data() + index, column.data() + index}; }
+  simd::EchoArrays at(int index) {
+    return {sample.data() + index, re.data() + index, im.data() + index, column.data() + index,
+            keeps_power ? power.data() + index : nullptr};
+  }
   void add(float at_sample, std::complex<float> amplitude, int in_column);
 
   int count = 0;
   std::vector<float> sample, re, im;
   std::vector<std::int32_t> column;
+
+  // For labels, kept on request: the expected power of each echo, and whose cells they are.
+  struct Run {
+    std::uint32_t tile;
+    int end;  // behind the last echo of the tile
+  };
+  bool keeps_power = false;
+  std::vector<float> power;
+  std::vector<Run> runs;
 };
 
 /// An echo without a surface: beamformed to the beams at its exact direction, never snapped to a column.

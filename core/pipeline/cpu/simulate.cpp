@@ -119,7 +119,8 @@ class PingSimulation {
     w_.first_hits.assign(request.switches.keep_truth ? static_cast<std::size_t>(plan_.columns.count) : 0, BeamTruth{});
     for (Workspace::Buffers::PerWorker& worker : w_.workers) {
       worker.statistics = {};
-      if (worker.echoes.column.empty()) worker.echoes.reserve(echo_room);
+      worker.echoes.keeps_power = labels != nullptr;
+      worker.echoes.reserve(std::max(worker.echoes.capacity(), echo_room));
     }
   }
 
@@ -294,15 +295,17 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
   mine.farthest.shape(mine.seen);
   mine.farthest.leave_out_hidden(w_.tiles, w_.tiles_by_group[static_cast<std::size_t>(first / group_columns_)], group,
                                  mine.in_sight);
+  if (labels_) w_.labels.begin_group(group);
   // scatter() stops when its buffer is full; the tiles' order stays.
   for (std::size_t next = 0; next < mine.in_sight.size();) {
     next = scatter(w_.tiles, mine.in_sight, next, group, kernels_, mine.echoes);
     mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
+    if (labels_) w_.labels.add_cells(group, mine.echoes);
     watch.lap(Stage::scatter);
     sum_pulses(first, mine);
     watch.lap(Stage::synthesize);
   }
-  if (labels_) w_.labels.add_cells(group, mine.echoes);
+  if (labels_) w_.labels.finish_group(group, mine.echoes);
 }
 
 /// Computed in time if the pulse is real-valued and tabulated, otherwise by way of the spectrum.

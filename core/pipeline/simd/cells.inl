@@ -5,7 +5,7 @@ inline constexpr int chunk = 256;
 
 struct Chunk {  // the cells of one stretch of a tile that are seen, packed
   alignas(64) float range[chunk + 16], offset[chunk + 16], cosine[chunk + 16], sine2[chunk + 16], column[chunk + 16],
-      weight_re[chunk + 16], weight_im[chunk + 16];
+      weight_re[chunk + 16], weight_im[chunk + 16], area[chunk + 16];
 };
 
 /// Ranges between which a tile's cells count, by its level and by the record.
@@ -25,11 +25,14 @@ inline Lanes area_of(const CellTile& t, int i, Lanes weight_re, Lanes weight_im)
   return choose(below(all(0), weight2), 1.0f / (magnitude(along) * CellTile::normal_unit), all(0));
 }
 
-/// The weights of the cells that are kept; in expected-power mode their areas.
-inline __attribute__((always_inline)) void pack_weights(const CellTile& t, int i, LaneMask keep, bool expected_power, int m,
-                                                        Chunk& c) {
+/// The weights of the cells that are kept, or their areas, or both.
+struct Wanted {
+  bool weights, areas;
+};
+inline __attribute__((always_inline)) void pack_weights(const CellTile& t, int i, LaneMask keep, Wanted wanted, int m, Chunk& c) {
   const Lanes re = counts(t.column(CellTile::weight_re) + i), im = counts(t.column(CellTile::weight_im) + i);
-  if (expected_power) return pack(c.weight_re + m, keep, area_of(t, i, re, im));
+  if (wanted.areas) pack(c.area + m, keep, area_of(t, i, re, im));
+  if (!wanted.weights) return;
   pack(c.weight_re + m, keep, re);
   pack(c.weight_im + m, keep, im);
 }
@@ -57,7 +60,7 @@ inline __attribute__((noinline)) LaneMask foreign_numbers(const GroupView& g, st
 /// Where the cells are: range, column, elevation, cosine of incidence; which lie in the group's window and do not look away; and
 /// which of them the depth map shows: a cell no farther than what the rays saw along its direction. Returns how many there are.
 template <bool conical, bool moves>
-__attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, int from, int n, Chunk& c) {
+__attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, Wanted what, int from, int n, Chunk& c) {
   const CellTile& t = *s.tile;
   const std::int16_t *tx = t.column(CellTile::x), *ty = t.column(CellTile::y), *tz = t.column(CellTile::z);
   const std::int16_t *nx = t.column(CellTile::normal_x), *ny = t.column(CellTile::normal_y), *nz = t.column(CellTile::normal_z);
@@ -138,7 +141,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, i
     const Lanes z2 = z * z, h2 = conical ? x * x : x * x + y * y;
     pack(c.sine2 + m, keep, quotient(z2, h2 + z2));
     pack(c.column + m, keep, column);
-    pack_weights(t, i, keep, g.expected_power, m, c);
+    pack_weights(t, i, keep, what, m, c);
     m += count_of(keep);
   }
   return m;
@@ -184,34 +187,41 @@ __attribute__((noinline)) void scatter_cells(const TileSeen& s, const GroupView&
 }
 
 /// The same in expected power: |xi|^2 is 1, so only the cell's area counts and no carrier is needed.
-inline void power_of_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
+__attribute__((noinline)) void power_of_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, float* power) {
   for (int i = 0; i < n; i += lanes) {
     const Lanes r = load(c.range + i);
     Lanes loss;
     for (int l = 0; l < lanes; ++l) loss[l] = std::exp(-g.decay_per_m * c.offset[i + l]);
     const Lanes amplitude =
         s.area_amplitude * load(c.cosine + i) * pattern_of(s, g, load(c.sine2 + i)) * loss * reciprocal(r * r);
-    store(out.re + i, amplitude * amplitude * level_weight(s, r) * load(c.weight_re + i));
+    store(power + i, amplitude * amplitude * level_weight(s, r) * load(c.area + i));
+  }
+}
+inline void scatter_power(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
+  power_of_cells(s, g, n, c, out.re);
+  for (int i = 0; i < n; i += lanes) {
     store(out.im + i, Lanes{});
-    store(out.sample + i, r * g.samples_per_m - (g.sample_offset - s.sample_shift));
+    store(out.sample + i, load(c.range + i) * g.samples_per_m - (g.sample_offset - s.sample_shift));
     *reinterpret_cast<LaneNumbers*>(out.column + i) = whole_part(load(c.column + i));
   }
 }
 
 int scatter_tile(const TileSeen& s, const GroupView& g, EchoArrays out) {
   Chunk c;
+  const Wanted w{!g.expected_power, g.expected_power || out.power != nullptr};
   int appended = 0;
   for (int from = 0; from < s.tile->count; from += chunk) {
     const int n = s.tile->count - from < chunk ? s.tile->count - from : chunk;
-    const int m = g.conical ? (s.moves ? see_cells<true, true>(s, g, from, n, c) : see_cells<true, false>(s, g, from, n, c))
-                            : (s.moves ? see_cells<false, true>(s, g, from, n, c) : see_cells<false, false>(s, g, from, n, c));
+    const int m = g.conical ? (s.moves ? see_cells<true, true>(s, g, w, from, n, c) : see_cells<true, false>(s, g, w, from, n, c))
+                            : (s.moves ? see_cells<false, true>(s, g, w, from, n, c) : see_cells<false, false>(s, g, w, from, n, c));
     if (m == 0) continue;
     if (s.law != nullptr) apply_law(s.law, m, c);
     if (g.expected_power)
-      power_of_cells(s, g, m, c, out);
+      scatter_power(s, g, m, c, out);
     else
       scatter_cells(s, g, m, c, out);
-    out = {out.sample + m, out.re + m, out.im + m, out.column + m};
+    if (!g.expected_power && out.power != nullptr) power_of_cells(s, g, m, c, out.power);
+    out = {out.sample + m, out.re + m, out.im + m, out.column + m, out.power != nullptr ? out.power + m : nullptr};
     appended += m;
   }
   return appended;

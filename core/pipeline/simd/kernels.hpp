@@ -67,7 +67,8 @@ struct EchoArrays {
   float* sample;  // fractional sample index
   float* re;
   float* im;
-  std::int32_t* column;  // absolute column
+  std::int32_t* column;    // absolute column
+  float* power = nullptr;  // what is expected of |re + i im|^2, for labels; null: not wanted, or re is that already
 };
 
 /// Rays that are scatterers: each draws a complex Gaussian of its own, a function of its counters (core/base/random.hpp).

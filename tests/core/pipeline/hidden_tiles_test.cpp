@@ -1,4 +1,5 @@
-// Tiles that are left out unseen: none of their cells may echo, and the rest must be much less than all.
+// Tiles of a ping, one by one: none of the cells of those that are left out unseen may echo, and labels get the same energy
+// beside the echoes as from a ping in expected power.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,8 +40,9 @@ struct Counts {
   std::size_t tiles = 0, left_out = 0, echoes = 0;
 };
 
-/// Compares every tile in view with what is left of them in a group of columns.
-void look(const Case& c, const Pose& pose, int first, int last, Counts& counts) {
+/// Calls f(kernels, group, tile, whether it is left out) for every tile in view of a group of columns.
+template <class F>
+void for_each_tile(const Case& c, const Pose& pose, int first, int last, const F& f) {
   Sounding sounding(crowded_scene(), oculus_low(), default_rows(8, 300));
   PingRequest& request = sounding.request;
   request.sonar_in_world = pose;
@@ -76,29 +78,54 @@ void look(const Case& c, const Pose& pose, int first, int last, Counts& counts) 
     std::vector<std::uint32_t> in_sight;
     farthest.leave_out_hidden(tiles, by_group[0], group, in_sight);
     EXPECT_TRUE(std::is_sorted(in_sight.begin(), in_sight.end()));
-    for (std::uint32_t i = 0; i < tiles.size(); ++i) {
-      Echoes echoes(tiles[i].seen.tile->count);
-      const int heard = kernels->scatter_tile(tiles[i].seen, group, echoes.at(0));
-      const bool is_left_out = !std::binary_search(in_sight.begin(), in_sight.end(), i);
-      counts.tiles += 1, counts.left_out += is_left_out, counts.echoes += static_cast<std::size_t>(heard);
-      EXPECT_FALSE(is_left_out && heard > 0)
-          << c.name << ", " << kernels->name << ", tile " << i << " with " << heard << " echoes";
-    }
+    for (std::uint32_t i = 0; i < tiles.size(); ++i)
+      f(*kernels, group, tiles[i].seen, !std::binary_search(in_sight.begin(), in_sight.end(), i));
   }
 }
 
+constexpr Vec3d place{0, 0, -0.3};
+
 TEST(HiddenTiles, NoEchoIsLostWithTilesThatAreLeftOut) {
   for (const Case& c : cases) {
-    Counts counts, narrow;
-    for (const double yaw : {-0.6, 0.0, 0.7}) {
-      const Pose pose{{0, 0.2 * yaw, -0.3}, quat_from_rpy({0.05, 0.2, yaw})};
-      look(c, pose, 0, 512, counts);
-      look(c, pose, 160, 208, narrow);
+    Counts all, narrow;
+    const auto look = [&](double yaw, int first, int last, Counts& counts) {
+      for_each_tile(c, {place, quat_from_rpy({0.05, 0.2, yaw})}, first, last,
+                    [&](const simd::Kernels& kernels, const simd::GroupView& group, const simd::TileSeen& tile, bool left_out) {
+                      Echoes echoes(tile.tile->count);
+                      const int heard = kernels.scatter_tile(tile, group, echoes.at(0));
+                      counts.tiles += 1, counts.left_out += left_out, counts.echoes += static_cast<std::size_t>(heard);
+                      EXPECT_FALSE(left_out && heard > 0) << c.name << ", " << kernels.name << ": " << heard << " echoes";
+                    });
+    };
+    for (const double yaw : {-0.6, 0.7}) {
+      look(yaw, 0, 512, all);
+      look(yaw, 160, 208, narrow);
     }
-    EXPECT_GT(counts.echoes, 100'000u) << c.name;
+    EXPECT_GT(all.echoes, 100'000u) << c.name;
     EXPECT_GT(narrow.echoes, 10'000u) << c.name;
-    EXPECT_GT(counts.left_out, counts.tiles / 4) << c.name << ": " << counts.left_out << " of " << counts.tiles;
+    EXPECT_GT(all.left_out, all.tiles / 4) << c.name << ": " << all.left_out << " of " << all.tiles;
   }
+}
+
+TEST(TilesForLabels, PowerBesideTheEchoesIsThatOfExpectedPower) {
+  std::size_t compared = 0;
+  for_each_tile(cases[4], {place, quat_from_rpy({0.05, 0.2, 0.1})}, 0, 512,
+                [&](const simd::Kernels& kernels, const simd::GroupView& group, const simd::TileSeen& tile, bool) {
+                  Echoes echoes, expected(tile.tile->count);
+                  echoes.keeps_power = true;
+                  echoes.reserve(tile.tile->count);
+                  const auto heard = static_cast<std::size_t>(kernels.scatter_tile(tile, group, echoes.at(0)));
+                  simd::GroupView in_power = group;
+                  in_power.expected_power = true;
+                  ASSERT_EQ(static_cast<std::size_t>(kernels.scatter_tile(tile, in_power, expected.at(0))), heard);
+                  for (std::size_t i = 0; i < heard; ++i) {
+                    EXPECT_EQ(echoes.power[i], expected.re[i]);
+                    EXPECT_EQ(echoes.sample[i], expected.sample[i]);
+                    EXPECT_EQ(echoes.column[i], expected.column[i]);
+                  }
+                  compared += heard;
+                });
+  EXPECT_GT(compared, 50'000u);
 }
 
 }  // namespace
