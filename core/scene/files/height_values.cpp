@@ -62,6 +62,13 @@ bool could_be_degrees(const RawHeights& raw) {
   return raw.x.front() >= -180 && raw.x.back() <= 360 && raw.y.front() >= -90 && raw.y.back() <= 90;
 }
 
+/// Cells of an arc second, its ninth, or several of them, as 0.000277777778, which no one chooses for metres.
+bool are_arc_seconds(double cell) {
+  const auto is_whole = [](double v) { return v > 0.5 && std::abs(v - std::round(v)) < 1e-3; };
+  constexpr double ninths_in_a_degree = 9 * 3600;
+  return is_whole(cell * ninths_in_a_degree) && !is_whole(cell * 1e5);
+}
+
 /// Degrees read as metres make ground absurdly steep: 1 m up in 100 m becomes 1000 to 1.
 bool shows_degrees(const RawHeights& raw) {
   const std::size_t columns = raw.x.size();
@@ -73,7 +80,7 @@ bool shows_degrees(const RawHeights& raw) {
     if (k % columns != 0 && !std::isnan(raw.z[k]) && !std::isnan(raw.z[k - 1]))
       rise += std::abs(static_cast<double>(raw.z[k]) - static_cast<double>(raw.z[k - 1])), ++steps;
   const double slope = steps == 0 ? 0 : rise / static_cast<double>(steps) / cell;
-  return slope > 10 || (slope == 0 && cell < 0.005);
+  return slope > 10 || (slope == 0 && cell < 0.005) || are_arc_seconds(cell);
 }
 
 /// A metre of Web Mercator is shorter on the ground, by the cosine of the latitude.

@@ -257,6 +257,12 @@ TEST(EsriGrid, SaysWhatItTakesForDegrees) {
   EXPECT_EQ(is_geographic(degrees_of("xllcorner -122.5\nyllcorner -47", "0.000833333", 12, true)), "degrees");
   EXPECT_EQ(is_geographic(degrees_of("xllcorner 237.5\nyllcorner 47", "0.016666667", 12)), "degrees");
   EXPECT_EQ(is_geographic(degrees_of(far, "0.004166667")), "metres");
+  const auto smooth = [&](const char* cell) {
+    return is_geographic("ncols 2\nnrows 2\n" + near_zero + "\ncellsize " + cell + "\n-10 -10.003 -10 -10.003\n");
+  };
+  for (const char* cell : {"0.00416666667", "0.000277777778", "0.00083333", "0.0166666667"})
+    EXPECT_EQ(smooth(cell), "degrees") << cell;
+  for (const char* cell : {"0.004", "0.0005", "0.025", "0.0254"}) EXPECT_EQ(smooth(cell), "metres") << cell;  // of a tank
   EXPECT_EQ(is_geographic(degrees_of(near_zero, "30")), "metres");
   EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.05", 12, true)), "metres");  // a tank
   EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.004166667"), {.geographic = false}), "metres");
