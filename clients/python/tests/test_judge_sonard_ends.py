@@ -1,11 +1,14 @@
 """A sonard that ends during a case is no verdict on the driver: the case is NOT RUN, and says why."""
+import os
 import pathlib
 import signal
+import subprocess
+import sys
 import tempfile
 import unittest
 import unittest.mock as mock
 
-import common  # noqa: F401  finds the package
+import common
 
 from sonard_client.daemon import Daemon
 from sonard_client.judge import run_case
@@ -71,6 +74,16 @@ class SonardEnds(unittest.TestCase):
             time.monotonic.return_value = 1.0
             time.sleep.side_effect = AssertionError("it waits for a sonar that does not come back")
             self.assertFalse(Scene.wait(scene, lambda: False, 1000.0))
+
+
+class TapEnds(unittest.TestCase):
+    def test_as_the_driver_did(self):
+        for script, code in (("kill -ABRT $$", -signal.SIGABRT), ("kill -KILL $$", -signal.SIGKILL), ("exit 3", 3), ("exit 0", 0)):
+            # A subscription that never comes: only the driver ends.
+            tap = ("import sys, time; from sonard_client.judge import ros_tap; ros_tap._subscribe_ros2 = lambda topic: time.sleep(1000); "
+                   f"sys.argv[1:] = ['ros2', '/t', '--', 'sh', '-c', {script!r}]; sys.exit(ros_tap.main())")
+            path = {**os.environ, "PYTHONPATH": str(common.ROOT / "clients/python")}
+            self.assertEqual(subprocess.run([sys.executable, "-B", "-c", tap], env=path, timeout=60, check=False).returncode, code)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
+import resource
+import signal
 import subprocess
 import sys
 import threading
@@ -80,7 +83,17 @@ def main() -> int:
     topic, command = sys.argv[2], sys.argv[sys.argv.index("--") + 1:]
     driver = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr)
     threading.Thread(target=subscribe, args=(topic,), daemon=True).start()
-    return driver.wait()
+    return ended_as(driver.wait())
+
+
+def ended_as(code: int) -> int:
+    """Ends by the driver's signal, if that ended it: as an exit code the judge could not tell it."""
+    if code < 0:
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # its core is the driver's
+        if -code not in (signal.SIGKILL, signal.SIGSTOP):
+            signal.signal(-code, signal.SIG_DFL)
+        os.kill(os.getpid(), -code)
+    return code
 
 
 if __name__ == "__main__":
