@@ -1,5 +1,5 @@
 // The one interface between the daemon and a vendor's protocol. A vendor is a pure translator: no sockets, no clock, no log. The
-// daemon owns time and bytes in flight; a Dialogue is one client's conversation, a Vendor frames pings and beacons.
+// daemon keeps the time and the buffers to be sent; a Dialogue is one client's conversation, a Vendor frames pings and beacons.
 #pragma once
 
 #include <array>

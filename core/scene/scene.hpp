@@ -45,7 +45,7 @@ struct Material {
   float roughness_m = 1e-3f;  // rms; decides how much mirrors and how much scatters
   float reflection = 0.5f;    // pressure reflection coefficient at normal incidence, water-referenced, -1..1
   Texture texture = {};
-  Texture grain = {};  // the same of shells and stones: shorter than a beam is wide
+  Texture grain = {};  // the same for shells and stones: shorter than a beam is wide
   std::uint32_t texture_seed = 0;
   std::string label = {};  // class of its surfaces in labels of samples; empty: its name
   bool operator==(const Material&) const = default;

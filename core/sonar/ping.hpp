@@ -22,7 +22,7 @@ namespace sonar {
 enum class Mode {
   canonical,  // surface cells: the model of docs/acoustics.md
   paper,      // Choi 2025 as printed: a fixed fan of rays, a frequency sum, its own beamforming
-  raster,     // the same with scatterers sampled on a perspective pixel grid, as the older method does
+  raster,     // as paper, but with scatterers on a perspective pixel grid, as rasterising simulators have them
 };
 inline constexpr std::array<std::string_view, 3> mode_names = {"canonical", "paper", "raster"};
 
@@ -38,8 +38,8 @@ struct Switches {
   bool keep_truth = false;      // fill Ping::truth
   bool keep_labels = false;     // fill Ping::labels, where samples can have them; only the CPU engine computes such pings
 
-  // Switched by name, see named_switches. A part that needs something of the scene or the model (volume, interference, leak, ...)
-  // is silent where that is not given, even when it is on.
+  // Switched by name, see named_switches. A part (volume, interference, leak, ...) for which the scene or the model has no data
+  // has no effect, even when it is on.
   bool noise = true;
   bool specular = true;
   bool texture = true;

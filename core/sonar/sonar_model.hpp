@@ -40,11 +40,11 @@ struct BeamProfile {
 struct SharedNoise {
   float level_db = -200;  // level of a channel, re the channel's own noise; below -150 = none
   int channels = 128;     // even
-  int group = 32;         // so many neighbours share it, less towards both ends; even; the channels a multiple of its half
-  float sine = 0.56f;     // of the direction it seems to come from, far away: half a wavelength over the channels' spacing
-  float full_m = 0.25f;   // nearer, its power is proportional to the range
-  float steady = 0;       // share of its power that is the same in every ping, of one phase, shared by all channels
-  float focus_rows = 0;   // the array is focused that many rows behind a row's centre
+  int group = 32;      // number of neighbours that share it, with weights that fall to both ends; even; its half divides channels
+  float sine = 0.56f;  // sine of the direction it seems to come from, at long range: half a wavelength / channel spacing
+  float full_m = 0.25f;  // nearer, its power is proportional to the range
+  float steady = 0;      // share of its power that is the same in every ping, of one phase, shared by all channels
+  float focus_rows = 0;  // the array is focused that many rows behind a row's centre
   float nearest_focus_m = 0;
 };
 
@@ -60,7 +60,7 @@ struct ReceiverModel {
   float leak_upa = 0;         // rms pressure of the transmitter's direct leakage, at range 0; 0 = none
   float leak_decay_db_per_m = 30;
   std::vector<float>
-      leak_ring_db;  // of a ringing leak: re leak_upa at 0, 1, 2 .. leak_ring_step_m, then over; takes the decay's place
+      leak_ring_db;  // level re leak_upa every leak_ring_step_m from 0 on, none behind the last; replaces leak_decay_db_per_m
   float leak_ring_step_m = 0.003f;
   bool leak_is_shared = false;  // shared by the channels, as shared_noise is; else its phases are random from column to column
   BeamProfile profile;

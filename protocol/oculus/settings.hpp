@@ -11,7 +11,7 @@
 
 namespace sonar::oculus {
 
-/// 37.5 MHz / 143, exact in the capture (M1200d mode 2). unknown: the rate of other modes; the same is used.
+/// 37.5 MHz / 143, exact in the capture (M1200d mode 2). unknown: the rate of other modes; sonard uses the same.
 inline constexpr double row_rate_hz = 37.5e6 / 143.0;
 inline constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus issue 13: 0-100 % is 0-96 dB
 inline constexpr int row_limit = 720;             // liboculus node README, measured by its authors
