@@ -50,7 +50,6 @@ install(FILES protocol/waterlinked/README.md DESTINATION ${documents}/protocol/w
 install(FILES protocol/dvl/README.md DESTINATION ${documents}/protocol/dvl COMPONENT sonard)
 install(FILES protocol/m3/README.md DESTINATION ${documents}/protocol/m3 COMPONENT sonard)
 install(FILES protocol/ping/README.md DESTINATION ${documents}/protocol/ping COMPONENT sonard)
-install(FILES clients/scene_tools/README.md DESTINATION ${documents}/clients/scene_tools COMPONENT sonard)
 install(FILES protocol/control/control.proto DESTINATION ${CMAKE_INSTALL_DATADIR}/sonard/protocol/control COMPONENT sonard)
 # What pages link to beyond the documents is installed below share/sonard; symbolic links lead there from where it lies in the
 # source tree. tests/acceptance/package_test.py follows every link.
