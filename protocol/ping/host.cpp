@@ -9,6 +9,7 @@
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping_host.hpp"
 #include "protocol/ping/surveyor.hpp"
+#include "protocol/sweep.hpp"
 
 namespace sonar::ping {
 namespace {
@@ -196,40 +197,6 @@ class OmniscanHost final : public PingHost {
   Waterfall waterfall_;
 };
 
-/// Bearing of a beam: beam 0 looks astern, the next ones over port back to astern.
-double bearing_rad(std::size_t beam) { return (grads / 2 - static_cast<double>(beam)) * 2 * pi / grads; }
-
-/// The scanned part of a turn. Cheap to copy.
-struct Turn {
-  static constexpr std::size_t first = first_grad + astern - grads, end = first + sector;  // the half ahead
-  std::size_t rows = 0;
-  double row_m = 0;
-  std::vector<std::shared_ptr<const Line>> lines = std::vector<std::shared_ptr<const Line>>(grads);
-
-  std::size_t lines_ahead() const {
-    return static_cast<std::size_t>(
-        std::count_if(lines.begin() + first, lines.begin() + end, [](const auto& line) { return line != nullptr; }));
-  }
-  /// The half ahead, as long as only that half was scanned.
-  PolarImage shown() const {
-    bool only_ahead = true;
-    for (std::size_t beam = 0; beam < grads; ++beam)
-      only_ahead = only_ahead && (lines[beam] == nullptr || (beam >= first && beam < end));
-    const std::size_t begin = only_ahead ? first : 0;
-    PolarImage image;
-    image.rows = rows;
-    image.beams = only_ahead ? sector : grads;
-    image.row_spacing_m = row_m;
-    image.samples.resize(rows * image.beams);
-    for (std::size_t beam = 0; beam < image.beams; ++beam) {
-      image.azimuth_rad.push_back(bearing_rad(begin + beam));
-      if (const auto& line = lines[begin + beam])
-        for (std::size_t row = 0; row < rows; ++row) image.samples[row * image.beams + beam] = (*line)[row];
-    }
-    return image;
-  }
-};
-
 /// Asks for the protocol version first, which changes nothing: a sonar by UDP is there when it answers.
 class Ping360Host final : public PingHost {
  public:
@@ -261,26 +228,18 @@ class Ping360Host final : public PingHost {
 
   HostPing line(std::uint16_t angle, unsigned period, unsigned khz, BytesView samples) {
     const double row_m = period * sample_unit_s * sound_mps / 2;
-    if (turn_.rows != samples.size() || turn_.row_m != row_m) turn_ = {samples.size(), row_m};
-    const auto beam = static_cast<std::size_t>((angle + astern) % grads);
-    auto line = std::make_shared<Line>();
-    for (const std::byte sample : samples) line->push_back(static_cast<float>(std::to_integer<int>(sample)));
-    turn_.lines[beam] = std::move(line);
+    Line line;
+    for (const std::byte sample : samples) line.push_back(static_cast<float>(std::to_integer<int>(sample)));
     HostPing ping;
     ping.facts = {++pings_,  1, static_cast<unsigned>(samples.size()), 8, row_m, row_m * static_cast<double>(samples.size()),
                   1e3 * khz, 0};
     ping.facts.note = "angle " + std::to_string(angle) + " grad";
-    ping.picture = [turn = turn_]() -> Result<PolarImage> { return turn.shown(); };
-    ping.drawing = [turn = turn_, head_rad = bearing_rad(beam)] {
-      return SonarPicture{.kind = PictureKind::sweep, .image = turn.shown(), .head_rad = head_rad};
-    };
-    ping.lines = turn_.lines_ahead();
-    ping.whole_lines = sector;
+    sweep_.add(static_cast<std::size_t>((angle + astern) % grads), std::move(line), row_m, ping);
     return ping;
   }
 
   bool is_open_ = false;
-  Turn turn_;
+  protocol::Sweep sweep_{grads};
   std::uint32_t pings_ = 0;  // a Ping360 does not number its pings
 };
 

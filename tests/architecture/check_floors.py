@@ -11,7 +11,7 @@ import sys
 # What a make of sonar may include beside its own folder.
 DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/dialogue.hpp", "protocol/host.hpp", "protocol/limits.hpp",
           "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/recorded/", "protocol/transport.hpp",
-          "protocol/vendor.hpp", "protocol/waterfall.hpp", "protocol/wire/"]
+          "protocol/sweep.hpp", "protocol/vendor.hpp", "protocol/waterfall.hpp", "protocol/wire/"]
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
     "core/base": ["core/base/"],

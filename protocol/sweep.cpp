@@ -1,0 +1,48 @@
+#include "protocol/sweep.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::protocol {
+
+double Sweep::bearing_rad(std::size_t direction) const {
+  const auto all = static_cast<double>(lines_.size());
+  return (all / 2 - static_cast<double>(direction)) * 2 * pi / all;
+}
+
+PolarImage Sweep::shown() const {
+  bool only_ahead = lines_.size() % 4 == 0;
+  for (std::size_t i = 0; i < lines_.size(); ++i)
+    only_ahead = only_ahead && (lines_[i] == nullptr || (i >= ahead_begin() && i < ahead_end()));
+  const std::size_t begin = only_ahead ? ahead_begin() : 0;
+  PolarImage image;
+  image.rows = rows_;
+  image.beams = only_ahead ? ahead_end() - begin : lines_.size();
+  image.row_spacing_m = row_m_;
+  image.samples.resize(rows_ * image.beams);
+  for (std::size_t beam = 0; beam < image.beams; ++beam) {
+    image.azimuth_rad.push_back(bearing_rad(begin + beam));
+    if (const auto& line = lines_[begin + beam])
+      for (std::size_t row = 0; row < rows_; ++row) image.samples[row * image.beams + beam] = (*line)[row];
+  }
+  return image;
+}
+
+void Sweep::add(std::size_t direction, Line line, double row_m, HostPing& ping) {
+  if (rows_ != line.size() || row_m_ != row_m) lines_.assign(lines_.size(), nullptr);
+  rows_ = line.size();
+  row_m_ = row_m;
+  lines_[direction] = std::make_shared<const Line>(std::move(line));
+  ping.picture = [sweep = *this]() -> Result<PolarImage> { return sweep.shown(); };
+  ping.drawing = [sweep = *this, head_rad = bearing_rad(direction)] {
+    return SonarPicture{.kind = PictureKind::sweep, .image = sweep.shown(), .head_rad = head_rad};
+  };
+  const auto at = [this](std::size_t i) { return lines_.begin() + static_cast<std::ptrdiff_t>(i); };
+  ping.lines = static_cast<std::size_t>(
+      std::count_if(at(ahead_begin()), at(ahead_end()), [](const auto& scanned) { return scanned != nullptr; }));
+  ping.whole_lines = ahead_end() - ahead_begin();
+}
+
+}  // namespace sonar::protocol
