@@ -40,6 +40,7 @@ install(FILES clients/bvtsdk/README.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/
 install(FILES docs/protocols/blueview-link.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk/protocols COMPONENT bvtsdk)
 install(FILES scenes/sonard.yaml scenes/sonard-blueview.yaml scenes/sonard-aris.yaml scenes/sonard-3d15.yaml scenes/sonard-ping360.yaml
   scenes/sonard-surveyor.yaml scenes/sonard-omniscan.yaml scenes/sonard-ping1d.yaml
+  scenes/sonard-s500.yaml
   scenes/sonard-dvl.yaml scenes/sonard-m3.yaml DESTINATION ${documents}/examples COMPONENT sonard)
 install(FILES README.md CONTRIBUTING.md LICENSE DESTINATION ${documents} COMPONENT sonard)
 install(DIRECTORY tests/judge DESTINATION ${documents}/tests COMPONENT sonard PATTERN "__pycache__" EXCLUDE)  # examples of docs/judge.md
@@ -107,10 +108,10 @@ set(CPACK_DEBIAN_SONARD_PACKAGE_CONTROL_EXTRA
 set(CPACK_COMPONENT_SONARD_DESCRIPTION "emulates imaging sonars on the network, from a 3D scene
 sonard holds a 3D scene, takes the pose of a vehicle, computes what a
 multibeam sonar would hear, and serves it as an Oculus, a BlueView sonar, an
-ARIS, a Sonar 3D-15, a Ping360, a Surveyor, an Omniscan, a Ping1D, a DVL or an
-M3: drivers written for the real device connect unchanged, those of BlueView
-with libraries of sonard's. With sonarctl, which listens to, looks at and
-steers sonars, and with a systemd unit, which is not started by the
+ARIS, a Sonar 3D-15, a Ping360, a Surveyor, an Omniscan, a Ping1D, an S500, a
+DVL or an M3: drivers written for the real device connect unchanged, those of
+BlueView with libraries of sonard's. With sonarctl, which listens to, looks at
+and steers sonars, and with a systemd unit, which is not started by the
 installation.")
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_NAME sonard-bvtsdk)
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_SECTION libdevel)

@@ -149,6 +149,7 @@ struct Make {
   char own_faults = 0;                   // first letter of the kinds of faults that only this make has
   bool each_ping_requested = false;      // by its hosts; a rate is a limit
   bool own_numbers = false;              // pings have numbers of their own, not those of sonard's events
+  bool shares_port = false;              // another make has its port: the host of each serves both
   bool scans = false;                    // pings come as fast as its head turns
   std::string_view demo_name = {};       // NAME of `sonard --demo NAME`; empty: name()
   std::string_view demo_profile = {};    // product of the demo; empty: the first model

@@ -13,6 +13,7 @@
 #include "protocol/ping/omniscan.hpp"
 #include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping360.hpp"
+#include "protocol/ping/s500.hpp"
 #include "protocol/ping/surveyor.hpp"
 #include "protocol/waterlinked/host.hpp"
 #include "protocol/waterlinked/waterlinked.hpp"
@@ -91,6 +92,7 @@ std::vector<Make> product_makes() {
        .codec = ping::omniscan::codec(),
        .usual_settings = "--rate 10",
        .own_numbers = true,
+       .shares_port = true,
        .demo_name = "omniscan",
        .demo_mount = RollPitchYaw{0, pi / 6, -pi / 2},  // to starboard
        .picture = PictureKind::waterfall},
@@ -103,6 +105,18 @@ std::vector<Make> product_makes() {
        .codec = ping::ping1d::codec(),
        .usual_settings = "--rate 10",
        .own_numbers = true,
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
+       .picture = PictureKind::waterfall},
+      {.device = &ping::s500::vendor(),
+       .title = "an S500",
+       .request = "request",
+       .remedy = "send set_ping_params (1015) with report_id 1308 and msec_per_ping 100",
+       .ports = ping::s500::host_ports,
+       .host = ping::s500::make_host,
+       .codec = ping::s500::codec(),
+       .usual_settings = "--rate 10",
+       .own_numbers = true,
+       .shares_port = true,
        .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
        .picture = PictureKind::waterfall},
       {.device = &dvl::vendor(),

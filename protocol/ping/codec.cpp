@@ -9,6 +9,7 @@
 #include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping360.hpp"
 #include "protocol/ping/ping_log.hpp"
+#include "protocol/ping/s500.hpp"
 #include "protocol/ping/surveyor.hpp"
 #include "protocol/recorded/raw_dump.hpp"
 
@@ -42,6 +43,7 @@ bool is_known(Id id) {
     case Id::ping1d_set_interval:
     case Id::ping1d_set_gain:
     case Id::ping1d_set_enable:
+    case Id::s500_set_ping_params:
     case Id::ping1d_goto_bootloader:
     case Id::ping1d_firmware_version:
     case Id::ping1d_device_id:
@@ -58,7 +60,9 @@ bool is_known(Id id) {
     case Id::ping1d_processor_temperature:
     case Id::ping1d_pcb_temperature:
     case Id::ping1d_enable:
+    case Id::s500_distance2:
     case Id::ping1d_profile:
+    case Id::s500_profile6:
     case Id::ping1d_continuous_start:
     case Id::ping1d_continuous_stop:
     case Id::ping360_set_device_id:
@@ -101,7 +105,7 @@ constexpr recording::Framing framing{{'B', 'R'}, header_size, length_of};
 constexpr std::array<recording::FileKind, 1> kinds{{{
     .ending = ".svlog",
     .name = "ping protocol log",
-    .holds = "frames of a Surveyor or an Omniscan",
+    .holds = "frames of a Surveyor, an Omniscan or an S500",
     .begins =
         [](BytesView front) {
           return recording::begins_with(front, {'B', 'R'});
@@ -134,6 +138,12 @@ recording::Codec ping1d::codec() {
   return {.framing = &framing, .sender = [](const RecordedMessage& message) {
             return holds(message, {Id::ping1d_distance_simple, Id::ping1d_distance, Id::ping1d_profile}) ? one_of(vendor())
                                                                                                          : std::nullopt;
+          }};
+}
+
+recording::Codec s500::codec() {
+  return {.framing = &framing, .files = kinds, .sender = [](const RecordedMessage& message) {
+            return holds(message, {Id::s500_distance2, Id::s500_profile6}) ? one_of(vendor()) : std::nullopt;
           }};
 }
 

@@ -6,7 +6,6 @@
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
 #include "protocol/ping/messages.hpp"
-#include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping_host.hpp"
 #include "protocol/ping/surveyor.hpp"
 #include "protocol/sweep.hpp"
@@ -31,14 +30,6 @@ Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
   if (wanted.gain_percent) p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent));
   if (const double ms = period_ms_of(wanted); ms > 0) p.period_ms = static_cast<std::int16_t>(std::lround(ms));
   return framed_message(Id::set_ping_parameters, 0, p);
-}
-
-Bytes omniscan_request(const protocol::SettingsOverride& wanted) {
-  OsPingParams p{.length_mm = static_cast<std::uint32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
-                 .enable = static_cast<std::uint8_t>(wanted.rate_hz == 0.0 ? 0 : 1)};
-  p.period_ms = static_cast<std::uint32_t>(std::lround(wanted.rate_hz ? period_ms_of(wanted) : 100));
-  if (wanted.gain_percent) p.gain = static_cast<std::int16_t>(std::lround(7 * *wanted.gain_percent / 100));
-  return framed_message(Id::os_ping_params, 0, p);
 }
 
 Bytes ping360_request(const protocol::SettingsOverride& wanted) {
@@ -125,40 +116,6 @@ HostPing ping_of(std::uint32_t number, double end_m, Points polar) {
   return found;
 }
 
-/// It is added to the waterfall.
-HostPing profile_of(const OsMonoProfile& data, BytesView rest, Waterfall& waterfall) {
-  HostPing found;
-  std::vector<std::uint16_t> powers;
-  wire::Reader reader(rest);
-  for (std::uint16_t i = 0, power = 0; i < data.results && reader.ok(); ++i) {
-    reader("power", power);
-    if (reader.ok()) powers.push_back(power);
-  }
-  const double start_m = 1e-3 * data.start_mm, row_m = 1e-3 * data.length_mm / std::max<double>(data.results, 1);
-  found.facts = {data.ping,
-                 1,
-                 static_cast<unsigned>(powers.size()),
-                 16,
-                 row_m,
-                 start_m + static_cast<double>(powers.size()) * row_m,
-                 static_cast<double>(data.hz),
-                 0};
-  found.picture = []() -> Result<PolarImage> {
-    return failure(ErrorKind::usage, "one ping of one beam makes no picture: sonarctl listen prints the profiles of an Omniscan");
-  };
-  if (powers.empty()) return found;
-  Line profile;
-  for (const std::uint16_t power : powers)
-    profile.push_back(data.lowest_db + static_cast<float>(power) / 65535 * (data.highest_db - data.lowest_db));
-  waterfall.add(std::move(profile), start_m, row_m, found);
-  const auto top = std::max_element(powers.begin(), powers.end());
-  const double db = static_cast<double>(data.lowest_db) +
-                    static_cast<double>(*top) / 65535 * static_cast<double>(data.highest_db - data.lowest_db);
-  found.facts.note =
-      format("strongest %.1f dB at %.2f m", db, start_m + (static_cast<double>(top - powers.begin()) + 0.5) * row_m);
-  return found;
-}
-
 class SurveyorHost final : public PingHost {
  public:
   using PingHost::PingHost;
@@ -180,21 +137,6 @@ class SurveyorHost final : public PingHost {
   }
 
   std::pair<std::optional<std::uint32_t>, Id> newest_{};  // a ping's number, and which message it came in
-};
-
-class OmniscanHost final : public PingHost {
- public:
-  using PingHost::PingHost;
-
- private:
-  std::optional<HostPing> ping_from(const Frame& frame) override {
-    OsMonoProfile data;
-    const auto rest = frame.header.id == Id::os_mono_profile ? read_front(frame, data) : std::nullopt;
-    if (!rest) return std::nullopt;
-    return profile_of(data, *rest, waterfall_);
-  }
-
-  Waterfall waterfall_;
 };
 
 /// Asks for the protocol version first, which changes nothing: a sonar by UDP is there when it answers.
@@ -250,9 +192,6 @@ Result<std::unique_ptr<protocol::Host>> ping360::make_host(const protocol::Wante
 }
 Result<std::unique_ptr<protocol::Host>> surveyor::make_host(const protocol::Wanted& wanted) {
   return host_of<SurveyorHost>("a Surveyor", surveyor_request, {"range", "rate", "gain", "mode"}, wanted);
-}
-Result<std::unique_ptr<protocol::Host>> omniscan::make_host(const protocol::Wanted& wanted) {
-  return host_of<OmniscanHost>("an Omniscan", omniscan_request, {"range", "rate", "gain", "mode"}, wanted);
 }
 
 }  // namespace sonar::ping

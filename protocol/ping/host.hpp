@@ -1,4 +1,4 @@
-// Hosts of the ping protocol (docs/protocols/ping.md): for a Ping360 by UDP, for a Surveyor, an Omniscan or a Ping1D by TCP.
+// Hosts of the ping protocol (docs/protocols/ping.md): for a Ping360 by UDP, for the others by TCP.
 #pragma once
 
 #include <array>
@@ -30,5 +30,11 @@ inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPo
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();
 }  // namespace ping1d
+
+namespace s500 {
+inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 51200}}};
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+recording::Codec codec();
+}  // namespace s500
 
 }  // namespace sonar::ping

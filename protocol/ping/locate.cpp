@@ -2,6 +2,7 @@
 
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
+#include "protocol/ping/s500_messages.hpp"
 
 namespace sonar::ping {
 namespace {
@@ -55,6 +56,16 @@ std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields
   return region == Region::metadata ? Place{header_size, fields_size} : Place{data, frame.size() - sum_size - data};
 }
 
+/// A region of the frame of that message, of fields M and then samples, among the frames of a ping.
+template <class M>
+std::optional<Place> samples_among(Id id, Region region, BytesView frames) {
+  const auto at = frame_of(id, frames);
+  if (!at) return std::nullopt;
+  auto place = one_beam(region, frames.empty() ? frames : frames.subspan(*at), wire::wire_size<M>());
+  if (place && !frames.empty()) place->first += *at;
+  return place;
+}
+
 constexpr std::size_t attitude_size = header_size + wire::wire_size<AttitudeReport>() + sum_size;
 
 /// Offset of the frame of points (3012) in all frames of a ping, or in the datagram that has this frame.
@@ -88,11 +99,16 @@ std::optional<Field> locate_ping1d(FieldName name, BytesView frames) {
 }
 
 std::optional<Place> locate_ping1d(Region region, BytesView frames) {
-  const auto at = frame_of(Id::ping1d_profile, frames);
-  if (!at) return std::nullopt;
-  auto place = one_beam(region, frames.empty() ? frames : frames.subspan(*at), wire::wire_size<Profile>());
-  if (place && !frames.empty()) place->first += *at;
-  return place;
+  return samples_among<Profile>(Id::ping1d_profile, region, frames);
+}
+
+std::optional<Field> locate_s500(FieldName name, BytesView frames) {
+  const auto at = frame_of(Id::s500_profile6, frames);
+  return at ? in_frame<Profile6>(name, *at, frames) : inside<Header>(name, 0, frames);
+}
+
+std::optional<Place> locate_s500(Region region, BytesView frames) {
+  return samples_among<Profile6>(Id::s500_profile6, region, frames);
 }
 
 std::optional<Field> locate_surveyor(FieldName name, BytesView frames) {

@@ -26,4 +26,8 @@ std::optional<Place> locate_omniscan(protocol::Region region, protocol::BytesVie
 std::optional<protocol::Field> locate_ping1d(protocol::FieldName name, protocol::BytesView frames);
 std::optional<Place> locate_ping1d(protocol::Region region, protocol::BytesView frames);
 
+/// The frames are those of a ping of an S500; only its profile has places.
+std::optional<protocol::Field> locate_s500(protocol::FieldName name, protocol::BytesView frames);
+std::optional<Place> locate_s500(protocol::Region region, protocol::BytesView frames);
+
 }  // namespace sonar::ping

@@ -1,5 +1,5 @@
 -- Wireshark dissector for the ping protocol of Blue Robotics and Cerulean: Ping360 on UDP 12345 and 9092, Surveyor on TCP and UDP
--- 62312, Omniscan on 51200, Ping1D on 9090. It shares nothing with the C++ code, so that the two can judge each other
+-- 62312, Omniscan and S500 on 51200, Ping1D on 9090. It shares nothing with the C++ code, so that the two can judge each other
 -- (tests/acceptance/ping_link_test.py). Layouts: docs/protocols/ping.md; how to install it: clients/wireshark/README.md.
 
 local ping = Proto("brping", "Blue Robotics ping protocol")
@@ -30,6 +30,8 @@ local messages = {
   [1004] = {"set_ping_interval", {{"ping_interval", "u16"}}},
   [1005] = {"set_gain_setting", {{"gain_setting", "u8"}}},
   [1006] = {"set_ping_enable", {{"ping_enabled", "u8"}}},
+  [1015] = {"set_ping_params", {{"start_mm", "u32"}, {"length_mm", "u32"}, {"gain_index", "i16"}, {"msec_per_ping", "i16"},
+    {"pulse_len_usec", "u16"}, {"report_id", "u16"}, {"skip", 2}, {"chirp", "u8"}, {"decimation", "u8"}}},
   [1100] = {"goto_bootloader", {}},
   [1200] = {"firmware_version", {{"device_type", "u8"}, {"device_model", "u8"}, {"firmware_version_major", "u16"},
     {"firmware_version_minor", "u16"}}},
@@ -49,8 +51,15 @@ local messages = {
   [1213] = {"processor_temperature", {{"processor_temperature", "u16"}}},
   [1214] = {"pcb_temperature", {{"pcb_temperature", "u16"}}},
   [1215] = {"ping_enable", {{"ping_enabled", "u8"}}},
+  [1223] = {"distance2", {{"ping_distance_mm", "u32"}, {"averaged_distance_mm", "u32"}, {"skip", 2}, {"ping_confidence", "u8"},
+    {"average_distance_confidence", "u8"}, {"timestamp", "u32"}}},
   [1300] = {"profile", {{"distance", "u32"}, {"confidence", "u16"}, {"transmit_duration", "u16"}, {"ping_number", "u32"},
     {"scan_start", "u32"}, {"scan_length", "u32"}, {"gain_setting", "u32"}, {"profile_data_length", "u16"}, {"profile_data", "rest"}}},
+  [1308] = {"profile6_t", {{"ping_number", "u32"}, {"start_mm", "u32"}, {"length_mm", "u32"}, {"start_ping_hz", "u32"},
+    {"end_ping_hz", "u32"}, {"adc_sample_hz", "u32"}, {"timestamp_msec", "u32"}, {"skip", 4}, {"pulse_duration_sec", "f32"},
+    {"analog_gain", "f32"}, {"max_pwr_db", "f32"}, {"min_pwr_db", "f32"}, {"this_ping_depth_m", "f32"}, {"smooth_depth_m", "f32"},
+    {"skip", 4}, {"ping_depth_measurement_confidence", "u8"}, {"gain_index", "u8"}, {"decimation", "u8"},
+    {"smoothed_depth_measurement_confidence", "u8"}, {"num_results", "u16"}, {"pwr_results", "rest"}}},
   [1400] = {"continuous_start", {{"id", "u16"}}},
   [1401] = {"continuous_stop", {{"id", "u16"}}},
   [2000] = {"set_device_id", {{"device_id", "u8"}, {"reserved", "u8"}}},

@@ -1,55 +1,20 @@
 #include "protocol/ping/ping1d_dialogue.hpp"
 
-#include <cmath>
-#include <utility>
-
 #include "protocol/ping/ping1d_settings.hpp"
-#include "protocol/ping/streaming.hpp"
+#include "protocol/ping/sounding.hpp"
 
 namespace sonar::ping::ping1d {
 namespace {
 
 using protocol::Reaction;
 
-constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping is taken as lost
 constexpr std::uint16_t firmware_major = 3, firmware_minor = 29, supply_mv = 5000;
 constexpr double housing_above_water_c = 8;  // assumed
 
-class Ping1DDialogue final : public StreamingConversation<Settings, settings_from> {
+class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
  public:
   Ping1DDialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
-      : StreamingConversation(device, port, {.revision = 1, .major = firmware_major, .minor = firmware_minor}), due_(now) {}
-
-  Reaction on_tick(Time now, bool ping_pending) override {
-    Reaction reaction;
-    if (now < next_tick()) return reaction;
-    if (fired_ && ping_pending) return fired_at_ = now, reaction;  // the interval is not over
-    Settings s = settings();
-    s.id = id_;
-    s.results = wanted();
-    fired_ = std::make_shared<HeldSettings>(s);
-    fired_at_ = now;
-    reaction.events.emplace_back(protocol::RequestPing{.joins = false, .head_rad = 0, .with = fired_});
-    return reaction;
-  }
-  Time next_tick() const override {
-    if (wanted() == no_result || !is_enabled()) return Time::max();
-    return fired_ ? fired_at_ + longest_wait : due_;
-  }
-  std::optional<Time> next_ping_request() const override {
-    return next_tick() != Time::max() && !fired_ ? std::optional(due_) : std::nullopt;
-  }
-  bool hosts_fall_silent() const override { return streamed_ != no_result; }
-  protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
-    const Results results = settings_from(made_with).results;
-    if (made_with == fired_.get()) {
-      fired_.reset();
-      due_ = now;
-    }
-    if ((results & wanted()) == 0) return {};
-    once_ &= ~results;
-    return {{Bytes{}}, {}};
-  }
+      : SoundingConversation(device, port, {.revision = 1, .major = firmware_major, .minor = firmware_minor}, now) {}
 
  protected:
   bool on_request(const Frame& frame, Time now, Reaction& reaction) override {
@@ -78,12 +43,11 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
         return true;
       case Id::ping1d_set_enable:
         set_value(frame, reaction, &Parameters::enable);
-        fired_.reset();  // its request ends with the pings
-        due_ = now;
+        forget_ping(now);  // its request ends with the pings
         return true;
       case Id::ping1d_continuous_start:
       case Id::ping1d_continuous_stop:
-        stream(frame, now, reaction);
+        set_stream(frame, now, reaction);
         return true;
       case Id::ping1d_goto_bootloader:
         refuse(frame, "it has no bootloader", reaction);
@@ -100,43 +64,33 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
       if (s.parameters.enable == 0)
         reaction.replies.push_back(nack(wanted_id, id_, "pings are disabled"));
       else
-        want(once_, result, now, reaction);
+        want_once(result, now, reaction);
       return true;
     }
     if (Bytes message = message_of(wanted_id, s.parameters); !message.empty())
       return reaction.replies.push_back(std::move(message)), true;
     return false;
   }
-  Bytes message_now(Id, Time) override { return {}; }
 
  private:
-  Results wanted() const { return once_ | streamed_; }
   /// In automatic mode the device sets range and gain itself, so these requests are refused.
   bool is_manual(const Frame& frame, Reaction& reaction) const {
     const bool manual = settings_after(reaction).parameters.mode_auto == 0;
     if (!manual) refuse(frame, "the mode is automatic", reaction);
     return manual;
   }
-  bool is_enabled() const { return settings().parameters.enable != 0; }
-  /// A ping under way does not serve the new request; the next ping does.
-  void want(Results& results, Results result, Time now, Reaction& reaction) {
-    if (!std::exchange(has_asked_, true)) change(reaction, [](Settings&) {});  // pings are enabled as it comes: now they are made
-    if (wanted() == no_result) due_ = now;
-    results |= result;
-  }
 
-  void stream(const Frame& frame, Time now, Reaction& reaction) {
+  void set_stream(const Frame& frame, Time now, Reaction& reaction) {
     Id id{};
     wire::Reader reader(frame.payload);
     reader("id", id);
     if (!reader.ok()) return refuse(frame, reader.failure_text(), reaction);
     const Results result = results_of(id);
     if (result == no_result) return refuse(frame, "that message is not streamed", reaction);
-    if (frame.header.id == Id::ping1d_continuous_start) {
-      want(streamed_, result, now, reaction);
-    } else {
-      streamed_ &= ~result;
-    }
+    if (frame.header.id == Id::ping1d_continuous_start)
+      stream(result, now, reaction);
+    else
+      stop_stream(result);
     reaction.replies.push_back(ack(frame.header.id, id_));
   }
 
@@ -157,17 +111,7 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
     set(frame, reaction, [&](Parameters& p) { p.*member = value; });
   }
 
-  template <class T>
-  Bytes value(Id id, T value) const {
-    Bytes payload;
-    wire::Writer write(payload);
-    write("value", value);
-    return framed(id, id_, payload);
-  }
   Bytes message_of(Id id, const Parameters& p) const {
-    const auto centidegrees = [&](double above_c) {
-      return static_cast<std::uint16_t>(std::lround(std::max(100 * (device_.water.temperature_c + above_c), 0.0)));
-    };
     switch (id) {
       case Id::ping1d_firmware_version:
         return framed_message(id, id_, FirmwareVersion{.major = firmware_major, .minor = firmware_minor});
@@ -200,12 +144,6 @@ class Ping1DDialogue final : public StreamingConversation<Settings, settings_fro
         return {};
     }
   }
-
-  Results once_ = no_result, streamed_ = no_result;  // results that the host waits for
-  Time due_{};                                       // when the next requested ping is due, if none is under way
-  std::shared_ptr<const HeldSettings> fired_;        // the ping that is being made
-  Time fired_at_{};
-  bool has_asked_ = false;
 };
 
 }  // namespace

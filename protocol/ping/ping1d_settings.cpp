@@ -14,9 +14,9 @@ namespace {
 
 constexpr std::array<double, 7> gains{0.6, 1.8, 5.5, 12.9, 30.2, 66.1, 144};  // DEF: of gain_setting
 constexpr int most_gain = static_cast<int>(gains.size()) - 1;
-constexpr int points = 200;                                        // recalled, like the ones that follow
-constexpr std::uint32_t least_length_mm = 1000, most_mm = 100000;  // DEF and manual
-constexpr double shortest_pulse_us = 26;  // at 1 m, as a user saw (ping-python, issue 157); unknown farther away: assumed there
+constexpr int points = 200;                // recalled, like the ones that follow
+constexpr std::uint32_t most_mm = 100000;  // manual
+constexpr double shortest_pulse_us = 26;   // at 1 m, as a user saw (ping-python, issue 157); unknown farther away: assumed there
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
@@ -24,7 +24,7 @@ SonarModel make_model() {
   FrequencyMode mode;
   mode.name = "115 kHz";
   mode.centre_hz = 115e3f;
-  mode.min_range_m = 0.3f;
+  mode.min_range_m = static_cast<float>(nearest_echo_m);
   mode.max_range_m = 1e-3f * most_mm;
   mode.source_level_db = 190;  // unknown: level and full scale; set so that sand takes the lowest gain at 0.5 m
   mode.beam_spacing = BeamSpacing::listed;
@@ -61,7 +61,7 @@ Settings settings_from(const VendorSettings* held) {
 }
 
 std::string complaint(const Parameters& p) {
-  if (p.range.length_mm < least_length_mm || p.range.length_mm > most_mm || p.range.start_mm > most_mm ||
+  if (p.range.length_mm < shortest_range_mm || p.range.length_mm > most_mm || p.range.start_mm > most_mm ||
       end_mm(p.range) > most_mm)
     return "scan_length is from 1000, its end to 100000";
   if (p.speed_mm_per_s < 1000000 || p.speed_mm_per_s > 2000000) return "speed_of_sound is not in 1000000..2000000";
@@ -110,7 +110,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Settings s = settings_from(device.settings.get());
   Parameters& p = s.parameters;
   if (wanted.range_m) {
-    const double low_m = 1e-3 * (p.range.start_mm + least_length_mm);
+    const double low_m = 1e-3 * (p.range.start_mm + shortest_range_mm);
     const std::string why =
         protocol::range_complaint(*wanted.range_m, "a Ping1D", low_m, 1e-3 * most_mm, "scan_start + scan_length");
     if (!why.empty()) return refused(why);
@@ -132,61 +132,11 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   return change_to(s);
 }
 
-Echo find_echo(const Ping& ping) {
-  constexpr double least_snr_db = 10;  // unknown: assumed, above what noise alone reaches in 200 points
-  constexpr double certain_snr_db = 30;
-  constexpr int longest_gap = 2;  // points of speckle inside an echo
-  const PingSettings& s = ping.request.settings;
-  const auto code = [&](int row) { return std::to_integer<int>(ping.samples[static_cast<std::size_t>(row)]); };
-  const int rows = std::min(s.range_bin_count, static_cast<int>(ping.samples.size()));
-  const auto nearest = static_cast<double>(models().front()->modes.front().min_range_m);
-  int first = 0;
-  while (first < rows && s.range_of_row(first) < nearest) ++first;
-  if (first >= rows) return {};
-  std::vector<int> codes;
-  int top = first;
-  for (int row = first; row < rows; ++row) {
-    codes.push_back(code(row));
-    if (code(row) > code(top)) top = row;
-  }
-  const auto middle = codes.begin() + static_cast<std::ptrdiff_t>(codes.size() / 2);
-  std::nth_element(codes.begin(), middle, codes.end());
-  Echo echo{.peak = code(top)};
-  if (echo.peak == 0) return echo;
-  const double half = echo.peak / 2.0;
-  int front = top;
-  for (int row = top - 1; row >= first && front - row <= longest_gap + 1; --row)
-    if (code(row) >= half) front = row;
-  // Between the last point below half the peak and the first one above.
-  const double below = front > 0 ? code(front - 1) : half;
-  const double part = front > 0 && below < half ? (code(front) - half) / (code(front) - below) : 0;
-  // The amplitude of an even bed is at half its peak at its distance, that of a mirror 0.7 pulses before: a middle way.
-  echo.range_m = s.range_of_row(front - part) + static_cast<double>(s.pulse_width_m) / 2;
-  const double snr_db = 20 * std::log10(echo.peak / std::max<double>(*middle, 1));
-  echo.confidence =
-      static_cast<int>(std::lround(100 * std::clamp((snr_db - least_snr_db) / (certain_snr_db - least_snr_db), 0.0, 1.0)));
-  return echo;
-}
-
 Parameters adjusted(const Parameters& made_with, const Echo& echo) {
-  constexpr int sure = 50, loud = 250;  // per cent; a strength that may be cut off
-  constexpr double loudest_wanted = 200;
-  // Shares of the range; the echo is to lie between them.
-  constexpr double nearest_part = 0.35, farthest_part = 0.85, wanted_part = 0.6;
-  constexpr std::uint32_t length_step_mm = 500, first_length_mm = 5000;
   Parameters p = made_with;
-  p.range.start_mm = 0;
-  if (echo.peak >= loud)
-    p.gain = static_cast<std::uint8_t>(std::max(p.gain - 1, 0));
-  else
-    while (p.gain < most_gain && echo.peak * gains[p.gain + 1u] / gains[made_with.gain] <= loudest_wanted) ++p.gain;
-  const double length_mm = p.range.length_mm, at = 1000 * echo.range_m / length_mm;
-  if (echo.confidence < sure) {
-    p.range.length_mm = length_mm >= most_mm ? first_length_mm : std::min(2 * p.range.length_mm, most_mm);
-  } else if (at < nearest_part || at > farthest_part) {
-    const auto steps = static_cast<std::uint32_t>(std::ceil(1000 * echo.range_m / wanted_part / length_step_mm));
-    p.range.length_mm = std::clamp(steps * length_step_mm, least_length_mm, most_mm);
-  }
+  const Reach next = ping::adjusted({made_with.range.length_mm, made_with.gain}, echo, {.gains = gains, .most_mm = most_mm});
+  p.range = {0, next.length_mm};
+  p.gain = static_cast<std::uint8_t>(next.gain);
   return p;
 }
 

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <vector>
 
+#include "protocol/ping/echo.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
 #include "protocol/vendor.hpp"
 
@@ -26,9 +27,7 @@ struct Parameters {
     return all(*this) == all(other);
   }
 };
-/// Messages that come of a ping, as bits.
-using Results = unsigned;
-inline constexpr Results no_result = 0, simple_result = 1, distance_result = 2, profile_result = 4;
+inline constexpr Results simple_result = 1, distance_result = 2, profile_result = 4;
 inline Results results_of(Id id) {
   return id == Id::ping1d_distance_simple ? simple_result
          : id == Id::ping1d_distance      ? distance_result
@@ -58,13 +57,8 @@ PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-struct Echo {
-  double range_m = 0;  // in the device's metres
-  int peak = 0;        // the highest strength, 0 to 255
-  int confidence = 0;  // per cent
-};
-/// The strongest echo of a profile: where it begins.
-Echo find_echo(const Ping& ping);
+using ping::Echo;
+using ping::find_echo;
 /// The automatic mode: range and gain after a ping in which that echo was found.
 Parameters adjusted(const Parameters& made_with, const Echo& echo);
 

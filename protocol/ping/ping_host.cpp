@@ -2,14 +2,40 @@
 
 #include <utility>
 
+#include "core/sonar/sample_code.hpp"
+
 namespace sonar::ping {
 
 using protocol::HostActions;
 using protocol::HostPing;
 
+namespace {
+
+Id refused_in(const Frame& nack) {
+  Id id{};
+  wire::Reader reader(nack.payload);
+  reader("nacked_id", id);
+  return id;
+}
+
+}  // namespace
+
 double period_ms_of(const protocol::SettingsOverride& wanted) {
   const double rate_hz = wanted.rate_hz.value_or(0);
   return rate_hz > 0 ? std::clamp(1000 / rate_hz, 1.0, 30000.0) : 0;
+}
+
+Line powers_in(BytesView rest, std::size_t count, float lowest_db, float highest_db) {
+  Line line(std::min(count, rest.size() / 2));
+  for (std::size_t i = 0; i < line.size(); ++i)
+    line[i] = lowest_db + static_cast<float>(sample_code(rest, i, 2)) / 65535 * (highest_db - lowest_db);
+  return line;
+}
+
+Result<void> check_wanted(std::string_view title, std::initializer_list<std::string_view> known, const protocol::Wanted& wanted) {
+  if (auto accepted = protocol::accept_settings(wanted, title, known); !accepted) return accepted;
+  if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, std::string(title) + " has one mode only");
+  return {};
 }
 
 HostActions PingHost::on_open(std::span<const std::uint16_t>, Time) {
@@ -24,7 +50,7 @@ HostActions PingHost::on_bytes(std::size_t, BytesView received, Time) {
   while (const auto frame = framer_.next()) {
     if (!frame->sum_is_right) continue;
     on_frame(*frame, actions);
-    if (frame->header.id == Id::nack) {
+    if (frame->header.id == Id::nack && !on_nack(refused_in(*frame), actions)) {
       std::string why;
       for (std::size_t i = 2; i < frame->payload.size(); ++i) why += static_cast<char>(frame->payload[i]);
       actions.emplace_back(Error{ErrorKind::bad_data, "refused a request: " + why});

@@ -29,6 +29,9 @@ std::optional<BytesView> read_front(const Frame& frame, M& message) {
   return BytesView(frame.payload).subspan(wire::wire_size<M>());
 }
 
+/// Powers of two bytes each, 0 to 65535 from lowest_db to highest_db, at most `count`.
+Line powers_in(BytesView rest, std::size_t count, float lowest_db, float highest_db);
+
 class PingHost : public protocol::Host {
  public:
   PingHost(std::string_view title, std::optional<Bytes> request) : title_(title), request_(std::move(request)) {}
@@ -43,6 +46,11 @@ class PingHost : public protocol::Host {
     if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
   }
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
+  /// Whether it has another request in place of the refused one.
+  virtual bool on_nack(Id refused, protocol::HostActions&) {
+    static_cast<void>(refused);
+    return false;
+  }
   virtual std::optional<protocol::HostPing> ping_from(const Frame& frame) = 0;
 
  private:
@@ -51,11 +59,13 @@ class PingHost : public protocol::Host {
   Framer framer_{65535};
 };
 
+/// usage: settings that a sonar with these options of sonarctl, and one mode, does not have.
+Result<void> check_wanted(std::string_view title, std::initializer_list<std::string_view> known, const protocol::Wanted& wanted);
+
 template <class Product>
 Result<std::unique_ptr<protocol::Host>> host_of(std::string_view title, Bytes (*request)(const protocol::SettingsOverride&),
                                                 std::initializer_list<std::string_view> known, const protocol::Wanted& wanted) {
-  if (auto accepted = protocol::accept_settings(wanted, title, known); !accepted) return tl::unexpected(accepted.error());
-  if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, std::string(title) + " has one mode only");
+  if (auto fits = check_wanted(title, known, wanted); !fits) return tl::unexpected(fits.error());
   return std::make_unique<Product>(title, wanted.as_it_is ? std::nullopt : std::optional(request(wanted.settings)));
 }
 

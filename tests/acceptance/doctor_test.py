@@ -147,7 +147,8 @@ class Doctor(unittest.TestCase):
         # Port, whether other bytes leave the connection open, and what a driver must send.
         makes = {"oculus-m1200d": (52100, True, "fire message", "0x15"), "blueview-p900-90": (14750, False, "", "request for a ping"),
                  "aris-3000": (56888, False, "", "SET_ACOUSTICS"), "surveyor-240": (62312, True, "request", "ping_enable"),
-                 "omniscan-450": (51200, True, "request", "os_ping_params"), "ping1d": (9090, True, "request", "continuous_start")}
+                 "omniscan-450": (51200, True, "request", "os_ping_params"), "ping1d": (9090, True, "request", "continuous_start"),
+                 "s500": (51200, True, "request", "set_ping_params")}
         for profile, (port, takes_junk, request, remedy) in makes.items():
             with self.subTest(profile=profile), Sonard(scene="l-targets.yaml", profile=profile) as daemon:
                 findings, is_connected = self.examine_driver(daemon, port, b"GOOD DAY, SONAR\r\n")

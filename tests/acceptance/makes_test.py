@@ -29,6 +29,7 @@ MAKES = {"oculus-m1200d": (52100, "--range", 3, "--gain", 60, "--rate", 5, "--mo
          "surveyor-240": (62312, "--range", 3, "--gain", 60, "--rate", 5),
          "omniscan-450": (51200, "--range", 3, "--gain", 60, "--rate", 5),
          "ping1d": (9090, "--range", 3, "--gain", 60, "--rate", 5),
+         "s500": (51200, "--make", "s500", "--range", 3, "--gain", 60, "--rate", 5),
          "dvl-a50": (16171, "--as-it-is"),  # it pings before settings come
          "m3": (20001, "--as-it-is")}  # no settings come
 PINGS = 4
@@ -111,7 +112,7 @@ class Makes(unittest.TestCase):
                     self.assertEqual(value, expected[profile][what])
 
 
-OWN_KINDS = {"oculus-m1200d": "oculus", "aris-3000": "aris", "waterlinked-3d15": "sonar-file", "surveyor-240": "svlog", "omniscan-450": "svlog", "m3": "imb"}
+OWN_KINDS = {"oculus-m1200d": "oculus", "aris-3000": "aris", "waterlinked-3d15": "sonar-file", "surveyor-240": "svlog", "omniscan-450": "svlog", "s500": "svlog", "m3": "imb"}
 
 
 class Recordings(unittest.TestCase):

@@ -1,4 +1,4 @@
-"""An emulated Ping360, Surveyor, Omniscan and Ping1D as hosts of the ping protocol meet them; and under tshark."""
+"""An emulated Ping360, Surveyor, Omniscan, Ping1D and S500 as hosts of the ping protocol meet them; and under tshark."""
 import math
 import pathlib
 import re
@@ -16,7 +16,7 @@ from pcap_writer import Capture
 from running_sonard import ROOT, SONARCTL, SONARD, Sonard, eventually, expect_quiet, run
 
 DISSECTOR = ROOT / "protocol/ping/ping.lua"
-PING360, DISCOVERY, SURVEYOR, OMNISCAN, PING1D = 12345, 30303, 62312, 51200, 9090
+PING360, DISCOVERY, SURVEYOR, OMNISCAN, PING1D, S500 = 12345, 30303, 62312, 51200, 9090, 51200
 B, C = (3.9, 10), (6.9, -8)  # range m, bearing deg clockwise: points of scenes/l-targets.yaml
 SIDE = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -30, 90]}"
 DOWN = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}"
@@ -324,6 +324,30 @@ class Ping1DLink(unittest.TestCase):
         self.assertEqual(len(re.findall(r"distance \d\.\d{3} m, confidence \d+ %", listener.stdout)), 5, listener.stdout)
 
 
+def sound(period_ms, report):
+    """An S500's ping parameters, with range and gain automatic."""
+    return frame(1015, struct.pack("<IIhhHHHBB", 0, 0, -1, period_ms, 0, report, 0, 0, 0))
+
+
+class S500Link(unittest.TestCase):
+    def test_single_pings_a_stream_and_its_end(self):
+        with Sonard(profile="s500", mount=DOWN, pose="{frame: ENU_FLU, xyz_m: [-7, 0, -3]}") as daemon:
+            host = Host(daemon.address, S500)
+            eventually(lambda: host.is_answered(general(5)))
+            profile = host.ask(sound(-1, 1308), 1308)[0]
+            self.assertEqual(len(profile), 66 + 2 * 1024)
+            host.send(sound(100, 1223))
+            for _ in range(25):
+                distance, averaged, _, confidence, sure, _ = struct.unpack("<IIHBBI", host.next(1223)[0])
+            self.assertGreater(confidence, 50)
+            self.assertAlmostEqual(distance / 1000, 2, delta=0.35)  # ripples and relief of the harbour's bed, 2 m below
+            self.assertAlmostEqual(averaged, distance, delta=50)
+            start, length = struct.unpack("<II", host.ask(general(1204), 1204)[0])
+            self.assertTrue(start == 0 and 0.3 < distance / length < 0.9, (distance, length))
+            host.send(sound(100, 0))
+            expect_quiet(host.udp)
+
+
 class AltitudeHold(unittest.TestCase):
     def test_the_example_brings_a_vehicle_to_its_altitude_and_keeps_it_there(self):
         with Sonard(profile="ping1d", mount=DOWN) as daemon:
@@ -374,6 +398,9 @@ class Dissected(unittest.TestCase):
         with Sonard(profile="ping1d", mount=DOWN) as daemon:
             down = Host(daemon.address, PING1D)
             down.ask(general(1300), 1300)
+        with Sonard(profile="s500", mount=DOWN) as daemon:
+            narrow = Host(daemon.address, S500)
+            narrow.ask(sound(-1, 1308), 1308)
         capture = Capture(device_port=SURVEYOR)
         capture.connect()
         whole = general(4) + settings(1)
@@ -383,6 +410,9 @@ class Dissected(unittest.TestCase):
             capture.udp(datagram, PING360)
         capture.udp(side.datagrams[0], OMNISCAN)
         capture.udp(down.datagrams[0], PING1D)
+        for datagram in narrow.datagrams:
+            capture.udp(datagram, S500)
+        capture.udp(sound(-1, 1308), S500)
         capture.tcp("client", side_scan(1))
         capture.tcp("client", frame(1300))  # as older hosts request it, without a payload
         with tempfile.TemporaryDirectory() as folder:
@@ -396,7 +426,7 @@ class Dissected(unittest.TestCase):
             capture.udp(host.datagrams[0][:-3], PING360)
             capture.write(path)
             broken = shark.tshark("-r", path, "-Y", "brping.expert.broken || brping.expert.checksum", dissector=DISSECTOR)
-        for name in ("general_request", "set_ping_parameters", "device_information", "device_data", "os_ping_params", "os_mono_profile", "profile"):
+        for name in ("general_request", "set_ping_parameters", "device_information", "device_data", "os_ping_params", "os_mono_profile", "profile", "profile6_t", "set_ping_params"):
             self.assertIn(name, lines)
         self.assertEqual(values, ["17", "1200", "2"])
         self.assertEqual(wrong.strip(), "")

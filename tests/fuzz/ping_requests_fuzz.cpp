@@ -35,7 +35,8 @@ void apply(const protocol::Reaction& reaction, protocol::DeviceState& device) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   protocol::Bytes bytes(size);
   for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(data[i]);
-  static const Device devices[] = {Device("ping360"), Device("surveyor-240"), Device("omniscan-450"), Device("ping1d")};
+  static const Device devices[] = {Device("ping360"), Device("surveyor-240"), Device("omniscan-450"), Device("ping1d"),
+                                   Device("s500")};
   for (const Device& as_it_comes : devices) {
     protocol::DeviceState device = as_it_comes.state;
     const protocol::Vendor& vendor = *as_it_comes.found.vendor;

@@ -40,6 +40,7 @@ ASKED = [
     ("omniscan-450", "2197, pings", 51200,
      frame(2197, struct.pack("<IIIffffhHBBBB", 0, 5000, 0, 0, 0, 0.002, 0.0015, -1, 1200, 1, 0, 0, 0))),
     ("ping1d", "1400, profiles", 9090, frame(1400, struct.pack("<H", 1300))),
+    ("s500", "1015, profiles", 51200, frame(1015, struct.pack("<IIhhHHHBB", 0, 5000, -1, 100, 0, 1308, 0, 0, 0))),
 ]
 
 

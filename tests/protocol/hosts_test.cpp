@@ -450,13 +450,29 @@ TEST_P(Hosts, HavePortsOfTheirMakeInACapture) {
   }
 }
 
+TEST(Makes, WithOnePortHaveHostsThatFindOutWhomTheyReached) {
+  for (const Make& one : makes())
+    for (const Make& other : makes()) {
+      if (&one == &other || one.ports.front().number != other.ports.front().number) continue;
+      Make mixed = one;
+      mixed.host = other.host;
+      Talk talk(mixed, {});
+      talk.run(6);
+      EXPECT_FALSE(talk.error) << talk.error->text;
+      EXPECT_FALSE(talk.pings.empty());
+      EXPECT_EQ(talk.host->about(), one.title);
+    }
+}
+
 TEST(Makes, HaveNamesAndPortsOfTheirOwn) {
   for (const Make& one : makes()) {
     EXPECT_FALSE(one.title.empty());
     for (const Make& other : makes())
       if (&one != &other) {
         EXPECT_NE(one.name(), other.name());
-        EXPECT_NE(one.ports.front().number, other.ports.front().number);
+        if (!one.shares_port || !other.shares_port) {
+          EXPECT_NE(one.ports.front().number, other.ports.front().number);
+        }
       }
     bool served = false;
     for (const Port& port : one.device->ports()) served = served || port.number == one.ports.front().number;

@@ -1,5 +1,5 @@
-// Pictures of a Ping360, an Omniscan, a Surveyor and a Ping1D of bodies at known places, through the whole engine, in closed
-// form.
+// Pictures of a Ping360, an Omniscan, a Surveyor, a Ping1D and an S500 of bodies at known places, through the whole engine, in
+// closed form.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +8,7 @@
 #include "protocol/ping/omniscan_settings.hpp"
 #include "protocol/ping/ping1d_settings.hpp"
 #include "protocol/ping/ping360_settings.hpp"
+#include "protocol/ping/s500_settings.hpp"
 #include "protocol/ping/surveyor_settings.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
@@ -341,6 +342,33 @@ TEST(Ping1DAcoustics, OpenWaterHasNoDistanceToTrust) {
     altimeter.sounding->request.number = PingNumber(number);
     EXPECT_LT(ping1d::find_echo(altimeter.sounding->ping()).confidence, 20);
   }
+}
+
+// ---- S500
+
+/// With automatic range and gain.
+TEST(S500Acoustics, TheBedIsAtItsDistance) {
+  for (const double altitude_m : {0.6, 1.5, 5.0, 20.0, 60.0})
+    for (const double strength_db : {-15.0, -35.0}) {
+      s500::Settings settings;
+      settings.parameters = s500::requested({}, {.length_mm = 0, .report = Id::s500_profile6});
+      Sounding sounding(bed(0, altitude_m, strength_db), s500::models().front()->modes[0], s500::ping_settings(settings));
+      sounding.request.switches.noise = true;
+      sounding.request.sonar_in_world = {{0, 0, 0}, quat_from_rpy({0, pi / 2, 0})};
+      Echo echo;
+      for (std::uint32_t number = 1; number <= 12; ++number) {
+        sounding.request.settings = s500::ping_settings(settings);
+        sounding.request.vendor_settings = std::make_shared<s500::HeldSettings>(settings);
+        sounding.request.number = PingNumber(number);
+        const Ping ping = sounding.ping();
+        echo = find_echo(ping);
+        settings = s500::after(ping, settings);
+      }
+      const auto pulse_m = static_cast<double>(sounding.request.settings.pulse_width_m);
+      EXPECT_NEAR(echo.range_m, altitude_m, 1.5 * pulse_m + 0.002 * altitude_m) << altitude_m << " m, " << strength_db << " dB";
+      EXPECT_GE(echo.confidence, 50) << altitude_m << " m, " << strength_db << " dB, gain " << settings.parameters.reach.gain;
+      EXPECT_NEAR(settings.parameters.reach.length_mm, 1000 * altitude_m / 0.6, 400 * altitude_m / 0.6 + 500);
+    }
 }
 
 }  // namespace

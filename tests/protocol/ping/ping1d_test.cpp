@@ -227,7 +227,7 @@ TEST(Ping1DAutomatic, GainKeepsTheEchoBelowFullScale) {
       p.gain = static_cast<std::uint8_t>(gain);
       const auto next = [&](const Parameters& from) {
         const double peak = std::min(255.0, amplitude * gain_of[from.gain]);
-        return adjusted(from, {.range_m = 6, .peak = static_cast<int>(peak), .confidence = 100});
+        return adjusted(from, {.range_m = 6, .peak = std::floor(peak), .confidence = 100});
       };
       for (int i = 0; i < 7; ++i) p = next(p);
       EXPECT_EQ(next(p), p) << "it comes to rest; from gain " << gain << ", amplitude " << amplitude;

@@ -108,6 +108,7 @@ TEST(CommandLine, TheDemoHasTheSonarThatIsAskedFor) {
   EXPECT_EQ(sonar_of({"--demo", "surveyor"}), "surveyor-240");
   EXPECT_EQ(sonar_of({"--demo", "omniscan"}), "omniscan-450");
   EXPECT_EQ(sonar_of({"--demo", "ping1d"}), "ping1d");
+  EXPECT_EQ(sonar_of({"--demo", "s500"}), "s500");
   EXPECT_EQ(sonar_of({"--demo", "dvl"}), "dvl-a50");
   EXPECT_EQ(sonar_of({"--demo", "m3"}), "m3");
   EXPECT_EQ(sonar_of({"run", "--demo=blueview", "--threads", "1"}), "blueview-p900-90");

@@ -1,0 +1,126 @@
+// The host of an Omniscan and of an S500. They have one port, so each finds out by its request which of them it has reached.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/text/format.hpp"
+#include "protocol/ping/host.hpp"
+#include "protocol/ping/omniscan_messages.hpp"
+#include "protocol/ping/ping_host.hpp"
+#include "protocol/ping/s500_messages.hpp"
+
+namespace sonar::ping {
+namespace {
+
+using protocol::HostActions;
+using protocol::HostPing;
+using text::format;
+
+Bytes omniscan_request(const protocol::SettingsOverride& wanted) {
+  OsPingParams p{.length_mm = static_cast<std::uint32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
+                 .enable = static_cast<std::uint8_t>(wanted.rate_hz == 0.0 ? 0 : 1)};
+  p.period_ms = static_cast<std::uint32_t>(std::lround(wanted.rate_hz ? period_ms_of(wanted) : 100));
+  if (wanted.gain_percent) p.gain = static_cast<std::int16_t>(std::lround(7 * *wanted.gain_percent / 100));
+  return framed_message(Id::os_ping_params, 0, p);
+}
+
+/// Without range and gain the sonar finds both itself.
+Bytes s500_request(const protocol::SettingsOverride& wanted) {
+  SetPingParams p{.length_mm = 0, .gain = -1, .period_ms = 100, .report = wanted.rate_hz == 0.0 ? Id{} : Id::s500_profile6};
+  if (wanted.range_m) p.length_mm = static_cast<std::uint32_t>(std::lround(std::max(1000 * *wanted.range_m, 1.0)));
+  if (wanted.gain_percent) p.gain = static_cast<std::int16_t>(std::lround(13 * *wanted.gain_percent / 100));
+  if (wanted.rate_hz.value_or(0) > 0) p.period_ms = static_cast<std::int16_t>(std::lround(period_ms_of(wanted)));
+  return framed_message(Id::s500_set_ping_params, 0, p);
+}
+
+struct Product {
+  std::string_view title;
+  Id request_id;
+  Bytes (*request)(const protocol::SettingsOverride&);
+};
+constexpr Product omniscan_product{"an Omniscan", Id::os_ping_params, omniscan_request};
+constexpr Product s500_product{"an S500", Id::s500_set_ping_params, s500_request};
+
+/// A ping of `rows` powers, without its distance.
+HostPing ping_of(std::uint32_t number, std::uint32_t start_mm, double row_m, std::size_t rows, double hz,
+                 std::string_view title) {
+  const double start_m = 1e-3 * start_mm;
+  HostPing found;
+  found.facts = {number, 1, static_cast<unsigned>(rows), 16, row_m, start_m + static_cast<double>(rows) * row_m, hz, 0};
+  found.picture = [title]() -> Result<PolarImage> {
+    return failure(ErrorKind::usage,
+                   "one ping of one beam makes no picture: sonarctl listen prints the profiles of " + std::string(title));
+  };
+  return found;
+}
+
+class PowerHost final : public PingHost {
+ public:
+  PowerHost(const Product& wanted, const Product& other, const protocol::Wanted& settings)
+      : PingHost(wanted.title, settings.as_it_is ? std::nullopt : std::optional(wanted.request(settings.settings))),
+        title_(wanted.title),
+        refusable_(wanted.request_id),
+        other_(other),
+        settings_(settings.settings) {}
+  std::string about() const override { return std::string(title_); }
+
+ private:
+  bool on_nack(Id refused, HostActions& actions) override {
+    if (!asks() || refused != refusable_ || title_ == other_.title) return false;
+    title_ = other_.title;
+    actions.emplace_back(protocol::HostSend{0, other_.request(settings_)});
+    return true;
+  }
+  std::optional<HostPing> ping_from(const Frame& frame) override {
+    if (frame.header.id == Id::os_mono_profile) return read(frame, OsMonoProfile{});
+    return frame.header.id == Id::s500_profile6 ? read(frame, Profile6{}) : std::nullopt;
+  }
+  template <class Data>
+  std::optional<HostPing> read(const Frame& frame, Data data) {
+    const auto rest = read_front(frame, data);
+    if (!rest) return std::nullopt;
+    Line powers = powers_in(*rest, data.results, data.lowest_db, data.highest_db);
+    const double row_m = 1e-3 * data.length_mm / std::max<double>(data.results, 1);
+    HostPing found = ping_of(data.ping, data.start_mm, row_m, powers.size(), hz_of(data), title_of(data));
+    if (powers.empty()) return found;
+    found.facts.note = note_of(data, powers, row_m);
+    waterfall_.add(std::move(powers), 1e-3 * data.start_mm, row_m, found);
+    return found;
+  }
+
+  static double hz_of(const OsMonoProfile& data) { return data.hz; }
+  static double hz_of(const Profile6& data) { return (data.start_hz + data.end_hz) / 2.0; }
+  static std::string_view title_of(const OsMonoProfile&) { return omniscan_product.title; }
+  static std::string_view title_of(const Profile6&) { return s500_product.title; }
+  static std::string note_of(const OsMonoProfile& data, const Line& powers, double row_m) {
+    const auto top = std::max_element(powers.begin(), powers.end());
+    return format("strongest %.1f dB at %.2f m", static_cast<double>(*top),
+                  1e-3 * data.start_mm + (static_cast<double>(top - powers.begin()) + 0.5) * row_m);
+  }
+  static std::string note_of(const Profile6& data, const Line&, double) {
+    return format("distance %.3f m, confidence %d %%", static_cast<double>(data.depth_m), data.confidence);
+  }
+
+  std::string_view title_;  // of the sonar, as far as is known
+  Id refusable_;
+  const Product& other_;
+  protocol::SettingsOverride settings_;
+  protocol::Waterfall waterfall_;
+};
+
+Result<std::unique_ptr<protocol::Host>> host_of(const Product& product, const Product& other, const protocol::Wanted& wanted) {
+  if (auto fits = check_wanted(product.title, {"range", "rate", "gain", "mode"}, wanted); !fits)
+    return tl::unexpected(fits.error());
+  return std::make_unique<PowerHost>(product, other, wanted);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<protocol::Host>> omniscan::make_host(const protocol::Wanted& wanted) {
+  return host_of(omniscan_product, s500_product, wanted);
+}
+Result<std::unique_ptr<protocol::Host>> s500::make_host(const protocol::Wanted& wanted) {
+  return host_of(s500_product, omniscan_product, wanted);
+}
+
+}  // namespace sonar::ping

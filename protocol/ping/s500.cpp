@@ -1,0 +1,135 @@
+#include "protocol/ping/s500.hpp"
+
+#include "protocol/ping/locate.hpp"
+#include "protocol/ping/omniscan_messages.hpp"
+#include "protocol/ping/ping1d_messages.hpp"
+#include "protocol/ping/s500_settings.hpp"
+#include "protocol/ping/sounding.hpp"
+
+namespace sonar::ping::s500 {
+namespace {
+
+using protocol::Reaction;
+
+constexpr auto port_table = streaming_ports(51200);
+constexpr std::uint16_t firmware_major = 2, firmware_minor = 2;
+constexpr double processor_above_water_c = 20;  // assumed
+
+class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
+ public:
+  S500Dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
+      : SoundingConversation(device, port, {.major = firmware_major, .minor = firmware_minor}, now) {}
+
+ protected:
+  bool on_request(const Frame& frame, Time now, Reaction& reaction) override {
+    if (frame.header.id == Id::s500_set_ping_params) {
+      SetPingParams wanted;
+      if (!read(frame, wanted, reaction)) return true;
+      if (const std::string why = complaint(wanted); !why.empty()) return refuse(frame, why, reaction), true;
+      change(reaction, [&](Settings& s) { s.parameters = requested(s.parameters, wanted); });
+      forget_ping(now);
+      stop_stream(~no_result);
+      const Results result = results_of(wanted.report);
+      if (result != no_result && wanted.period_ms < 0) want_once(result, now, reaction);
+      if (result != no_result && wanted.period_ms >= 0) stream(result, now, reaction);
+      reaction.replies.push_back(ack(frame.header.id, id_));
+      return true;
+    }
+    if (frame.header.id == Id::set_sound_speed_before) {
+      SoundSpeed speed;
+      if (!read(frame, speed, reaction)) return true;
+      if (speed.mm_per_s < 1000000 || speed.mm_per_s > 2000000)
+        return refuse(frame, "sos_mm_per_sec is not in 1000000..2000000", reaction), true;
+      change(reaction, [&](Settings& s) { s.parameters.speed_mm_per_s = speed.mm_per_s; });
+      reaction.replies.push_back(ack(frame.header.id, id_));
+      return true;
+    }
+    // The maker's description allows requests by the number of the wanted message, without a payload.
+    if (frame.payload.empty()) answer(frame.header.id, now, reaction);
+    return frame.payload.empty();
+  }
+
+  bool on_wanted(Id wanted_id, Time now, Reaction& reaction) override {
+    const Parameters p = settings_after(reaction).parameters;
+    if (const Results result = results_of(wanted_id); result != no_result) {
+      if (p.enable == 0)
+        reaction.replies.push_back(nack(wanted_id, id_, "pings are disabled"));
+      else
+        want_once(result, now, reaction);
+      return true;
+    }
+    Bytes message = message_of(wanted_id, p);
+    if (message.empty()) return false;
+    reaction.replies.push_back(std::move(message));
+    return true;
+  }
+
+ private:
+  Bytes message_of(Id id, const Parameters& p) const {
+    switch (id) {
+      case Id::ping1d_firmware_version:
+        return framed_message(id, id_, FirmwareVersion{.type = 0, .model = 0, .major = firmware_major, .minor = firmware_minor});
+      case Id::ping1d_sound_speed:
+        return value(id, p.speed_mm_per_s);
+      case Id::ping1d_range:
+        return framed_message(id, id_, ScanRange{p.ping.start_mm, p.reach.length_mm});
+      case Id::ping1d_interval:
+        return value(id, static_cast<std::uint16_t>(interval_ms(p)));
+      case Id::ping1d_gain:
+        return value(id, static_cast<std::uint32_t>(p.reach.gain));
+      case Id::ping1d_processor_temperature:
+        return value(id, std::uint32_t{centidegrees(processor_above_water_c)});
+      default:
+        return {};
+    }
+  }
+};
+
+class S500Vendor final : public StreamingVendor {
+ public:
+  std::string_view name() const override { return "s500"; }
+  std::span<const std::shared_ptr<const SonarModel>> models() const override { return s500::models(); }
+  std::span<const protocol::Port> ports() const override { return port_table; }
+  std::span<const protocol::Option> options() const override { return streaming_options(); }
+  protocol::ChangeSettings initial_settings(const protocol::DeviceState&) const override { return change_to(Settings{}); }
+  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
+                                                  const protocol::DeviceState& device) const override {
+    return s500::apply_override(wanted, device);
+  }
+  double gain_percent(const protocol::DeviceState& device) const override {
+    return s500::gain_percent(settings_from(device.settings.get()).parameters);
+  }
+  std::optional<protocol::ChangeSettings> after_ping(const Ping& ping, const protocol::DeviceState& device) const override {
+    return change_to(after(ping, settings_from(device.settings.get())));
+  }
+  bool measures_distance() const override { return true; }
+  std::optional<protocol::Distance> distance_in(const Ping& ping) const override {
+    const Echo echo = find_echo(ping);
+    return protocol::Distance{echo.range_m, echo.confidence};
+  }
+  std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,
+                                               Time now) const override {
+    return std::make_unique<S500Dialogue>(device, port, now);
+  }
+  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
+                                       protocol::BytesView message) const override {
+    return part == protocol::Part::ping ? locate_s500(name, message) : std::nullopt;
+  }
+  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
+    return locate_s500(region, ping);
+  }
+
+ protected:
+  std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) const override {
+    return s500::frames_of(ping, device);
+  }
+};
+
+}  // namespace
+
+const protocol::Vendor& vendor() {
+  static const S500Vendor only;
+  return only;
+}
+
+}  // namespace sonar::ping::s500

@@ -1,0 +1,234 @@
+#include "protocol/ping/s500_settings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+
+#include "core/base/geometry.hpp"
+#include "core/text/format.hpp"
+#include "protocol/limits.hpp"
+#include "protocol/ping/one_beam.hpp"
+#include "protocol/ping/ping1d_messages.hpp"
+
+namespace sonar::ping::s500 {
+namespace {
+
+constexpr int points = 1024;               // DEF, of pings of one frequency
+constexpr std::uint32_t most_mm = 142000;  // as hosts limit it
+constexpr int fastest_ms = 100;            // maker's specification: at most 10 pings a second
+constexpr double shortest_pulse_us = 20;   // unknown: assumed
+constexpr double db_per_gain = 4;          // unknown: assumed, like the level and full scale
+constexpr std::size_t averaged_pings = 20;
+
+/// Amplifications by gain_index.
+const std::array<double, 14>& gains() {
+  static const auto all = [] {
+    std::array<double, 14> made{};
+    for (std::size_t i = 0; i < made.size(); ++i) made[i] = std::pow(10, db_per_gain * static_cast<double>(i) / 20);
+    return made;
+  }();
+  return all;
+}
+int most_gain() { return static_cast<int>(gains().size()) - 1; }
+
+tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
+
+SonarModel make_model() {
+  FrequencyMode mode;
+  mode.name = "500 kHz";
+  mode.centre_hz = 500e3f;
+  mode.min_range_m = static_cast<float>(nearest_echo_m);
+  mode.max_range_m = 1e-3f * most_mm;
+  mode.source_level_db = 205;
+  mode.beam_spacing = BeamSpacing::listed;
+  mode.beam_azimuths_rad = {0};
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(5));  // as hosts state it
+  mode.pattern.elevation_width_rad = mode.pattern.azimuth_width_rad;
+  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(13));  // its main lobe down to -20 dB
+  mode.receiver.full_scale_upa = 1e9f;
+  SonarModel model;
+  model.profile = "s500";
+  model.name = "S500";
+  model.max_rate_hz = 1000.0 / fastest_ms;
+  model.modes = {mode};
+  return model;
+}
+
+/// Over the newest pings: mean distance of those with an echo, mean confidence of all.
+Echo average(std::span<const Echo> echoes) {
+  Echo mean;
+  int sure = 0, confidence = 0;
+  for (const Echo& echo : echoes) {
+    confidence += echo.confidence;
+    if (echo.confidence == 0) continue;
+    mean.range_m += echo.range_m;
+    ++sure;
+  }
+  mean.range_m = sure > 0 ? mean.range_m / sure : 0;
+  mean.confidence = echoes.empty() ? 0 : static_cast<int>(std::lround(confidence / static_cast<double>(echoes.size())));
+  return mean;
+}
+std::vector<Echo> with(std::vector<Echo> earlier, const Echo& newest) {
+  earlier.push_back(newest);
+  if (earlier.size() > averaged_pings) earlier.erase(earlier.begin());
+  return earlier;
+}
+
+std::uint32_t mm(double metres) { return static_cast<std::uint32_t>(std::lround(1000 * metres)); }
+
+}  // namespace
+
+std::span<const std::shared_ptr<const SonarModel>> models() {
+  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
+  return all;
+}
+
+bool HeldSettings::equals(const VendorSettings& other) const {
+  const auto* of = dynamic_cast<const HeldSettings*>(&other);
+  const auto all = [](const Settings& s) {
+    const Parameters& p = s.parameters;
+    return std::tuple(s.id, p.ping, p.reach.length_mm, p.reach.gain, p.speed_mm_per_s, p.enable);
+  };
+  return of != nullptr && all(of->settings) == all(settings);
+}
+
+Settings settings_from(const VendorSettings* held) {
+  const auto* of = dynamic_cast<const HeldSettings*>(held);
+  return of != nullptr ? of->settings : Settings{};
+}
+
+std::string complaint(const SetPingParams& p) {
+  if ((p.length_mm != 0 && p.length_mm < shortest_range_mm) || p.length_mm > most_mm || p.start_mm > most_mm ||
+      p.start_mm + p.length_mm > most_mm)
+    return "length_mm is 0 or from 1000, its end to 142000";
+  if (p.gain < -1 || p.gain > most_gain()) return "gain_index is not in -1..13";
+  if (p.period_ms < -1) return "msec_per_ping is not in -1..32767";
+  if (p.report != Id{} && p.report != Id::s500_distance2 && p.report != Id::s500_profile6) return "report_id is 0, 1223 or 1308";
+  return p.chirp > 1 ? "chirp is 0 or 1" : "";
+}
+
+Parameters requested(const Parameters& before, const SetPingParams& wanted) {
+  Parameters p = before;
+  p.ping = wanted;
+  p.enable = wanted.report == Id{} ? 0 : 1;
+  if (wanted.length_mm != 0) p.reach.length_mm = wanted.length_mm;
+  if (wanted.gain >= 0) p.reach.gain = wanted.gain;
+  p.reach.length_mm = std::min(p.reach.length_mm, std::max(most_mm - wanted.start_mm, shortest_range_mm));
+  return p;
+}
+
+int interval_ms(const Parameters& p) { return std::max<int>(p.ping.period_ms, fastest_ms); }
+
+PingSettings ping_settings(const Settings& settings) {
+  const Parameters& p = settings.parameters;
+  const double speed_mps = 1e-3 * p.speed_mm_per_s, length_m = 1e-3 * p.reach.length_mm;
+  PingSettings s;
+  s.beam_count = 1;
+  s.range_bin_count = points;
+  s.range_start_m = 1e-3 * p.ping.start_mm;
+  s.range_m = s.range_start_m + length_m;
+  s.range_bin_m = length_m / points;
+  s.samples_per_row = 2;
+  s.pulse_width_m = static_cast<float>(std::max(2 * s.range_bin_m, 1e-6 * shortest_pulse_us * speed_mps / 2));
+  s.rate_hz = p.enable == 0 ? 0 : 1000.0f / static_cast<float>(interval_ms(p));
+  s.triggered = true;
+  s.gain_db = static_cast<float>(db_per_gain * p.reach.gain);
+  s.tvg = false;
+  s.device_sound_speed_mps = static_cast<float>(speed_mps);
+  s.format = {.bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -140, .ceiling_db = 20};
+  return s;
+}
+
+protocol::ChangeSettings change_to(const Settings& settings) {
+  const PingSettings s = ping_settings(settings);
+  const Parameters& p = settings.parameters;
+  return {s, std::make_shared<HeldSettings>(settings),
+          text::format("%s, %.2f to %.2f m%s, gain %d%s, at most %.4g Hz, sound speed %g m/s",
+                       p.enable != 0 ? "pings as requested" : "standby", s.range_start_m, s.range_m,
+                       p.ping.length_mm == 0 ? " (automatic)" : "", p.reach.gain, p.ping.gain < 0 ? " (automatic)" : "",
+                       static_cast<double>(s.rate_hz), static_cast<double>(s.device_sound_speed_mps))};
+}
+
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
+  Settings s = settings_from(device.settings.get());
+  Parameters& p = s.parameters;
+  SetPingParams asked = p.ping;
+  if (wanted.range_m) {
+    const double low_m = 1e-3 * (asked.start_mm + shortest_range_mm);
+    const std::string why = protocol::range_complaint(*wanted.range_m, "an S500", low_m, 1e-3 * most_mm, "start_mm + length_mm");
+    if (!why.empty()) return refused(why);
+    asked.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - asked.start_mm;
+  }
+  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
+  if (wanted.gain_percent) asked.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent / 100 * most_gain()));
+  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
+  if (wanted.rate_hz && *wanted.rate_hz > 0)
+    asked.period_ms = static_cast<std::int16_t>(std::lround(std::clamp(1000 / *wanted.rate_hz, 1.0, 30000.0)));
+  if (const std::string why = one_beam_complaint(wanted, "an S500", 16); !why.empty()) return refused(why);
+  if (const std::string why = complaint(asked); !why.empty()) return refused("S500: " + why);
+  const std::uint8_t enabled = p.enable;
+  p = requested(p, asked);
+  p.enable = wanted.rate_hz ? *wanted.rate_hz > 0 : enabled;
+  return change_to(s);
+}
+
+double gain_percent(const Parameters& p) { return 100.0 / most_gain() * p.reach.gain; }
+
+Settings after(const Ping& ping, const Settings& now) {
+  const Echo echo = find_echo(ping);
+  Settings next = now;
+  next.earlier = with(now.earlier, echo);
+  Parameters& p = next.parameters;
+  const Reach made_with = settings_from(ping.request.vendor_settings.get()).parameters.reach;
+  // Otherwise a host has changed them since.
+  if (made_with.length_mm != p.reach.length_mm || made_with.gain != p.reach.gain) return next;
+  const Reach chosen = adjusted(made_with, echo, {gains(), most_mm});
+  if (p.ping.length_mm == 0)
+    p.reach.length_mm = std::min(chosen.length_mm, std::max(most_mm - p.ping.start_mm, shortest_range_mm));
+  if (p.ping.gain < 0) p.reach.gain = chosen.gain;
+  return next;
+}
+
+std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) {
+  const Settings s = settings_from(ping.request.vendor_settings.get());
+  const PingSettings& made = ping.request.settings;
+  const Results results = s.results != no_result ? s.results : profile_result;
+  const Echo echo = find_echo(ping), averaged = average(with(s.earlier, echo));
+  const auto power_up_ms = static_cast<std::uint32_t>(
+      std::chrono::duration_cast<std::chrono::milliseconds>(ping.request.fired_at - device.powered_up_at).count());
+  const auto confidence = static_cast<std::uint8_t>(echo.confidence);
+  std::vector<Bytes> frames;
+  if ((results & altitude_result) != 0)
+    frames.push_back(framed_message(Id::ping1d_distance_simple, s.id, DistanceSimple{mm(echo.range_m), confidence}));
+  if ((results & distance_result) != 0)
+    frames.push_back(framed_message(Id::s500_distance2, s.id,
+                                    Distance2{mm(echo.range_m), mm(averaged.range_m), 0, confidence,
+                                              static_cast<std::uint8_t>(averaged.confidence), power_up_ms}));
+  if ((results & profile_result) == 0) return frames;
+  Profile6 profile;
+  profile.ping = static_cast<std::uint32_t>(ping.request.number) - 1;  // from 0
+  profile.start_mm = mm(made.range_start_m);
+  profile.length_mm = mm(made.range_m - made.range_start_m);
+  profile.start_hz = profile.end_hz = static_cast<std::uint32_t>(device.model->modes.front().centre_hz);
+  profile.sampling_hz = static_cast<std::uint32_t>(
+      std::lround(static_cast<double>(made.device_sound_speed_mps) / (2 * made.range_bin_m)));  // unknown: that of the results
+  profile.power_up_ms = power_up_ms;
+  profile.pulse_s = 2 * made.pulse_width_m / made.device_sound_speed_mps;
+  profile.analog_gain = made.gain_db;
+  profile.highest_db = made.format.ceiling_db;
+  profile.lowest_db = made.format.floor_db;
+  profile.depth_m = static_cast<float>(echo.range_m);
+  profile.smooth_depth_m = static_cast<float>(averaged.range_m);
+  profile.confidence = confidence;
+  profile.gain = static_cast<std::uint8_t>(std::lround(static_cast<double>(made.gain_db) / db_per_gain));
+  profile.decimation = s.parameters.ping.decimation;
+  profile.smooth_confidence = static_cast<std::uint8_t>(averaged.confidence);
+  profile.results = static_cast<std::uint16_t>(ping.samples.size() / 2);
+  Bytes payload = wire::bytes_of(profile);
+  payload.insert(payload.end(), ping.samples.begin(), ping.samples.end());
+  frames.push_back(framed(Id::s500_profile6, s.id, payload));
+  return frames;
+}
+
+}  // namespace sonar::ping::s500

@@ -1,0 +1,62 @@
+// The laws of an S500: its settings, the distances over several pings, and the frames of a ping. Pure functions; sources:
+// docs/protocols/ping1d.md.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "protocol/ping/echo.hpp"
+#include "protocol/ping/s500_messages.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::ping::s500 {
+
+std::span<const std::shared_ptr<const SonarModel>> models();
+
+struct Parameters {
+  SetPingParams ping;              // as requested
+  Reach reach{.length_mm = 5000};  // in force: as requested, or as the device chose it
+  std::uint32_t speed_mm_per_s = 1500000;
+  std::uint8_t enable = 1;
+};
+
+inline constexpr Results altitude_result = 1, distance_result = 2, profile_result = 4;
+inline Results results_of(Id id) {
+  return id == Id::ping1d_distance_simple ? altitude_result
+         : id == Id::s500_distance2       ? distance_result
+         : id == Id::s500_profile6        ? profile_result
+                                          : no_result;
+}
+
+struct Settings {
+  std::uint8_t id = 0;  // id of the device; unknown: its number
+  Parameters parameters;
+  Results results = no_result;  // results for which the ping is fired; a ping without a host has its profile
+  std::vector<Echo> earlier;    // the newest is the last
+};
+struct HeldSettings final : VendorSettings {
+  explicit HeldSettings(const Settings& s) : settings(s) {}
+  /// But for the results and the echoes, which differ from ping to ping.
+  bool equals(const VendorSettings& other) const override;
+  Settings settings;
+};
+/// The settings of a new device, for null.
+Settings settings_from(const VendorSettings* held);
+
+/// Why the device refuses it; empty = it does not.
+std::string complaint(const SetPingParams& wanted);
+/// The parameters in force after the request.
+Parameters requested(const Parameters& before, const SetPingParams& wanted);
+/// Least time from a ping to the next.
+int interval_ms(const Parameters& parameters);
+PingSettings ping_settings(const Settings& settings);
+protocol::ChangeSettings change_to(const Settings& settings);
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+double gain_percent(const Parameters& parameters);
+
+/// `now` after a ping, which may have been made with others.
+Settings after(const Ping& ping, const Settings& now);
+/// Those of Settings::results, in the order of their numbers.
+std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device);
+
+}  // namespace sonar::ping::s500

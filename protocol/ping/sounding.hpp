@@ -1,0 +1,94 @@
+// The common part of the conversations with range finders, Ping1D and S500: pings are fired one by one for what a host requests
+// or streams.
+#pragma once
+
+#include <cmath>
+#include <utility>
+
+#include "protocol/ping/echo.hpp"
+#include "protocol/ping/streaming.hpp"
+
+namespace sonar::ping {
+
+/// `Settings` as those of a StreamingConversation, and with `results`, for which a ping is fired; `Held` holds them.
+template <class Settings, class Held, Settings (*settings_from)(const VendorSettings*)>
+class SoundingConversation : public StreamingConversation<Settings, settings_from> {
+  using Base = StreamingConversation<Settings, settings_from>;
+  static constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping is taken as lost
+
+ public:
+  SoundingConversation(const protocol::DeviceState& device, const protocol::Port& port, DeviceInformation identity, Time now)
+      : Base(device, port, identity), due_(now) {}
+
+  protocol::Reaction on_tick(Time now, bool ping_pending) override {
+    protocol::Reaction reaction;
+    if (now < next_tick()) return reaction;
+    if (fired_ && ping_pending) return fired_at_ = now, reaction;  // the interval is not over
+    Settings s = this->settings();
+    s.id = this->id_;
+    s.results = wanted();
+    fired_ = std::make_shared<Held>(s);
+    fired_at_ = now;
+    reaction.events.emplace_back(protocol::RequestPing{.joins = false, .head_rad = 0, .with = fired_});
+    return reaction;
+  }
+  Time next_tick() const override {
+    if (wanted() == no_result || this->settings().parameters.enable == 0) return Time::max();
+    return fired_ ? fired_at_ + longest_wait : due_;
+  }
+  std::optional<Time> next_ping_request() const override {
+    return next_tick() != Time::max() && !fired_ ? std::optional(due_) : std::nullopt;
+  }
+  bool hosts_fall_silent() const override { return streamed_ != no_result; }
+  protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
+    const Results results = settings_from(made_with).results;
+    if (made_with == fired_.get()) {
+      fired_.reset();
+      due_ = now;
+    }
+    if ((results & wanted()) == 0) return {};
+    once_ &= ~results;
+    return {{Bytes{}}, {}};
+  }
+
+ protected:
+  Bytes message_now(Id, Time) override { return {}; }
+
+  Results wanted() const { return once_ | streamed_; }
+  void want_once(Results result, Time now, protocol::Reaction& reaction) { want(once_, result, now, reaction); }
+  void stream(Results result, Time now, protocol::Reaction& reaction) { want(streamed_, result, now, reaction); }
+  void stop_stream(Results result) { streamed_ &= ~result; }
+  /// A ping under way serves no request any more.
+  void forget_ping(Time now) {
+    fired_.reset();
+    due_ = now;
+  }
+  template <class T>
+  Bytes value(Id id, T value) const {
+    Bytes payload;
+    wire::Writer write(payload);
+    write("value", value);
+    return framed(id, this->id_, payload);
+  }
+  /// Hundredths of a degree, so far above the water.
+  std::uint16_t centidegrees(double above_c) const {
+    return static_cast<std::uint16_t>(std::lround(std::max(100 * (this->device_.water.temperature_c + above_c), 0.0)));
+  }
+
+ private:
+  /// A ping under way does not serve the new request; the next ping does.
+  void want(Results& results, Results result, Time now, protocol::Reaction& reaction) {
+    // Pings are enabled as the device comes: now they are made.
+    if (!std::exchange(has_asked_, true)) this->change(reaction, [](Settings&) {});
+    if (wanted() == no_result) due_ = now;
+    results |= result;
+  }
+
+  Results once_ = no_result, streamed_ = no_result;  // results that the host waits for
+  Time due_{};                                       // when the next requested ping is due, if none is under way
+  std::shared_ptr<const Held> fired_;                // the ping that is being made
+  Time fired_at_{};
+  bool has_asked_ = false;
+};
+
+}  // namespace sonar::ping
