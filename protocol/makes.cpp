@@ -7,6 +7,8 @@
 #include "protocol/host.hpp"
 #include "protocol/m3/host.hpp"
 #include "protocol/m3/m3.hpp"
+#include "protocol/micron/host.hpp"
+#include "protocol/micron/micron.hpp"
 #include "protocol/oculus/host.hpp"
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/ping/host.hpp"
@@ -136,6 +138,16 @@ std::vector<Make> product_makes() {
        .ports = m3::host_ports,
        .host = m3::make_host,
        .codec = m3::codec()},
+      {.device = &micron::vendor(),
+       .title = "a Micron",
+       .request = "message",
+       .remedy = "send mtHeadCommand (19), then mtSendData (25) for each scan line",
+       .ports = micron::host_ports,
+       .host = micron::make_host,
+       .codec = micron::codec(),
+       .own_numbers = true,
+       .scans = true,
+       .picture = PictureKind::sweep},
   };
 }
 

@@ -1,5 +1,5 @@
-// The laws by which the family's range finders read a ping of one beam: the distance to the strongest echo, and range and gain for
-// the next ping. Pure functions; the laws are assumptions (docs/protocols/ping1d.md).
+// The laws by which the family's range finders read a ping of one beam: the distance to the strongest echo, and range and gain
+// for the next ping. Pure functions; the laws are assumptions (docs/protocols/ping1d.md).
 #pragma once
 
 #include <cstdint>

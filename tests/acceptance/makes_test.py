@@ -31,7 +31,8 @@ MAKES = {"oculus-m1200d": (52100, "--range", 3, "--gain", 60, "--rate", 5, "--mo
          "ping1d": (9090, "--range", 3, "--gain", 60, "--rate", 5),
          "s500": (51200, "--make", "s500", "--range", 3, "--gain", 60, "--rate", 5),
          "dvl-a50": (16171, "--as-it-is"),  # it pings before settings come
-         "m3": (20001, "--as-it-is")}  # no settings come
+         "m3": (20001, "--as-it-is"),  # no settings come
+         "micron": (4001, "--range", 3, "--gain", 60)}
 PINGS = 4
 LONGEST_BEACON = 142  # bytes; beacons hold the address, which differs from run to run
 PATIENCE = ("--wait", 120)
@@ -126,7 +127,7 @@ class Recordings(unittest.TestCase):
             with self.subTest(profile=profile), Sonard(scene="l-targets.yaml", profile=profile, arguments=CHEAP) as daemon:
                 folder = pathlib.Path(daemon.folder.name)
                 kinds = ["mcap", "pcap"] + ([OWN_KINDS[profile]] if profile in OWN_KINDS else [])
-                pings = 210 if profile == "ping360" else PINGS  # a picture is of a whole scan
+                pings = 210 if profile in ("ping360", "micron") else PINGS  # a picture is of a whole scan
                 outputs = [word for kind in kinds for word in (f"--{kind}", folder / f"run.{kind}")]
                 done = self.ctl("record", f"{daemon.address}:{port}", "--pings", pings, *settings, *PATIENCE, *outputs)
                 self.assertEqual(done.returncode, 0, done.stderr)
@@ -139,7 +140,7 @@ class Recordings(unittest.TestCase):
                 self.assertEqual(len(shown), 1, "the same of every file")
                 for kind in kinds:
                     with self.subTest(profile=profile, kind=kind):
-                        self.replay(folder / f"run.{kind}", port, profile in ("blueview-p900-90", "ping360"))
+                        self.replay(folder / f"run.{kind}", port, profile in ("blueview-p900-90", "ping360", "micron"))
 
     def replay(self, path, port, depends_on_requests):
         """`sonarctl listen` of `sonard replay`."""

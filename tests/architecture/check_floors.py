@@ -121,8 +121,8 @@ FORBIDDEN = [
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]
 # A make of sonar is its folder and a line of makes.cpp; these files still name one. The list only gets shorter.
-MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|\bs500|surveyor|omniscan|3d-?15|protocol/ping/|\bping::|dvl-a|protocol/dvl/|\bdvl::", re.I)
-MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
+MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|\bs500|surveyor|omniscan|3d-?15|protocol/ping/|\bping::|dvl-a|protocol/dvl/|\bdvl::|\bmicron", re.I)
+MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl|micron)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
 NAME_MAKES = {
     "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py",
     "clients/python/sonard_client/judge/cases.py", "clients/python/sonard_client/judge/truth.py",

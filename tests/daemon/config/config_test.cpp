@@ -327,6 +327,7 @@ TEST(Config, TheShippedExampleIsValid) {
                                       {"sonard-omniscan.yaml", "omniscan-450"},
                                       {"sonard-ping1d.yaml", "ping1d"},
                                       {"sonard-s500.yaml", "s500"},
+                                      {"sonard-micron.yaml", "micron"},
                                       {"sonard-dvl.yaml", "dvl-a50"},
                                       {"sonard-m3.yaml", "m3"}}) {
     const auto ping = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/" + file);

@@ -173,7 +173,8 @@ TEST(M3Settings, AreRefusedWhereTheProductHasNone) {
     return change ? "taken" : change.error().text;
   };
   EXPECT_THAT(refusal({.range_m = 151, .rate_hz = {}, .gain_percent = {}, .mode = {}, .beams = {}}), HasSubstr("1 to 150 m"));
-  EXPECT_THAT(refusal({.range_m = {}, .rate_hz = 41, .gain_percent = {}, .mode = {}, .beams = {}}), HasSubstr("the rate of an M3 is 0 to 40 Hz, not 41 Hz"));
+  EXPECT_THAT(refusal({.range_m = {}, .rate_hz = 41, .gain_percent = {}, .mode = {}, .beams = {}}),
+              HasSubstr("the rate of an M3 is 0 to 40 Hz, not 41 Hz"));
   EXPECT_THAT(refusal({.range_m = {}, .rate_hz = {}, .gain_percent = 101, .mode = {}, .beams = {}}), HasSubstr("0 to 100"));
   EXPECT_THAT(refusal({.range_m = {}, .rate_hz = {}, .gain_percent = {}, .mode = 1, .beams = {}}), HasSubstr("one mode"));
   EXPECT_THAT(refusal({.range_m = {}, .rate_hz = {}, .gain_percent = {}, .mode = {}, .beams = 64}), HasSubstr("128 beams"));

@@ -1,0 +1,200 @@
+#include "protocol/micron/dialogue.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "protocol/micron/settings.hpp"
+
+namespace sonar::micron {
+namespace {
+
+using protocol::Reaction;
+
+constexpr auto alive_period = std::chrono::seconds(1);
+constexpr auto boot_time = std::chrono::seconds(2);     // unknown: hosts wait 2.5 s before they read
+constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping is taken as lost; it is still sent if it comes
+constexpr int recentring_alives = 2;                    // the first states that the head is away from its centre
+constexpr std::size_t user_size = 250, calibration_size = 66, fpga_version_size = 14;  // of their payloads
+constexpr std::size_t notices_per_call = 8;                                            // bounds the log output of a hostile host
+
+class MicronDialogue final : public protocol::Dialogue {
+ public:
+  MicronDialogue(const protocol::DeviceState& device, Time now)
+      : device_(device), next_alive_(now + alive_period), arrives_(now), knows_parameters_(settings().has_parameters) {}
+
+  Reaction on_bytes(BytesView received, Time now) override {
+    Reaction reaction;
+    splitter_.append(now, received);
+    while (const auto whole = splitter_.next()) {
+      if (now < boots_until_) continue;  // it hears nothing
+      if (const auto message = read_frame(whole->bytes))
+        on_message(*message, now, reaction);
+      else
+        notice(std::to_string(whole->bytes.size()) + " bytes that are no message", reaction);
+    }
+    return reaction;
+  }
+
+  Reaction on_tick(Time now, bool ping_pending) override {
+    Reaction reaction;
+    if (now >= next_alive_) {
+      reaction.replies.push_back(alive(now));
+      next_alive_ = now + alive_period;
+    }
+    if (now < ping_tick()) return reaction;
+    if (fired_ && ping_pending) return fired_at_ = now, reaction;  // it has not been started
+    if (fired_) return late_ = fired_, advance(now), reaction;     // it was started and has brought no ping yet
+    Settings s = settings();
+    s.bearing = static_cast<std::uint16_t>(scan_.bearing);
+    fired_ = std::make_shared<HeldSettings>(s);
+    fired_at_ = now;
+    reaction.events.emplace_back(protocol::RequestPing{.joins = false, .head_rad = head_rad(s), .with = fired_});
+    return reaction;
+  }
+  Time next_tick() const override { return std::min(next_alive_, ping_tick()); }
+  std::optional<Time> next_ping_request() const override {
+    return wanted_ > 0 && !fired_ ? std::optional(ping_tick()) : std::nullopt;
+  }
+  void on_ping_queued(Time) override {}
+  protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
+    if (late_ && made_with == late_.get())
+      late_.reset();
+    else if (fired_ && made_with == fired_.get())
+      advance(now);
+    else
+      return {};                       // made for a request that a new command has replaced
+    next_alive_ = now + alive_period;  // unknown: assumed, because drivers read the lines of a scan without looking for others
+    return {{Bytes{}}, {}};
+  }
+
+ private:
+  void on_message(const Message& message, Time now, Reaction& reaction) {
+    switch (message.header.id) {
+      case Id::send_version: {
+        const VersionData version{.software = 1, .serial = device_.id};
+        reaction.replies.push_back(from_head(Id::version_data, wire::bytes_of(version)));
+        return;
+      }
+      case Id::send_user:  // drivers of the first message wait for the others, too
+        reaction.replies.push_back(from_head(Id::user_data, Bytes(user_size)));
+        reaction.replies.push_back(from_head(Id::fpga_calibration_data, Bytes(calibration_size)));
+        reaction.replies.push_back(from_head(Id::fpga_version_data, Bytes(fpga_version_size)));
+        return;
+      case Id::reboot:
+        return reboot(now, reaction);
+      case Id::head_command:
+        return on_command(message.payload, now, reaction);
+      case Id::send_data: {
+        if (!settings_after(reaction).has_parameters) return notice("it has no parameters: send mtHeadCommand first", reaction);
+        const int lines = protocol::text_option(device_.options, option_name::lines) == "2" ? 2 : 1;
+        wanted_ = std::min(wanted_ + lines, 2 * lines);
+        next_alive_ = now + alive_period;
+        return;
+      }
+      case Id::stop_alives:
+        next_alive_ = Time::max();
+        return;
+      default:
+        notice("unknown message " + std::to_string(static_cast<int>(message.header.id)), reaction);
+    }
+  }
+
+  void on_command(BytesView payload, Time now, Reaction& reaction) {
+    Settings s = settings_after(reaction);
+    if (payload.size() == 1 && payload.front() == std::byte{reverse_command}) {
+      scan_.to_right = !scan_.to_right;
+      return;
+    }
+    const auto command = read_front<HeadCommand>(payload);
+    if (!command || (command->kind != whole_command && command->kind != long_command))
+      return notice("mtHeadCommand of another kind", reaction);
+    if (const std::string why = complaint(*command); !why.empty()) return notice("ignored mtHeadCommand: " + why, reaction);
+    s.command = *command;
+    s.has_parameters = true;
+    forget_pings();
+    const int way = scan_.begin(s.command);
+    arrives_ = std::max(arrives_, now) + turning(way);
+    reaction.events.emplace_back(change_to(s, device_));
+  }
+
+  void reboot(Time now, Reaction& reaction) {
+    forget_pings();
+    scan_ = {};
+    boots_until_ = now + boot_time;
+    recentring_ = recentring_alives;
+    next_alive_ = arrives_ = boots_until_;
+    knows_parameters_ = false;
+    reaction.events.emplace_back(change_to(Settings{}, device_));
+  }
+
+  Bytes alive(Time now) {
+    const Settings s = settings();
+    using namespace head_info;
+    const bool centred = recentring_ == 0;
+    std::uint8_t info = motor_on | (centred ? head_info::centred : static_cast<std::uint8_t>(recentring | motoring));
+    if (recentring_ == recentring_alives || (s.has_parameters && scan_.to_right)) info |= to_right;
+    // Parameters are received in one sign of life and valid from the next one on.
+    if (!s.has_parameters || !knows_parameters_) info |= no_parameters;
+    if (s.has_parameters) info |= received_parameters;
+    knows_parameters_ = s.has_parameters;
+    recentring_ = std::max(recentring_ - 1, 0);
+    constexpr auto day = std::chrono::hours(24);
+    const auto of_day = std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch() % day);
+    const Alive message{.lacks_parameters = static_cast<std::uint8_t>((info & no_parameters) != 0 ? 0x80 : 0),
+                        .time_ms = static_cast<std::uint32_t>(of_day.count()),
+                        .bearing = static_cast<std::uint16_t>(scan_.bearing),
+                        .head_info = info};
+    return from_head(Id::alive, wire::bytes_of(message));
+  }
+
+  /// Call it after a ping: the head turns on when the bins were taken and sent.
+  void advance(Time now) {
+    fired_.reset();
+    --wanted_;
+    const HeadCommand command = settings().command;
+    const auto after = listening(command) + transfer(command, device_.options);
+    // After a late ping the scan does not catch up: the next one is due now at the earliest.
+    arrives_ = std::max(fired_at_ + after + turning(scan_.advance(command)), now);
+  }
+  void forget_pings() {
+    wanted_ = 0;
+    fired_.reset();
+    late_.reset();
+  }
+
+  Settings settings() const { return settings_from(device_.settings.get()); }
+  /// With the changes of the same call, which are not in force yet.
+  Settings settings_after(const Reaction& reaction) const {
+    Settings s = settings();
+    for (const protocol::Event& event : reaction.events)
+      if (const auto* earlier = std::get_if<protocol::ChangeSettings>(&event)) s = settings_from(earlier->vendor_settings.get());
+    return s;
+  }
+  Time ping_tick() const {
+    if (wanted_ == 0) return Time::max();
+    return fired_ ? fired_at_ + longest_wait : arrives_;
+  }
+  static void notice(std::string text, Reaction& reaction) {
+    if (reaction.events.size() < notices_per_call) reaction.events.emplace_back(protocol::Notice{std::move(text)});
+  }
+
+  const protocol::DeviceState& device_;
+  recording::MessageSplitter splitter_{recording::Origin::client, framing};
+  Time next_alive_{}, boots_until_{};
+  int recentring_ = 0;  // signs of life that still say so
+  Scan scan_;           // where the head is or goes to
+  Time arrives_{};      // there
+  bool knows_parameters_;
+  int wanted_ = 0;                             // scan lines
+  std::shared_ptr<const HeldSettings> fired_;  // the ping that is being made
+  std::shared_ptr<const HeldSettings> late_;   // one that has not come in time
+  Time fired_at_{};
+};
+
+}  // namespace
+
+std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now) {
+  return std::make_unique<MicronDialogue>(device, now);
+}
+
+}  // namespace sonar::micron

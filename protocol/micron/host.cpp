@@ -1,0 +1,124 @@
+#include "protocol/micron/host.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/text/format.hpp"
+#include "protocol/micron/settings.hpp"
+#include "protocol/sweep.hpp"
+
+namespace sonar::micron {
+namespace {
+
+using protocol::HostActions;
+using protocol::HostPing;
+
+constexpr double usual_range_m = 10, sound_mps = 1500;
+constexpr auto patience = std::chrono::milliseconds(500);  // for a scan line
+
+/// The half circle ahead in steps of a grad.
+HeadCommand command_of(const protocol::SettingsOverride& wanted) {
+  HeadCommand c;
+  c.control &= static_cast<std::uint16_t>(~control::continuous);
+  c.left = ahead - turn / 4;
+  c.right = ahead + turn / 4;
+  const double range_m = wanted.range_m.value_or(usual_range_m);
+  c.interval = static_cast<std::uint16_t>(std::clamp(std::lround(2 * range_m / sound_mps / c.bins / bin_unit_s), 1L, 65535L));
+  c.range_dm = static_cast<std::uint16_t>(std::clamp(std::lround(10 * range_m), 1L, 16383L));
+  if (wanted.gain_percent)
+    c.gain = static_cast<std::uint8_t>(std::clamp(std::lround(most_gain * *wanted.gain_percent / 100), 0L, 255L));
+  c.gain2 = c.gain;
+  return c;
+}
+
+class MicronHost final : public protocol::Host {
+ public:
+  explicit MicronHost(std::optional<HeadCommand> command) : command_(std::move(command)) {}
+
+  HostActions on_open(std::span<const std::uint16_t>, Time now) override {
+    if (!command_) return {};
+    return {protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*command_))}, request(now)};
+  }
+  /// A request or its answer may be lost.
+  HostActions on_tick(Time now) override { return command_ && now >= *next_tick() ? HostActions{request(now)} : HostActions{}; }
+  std::optional<Time> next_tick() const override { return command_ ? std::optional(requested_at_ + patience) : std::nullopt; }
+  HostActions on_bytes(std::size_t, BytesView received, Time now) override {
+    HostActions actions;
+    splitter_.append(now, received);
+    while (const auto whole = splitter_.next()) {
+      const auto message = read_frame(whole->bytes);
+      if (!message) {
+        counts_.junk_bytes += whole->bytes.size();
+        continue;
+      }
+      ++counts_.messages;
+      if (message->header.id == Id::alive) on_alive(message->payload, actions);
+      if (message->header.id != Id::head_data) continue;
+      if (auto ping = ping_from(message->payload)) {
+        ping->facts.message_size = whole->bytes.size();
+        actions.emplace_back(*std::move(ping));
+      }
+      if (command_) actions.emplace_back(request(now));
+    }
+    return actions;
+  }
+  std::string about() const override { return "a Micron"; }
+  std::optional<Counts> counts() const override { return counts_; }
+
+ private:
+  protocol::HostSend request(Time now) {
+    requested_at_ = now;
+    return {0, from_host(Id::send_data, Bytes(4))};
+  }
+
+  /// A head that has restarted lacks its parameters.
+  void on_alive(BytesView payload, HostActions& actions) const {
+    const auto alive = read_front<Alive>(payload);
+    if (alive && command_ && (alive->head_info & head_info::received_parameters) == 0)
+      actions.emplace_back(protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*command_))});
+  }
+
+  std::optional<HostPing> ping_from(BytesView payload) {
+    const auto data = read_front<HeadData>(payload);
+    if (!data || data->step == 0 || data->bearing >= turn) return std::nullopt;
+    const BytesView rest = payload.subspan(wire::wire_size<HeadData>());
+    if (rest.size() != data->size) return std::nullopt;
+    const bool eight_bits = (data->control & control::eight_bits) != 0;
+    const Bytes bins = eight_bits ? Bytes(rest.begin(), rest.end()) : unpacked(rest);
+    if (bins.empty()) return std::nullopt;
+    const double row_m = data->interval * bin_unit_s * sound_mps / 2;
+    const auto rows = static_cast<unsigned>(bins.size());
+    HostPing ping;
+    const double frequency_hz = static_cast<double>(models().front()->modes.front().centre_hz);
+    ping.facts = {++pings_, 1, rows, eight_bits ? 8u : 4u, row_m, rows * row_m, frequency_hz, 0};
+    ping.facts.note = text::format("bearing %.1f deg", (data->bearing - ahead) * 360.0 / turn);
+    protocol::Line line;
+    for (const std::byte bin : bins) line.push_back(static_cast<float>(std::to_integer<int>(bin) * (eight_bits ? 1 : 17)));
+    const auto directions = static_cast<std::size_t>(std::max(turn / data->step, 4));
+    if (sweep_.directions() != directions) sweep_ = protocol::Sweep(directions);
+    const bool is_inverted = (data->control & control::inverted) != 0;
+    const int bearing = is_inverted ? (turn - data->bearing) % turn : data->bearing;
+    const auto direction = static_cast<std::size_t>(std::lround(bearing * static_cast<double>(directions) / turn)) % directions;
+    sweep_.add(direction, std::move(line), row_m, ping);
+    return ping;
+  }
+
+  std::optional<HeadCommand> command_;  // nullopt: nothing is sent
+  recording::MessageSplitter splitter_{recording::Origin::device, framing};
+  protocol::Sweep sweep_{400};
+  Time requested_at_{};
+  std::uint32_t pings_ = 0;  // a Micron does not number its pings
+  Counts counts_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
+  if (auto accepted = protocol::accept_settings(wanted, "a Micron", {"range", "gain", "mode"}); !accepted)
+    return tl::unexpected(accepted.error());
+  if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, "a Micron has one mode only");
+  return std::make_unique<MicronHost>(wanted.as_it_is ? std::nullopt : std::optional(command_of(wanted.settings)));
+}
+
+}  // namespace sonar::micron

@@ -1,0 +1,23 @@
+// Where mtHeadData has the fields and regions that faults change.
+#include "protocol/micron/settings.hpp"
+
+namespace sonar::micron {
+
+std::optional<protocol::Field> locate(protocol::FieldName name, BytesView frame) {
+  if (const auto found = wire::locate<Header>(name, frame)) return found;
+  auto found = wire::locate<HeadData>(name);
+  if (found) found->offset += header_size;
+  return found && !frame.empty() && found->offset + found->size > frame.size() ? std::nullopt : found;
+}
+
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView frame) {
+  constexpr std::size_t data = header_size + wire::wire_size<HeadData>();
+  if (region == protocol::Region::bearings) return std::nullopt;
+  if (frame.empty()) return std::pair<std::size_t, std::size_t>{};
+  if (frame.size() <= data) return std::nullopt;
+  if (region == protocol::Region::header) return std::pair{std::size_t{0}, header_size};
+  return region == protocol::Region::metadata ? std::pair{header_size, data - header_size}
+                                              : std::pair{data, frame.size() - 1 - data};
+}
+
+}  // namespace sonar::micron
