@@ -43,11 +43,6 @@ std::string out_of_range(const Acoustics& a, const Product& product) {
 
 }  // namespace
 
-bool HeldSettings::equals(const VendorSettings& other) const {
-  const auto* of = dynamic_cast<const HeldSettings*>(&other);
-  return of != nullptr && settings == of->settings;
-}
-
 Settings initial_settings(const protocol::DeviceState& device) {
   Settings s;
   const Product& product = product_of(*device.model);

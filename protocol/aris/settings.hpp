@@ -7,6 +7,7 @@
 
 #include "core/sonar/ping_settings.hpp"
 #include "protocol/aris/models.hpp"
+#include "protocol/held_settings.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::aris {
@@ -30,11 +31,7 @@ struct Settings {
   std::uint32_t first_ping = 0;              // number of the last ping before the controller connected
   bool operator==(const Settings&) const = default;
 };
-struct HeldSettings final : VendorSettings {
-  explicit HeldSettings(const Settings& s) : settings(s) {}
-  bool equals(const VendorSettings& other) const override;
-  Settings settings;
-};
+using HeldSettings = protocol::Held<Settings>;
 Settings initial_settings(const protocol::DeviceState& device);
 /// initial_settings() for null.
 Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device);

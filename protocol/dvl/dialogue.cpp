@@ -4,6 +4,7 @@
 
 #include "protocol/dvl/commands.hpp"
 #include "protocol/dvl/reports.hpp"
+#include "protocol/held_settings.hpp"
 
 namespace sonar::dvl {
 namespace {
@@ -95,10 +96,7 @@ class DvlDialogue final : public protocol::Dialogue {
   Settings settings() const { return settings_from(device_.settings.get()); }
   /// With the changes of the same call, which are not in force yet.
   Settings settings_after(const Reaction& reaction) const {
-    Settings s = settings();
-    for (const protocol::Event& event : reaction.events)
-      if (const auto* earlier = std::get_if<protocol::ChangeSettings>(&event)) s = settings_from(earlier->vendor_settings.get());
-    return s;
+    return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
 
   void on_object(const std::string& object, Time now, Reaction& reaction) {

@@ -17,11 +17,6 @@ bool HeldSettings::equals(const VendorSettings& other) const {
   return of != nullptr && of->settings.configured() == settings.configured();
 }
 
-Settings settings_from(const VendorSettings* held) {
-  const auto* of = dynamic_cast<const HeldSettings*>(held);
-  return of != nullptr ? of->settings : Settings{};
-}
-
 bool allow_modes(std::string_view text, Settings& settings) {
   const auto mode = [](char c) { return c >= '0' && c < '0' + range_mode_count ? std::optional(c - '0') : std::nullopt; };
   std::optional<int> lowest, highest;

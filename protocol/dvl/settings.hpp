@@ -6,6 +6,7 @@
 
 #include "core/sonar/range_image.hpp"
 #include "protocol/dvl/models.hpp"
+#include "protocol/held_settings.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::dvl {
@@ -42,7 +43,7 @@ struct HeldSettings final : RangeImageSettings {
   Settings settings;
 };
 /// As the device comes, for null.
-Settings settings_from(const VendorSettings* held);
+inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// Allows the modes of "auto", "=a" or "a<=b". False: the text is none of these.
 bool allow_modes(std::string_view text, Settings& settings);

@@ -19,16 +19,6 @@ constexpr double near_per_far = 0.02;             // PKT, LOG: 0.2 of 10 m, 0.4 
 
 }  // namespace
 
-bool HeldSettings::equals(const VendorSettings& other) const {
-  const auto* of = dynamic_cast<const HeldSettings*>(&other);
-  return of != nullptr && of->settings == settings;
-}
-
-Settings settings_from(const VendorSettings* held) {
-  const auto* of = dynamic_cast<const HeldSettings*>(held);
-  return of != nullptr ? of->settings : Settings{};
-}
-
 double near_of(double far_m) { return std::max(nearest_m, near_per_far * far_m); }
 
 Window window_of(double near_m, double far_m) {

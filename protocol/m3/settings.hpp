@@ -5,6 +5,7 @@
 
 #include "core/sonar/phases.hpp"
 #include "core/sonar/ping_settings.hpp"
+#include "protocol/held_settings.hpp"
 #include "protocol/m3/messages.hpp"
 #include "protocol/m3/models.hpp"
 #include "protocol/vendor.hpp"
@@ -21,13 +22,9 @@ struct Settings {
   float c_db = GainLaw{}.c_db;
   bool operator==(const Settings&) const = default;
 };
-struct HeldSettings final : PhasedSettings {
-  explicit HeldSettings(const Settings& s) : settings(s) {}
-  bool equals(const VendorSettings& other) const override;
-  Settings settings;
-};
+using HeldSettings = protocol::Held<Settings, PhasedSettings>;
 /// Settings{} for null.
-Settings settings_from(const VendorSettings* held);
+inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// The near range that goes with a far one.
 double near_of(double far_m);

@@ -165,10 +165,7 @@ class MicronDialogue final : public protocol::Dialogue {
   Settings settings() const { return settings_from(device_.settings.get()); }
   /// With the changes of the same call, which are not in force yet.
   Settings settings_after(const Reaction& reaction) const {
-    Settings s = settings();
-    for (const protocol::Event& event : reaction.events)
-      if (const auto* earlier = std::get_if<protocol::ChangeSettings>(&event)) s = settings_from(earlier->vendor_settings.get());
-    return s;
+    return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
   Time ping_tick() const {
     if (wanted_ == 0) return Time::max();

@@ -66,14 +66,8 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   return all;
 }
 
-bool HeldSettings::equals(const VendorSettings& other) const {
-  const auto* of = dynamic_cast<const HeldSettings*>(&other);
-  return of != nullptr && of->settings.command == settings.command && of->settings.has_parameters == settings.has_parameters;
-}
-
-Settings settings_from(const VendorSettings* held) {
-  const auto* of = dynamic_cast<const HeldSettings*>(held);
-  return of != nullptr ? of->settings : Settings{};
+bool same_settings(const Settings& a, const Settings& b) {
+  return a.command == b.command && a.has_parameters == b.has_parameters;
 }
 
 std::string complaint(const HeadCommand& c) {

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "protocol/held_settings.hpp"
 #include "protocol/micron/messages.hpp"
 #include "protocol/options.hpp"
 #include "protocol/vendor.hpp"
@@ -26,14 +27,11 @@ struct Settings {
   bool has_parameters = false;    // a host has sent the command since the last reboot
   std::uint16_t bearing = ahead;  // of a ping
 };
-struct HeldSettings final : VendorSettings {
-  explicit HeldSettings(const Settings& s) : settings(s) {}
-  /// But for the bearing, which changes with every ping.
-  bool equals(const VendorSettings& other) const override;
-  Settings settings;
-};
+/// But for the bearing, which changes with every ping.
+bool same_settings(const Settings& a, const Settings& b);
+using HeldSettings = protocol::Held<Settings>;
 /// The settings of a new device, for null.
-Settings settings_from(const VendorSettings* held);
+inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// Why the device ignores it; empty = it does not.
 std::string complaint(const HeadCommand& command);

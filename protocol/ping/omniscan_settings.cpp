@@ -56,16 +56,6 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   return all;
 }
 
-bool HeldSettings::equals(const VendorSettings& other) const {
-  const auto* of = dynamic_cast<const HeldSettings*>(&other);
-  return of != nullptr && of->settings == settings;
-}
-
-Settings settings_from(const VendorSettings* held) {
-  const auto* of = dynamic_cast<const HeldSettings*>(held);
-  return of != nullptr ? of->settings : Settings{};
-}
-
 std::string complaint(const OsPingParams& p) {
   if (p.length_mm < least_length_mm || 1e-3 * p.start_mm + 1e-3 * p.length_mm > longest_m)
     return "length_mm is from 100, its end to 150000";

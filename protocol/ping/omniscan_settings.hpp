@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "protocol/held_settings.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/vendor.hpp"
 
@@ -17,13 +18,9 @@ struct Settings {
   float speed_mps = 1500;
   bool operator==(const Settings&) const = default;
 };
-struct HeldSettings final : VendorSettings {
-  explicit HeldSettings(const Settings& s) : settings(s) {}
-  bool equals(const VendorSettings& other) const override;
-  Settings settings;
-};
+using HeldSettings = protocol::Held<Settings>;
 /// Null: the settings of a new device.
-Settings settings_from(const VendorSettings* held);
+inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// Why the device refuses the parameters; empty if it accepts them.
 std::string complaint(const OsPingParams& parameters);

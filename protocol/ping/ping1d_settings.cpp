@@ -50,15 +50,7 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   return all;
 }
 
-bool HeldSettings::equals(const VendorSettings& other) const {
-  const auto* of = dynamic_cast<const HeldSettings*>(&other);
-  return of != nullptr && of->settings.id == settings.id && of->settings.parameters == settings.parameters;
-}
-
-Settings settings_from(const VendorSettings* held) {
-  const auto* of = dynamic_cast<const HeldSettings*>(held);
-  return of != nullptr ? of->settings : Settings{};
-}
+bool same_settings(const Settings& a, const Settings& b) { return a.id == b.id && a.parameters == b.parameters; }
 
 std::string complaint(const Parameters& p) {
   if (p.range.length_mm < shortest_range_mm || p.range.length_mm > most_mm || p.range.start_mm > most_mm ||

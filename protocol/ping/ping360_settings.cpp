@@ -76,19 +76,11 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   return all;
 }
 
-bool HeldSettings::equals(const VendorSettings& other) const {
-  const auto* of = dynamic_cast<const HeldSettings*>(&other);
-  if (of == nullptr) return false;
-  Transducer theirs = of->settings.ping;
-  // The angle is not compared, because it changes with every ping.
-  theirs.angle = settings.ping.angle;
+bool same_settings(const Settings& a, const Settings& b) {
+  Transducer theirs = a.ping;
+  theirs.angle = b.ping.angle;
   const auto scan = [](const Settings& s) { return std::tuple(s.scans, s.start, s.stop, s.steps, s.delay_ms); };
-  return settings.ping == theirs && scan(settings) == scan(of->settings);
-}
-
-Settings settings_from(const VendorSettings* held) {
-  const auto* of = dynamic_cast<const HeldSettings*>(held);
-  return of != nullptr ? of->settings : Settings{};
+  return b.ping == theirs && scan(b) == scan(a);
 }
 
 std::string complaint(const Transducer& t) {

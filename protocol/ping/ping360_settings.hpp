@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "protocol/held_settings.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/vendor.hpp"
 
@@ -27,14 +28,11 @@ struct Settings {
   std::uint16_t start = 0, stop = 399;
   std::uint8_t steps = 1, delay_ms = 0;
 };
-struct HeldSettings final : VendorSettings {
-  explicit HeldSettings(const Settings& s) : settings(s) {}
-  /// But for the angle, which changes with every ping.
-  bool equals(const VendorSettings& other) const override;
-  Settings settings;
-};
+/// But for the angle, which changes with every ping.
+bool same_settings(const Settings& a, const Settings& b);
+using HeldSettings = protocol::Held<Settings>;
 /// The settings of a new device, for null.
-Settings settings_from(const VendorSettings* held);
+inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// Why the device refuses it; empty = it does not.
 std::string complaint(const Transducer& t);

@@ -84,18 +84,12 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   return all;
 }
 
-bool HeldSettings::equals(const VendorSettings& other) const {
-  const auto* of = dynamic_cast<const HeldSettings*>(&other);
+bool same_settings(const Settings& a, const Settings& b) {
   const auto all = [](const Settings& s) {
     const Parameters& p = s.parameters;
     return std::tuple(s.id, p.ping, p.reach.length_mm, p.reach.gain, p.speed_mm_per_s, p.enable);
   };
-  return of != nullptr && all(of->settings) == all(settings);
-}
-
-Settings settings_from(const VendorSettings* held) {
-  const auto* of = dynamic_cast<const HeldSettings*>(held);
-  return of != nullptr ? of->settings : Settings{};
+  return all(a) == all(b);
 }
 
 std::string complaint(const SetPingParams& p) {

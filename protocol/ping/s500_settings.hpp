@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "protocol/held_settings.hpp"
 #include "protocol/ping/echo.hpp"
 #include "protocol/ping/s500_messages.hpp"
 #include "protocol/vendor.hpp"
@@ -34,14 +35,11 @@ struct Settings {
   Results results = no_result;  // results for which the ping is fired; a ping without a host has its profile
   std::vector<Echo> earlier;    // the newest is the last
 };
-struct HeldSettings final : VendorSettings {
-  explicit HeldSettings(const Settings& s) : settings(s) {}
-  /// But for the results and the echoes, which differ from ping to ping.
-  bool equals(const VendorSettings& other) const override;
-  Settings settings;
-};
+/// But for the results and the echoes, which differ from ping to ping.
+bool same_settings(const Settings& a, const Settings& b);
+using HeldSettings = protocol::Held<Settings>;
 /// The settings of a new device, for null.
-Settings settings_from(const VendorSettings* held);
+inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// Why the device refuses it; empty = it does not.
 std::string complaint(const SetPingParams& wanted);

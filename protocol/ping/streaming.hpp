@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "protocol/held_settings.hpp"
 #include "protocol/ping/conversation.hpp"
 
 namespace sonar::ping {
@@ -37,10 +38,7 @@ class StreamingConversation : public Conversation {
   Settings settings() const { return settings_from(device_.settings.get()); }
   /// With the changes of the same call, which are not in force yet.
   Settings settings_after(const protocol::Reaction& reaction) const {
-    Settings s = settings();
-    for (const protocol::Event& event : reaction.events)
-      if (const auto* earlier = std::get_if<protocol::ChangeSettings>(&event)) s = settings_from(earlier->vendor_settings.get());
-    return s;
+    return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
   template <class Change>
   void change(protocol::Reaction& reaction, Change apply) {

@@ -72,16 +72,9 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   return all;
 }
 
-bool HeldSettings::equals(const VendorSettings& other) const {
-  const auto* of = dynamic_cast<const HeldSettings*>(&other);
-  if (of == nullptr || of->settings.id != settings.id || of->settings.parameters != settings.parameters) return false;
-  const auto &a = settings.utc_ahead, &b = of->settings.utc_ahead;
-  return a.has_value() == b.has_value() && (!a || std::chrono::abs(*a - *b) < std::chrono::milliseconds(1));
-}
-
-Settings settings_from(const VendorSettings* held) {
-  const auto* of = dynamic_cast<const HeldSettings*>(held);
-  return of != nullptr ? of->settings : Settings{};
+bool same_settings(const Settings& a, const Settings& b) {
+  if (a.id != b.id || a.parameters != b.parameters || a.utc_ahead.has_value() != b.utc_ahead.has_value()) return false;
+  return !a.utc_ahead || std::chrono::abs(*a.utc_ahead - *b.utc_ahead) < std::chrono::milliseconds(1);
 }
 
 std::string complaint(const PingParameters& p) {

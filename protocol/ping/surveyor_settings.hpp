@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "protocol/held_settings.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/vendor.hpp"
 
@@ -17,14 +18,11 @@ struct Settings {
   PingParameters parameters;
   std::optional<std::chrono::nanoseconds> utc_ahead;  // offset of the device's clock, once a host has set it
 };
-struct HeldSettings final : VendorSettings {
-  explicit HeldSettings(const Settings& s) : settings(s) {}
-  /// Clocks that differ by less than a millisecond are the same.
-  bool equals(const VendorSettings& other) const override;
-  Settings settings;
-};
+/// Clocks that differ by less than a millisecond are the same.
+bool same_settings(const Settings& a, const Settings& b);
+using HeldSettings = protocol::Held<Settings>;
 /// Null: the settings of a new device.
-Settings settings_from(const VendorSettings* held);
+inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// Why the device refuses the parameters; empty if it accepts them.
 std::string complaint(const PingParameters& parameters);

@@ -9,9 +9,10 @@ import subprocess
 import sys
 
 # What a make of sonar may include beside its own folder.
-DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/dialogue.hpp", "protocol/host.hpp", "protocol/limits.hpp",
-          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/recorded/", "protocol/transport.hpp",
-          "protocol/sweep.hpp", "protocol/vendor.hpp", "protocol/waterfall.hpp", "protocol/wire/"]
+DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/awaited_ping.hpp", "protocol/dialogue.hpp",
+          "protocol/held_settings.hpp", "protocol/host.hpp", "protocol/limits.hpp",
+          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/recorded/", "protocol/serial_line.hpp",
+          "protocol/sweep.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/waterfall.hpp", "protocol/wire/"]
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
     "core/base": ["core/base/"],
@@ -29,13 +30,8 @@ FLOORS = {
     "protocol/control": ["core/base/", "protocol/control/"],
     "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/", "protocol/host.hpp"],
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
-    "protocol/oculus": [*DEVICE, "protocol/oculus/"],
-    "protocol/aris": [*DEVICE, "protocol/aris/"],
-    "protocol/waterlinked": [*DEVICE, "protocol/waterlinked/"],
-    "protocol/ping": [*DEVICE, "protocol/ping/"],
-    "protocol/dvl": [*DEVICE, "protocol/dvl/"],
-    "protocol/m3": [*DEVICE, "protocol/m3/"],
-    "protocol/blueview": [*DEVICE, "protocol/blueview/"],
+    **{f"protocol/{make}": [*DEVICE, f"protocol/{make}/"]
+       for make in ("aris", "blueview", "dvl", "m3", "micron", "oculus", "ping", "waterlinked")},
     "protocol/recorded": ["core/base/", "core/sonar/", "protocol/wire/", "protocol/recorded/"],
     "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/sender.hpp",
                            "protocol/wire/", "protocol/recorded/", "protocol/recording/"],

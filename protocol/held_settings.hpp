@@ -1,0 +1,40 @@
+// The settings of a make as a device holds them, and as pings carry them to their frames.
+#pragma once
+
+#include "core/sonar/ping.hpp"
+#include "protocol/dialogue.hpp"
+
+namespace sonar::protocol {
+
+/// Whether a client would see no difference. A make whose settings have parts that differ from ping to ping has its own, in its
+/// namespace.
+template <class Settings>
+bool same_settings(const Settings& a, const Settings& b) {
+  return a == b;
+}
+
+template <class Settings, class Base = VendorSettings>
+struct Held final : Base {
+  explicit Held(const Settings& s) : settings(s) {}
+  bool equals(const VendorSettings& other) const override {
+    const auto* of = dynamic_cast<const Held*>(&other);
+    return of != nullptr && same_settings(of->settings, settings);
+  }
+  Settings settings;
+};
+
+/// The held settings; null = those of a new device.
+template <class HeldSettings>
+auto settings_in(const VendorSettings* held) {
+  const auto* of = dynamic_cast<const HeldSettings*>(held);
+  return of != nullptr ? of->settings : decltype(of->settings){};
+}
+
+/// The settings that hold after `reaction`, whose changes are not in force yet; `now` without one.
+inline const VendorSettings* settings_after(const Reaction& reaction, const VendorSettings* now) {
+  for (const Event& event : reaction.events)
+    if (const auto* change = std::get_if<ChangeSettings>(&event)) now = change->vendor_settings.get();
+  return now;
+}
+
+}  // namespace sonar::protocol
