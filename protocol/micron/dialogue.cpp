@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "protocol/awaited_ping.hpp"
 #include "protocol/micron/settings.hpp"
 
 namespace sonar::micron {
@@ -11,9 +12,8 @@ namespace {
 using protocol::Reaction;
 
 constexpr auto alive_period = std::chrono::seconds(1);
-constexpr auto boot_time = std::chrono::seconds(2);     // unknown: hosts wait 2.5 s before they read
-constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping is taken as lost; it is still sent if it comes
-constexpr int recentring_alives = 2;                    // the first states that the head is away from its centre
+constexpr auto boot_time = std::chrono::seconds(2);  // unknown: hosts wait 2.5 s before they read
+constexpr int recentring_alives = 2;                 // the first states that the head is away from its centre
 constexpr std::size_t user_size = 250, calibration_size = 66, fpga_version_size = 14;  // of their payloads
 constexpr std::size_t notices_per_call = 8;                                            // bounds the log output of a hostile host
 
@@ -42,27 +42,26 @@ class MicronDialogue final : public protocol::Dialogue {
       next_alive_ = now + alive_period;
     }
     if (now < ping_tick()) return reaction;
-    if (fired_ && ping_pending) return fired_at_ = now, reaction;  // it has not been started
-    if (fired_) return late_ = fired_, advance(now), reaction;     // it was started and has brought no ping yet
+    if (awaited_.is_under_way()) {
+      if (awaited_.lose(ping_pending, now)) advance(now);
+      return reaction;
+    }
     Settings s = settings();
     s.bearing = static_cast<std::uint16_t>(scan_.bearing);
-    fired_ = std::make_shared<HeldSettings>(s);
-    fired_at_ = now;
-    reaction.events.emplace_back(protocol::RequestPing{.joins = false, .head_rad = head_rad(s), .with = fired_});
+    const auto with = std::make_shared<const HeldSettings>(s);
+    awaited_.begin(with, now);
+    reaction.events.emplace_back(protocol::RequestPing{.joins = false, .head_rad = head_rad(s), .with = with});
     return reaction;
   }
   Time next_tick() const override { return std::min(next_alive_, ping_tick()); }
   std::optional<Time> next_ping_request() const override {
-    return wanted_ > 0 && !fired_ ? std::optional(ping_tick()) : std::nullopt;
+    return wanted_ > 0 && !awaited_.is_under_way() ? std::optional(ping_tick()) : std::nullopt;
   }
   void on_ping_queued(Time) override {}
   protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
-    if (late_ && made_with == late_.get())
-      late_.reset();
-    else if (fired_ && made_with == fired_.get())
-      advance(now);
-    else
-      return {};                       // made for a request that a new command has replaced
+    const auto arrival = awaited_.arrive(made_with);
+    if (arrival == protocol::AwaitedPing::Arrival::other) return {};
+    if (arrival == protocol::AwaitedPing::Arrival::awaited) advance(now);
     next_alive_ = now + alive_period;  // unknown: assumed, because drivers read the lines of a scan without looking for others
     return {{Bytes{}}, {}};
   }
@@ -149,17 +148,15 @@ class MicronDialogue final : public protocol::Dialogue {
 
   /// Call it after a ping: the head turns on when the bins were taken and sent.
   void advance(Time now) {
-    fired_.reset();
     --wanted_;
     const HeadCommand command = settings().command;
     const auto after = listening(command) + transfer(command, device_.options);
     // After a late ping the scan does not catch up: the next one is due now at the earliest.
-    arrives_ = std::max(fired_at_ + after + turning(scan_.advance(command)), now);
+    arrives_ = std::max(awaited_.fired_at() + after + turning(scan_.advance(command)), now);
   }
   void forget_pings() {
     wanted_ = 0;
-    fired_.reset();
-    late_.reset();
+    awaited_.forget();
   }
 
   Settings settings() const { return settings_from(device_.settings.get()); }
@@ -169,7 +166,7 @@ class MicronDialogue final : public protocol::Dialogue {
   }
   Time ping_tick() const {
     if (wanted_ == 0) return Time::max();
-    return fired_ ? fired_at_ + longest_wait : arrives_;
+    return awaited_.is_under_way() ? awaited_.lost_at() : arrives_;
   }
   static void notice(std::string text, Reaction& reaction) {
     if (reaction.events.size() < notices_per_call) reaction.events.emplace_back(protocol::Notice{std::move(text)});
@@ -182,10 +179,8 @@ class MicronDialogue final : public protocol::Dialogue {
   Scan scan_;           // where the head is or goes to
   Time arrives_{};      // there
   bool knows_parameters_;
-  int wanted_ = 0;                             // scan lines
-  std::shared_ptr<const HeldSettings> fired_;  // the ping that is being made
-  std::shared_ptr<const HeldSettings> late_;   // one that has not come in time
-  Time fired_at_{};
+  int wanted_ = 0;  // scan lines
+  protocol::AwaitedPing awaited_;
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
 #include "protocol/limits.hpp"
+#include "protocol/serial_line.hpp"
 
 namespace sonar::micron {
 namespace {
@@ -145,11 +146,9 @@ double head_rad(const Settings& settings) {
 std::chrono::nanoseconds listening(const HeadCommand& c) { return nanoseconds_from(c.bins * c.interval * bin_unit_s); }
 
 std::chrono::nanoseconds transfer(const HeadCommand& c, const protocol::OptionValues& options) {
-  constexpr double bits_of_byte = 10;  // with start and stop
-  const double rate = protocol::number_option(options, option_name::link_rate);
   const int bytes =
       static_cast<int>(frame_size + wire::wire_size<HeadData>()) + ((c.control & control::eight_bits) != 0 ? c.bins : c.bins / 2);
-  return rate > 0 ? nanoseconds_from(bits_of_byte * bytes / rate) : std::chrono::nanoseconds(0);
+  return protocol::serial_time(bytes, protocol::number_option(options, option_name::link_rate));
 }
 
 std::chrono::nanoseconds turning(int sixteenths) { return std::abs(sixteenths) * turn_of_a_sixteenth; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "protocol/awaited_ping.hpp"
 #include "protocol/ping/conversation.hpp"
 #include "protocol/ping/ping360_settings.hpp"
 
@@ -10,8 +11,6 @@ namespace sonar::ping::ping360 {
 namespace {
 
 using protocol::Reaction;
-
-constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping is taken as lost; it is still sent if it comes
 
 DeviceInformation identity(const protocol::OptionValues& options) {
   DeviceInformation info;
@@ -32,11 +31,10 @@ class Ping360Dialogue final : public Conversation {
   Reaction on_tick(Time now, bool ping_pending) override {
     Reaction reaction;
     if (now < next_tick()) return reaction;
-    // Here fired_ means that longest_wait is over. A request that has not been started, because an earlier ping is still being
-    // computed, gets the whole time again.
-    if (fired_ && ping_pending) return fired_at_ = now, reaction;
-    // A request that was started has brought no ping yet. The task continues, and the ping is still sent if it comes.
-    if (fired_) return late_ = fired_, advance(now), reaction;
+    if (awaited_.is_under_way()) {
+      if (awaited_.lose(ping_pending, now)) advance(now);  // the task continues
+      return reaction;
+    }
     Settings s = settings();
     s.id = id_;
     s.ping.angle = head_.target();
@@ -46,27 +44,25 @@ class Ping360Dialogue final : public Conversation {
       task_ = Task::none;
       return reaction;
     }
-    fired_ = std::make_shared<HeldSettings>(s);
-    fired_at_ = now;
+    const auto with = std::make_shared<const HeldSettings>(s);
+    awaited_.begin(with, now);
     reaction.events.emplace_back(
-        protocol::RequestPing{.joins = false, .head_rad = ping360::head_rad(s.ping.angle, device_.options), .with = fired_});
+        protocol::RequestPing{.joins = false, .head_rad = ping360::head_rad(s.ping.angle, device_.options), .with = with});
     return reaction;
   }
   Time next_tick() const override {
     if (task_ == Task::none) return Time::max();
-    return fired_ ? fired_at_ + longest_wait : due_;
+    return awaited_.is_under_way() ? awaited_.lost_at() : due_;
   }
   std::optional<Time> next_ping_request() const override {
-    return task_ != Task::none && !fired_ ? std::optional(due_) : std::nullopt;  // a turn without a ping counts too
+    return task_ != Task::none && !awaited_.is_under_way() ? std::optional(due_)
+                                                           : std::nullopt;  // a turn without a ping counts too
   }
   bool hosts_fall_silent() const override { return task_ != Task::none; }  // ping-python sends nothing while it scans
   protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
-    if (late_ && made_with == late_.get())
-      late_.reset();
-    else if (fired_ && made_with == fired_.get())
-      advance(now);
-    else
-      return {};  // made for a request that a newer one has replaced
+    const auto arrival = awaited_.arrive(made_with);
+    if (arrival == protocol::AwaitedPing::Arrival::other) return {};
+    if (arrival == protocol::AwaitedPing::Arrival::awaited) advance(now);
     return {{Bytes{}}, {}};
   }
 
@@ -131,21 +127,19 @@ class Ping360Dialogue final : public Conversation {
   /// The head stops where it is, also in the middle of a turn. A ping that still comes is not sent.
   void stop(Time now) {
     task_ = Task::none;
-    fired_.reset();
-    late_.reset();
+    awaited_.forget();
     head_ = {head_.angle_at(now), head_.angle_at(now), now};
   }
 
   /// Call it after a ping. A scan continues when the samples were taken and sent, and the head has turned.
   void advance(Time now) {
-    fired_.reset();
     if (task_ != Task::scan) {
       task_ = Task::none;
       return;
     }
     const Settings s = settings();
     const auto after = listening(s.ping) + transfer(s.ping, device_.options) + std::chrono::milliseconds(s.delay_ms);
-    const Time turns_at = fired_at_ + after;
+    const Time turns_at = awaited_.fired_at() + after;
     const bool oscillates = text_option(device_.options, option_name::sector_scan) != "wrap";
     head_.turn_to(next_angle(head_.target(), s, back_, oscillates), turns_at);
     // After a late ping the scan does not catch up: the next one is due now at the earliest.
@@ -156,9 +150,7 @@ class Ping360Dialogue final : public Conversation {
   Task task_ = Task::none;
   bool back_ = false;  // a scan that oscillates goes back
   Time due_{};
-  std::shared_ptr<const HeldSettings> fired_;  // the ping that is being made
-  std::shared_ptr<const HeldSettings> late_;   // one that has not come in time
-  Time fired_at_{};
+  protocol::AwaitedPing awaited_;
 };
 
 }  // namespace

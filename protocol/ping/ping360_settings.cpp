@@ -9,6 +9,7 @@
 #include "protocol/limits.hpp"
 #include "protocol/ping/conversation.hpp"
 #include "protocol/ping/one_beam.hpp"
+#include "protocol/serial_line.hpp"
 
 namespace sonar::ping::ping360 {
 namespace {
@@ -171,10 +172,8 @@ double head_rad(std::uint16_t angle, const protocol::OptionValues& options) {
 std::chrono::nanoseconds listening(const Transducer& t) { return nanoseconds_from(t.samples * t.period * sample_unit_s); }
 
 std::chrono::nanoseconds transfer(const Transducer& t, const protocol::OptionValues& options) {
-  constexpr double bits_of_byte = 10;  // with start and stop
-  const double rate = number_option(options, option_name::link_rate);
   const double bytes = static_cast<double>(header_size + wire::wire_size<AutoDeviceData>() + t.samples + sum_size);
-  return rate > 0 ? nanoseconds_from(bits_of_byte * bytes / rate) : std::chrono::nanoseconds(0);
+  return protocol::serial_time(bytes, number_option(options, option_name::link_rate));
 }
 
 Time Head::arrives() const { return since + std::abs(to - from) * turn_of_a_grad; }

@@ -1,0 +1,51 @@
+// The one ping that a dialogue has requested and waits for, where hosts ask for each scan line.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <utility>
+
+#include "core/sonar/ping.hpp"
+
+namespace sonar::protocol {
+
+class AwaitedPing {
+ public:
+  bool is_under_way() const { return fired_ != nullptr; }
+  Time fired_at() const { return fired_at_; }
+  /// Time at which it is taken as lost. It is still sent if it comes later.
+  Time lost_at() const { return fired_at_ + longest_wait; }
+
+  /// `with`: RequestPing::with.
+  void begin(std::shared_ptr<const VendorSettings> with, Time now) {
+    fired_ = std::move(with);
+    fired_at_ = now;
+  }
+  /// Call it at lost_at(). False: the request has not been started, because an earlier ping is still being computed
+  /// (`ping_pending`), and gets the whole time again.
+  bool lose(bool ping_pending, Time now) {
+    if (ping_pending) return fired_at_ = now, false;
+    late_ = std::exchange(fired_, nullptr);
+    return true;
+  }
+  /// A ping that came: `other` was made for a request that a newer one has replaced, `late` was taken as lost.
+  enum class Arrival { other, late, awaited };
+  Arrival arrive(const VendorSettings* made_with) {
+    if (late_ && made_with == late_.get()) return late_.reset(), Arrival::late;
+    if (fired_ && made_with == fired_.get()) return fired_.reset(), Arrival::awaited;
+    return Arrival::other;
+  }
+  /// A ping that still comes is then of another request.
+  void forget() {
+    fired_.reset();
+    late_.reset();
+  }
+
+ private:
+  static constexpr auto longest_wait = std::chrono::seconds(2);
+
+  std::shared_ptr<const VendorSettings> fired_, late_;
+  Time fired_at_{};
+};
+
+}  // namespace sonar::protocol
