@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/letters.hpp"
+
 namespace sonar {
 namespace {
 
@@ -29,8 +31,7 @@ std::optional<UtmZone> utm_zone_from(std::string_view text) {
     zone.number = 10 * zone.number + (text[at] - '0');
   while (at < text.size() && (text[at] == ' ' || text[at] == '_')) ++at;
   if (zone.number < 1 || zone.number > 60) return std::nullopt;
-  std::string hemisphere(text.substr(at));
-  for (char& c : hemisphere) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
+  const std::string hemisphere = small_letters(text.substr(at));
   zone.south = hemisphere == "s" || hemisphere == "south";
   return zone.south || hemisphere == "n" || hemisphere == "north" ? std::optional(zone) : std::nullopt;
 }

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/base/letters.hpp"
 #include "core/motion/stamp.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/nearest.hpp"
@@ -50,8 +51,7 @@ constexpr std::array<std::array<std::string_view, 2>, 10> other_names{{{"time", 
 
 std::string plain_name(std::string_view word) {
   if (word.size() > 1 && word.front() == '"' && word.back() == '"') word = word.substr(1, word.size() - 2);
-  std::string name(word.substr(0, longest_name));
-  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
+  const std::string name = small_letters(word.substr(0, longest_name));
   for (const auto& [other, ours] : other_names)
     if (name == other) return std::string(ours);
   return name;

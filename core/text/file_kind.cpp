@@ -4,6 +4,8 @@
 #include <array>
 #include <string>
 
+#include "core/base/letters.hpp"
+
 namespace sonar::text {
 namespace {
 
@@ -36,9 +38,8 @@ constexpr std::array<Kind, 14> kinds{
 std::string_view unusable_kind(std::string_view begin) {
   for (const Kind& kind : kinds)
     if (begin.starts_with(kind.begins)) return kind.says;
-  std::string word(begin.substr(0, kind_bytes));
+  std::string word = small_letters(begin.substr(0, kind_bytes));
   word.erase(0, std::min(word.find_first_not_of(" \t\r\n"), word.size()));
-  for (char& c : word) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
   if (word.starts_with("<!doctype html") || word.starts_with("<html"))
     return "is a web page, not the file itself; was the download refused? Fetch it again";
   return {};

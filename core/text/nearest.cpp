@@ -4,15 +4,15 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/base/letters.hpp"
+
 namespace sonar::text {
 namespace {
 
 std::string folded(std::string_view s) {
-  std::string out(s.substr(0, 64));  // a longer name is not a typing error
-  for (char& c : out) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  std::string out = small_letters(s.substr(0, 64));  // a longer name is not a typing error
+  for (char& c : out)
     if (c == '-' || c == ' ') c = '_';
-  }
   return out;
 }
 

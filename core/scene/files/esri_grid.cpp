@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 
+#include "core/base/letters.hpp"
 #include "core/base/regular_file.hpp"
 #include "core/scene/files/height_values.hpp"
 
@@ -33,12 +34,6 @@ class Words {
   std::size_t at_, line_ = 1;
 };
 
-std::string lower(std::string_view s) {
-  std::string out(s);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return out;
-}
-
 struct Header {
   std::size_t columns = 0, rows = 0;
   double x = 0, y = 0, cell_x = 0, cell_y = 0;
@@ -61,7 +56,7 @@ Result<Header> read_header(Words& words) {
       words.rewind(word);
       break;
     }
-    std::string key = lower(word.substr(0, 20));
+    std::string key = small_letters(word.substr(0, 20));
     if (key == "nodata") key = "nodata_value";
     static constexpr std::array<const char*, 10> keys{"ncols",     "nrows",    "xllcorner", "yllcorner", "xllcenter",
                                                       "yllcenter", "cellsize", "dx",        "dy",        "nodata_value"};

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "core/base/letters.hpp"
 #include "core/base/load_step.hpp"
 #include "core/base/memory_left.hpp"
 
@@ -16,11 +17,7 @@ Vec3d z_up_from_y_up(Vec3d p) { return {p.x, -p.z, p.y}; }
 
 }  // namespace
 
-std::string mesh_extension(const std::filesystem::path& file) {
-  std::string e = file.extension().string();
-  for (char& c : e) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return e;
-}
+std::string mesh_extension(const std::filesystem::path& file) { return small_letters(file.extension().string()); }
 
 tl::unexpected<Error> bad_mesh(const MeshFile& request, const std::string& what) {
   return failure(ErrorKind::bad_data, request.file.filename().string() + ": " + what);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "core/base/letters.hpp"
 #include "core/base/load_step.hpp"
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
@@ -45,8 +46,8 @@ std::string grid_by_content(const std::filesystem::path& file) {
     if (head->starts_with(magic)) return ".tif";
   if (head->starts_with(byte_order_mark)) head->erase(0, byte_order_mark.size());
   head->erase(0, head->find_first_not_of(" \t\r\n"));
-  for (char& c : *head) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
-  return head->starts_with("ncols ") || head->starts_with("ncols\t") ? ".asc" : "";
+  const std::string word = small_letters(head->substr(0, 6));
+  return word == "ncols " || word == "ncols\t" ? ".asc" : "";
 }
 
 constexpr std::uint64_t memory_of_a_height = 64;  // bytes, while a grid becomes a mesh

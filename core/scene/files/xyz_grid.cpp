@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <limits>
 
+#include "core/base/letters.hpp"
 #include "core/base/regular_file.hpp"
 #include "core/scene/files/height_values.hpp"
 #include "core/text/format.hpp"
@@ -78,10 +79,8 @@ Order order_by(const Line& names, std::size_t count) {
   using Begins = std::initializer_list<std::string_view>;
   const auto column = [&](Begins begins, std::size_t otherwise) {
     const auto is_it = [&](std::string_view name) {
-      return std::any_of(begins.begin(), begins.end(), [&](std::string_view begin) {
-        return name.size() >= begin.size() &&
-               std::equal(begin.begin(), begin.end(), name.begin(), [](char a, char b) { return a == (b | 32); });
-      });
+      return std::any_of(begins.begin(), begins.end(),
+                         [&](std::string_view begin) { return same_letters(name.substr(0, begin.size()), begin); });
     };
     const auto found = std::find_if(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(count), is_it);
     return found == names.begin() + static_cast<std::ptrdiff_t>(count) ? otherwise
@@ -93,7 +92,7 @@ Order order_by(const Line& names, std::size_t count) {
   if (order.z == count) order.z = count == 3 ? 3 - order.x - order.y : 2;
   const bool distinct = order.x != order.y && order.x != order.z && order.y != order.z && order.last() < count;
   if (!distinct) return {};
-  order.depth = (names[order.z].front() | 32) == 'd';
+  order.depth = small_letter(names[order.z].front()) == 'd';
   return order;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/base/letters.hpp"
+
 namespace sonar {
 namespace {
 
@@ -331,8 +333,8 @@ constexpr Trouble trouble_table[] = {
 // clang-format on
 
 bool same_word(std::string_view a, std::string_view b) {
-  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c == '_' ? '-' : c; };
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](char x, char y) { return lower(x) == lower(y); });
+  const auto folded = [](char c) { return c == '_' ? '-' : small_letter(c); };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](char x, char y) { return folded(x) == folded(y); });
 }
 
 }  // namespace

@@ -3,17 +3,14 @@
 #include <algorithm>
 #include <array>
 
+#include "core/base/letters.hpp"
+
 namespace sonar {
 namespace {
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-bool same_word(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return lower(x) == lower(y); });
-}
-
 int hex_value(char c) {
   if (c >= '0' && c <= '9') return c - '0';
-  const char l = lower(c);
+  const char l = small_letter(c);
   return l >= 'a' && l <= 'f' ? l - 'a' + 10 : -1;
 }
 
@@ -74,15 +71,15 @@ bool host_allowed(std::string_view host, Ipv4 reached, const std::vector<std::st
   if (host.find(':') != std::string_view::npos && !good_port(port)) return false;
   if (const auto ip = parse_ipv4(name)) {
     if (*ip == reached || is_loopback(*ip)) return true;
-  } else if (same_word(name, "localhost")) {
+  } else if (same_letters(name, "localhost")) {
     return true;
   }
-  return !name.empty() && std::any_of(names.begin(), names.end(), [&](const std::string& n) { return same_word(n, name); });
+  return !name.empty() && std::any_of(names.begin(), names.end(), [&](const std::string& n) { return same_letters(n, name); });
 }
 
 bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std::string>& names) {
   for (const std::string_view scheme : {"http://", "https://"})
-    if (origin.size() > scheme.size() && same_word(origin.substr(0, scheme.size()), scheme))
+    if (origin.size() > scheme.size() && same_letters(origin.substr(0, scheme.size()), scheme))
       return host_allowed(origin.substr(scheme.size()), reached, names);
   return false;  // "null", and other schemes
 }
@@ -115,13 +112,13 @@ std::vector<std::string> words_of_header(std::string_view list) {
 
 bool header_names(std::string_view list, std::string_view wanted) {
   const std::vector<std::string> words = words_of_header(list);
-  return std::any_of(words.begin(), words.end(), [&](const std::string& word) { return same_word(word, wanted); });
+  return std::any_of(words.begin(), words.end(), [&](const std::string& word) { return same_letters(word, wanted); });
 }
 
 bool is_json(std::string_view content_type) {
   std::string_view type = cut(content_type, ';');
   while (!type.empty() && (type.back() == ' ' || type.back() == '\t')) type.remove_suffix(1);
-  return same_word(type, "application/json");
+  return same_letters(type, "application/json");
 }
 
 namespace {

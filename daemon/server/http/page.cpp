@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "core/base/letters.hpp"
+
 namespace sonar {
 namespace {
 
@@ -15,13 +17,6 @@ std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t");
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
-
-bool same_word(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
-    const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
-    return lower(x) == lower(y);
-  });
 }
 
 /// Calls take(name, parameters) for each element of a list such as "text/html;q=0.9, */*", until it returns true.
@@ -44,8 +39,9 @@ bool excluded(std::string_view parameters) {
 }
 
 bool names(std::string_view list, std::string_view wanted) {
-  return any_of_list(
-      list, [&](std::string_view name, std::string_view parameters) { return same_word(name, wanted) && !excluded(parameters); });
+  return any_of_list(list, [&](std::string_view name, std::string_view parameters) {
+    return same_letters(name, wanted) && !excluded(parameters);
+  });
 }
 
 }  // namespace
