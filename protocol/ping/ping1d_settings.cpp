@@ -8,6 +8,7 @@
 #include "core/base/geometry.hpp"
 #include "protocol/limits.hpp"
 #include "protocol/ping/one_beam.hpp"
+#include "protocol/ping/period.hpp"
 
 namespace sonar::ping::ping1d {
 namespace {
@@ -112,7 +113,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
-    if (p.enable != 0) p.interval_ms = static_cast<std::uint16_t>(std::lround(std::clamp(1000 / *wanted.rate_hz, 1.0, 30000.0)));
+    if (p.enable != 0) p.interval_ms = static_cast<std::uint16_t>(std::lround(period_ms(*wanted.rate_hz)));
   }
   if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {

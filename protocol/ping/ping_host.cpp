@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/sonar/sample_code.hpp"
+#include "protocol/ping/period.hpp"
 
 namespace sonar::ping {
 
@@ -22,7 +23,7 @@ Id refused_in(const Frame& nack) {
 
 double period_ms_of(const protocol::SettingsOverride& wanted) {
   const double rate_hz = wanted.rate_hz.value_or(0);
-  return rate_hz > 0 ? std::clamp(1000 / rate_hz, 1.0, 30000.0) : 0;
+  return rate_hz > 0 ? period_ms(rate_hz) : 0;
 }
 
 Line powers_in(BytesView rest, std::size_t count, float lowest_db, float highest_db) {
