@@ -35,9 +35,10 @@ void Sweep::add(std::size_t direction, Line line, double row_m, HostPing& ping) 
   rows_ = line.size();
   row_m_ = row_m;
   lines_[direction] = std::make_shared<const Line>(std::move(line));
-  ping.picture = [sweep = *this]() -> Result<PolarImage> { return sweep.shown(); };
-  ping.drawing = [sweep = *this, head_rad = bearing_rad(direction)] {
-    return SonarPicture{.kind = PictureKind::sweep, .image = sweep.shown(), .head_rad = head_rad};
+  const auto now = std::make_shared<const Sweep>(*this);
+  ping.picture = [now]() -> Result<PolarImage> { return now->shown(); };
+  ping.drawing = [now, head_rad = bearing_rad(direction)] {
+    return SonarPicture{.kind = PictureKind::sweep, .image = now->shown(), .head_rad = head_rad};
   };
   const auto at = [this](std::size_t i) { return lines_.begin() + static_cast<std::ptrdiff_t>(i); };
   ping.lines = static_cast<std::size_t>(
