@@ -157,6 +157,7 @@ struct Make {
   PictureKind picture = PictureKind::fan;
 
   std::string_view name() const { return device->name(); }
+  bool is_by_udp() const { return ports.front().kind == HostPort::Kind::udp; }  // what hosts send it
   /// The unit of a rate of pings: a ping of some natures is one line of the picture.
   std::string_view rate_unit() const {
     return picture == PictureKind::sweep || picture == PictureKind::waterfall ? "lines/s" : "Hz";

@@ -129,7 +129,7 @@ PingStream::~PingStream() {
   if (host_ != nullptr && is_started_ && !ended_) carry_out(host_->on_leave());
 }
 
-std::string PingStream::place() const { return (make_->ports.front().kind == Kind::udp ? "udp " : "tcp ") + text_from(device_); }
+std::string PingStream::place() const { return (make_->is_by_udp() ? "udp " : "tcp ") + text_from(device_); }
 
 Result<Socket> PingStream::open_port(std::size_t port, milliseconds patience) {
   const protocol::HostPort& wanted = make_->ports[port];

@@ -46,8 +46,8 @@ std::string where_to_connect(const v1::SonarStatus& sonar) {
   if (colon == std::string::npos) return sonar.advertised();
   const std::string host = at.substr(0, colon);
   const protocol::Make& make = protocol::make_of_profile(sonar.profile());
-  const bool by_udp = make.ports.front().kind == protocol::HostPort::Kind::udp;
-  return (host == "0.0.0.0" ? sonar.advertised() : host) + (by_udp ? ", UDP port " : ", TCP port ") + at.substr(colon + 1);
+  return (host == "0.0.0.0" ? sonar.advertised() : host) + (make.is_by_udp() ? ", UDP port " : ", TCP port ") +
+         at.substr(colon + 1);
 }
 
 const v1::SonarStatus* find(const v1::DaemonStatus* in, const std::string& name) {

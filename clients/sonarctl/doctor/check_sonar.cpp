@@ -41,7 +41,10 @@ const ReceivedStatus* status_from(const Facts& facts, const std::string& host) {
 class SonarChecks {
  public:
   SonarChecks(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings)
-      : facts_(facts), sonar_(sonar), findings_(findings), at_((is_by_udp() ? "udp " : "tcp ") + text_from(sonar.at)) {
+      : facts_(facts),
+        sonar_(sonar),
+        findings_(findings),
+        at_((sonar.make->is_by_udp() ? "udp " : "tcp ") + text_from(sonar.at)) {
     if (facts.sonars.size() > 1) prefix_ = (sonar.name.empty() ? sonar.at.host : sonar.name) + ": ";
   }
 
@@ -63,7 +66,6 @@ class SonarChecks {
     findings_.push_back({level, check, prefix_ + text, cure});
   }
 
-  bool is_by_udp() const { return sonar_.make->ports.front().kind == protocol::HostPort::Kind::udp; }
   bool answers() const { return sonar_.stream.outcome >= Outcome::closed_without_a_byte || !sonar_.clients.empty(); }
 
   /// Images go by UDP, and no client connects for them. So only the status of the daemon shows them.
@@ -139,7 +141,8 @@ class SonarChecks {
                    sonar_.at.host + " is busy: " + joined(sonar_.clients) + " is connected; not connecting" + stats_of_daemon(),
                    "");
       case Outcome::refused:
-        return add(Level::fail, "ping", at_ + (is_by_udp() ? "" : " refuses the connection") + ": no program listens there",
+        return add(Level::fail, "ping",
+                   at_ + (sonar_.make->is_by_udp() ? "" : " refuses the connection") + ": no program listens there",
                    where_else());
       case Outcome::unreachable:
         return add(Level::fail, "ping", at_ + " does not answer: " + s.error, way_there());

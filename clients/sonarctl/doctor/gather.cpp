@@ -105,7 +105,7 @@ class Gathering {
     for (const SocketLine& socket : sockets)
       if (socket.state == listening && make_at(socket.local_port) != nullptr) note(socket);
     for (const SocketLine& socket : by_udp)
-      if (const Make* const make = make_at(socket.local_port); make != nullptr && is_by_udp(*make)) note(socket);
+      if (const Make* const make = make_at(socket.local_port); make != nullptr && make->is_by_udp()) note(socket);
   }
 
   void find_sonars(const Endpoint& given, const DiscoveryQuestion& search) {
@@ -188,8 +188,6 @@ class Gathering {
         sonar.clients.push_back(received.client);
   }
 
-  static bool is_by_udp(const Make& make) { return make.ports.front().kind == protocol::HostPort::Kind::udp; }
-
   void examine(SonarFacts& sonar, const std::vector<SocketLine>& sockets, const std::vector<SocketLine>& by_udp,
                const std::map<std::uint64_t, Program>& programs) {
     const auto ip = ipv4_of(sonar.at.host);
@@ -200,9 +198,9 @@ class Gathering {
     sonar.at.host = *ip;
     sonar.on_this_host = is_on_this_host(*ip);
     sonar.in_our_network = is_in_our_network(*ip);
-    for (const SocketLine& socket : is_by_udp(*sonar.make) ? by_udp : sockets) {
+    for (const SocketLine& socket : sonar.make->is_by_udp() ? by_udp : sockets) {
       const bool here = socket.local_host == *ip || socket.local_host == "0.0.0.0" || socket.local_host == "[::]";
-      const bool waits = socket.state == listening || is_by_udp(*sonar.make);
+      const bool waits = socket.state == listening || sonar.make->is_by_udp();
       if (sonar.on_this_host && here && waits && socket.local_port == sonar.at.port)
         sonar.listeners.push_back(holder_of(socket, programs));
     }

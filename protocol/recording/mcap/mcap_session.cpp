@@ -62,8 +62,7 @@ class McapRecordingReader final : public RecordingReader {
 McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make)
     : writer_(std::move(sink)), sonar_(std::move(sonar)), make_(&make) {
   device_ = vendor_channel("device", "device", "tcp");
-  const bool by_udp = make.ports.front().kind == protocol::HostPort::Kind::udp;
-  client_ = vendor_channel("client", "client", by_udp ? "udp" : "tcp");
+  client_ = vendor_channel("client", "client", make.is_by_udp() ? "udp" : "tcp");
   status_ = vendor_channel("status", "device", "udp");
   image_ = protobuf_channel("/" + sonar_ + "/image", "foxglove.RawImage");
   pose_ = protobuf_channel("/" + sonar_ + "/pose", "foxglove.PoseInFrame");
