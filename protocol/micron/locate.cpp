@@ -4,10 +4,8 @@
 namespace sonar::micron {
 
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView frame) {
-  if (const auto found = wire::locate<Header>(name, frame)) return found;
-  auto found = wire::locate<HeadData>(name);
-  if (found) found->offset += header_size;
-  return found && !frame.empty() && found->offset + found->size > frame.size() ? std::nullopt : found;
+  const auto found = wire::locate<Header>(name, frame);
+  return found ? found : wire::locate<HeadData>(name, frame, header_size);
 }
 
 std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView frame) {

@@ -11,19 +11,11 @@ using protocol::Field;
 using protocol::FieldName;
 using protocol::Region;
 
-template <class M>
-std::optional<Field> inside(FieldName name, std::size_t offset, BytesView message) {
-  auto found = wire::locate<M>(name);
-  if (!found) return found;
-  found->offset += offset;
-  return message.empty() || found->offset + found->size <= message.size() ? found : std::nullopt;
-}
-
 /// In the header of the first frame, else in a message, whose frame begins at `offset`.
 template <class M>
 std::optional<Field> in_frame(FieldName name, std::size_t offset, BytesView frames) {
-  const auto header = inside<Header>(name, 0, frames);
-  return header ? header : inside<M>(name, offset + header_size, frames);
+  const auto header = wire::locate<Header>(name, frames);
+  return header ? header : wire::locate<M>(name, frames, offset + header_size);
 }
 
 bool is_of(Id id, BytesView frame) {
@@ -95,7 +87,7 @@ std::optional<Place> locate_omniscan(Region region, BytesView frame) {
 std::optional<Field> locate_ping1d(FieldName name, BytesView frames) {
   if (const auto at = frame_of(Id::ping1d_profile, frames)) return in_frame<Profile>(name, *at, frames);
   if (const auto at = frame_of(Id::ping1d_distance, frames)) return in_frame<Distance>(name, *at, frames);
-  return inside<Header>(name, 0, frames);
+  return wire::locate<Header>(name, frames);
 }
 
 std::optional<Place> locate_ping1d(Region region, BytesView frames) {
@@ -104,7 +96,7 @@ std::optional<Place> locate_ping1d(Region region, BytesView frames) {
 
 std::optional<Field> locate_s500(FieldName name, BytesView frames) {
   const auto at = frame_of(Id::s500_profile6, frames);
-  return at ? in_frame<Profile6>(name, *at, frames) : inside<Header>(name, 0, frames);
+  return at ? in_frame<Profile6>(name, *at, frames) : wire::locate<Header>(name, frames);
 }
 
 std::optional<Place> locate_s500(Region region, BytesView frames) {
@@ -113,7 +105,7 @@ std::optional<Place> locate_s500(Region region, BytesView frames) {
 
 std::optional<Field> locate_surveyor(FieldName name, BytesView frames) {
   const auto at = atof_frame(frames);
-  return at ? in_frame<AtofPointData>(name, *at, frames) : inside<Header>(name, 0, frames);
+  return at ? in_frame<AtofPointData>(name, *at, frames) : wire::locate<Header>(name, frames);
 }
 
 std::optional<Place> locate_surveyor(Region region, BytesView frames) {

@@ -284,15 +284,16 @@ constexpr std::size_t wire_size() {
   return counter.bytes;
 }
 
-/// The place of the field of that meaning (Locator); nothing if no field has it, or `message`, if it is not empty, ends before
-/// the field does.
+/// The place of the field of that meaning (Locator) in bytes in which the message begins at `at`; nothing if no field has it, or
+/// `bytes`, if they are not empty, end before the field does.
 template <class M, class Meaning>
-constexpr std::optional<Field> locate(Meaning meaning, BytesView message = {}) {
+constexpr std::optional<Field> locate(Meaning meaning, BytesView bytes = {}, std::size_t at = 0) {
   Locator<Meaning> locator(meaning);
   const M layout{};
   fields(locator, layout);
-  const std::optional<Field> found = locator.found;
-  return found && !message.empty() && found->offset + found->size > message.size() ? std::nullopt : found;
+  std::optional<Field> found = locator.found;
+  if (found) found->offset += at;
+  return found && !bytes.empty() && found->offset + found->size > bytes.size() ? std::nullopt : found;
 }
 
 template <class M>

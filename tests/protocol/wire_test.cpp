@@ -86,6 +86,8 @@ TEST(Wire, LocatesFieldsByTheirMeaning) {
   EXPECT_FALSE(locate<Outer>(Meaning::words));
   EXPECT_TRUE(locate<Outer>(Meaning::share, little));
   EXPECT_FALSE(locate<Outer>(Meaning::share, BytesView(little).first(little.size() - 1)));
+  EXPECT_EQ(locate<Inner>(Meaning::octets, little, 7), (Field{Field::Type::bytes, 9, 3})) << "of a message inside the bytes";
+  EXPECT_FALSE(locate<Inner>(Meaning::octets, little, little.size() - 4));
 }
 
 TEST(Wire, ReadsBothByteOrders) {
