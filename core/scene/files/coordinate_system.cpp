@@ -26,6 +26,11 @@ constexpr std::array<std::string_view, 7> in_lengths{"PROJCS",   "PROJCRS", "PRO
 constexpr std::array<std::string_view, 6> in_degrees{"GEOGCS", "GEOGCRS", "GEODCRS", "GEOGRAPHICCRS", "GEODETICCRS", "GEODCS"};
 constexpr std::array<std::string_view, 4> of_heights{"VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"};
 
+std::string without_blanks(std::string name) {
+  std::erase_if(name, [](char c) { return c == ' ' || c == '_'; });
+  return name;
+}
+
 /// Datums that agree with WGS 84 within 2 m, as names of systems have them, without blanks and underscores.
 constexpr std::array<std::string_view, 16> modern_datums{"WGS84",    "WGS1984", "ETRS89",  "ETRS1989",   "NAD83",  "NAD1983",
                                                          "GDA94",    "GDA1994", "GDA2020", "SIRGAS2000", "SIRGAS", "RGF93",
@@ -136,7 +141,7 @@ class WktReader {
     if (system_.geographic && open_.size() == system_at_ + 1) name_ = given.substr(0, longest_name);
     if (!system_.utm && (open_.size() == 1 || is_one_of(last.word, in_lengths))) system_.utm = utm_of_name(name);
     if (last.word == "PROJECTION" || last.word == "METHOD") {
-      std::erase_if(last.name, [](char c) { return c == ' ' || c == '_'; });
+      last.name = without_blanks(last.name);
       transverse_ = last.name == "TRANSVERSEMERCATOR" || last.name == "GAUSSKRUGER";
     }
   }
@@ -155,8 +160,8 @@ class WktReader {
     if (is_one_of(open_[owner - 1].word, of_heights)) system_.height_unit_m = *first;
   }
 
-  void take_parameter(std::string name, double value) {
-    std::erase_if(name, [](char c) { return c == ' ' || c == '_'; });
+  void take_parameter(const std::string& given, double value) {
+    const std::string name = without_blanks(given);
     if (name.starts_with("LATITUDEOF")) by_.latitude_deg = value;
     if (name == "CENTRALMERIDIAN" || name.starts_with("LONGITUDEOF")) by_.central_meridian_deg = value;
     if (name.starts_with("SCALEFACTOR")) by_.scale = value;
