@@ -35,7 +35,7 @@ class PictureProgress {
   explicit PictureProgress(double limit_s) : limit_s_(limit_s) {}
   /// A line to print: with the first ping, then every two seconds. `ping` is not whole.
   std::optional<std::string> line_at(const HostPing& ping, Clock::time_point now);
-  /// Whether the picture is to be taken as it is.
+  /// The picture is to be taken as it is.
   bool is_over(Clock::time_point now) const;
 
  private:

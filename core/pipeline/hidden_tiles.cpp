@@ -65,7 +65,7 @@ void find_columns(Span sine, const Columns& columns, PreparedTile& tile) {
   tile.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(columns.count)));
 }
 
-/// Whether no cell at these ranges counts, by its level and by the record, or at these tangents.
+/// No cell counts at these ranges, by its level and by the record, or at these tangents.
 bool out_of_view(const PingContext& context, const simd::TileSeen& seen, Span range, Span tangent) {
   const PingPlan& plan = context.plan;
   const PingScalars& s = context.scalars;

@@ -36,7 +36,7 @@ class FarthestSeen {
                         const simd::GroupView& group, std::vector<std::uint32_t>& in_sight) const;
 
  private:
-  /// Whether the map hides every cell of the tile in columns [first, last). `beside`: GroupView::columns_beside.
+  /// The map hides every cell of the tile in columns [first, last). `beside`: GroupView::columns_beside.
   bool hides(const PreparedTile& tile, int first, int last, int beside) const;
 
   static constexpr int columns_a_block = 4, bins_a_block = 16;

@@ -203,7 +203,7 @@ class SonarChecks {
                 : "its client requested standby or single pings; sonarctl status shows the settings");
   }
 
-  /// Those that connected while this check waited.
+  /// Clients that connected while this check waited.
   std::string clients_beside_us() const {
     std::vector<std::string> rivals;
     if (sonar_.reported)

@@ -72,9 +72,9 @@ CoordinateSystem system_by_prj(const std::filesystem::path& heights);
 CoordinateSystem system_of_wkt(std::string_view text);
 /// The zone of a projected system of the EPSG data set; empty for other projections, and for older datums.
 std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
-/// Whether that code of the EPSG data set is one of latitudes and longitudes within 2 m of WGS 84.
+/// True for the codes, in the EPSG data set, of latitudes and longitudes within 2 m of WGS 84.
 bool agrees_with_wgs84(std::uint32_t code);
-/// Whether it is GRS 80 or that of WGS 84, as all datums since about 1980 have them.
+/// True for GRS 80 and the ellipsoid of WGS 84, which all datums since about 1980 have.
 bool is_modern_ellipsoid(double semi_major_m, double inverse_flattening);
 /// The zone; its false easting may have the number of the zone before it, as 32500000.
 std::optional<UtmZone> utm_of_parameters(const TransverseMercator& by);
