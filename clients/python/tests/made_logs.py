@@ -346,3 +346,7 @@ def ulog(truth=False, steps=50, has_place=True):
             out += ulog_message("D", struct.pack("<HQ4f", 2, stamp, *quaternion(*angles)))
             out += ulog_message("D", struct.pack("<HQ6f", 3, stamp, 0, 0, 0, north, east, down + 100))
     return out
+
+
+ROS2_TOPICS = [("/odom", "nav_msgs/msg/Odometry", [(100 + i, odometry(i)) for i in range(5)]),
+               ("/image", "sensor_msgs/msg/Image", [(100, b"not read")])]

@@ -3,8 +3,6 @@ import contextlib
 import io
 import math
 import random
-import shutil
-import sqlite3
 import struct
 import unittest
 from unittest import mock
@@ -12,10 +10,9 @@ from unittest import mock
 import made_logs as made
 from converted import WithFolder
 
-from sonard_client.convert import ConvertError, Geodetic, convert, format_of, rosbag2
+from sonard_client.convert import ConvertError, Geodetic, format_of
 from sonard_client.convert.__main__ import main
 from sonard_client.convert.mavlink import crc
-from sonard_client.convert.rosbag2 import files_of
 from sonard_client.geodesy import LocalPlane, ecef, parse_origin
 from sonard_client.nmea import Assumptions
 from sonard_client.rotations import between, quaternion_from_rpy
@@ -367,167 +364,6 @@ class WithoutHorizontalPosition(WithFolder):
         self.assert_held(self.convert(log, at=(3, 4)), range(20), (3, 4))
 
 
-class RecordingsOfRos2(WithFolder):
-    TOPICS = [("/odom", "nav_msgs/msg/Odometry", [(100 + i, made.odometry(i)) for i in range(5)]),
-              ("/image", "sensor_msgs/msg/Image", [(100, b"not read")])]
-
-    def test_a_file(self):
-        path = made.db3(self.folder / "odom #1 50%.db3", self.TOPICS)
-        self.assertEqual(format_of(path), "db3")
-        track = convert(path, warn=self.warned.append)
-        self.assertEqual((track.source, track.frame, self.warned), ("/odom", "ENU_FLU", []))
-        self.assert_track(track, range(5), t0=100, metres=1e-9, radians=1e-6)
-        with self.assertRaisesRegex(ConvertError, r"no poses on topic '/pose'; topics with poses: '/odom' \(5 poses\)"):
-            convert(path, topic="/pose")
-
-    def folder_of(self, *names):
-        folder = self.folder / "recording"
-        folder.mkdir()
-        (folder / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n" +
-                                              "".join(f"    - {name}\n" for name in names))
-        return folder
-
-    def test_a_folder_of_several_files(self):
-        for kind in ("db3", "mcap"):
-            with self.subTest(kind):
-                folder = self.folder_of(f"r_10.{kind}", f"r_9.{kind}")  # in this order, whatever their names
-                parts = [(f"r_10.{kind}", range(3)), (f"r_9.{kind}", range(3, 6))]
-                for name, steps in parts:
-                    messages = [(100 + i, made.odometry(i)) for i in steps]
-                    if kind == "db3":
-                        made.db3(folder / name, [("/odom", "nav_msgs/msg/Odometry", messages)])
-                    else:
-                        (folder / name).write_bytes(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", messages)]))
-                for named in (folder, folder / "metadata.yaml"):
-                    self.assertEqual(format_of(named), kind)
-                    track = convert(named, warn=self.warned.append)
-                    self.assertEqual(self.warned, [])
-                    self.assert_track(track, range(6), t0=100, metres=1e-9, radians=1e-6)
-                shutil.rmtree(folder)
-
-    def test_folders_without_files(self):
-        folder = self.folder_of()
-        with self.assertRaisesRegex(ConvertError, "a folder without .db3 and .mcap files"):
-            format_of(folder)
-        (folder / "r_0.db3.zstd").write_bytes(b"x")
-        with self.assertRaisesRegex(ConvertError, "r_0.db3.zstd is compressed; unpack it first: zstd -d "):
-            format_of(folder)
-
-    def test_parts_that_are_not_read_are_named(self):
-        folder = self.folder_of("sub/r_0.db3", "r_1.db3.zstd", "r_2.db3.zstd", "r_3.db3", "'r_\x1b4.mcap'")
-        for name in ("r_0.db3", "r_2.db3"):
-            made.db3(folder / name, self.TOPICS)
-        for name in ("r_1.db3.zstd", "r_2.db3.zstd"):
-            (folder / name).write_bytes(b"x")
-        self.assertEqual([p.name for p in files_of(folder, self.warned.append)], ["r_0.db3", "r_2.db3"])
-        self.assertEqual(self.warned, [
-            "parts of the recording are compressed, so they are omitted; unpack them first: zstd -d: r_1.db3.zstd",
-            "parts of the recording are omitted: metadata.yaml lists them, and they are not in the folder: r_3.db3, r_?4.mcap"])
-        self.warned = []
-        convert(folder, warn=self.warned.append)
-        self.assertEqual(len([text for text in self.warned if "parts of the recording" in text]), 2)
-
-    def test_metadata_of_blank_lines(self):
-        folder = self.folder_of()
-        made.db3(folder / "r_0.db3", self.TOPICS)
-        for text in ("\n" * (1 << 20), " " * (1 << 20), "- " + " " * (1 << 20), "- a.db3" * (1 << 17) + " x", "- \n" * (1 << 18)):
-            (folder / "metadata.yaml").write_text(text)
-            self.assertEqual(len(files_of(folder)), 1)  # a quadratic search takes hours
-
-    def test_messages_that_are_not_merged_yet(self):
-        path, copy = self.folder / "live.db3", self.folder / "copy.db3"
-        made.db3(path, [("/odom", "nav_msgs/msg/Odometry", [(100, made.odometry(0))])])
-        with contextlib.closing(sqlite3.connect(path)) as base:
-            base.execute("PRAGMA journal_mode=WAL")
-            base.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 101000000000, ?)", (made.odometry(1),))
-            base.commit()
-            for end in ("", "-wal"):
-                shutil.copy(f"{path}{end}", f"{copy}{end}")
-        self.assertEqual(len(convert(copy).rows), 2)
-        self.assertGreater((self.folder / "copy.db3-wal").stat().st_size, 0)
-
-    def test_changes_that_were_not_finished(self):
-        path, copy = self.folder / "live.db3", self.folder / "copy.db3"
-        made.db3(path, self.TOPICS)
-        with contextlib.closing(sqlite3.connect(path)) as base:
-            base.execute("PRAGMA cache_size=1")  # so that pages are written before the end
-            base.execute("UPDATE topics SET name = '/half'")
-            base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 1, ?)", [(bytes(5000),)] * 50)
-            for end in ("", "-journal"):
-                shutil.copy(f"{path}{end}", f"{copy}{end}")
-            base.rollback()
-        with self.assertRaisesRegex(ConvertError, "copy.db3: its writer did not end .*: copy.db3-journal belongs to it"):
-            convert(copy)
-
-    def test_only_stored_tables_are_read(self):
-        endless = "AS WITH RECURSIVE c(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM c) SELECT n AS id, "
-        for table, statement, said in (
-                ("messages", f"CREATE VIEW messages {endless} 1 AS topic_id, n AS timestamp, x'00' AS data FROM c",
-                 "messages is not a stored table"),
-                ("topics", f"CREATE VIEW topics {endless} '/a' AS name, 'nav_msgs/msg/Odometry' AS type, 'cdr' AS "
-                 "serialization_format FROM c", "topics is not a stored table"),
-                ("messages", "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp, data AS (zeroblob(900000000)))",
-                 "column data of messages is not stored")):
-            with self.subTest(said):
-                path = self.folder / "log"
-                path.unlink(missing_ok=True)
-                made.db3(path, self.TOPICS)
-                with contextlib.closing(sqlite3.connect(path)) as base, base:
-                    base.execute(f"DROP TABLE {table}")
-                    base.execute(statement)
-                with self.assertRaisesRegex(ConvertError, f"log: not a recording of ROS 2, or damaged: {said}"):
-                    convert(path)
-
-    def repeating(self, topic_id):
-        """A file of some kB whose tree of messages lists the same pages again and again."""
-        path = self.folder / "log"
-        with contextlib.closing(sqlite3.connect(path)) as base:
-            base.execute("PRAGMA page_size=512")
-            base.execute("VACUUM")
-        made.db3(path, [("/odom", "nav_msgs/msg/Odometry", [(i, b"x") for i in range(1000)])])
-        with contextlib.closing(sqlite3.connect(path)) as base, base:
-            base.execute("UPDATE messages SET topic_id = ?", (topic_id,))
-            root, = base.execute("SELECT rootpage FROM sqlite_master WHERE name = 'messages'").fetchone()
-        data = bytearray(path.read_bytes())
-
-        def children(page):
-            at = 512 * (page - 1)
-            cells = struct.unpack_from(">H", data, at + 3)[0]
-            self.assertEqual(data[at], 5)  # an inner page
-            return [at + 8] + [at + struct.unpack_from(">H", data, at + 12 + 2 * i)[0] for i in range(cells)]
-
-        places = children(root)
-        inner, leaf = (struct.unpack_from(">I", data, at)[0] for at in places[:2])
-        for level, below in ((root, inner), (inner, leaf)):
-            if level == inner:
-                data[512 * (inner - 1):512 * inner] = data[512 * (root - 1):512 * root]
-            for at in children(level):
-                struct.pack_into(">I", data, at, below)
-        path.write_bytes(data)
-        return path
-
-    def test_tables_that_list_more_than_the_file_holds(self):
-        for topic_id, steps in ((1, rosbag2.STEPS_PER_BYTE), (2, 0.05)):  # its messages are read, or only stepped over
-            path = self.repeating(topic_id)
-            with self.subTest(topic_id), mock.patch.object(rosbag2, "STEPS_PER_BYTE", steps), \
-                    mock.patch.object(rosbag2, "_STEPS_AT_ONCE", 1000), \
-                    self.assertRaisesRegex(ConvertError, "log: its tables list more than a file of this size can hold"):
-                convert(path)
-            path.unlink()
-
-    def test_messages_compressed_one_by_one(self):
-        path = made.db3(self.folder / "log", [("/odom", "nav_msgs/msg/Odometry", [(1, b"\x28\xb5\x2f\xfd...")])])
-        with self.assertRaisesRegex(ConvertError, "compressed one by one; .*ros2 bag convert"):
-            convert(path)
-
-    def test_another_database(self):
-        path = self.folder / "log"
-        with contextlib.closing(sqlite3.connect(path)) as base, base:
-            base.execute("CREATE TABLE notes(a)")
-        with self.assertRaisesRegex(ConvertError, "not a recording of ROS 2, or damaged: no such table: topics"):
-            convert(path)
-
-
 class Px4(WithFolder):
     def test_estimates(self):
         track = self.convert(made.ulog())
@@ -652,7 +488,7 @@ class Corrupted(WithFolder):
                 format_of(self.file(content, name))
 
     def test_a_database_changed_anywhere(self):
-        whole = made.db3(self.folder / "whole", RecordingsOfRos2.TOPICS).read_bytes()
+        whole = made.db3(self.folder / "whole", made.ROS2_TOPICS).read_bytes()
         draw = random.Random(2)
         for number in range(60):
             data = bytearray(whole)
