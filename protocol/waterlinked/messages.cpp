@@ -51,7 +51,7 @@ Bytes packed(const Message& message) {
   packet.mutable_msg()->PackFrom(message);
   const std::string text = packet.SerializeAsString();
   Bytes bytes(text.size());
-  std::memcpy(bytes.data(), text.data(), text.size());
+  if (!text.empty()) std::memcpy(bytes.data(), text.data(), text.size());
   return bytes;
 }
 

@@ -4,13 +4,22 @@
 #include "core/scene/files/geo_keys.hpp"
 #include "tests/fuzz/heights.hpp"
 
+namespace {
+
+/// Bytes read as values; what is left at the end is dropped.
+template <class T>
+std::vector<T> values_of(const std::uint8_t* data, std::size_t size) {
+  std::vector<T> values(size / sizeof(T));
+  if (!values.empty()) std::memcpy(values.data(), data, values.size() * sizeof(T));  // data is null when there are no bytes
+  return values;
+}
+
+}  // namespace
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   sonar::fuzz::check_grid_reader(data, size, [](const auto& file) { return sonar::read_geo_tiff_heights(file, {}); });
-  std::vector<std::uint16_t> words(size / 2);
-  std::memcpy(words.data(), data, 2 * words.size());
-  std::vector<double> numbers(size / 8);
-  std::memcpy(numbers.data(), data, 8 * numbers.size());
-  const sonar::GeoKeys keys(std::move(words), std::move(numbers), {reinterpret_cast<const char*>(data), size});
+  const sonar::GeoKeys keys(values_of<std::uint16_t>(data, size), values_of<double>(data, size),
+                            {reinterpret_cast<const char*>(data), size});
   const auto system = sonar::system_of_keys(keys, std::nullopt);
   sonar::fuzz::require(system ? system->name.size() <= 100 : !system.error().text.empty());
   return 0;

@@ -1,5 +1,6 @@
-// Stands in for libFuzzer's main in ordinary builds: runs a fuzz entry point over its seeds, and over inputs made from them and
-// from the dictionary, always the same ones. usage: NAME_fuzz [-runs=N] [-dict=FILE] [-only=NUMBER] [seed files and folders]
+// Stands in for libFuzzer's main in ordinary builds: runs a fuzz entry point over no bytes, over its seeds, and over inputs made
+// from them and from the dictionary, always the same ones.
+// usage: NAME_fuzz [-runs=N] [-dict=FILE] [-only=NUMBER] [seed files and folders]
 #include <signal.h>
 #include <unistd.h>
 
@@ -16,7 +17,14 @@
 
 #include "tests/fuzz/mutator.hpp"
 
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(__SANITIZE_ADDRESS__)  // g++
+#define SONARD_DEATH_CALLBACK
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)  // clang
+#define SONARD_DEATH_CALLBACK
+#endif
+#endif
+#if defined(SONARD_DEATH_CALLBACK)
 #include <sanitizer/common_interface_defs.h>
 #endif
 
@@ -86,13 +94,17 @@ int main(int argc, char** argv) {
       add_seeds(argument, seeds);
     }
   }
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(SONARD_DEATH_CALLBACK)
   __sanitizer_set_death_callback(say_last_words);
 #else
   for (const int number : {SIGSEGV, SIGFPE, SIGBUS, SIGILL}) signal(number, on_signal);
 #endif
   signal(SIGABRT, on_signal);
 
+  if (only == ~0u) {
+    announce("the empty input", 0);
+    LLVMFuzzerTestOneInput(nullptr, 0);
+  }
   for (std::uint32_t i = 0; i < seeds.size() && only == ~0u; ++i) {
     announce("seed", i);
     run(seeds[i]);

@@ -21,6 +21,10 @@ def program():
     return os.environ.get("SONARD_BROWSER") or shutil.which("chromium") or shutil.which("chromium-browser")
 
 
+class Navigated(RuntimeError):
+    """The page was replaced by another before the browser answered."""
+
+
 class Browser:
     """with Browser() as browser: page = browser.open(url)"""
 
@@ -99,7 +103,8 @@ class Page:
             word = json.loads(message[1])
             if word.get("id") == self.calls:
                 if "error" in word:
-                    raise RuntimeError(f"{method}: {word['error']['message']}")
+                    kind = Navigated if "navigated" in word["error"]["message"] else RuntimeError
+                    raise kind(f"{method}: {word['error']['message']}")
                 return word["result"]
             self.note(word)
 
@@ -174,9 +179,11 @@ class Page:
             self.run("window.clicked = null, addEventListener('click', (e) => { window.clicked = e.target; }, {capture: true, once: true})")
             for kind in ("mousePressed", "mouseReleased"):
                 self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
-            # Undefined after a click on a link, which loads another page.
-            other = self.run(f"""window.clicked === undefined || window.clicked?.closest({json.dumps(selector)}) ? ''
-              : window.clicked?.outerHTML.slice(0, 200) ?? 'nothing'""")
+            try:  # undefined in the page that a click on a link has loaded
+                other = self.run(f"""window.clicked === undefined || window.clicked?.closest({json.dumps(selector)}) ? ''
+                  : window.clicked?.outerHTML.slice(0, 200) ?? 'nothing'""")
+            except Navigated:
+                return
             if not other:
                 return
         raise AssertionError(f"a click at the place of {selector} reaches {other}")

@@ -79,7 +79,7 @@ class PageChecks:
         except Exception:
             FAILED_SHOTS.mkdir(parents=True, exist_ok=True)
             for number, page in enumerate(self.open_pages):
-                with contextlib.suppress(OSError):  # it is closed already
+                with contextlib.suppress(OSError, RuntimeError):  # it is closed already, or another page is being loaded
                     page.picture(FAILED_SHOTS / f"failed-{self.id().rpartition('.')[2]}-{number}.png")
             raise
 
