@@ -1,5 +1,5 @@
-"""What one datagram, whose sender may be forged, makes each emulated sonar send: the table of docs/operations.md, "Datagrams with a
-forged sender". By hand: SONARD_BUILD=build/release python3 tests/load/amplification.py [SECONDS]
+"""Measures what each emulated sonar sends after one datagram whose sender may be forged: the figures of
+tests/reliability/README.md, "Datagrams with a forged sender". By hand: SONARD_BUILD=build/release python3 tests/load/amplification.py [SECONDS]
 
 The sender's port stays open and silent, which is the worst case: a closed one ends a stream at once.
 """
