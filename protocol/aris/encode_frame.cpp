@@ -10,10 +10,12 @@
 namespace sonar::aris {
 namespace {
 
-/// The sixteenth of the beams that a channel of the digitiser holds: a property of the hardware, as in the vendor's library.
+/// Each ping of a frame forms 16 beams, one for each channel of the digitiser. With n pings a frame, channel k of ping p holds
+/// beam n sixteenth[k] + p. This order is a property of the hardware; the vendor's library puts beams in order likewise.
 constexpr std::array<std::size_t, channels> sixteenth{10, 2, 14, 6, 8, 0, 12, 4, 11, 3, 15, 7, 9, 1, 13, 5};
 constexpr std::size_t first_part_samples = 620, part_samples = 1370;  // samples in a datagram of 1400 bytes
 constexpr std::size_t largest_picture = std::size_t{most_samples} * 128;
+/// The header has the absolute pressure. Clients of the vendor's SDK compute (pressure - 14.6959) x 0.702398 as the depth.
 constexpr double surface_psi = 14.6959, psi_per_m = 1 / 0.702398;
 
 std::uint64_t microseconds(std::chrono::nanoseconds t) {
@@ -56,7 +58,7 @@ void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used, c
   h.interpacket_delay_us = s.packet_delay_us;
 }
 
-/// Compass and accelerometer are in the sonar.
+/// The compass and the accelerometer are in the sonar, so they measure the attitude of the sonar and not that of the vehicle.
 void set_attitude(FrameHeader& h, const Quatd& sonar_in_world) {
   const RollPitchYaw angles = rpy_from_quat(sonar_in_world);
   h.compass_heading_deg = static_cast<float>(deg_from_rad(heading_rad(sonar_in_world)));
@@ -84,7 +86,7 @@ FrameHeader header_of(const Ping& ping, const protocol::DeviceState& device, con
   return h;
 }
 
-/// Rows as they are, beams from starboard.
+/// The samples with the beams of each row in reverse order: beam 0 of a Ping is at port, beam 0 of an ARIS at starboard.
 Bytes mirrored(const Ping& ping) {
   const auto beams = static_cast<std::ptrdiff_t>(ping.request.settings.beam_count);
   Bytes out(ping.samples);
@@ -152,7 +154,7 @@ std::optional<DecodedFrame> FrameAssembler::add(BytesView datagram) {
   const auto total = static_cast<std::size_t>(part.total_size), at = static_cast<std::size_t>(part.data_offset);
   if (total > largest_picture || at + part.data.size() > total) return std::nullopt;
   if (part.frame_index != index_ || done_ || total != total_) {
-    if (part.frame_index == index_ && total == total_) return std::nullopt;  // a part that came twice
+    if (part.frame_index == index_ && total == total_) return std::nullopt;  // a repeated part of a frame that is whole
     incomplete_ += done_ ? 0 : 1;
     index_ = part.frame_index;
     total_ = total;

@@ -1,4 +1,4 @@
-// The controller of an ARIS (docs/protocols/aris.md): commands at one port, frames at another.
+// The controller's side of an ARIS (docs/protocols/aris.md). It sends commands by TCP and receives frames by UDP.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 
 namespace sonar::aris {
 
+/// Frames arrive at any free port (0): the controller tells the device its number by SET_FRAMESTREAM_RECEIVER.
 inline constexpr std::array<protocol::HostPort, 2> host_ports{
     {{protocol::HostPort::Kind::tcp, command_port}, {protocol::HostPort::Kind::udp_listen, 0}}};
 

@@ -1,5 +1,5 @@
-// The laws of an ARIS: which acoustic settings are valid, what the device makes of them, and the PingSettings they mean. Pure
-// functions; formulas and sources: docs/protocols/aris.md.
+// Checks the acoustic settings that a controller sends to an ARIS, limits them as the device does, and converts them to
+// PingSettings. Pure functions; formulas and sources: docs/protocols/aris.md.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ namespace sonar::aris {
 inline constexpr double highest_rate_hz = 15, highest_gain_db = 24;
 inline constexpr std::uint32_t least_samples = 128, most_samples = 4096;  // per beam
 
-/// All that a controller has set, kept beside PingSettings: frames echo it.
+/// Everything that a controller has set. It is kept beside PingSettings because the headers of frames repeat it.
 struct Settings {
   Acoustics acoustics;
   bool valid = false;                                       // a SET_ACOUSTICS was accepted
@@ -33,7 +33,7 @@ struct Settings {
 };
 using HeldSettings = protocol::Held<Settings>;
 Settings initial_settings(const protocol::DeviceState& device);
-/// initial_settings() for null.
+/// The settings in `held`; if it is null, initial_settings().
 Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device);
 
 /// Sound speed from the temperature and depth of the water at the device, and the salinity that was set [m/s].
@@ -42,7 +42,7 @@ double sound_speed_mps(double temperature_c, double salinity_psu, double depth_m
 /// Highest frame rate with these settings, 1 to 15 [Hz].
 double highest_frame_rate_hz(const Product& product, const Acoustics& acoustics, std::optional<std::uint32_t> packet_delay_us);
 
-/// Start delay, samples and a rest [us].
+/// The shortest cycle period that the device accepts: start delay, all samples, and a rest of 360 us [us].
 std::uint32_t shortest_cycle_us(const Acoustics& acoustics);
 
 /// The device's answer to a SET_ACOUSTICS.
@@ -53,12 +53,13 @@ struct Verdict {
 };
 Verdict judge(const Acoustics& asked, const Product& product, bool lenient_cycle,
               std::optional<std::uint32_t> packet_delay_us = std::nullopt);
-/// The same, noted in the settings: the cookie under its kind, and the settings used unless they were refused.
+/// Calls judge() and writes its result into `settings`: the cookie as applied, constrained or invalid, and, unless the request
+/// was refused, the acoustic settings that the device uses.
 Verdict apply(Settings& settings, const Acoustics& asked, const protocol::DeviceState& device);
 
-/// 0 to 1000 over the window of the product.
+/// Position of the focus motor for a range: 0 at the sonar, 1000 at the end of the product's longest window.
 std::uint32_t focus_position(double range_m, const Product& product);
-/// Where the focus motor is, which takes a second for the whole way.
+/// Position of the focus motor at one moment. The motor takes a second from 0 to 1000.
 struct FocusNow {
   std::uint32_t position = 0;
   bool moves = false;

@@ -19,12 +19,17 @@ using protocol::Notice;
 using protocol::Reaction;
 using protocol::RequestPing;
 
-constexpr auto keep_alive_after = 2s;  // since the last message sent
+// The link is sonard's own, so these values are chosen (docs/protocols/blueview-link.md).
+constexpr auto keep_alive_after = 2s;  // since the sonar sent its last message
 constexpr auto longest_host_silence = 10s;
-constexpr std::size_t most_waiting = 8;  // triggers of one host that may wait for their ping
+constexpr std::size_t most_waiting = 8;  // PING requests of one host that may be unanswered at a time
 constexpr std::uint32_t longest_wait_ms = 600000;
-constexpr float housing_above_water_c = 2;  // unknown: reading of a real head's thermometer
+constexpr float housing_above_water_c = 2;  // unknown: how warm the housing of a real head is
 
+/// A connection has one state, `greeted_`: before HELLO every request but HELLO is refused. After it a host gets pings in two
+/// ways that do not exclude each other: single PING requests, which wait in `waiting_` for a ping of their head and settings, and
+/// one subscription, which requests a ping each interval. All hosts share the settings and the sonar computes one ping at a time,
+/// so both only ask the device for a ping, and on_ping() decides which requests it answers.
 class BlueViewDialogue final : public protocol::Dialogue {
  public:
   BlueViewDialogue(const DeviceState& device, Time now) : device_(device), spoke_at_(now) {}
@@ -35,7 +40,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     framer_.append(received);
     while (const auto frame = framer_.next()) {
       on_frame(*frame, now, reaction);
-      // Frames behind one that closes the connection have no effect.
+      // A frame that closes the connection ends it: later frames of the same piece have no effect.
       if (!reaction.events.empty() && std::holds_alternative<Close>(reaction.events.back())) return reaction;
     }
     if (!framer_.broken().empty()) reaction.events.emplace_back(Close{framer_.broken()});
@@ -46,13 +51,15 @@ class BlueViewDialogue final : public protocol::Dialogue {
   Reaction on_tick(Time now, bool ping_pending) override {
     Reaction reaction;
     settings_ = settings_from(device_.settings.get(), device_);
-    while (!waiting_.empty() && waiting_.front().until <= now) {  // all waits have the same length, so the oldest ends first
+    // on_ping_request() keeps the ends of the waits in order, so the first one ends first.
+    while (!waiting_.empty() && waiting_.front().until <= now) {
       reaction.replies.push_back(make_error(waiting_.front().request_id, Code::timeout, "no ping in the time given"));
       waiting_.pop_front();
     }
     if (subscription_ && subscription_->next <= now) {
       subscription_->wanted = true;
-      // A single ping that a host requested of another head comes first; else a quick subscription would always be served.
+      // A pending PING request for another head comes first. Else a subscription with a short interval would never let it
+      // through.
       if (!ping_pending || settings_.active_head == subscription_->head) ask_for_ping(subscription_->head, reaction);
       // Intervals that have passed are skipped, so that a late tick requests one ping and not a burst.
       subscription_->next += ((now - subscription_->next) / subscription_->interval + 1) * subscription_->interval;
@@ -83,7 +90,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const HeadSettings& fired = fired_with.heads[static_cast<std::size_t>(head)];
     const HeadSettings now_set = settings_from(device_.settings.get(), device_).heads[static_cast<std::size_t>(head)];
     for (auto it = waiting_.begin(); it != waiting_.end();) {
-      // A ping fired before the host's latest SET does not answer its later request.
+      // The host sent SET and then PING. A ping that was fired before the SET does not answer: its settings differ both from
+      // those at the request and from the present ones.
       if (it->head != head || (fired != it->asked_with && fired != now_set)) {
         ++it;
         continue;
@@ -96,7 +104,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
       subscription_->wanted = false;
     }
     const bool subscriber_waits = subscription_ && subscription_->wanted;
-    if (!waiting_.empty() || subscriber_waits) {  // for another head, or with other settings: that ping is requested next
+    if (!waiting_.empty() || subscriber_waits) {  // they need another head or other settings: request that ping next
       Reaction reaction;
       settings_ = settings_from(device_.settings.get(), device_);
       ask_for_ping(waiting_.empty() ? subscription_->head : waiting_.front().head, reaction);
@@ -131,7 +139,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     return alias ? std::optional<int>(0) : std::nullopt;
   }
 
-  /// Until a HELLO of our version only HELLO and KEEPALIVE are accepted; other requests get error 14004.
+  /// Before a HELLO of version 1 only HELLO and KEEPALIVE are accepted; other requests get error 14004.
   void on_frame(const Frame& frame, Time now, Reaction& reaction) {
     wire::Reader reader(frame.payload);
     switch (frame.header.type) {
@@ -154,7 +162,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const auto head = head_of(id);
     if (reader.ok() && !head) return refuse(frame, Code::no_head, "no head " + std::to_string(id), reaction);
     if (head) on_head_frame(frame, *head, reader, now, reaction);
-    // Handlers of a frame that is too short return without a reply; it is refused here, once.
+    // If the frame is too short, its handler returns without a reply; the frame is refused here, once.
     if (!reader.ok()) refuse(frame, Code::bad_parameter, reader.failure_text(), reaction);
   }
 
@@ -255,7 +263,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reaction.replies.push_back(make_frame(reply_to(FrameType::get), frame.header.request_id, payload));
   }
 
-  /// A trigger waits until on_ping() answers it, or until its time is over: error 18 by on_tick().
+  /// Puts a PING request into `waiting_`. on_ping() answers it, or on_tick() with error 18 when its time is over.
   void on_ping_request(const Frame& frame, int head, wire::Reader& reader, Time now, Reaction& reaction) {
     std::uint32_t timeout_ms = 0;
     reader("timeout_ms", timeout_ms);
@@ -264,7 +272,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
       return refuse(frame, Code::bad_parameter, "8 triggers wait for their pings already", reaction);
     const std::chrono::milliseconds wait(std::min(timeout_ms == 0 ? longest_wait_ms : timeout_ms, longest_wait_ms));
     Time until = now + wait;
-    if (!waiting_.empty()) until = std::max(until, waiting_.back().until);  // answers go out in the order of the questions
+    if (!waiting_.empty()) until = std::max(until, waiting_.back().until);  // answers go out in the order of the requests
     waiting_.push_back({frame.header.request_id, head, until, settings_.heads[static_cast<std::size_t>(head)]});
     ask_for_ping(head, reaction);
   }
@@ -282,7 +290,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reaction.replies.push_back(make_frame(reply_to(FrameType::subscribe), frame.header.request_id, {}));
   }
 
-  /// Selects the head first, because a ping is made of the active head. It joins a ping in progress that has these settings.
+  /// Requests a ping of a head. It makes the head active first, because the device pings with the active head. A ping of that
+  /// head that is already being computed with these settings serves the request too (`joins`).
   void ask_for_ping(int head, Reaction& reaction) {
     settings_.active_head = head;
     reaction.events.emplace_back(change());
@@ -295,7 +304,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
 
   const DeviceState& device_;
   Framer framer_;
-  SonarSettings settings_;  // as of this call
+  SonarSettings settings_;  // the device's, read at the begin of each call, and changed by it
   bool greeted_ = false;
   std::deque<Waiting> waiting_;  // oldest first
   std::optional<Subscription> subscription_;

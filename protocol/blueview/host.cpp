@@ -14,10 +14,10 @@ namespace {
 using namespace std::chrono_literals;
 using protocol::HostActions;
 
-constexpr auto silence_of_host = 2s;     // after the last message sent
-constexpr std::uint16_t abi_of_sdk = 4;  // abi of the SDK; the answers do not depend on it
+constexpr auto keep_alive_after = 2s;    // since this host sent its last message
+constexpr std::uint16_t abi_of_sdk = 4;  // the sonar reads this number and ignores it
 
-/// "no head 3 (code 2010)"
+/// The text of an error frame, such as "no head 3 (code 2010)".
 std::string text_of_error(wire::BytesView payload) {
   wire::Reader reader(payload);
   std::int32_t code = 0;
@@ -69,14 +69,15 @@ std::optional<Greeting> read_greeting(wire::BytesView payload) {
   return reader.ok() && !greeting.heads.empty() ? std::optional(greeting) : std::nullopt;
 }
 
-/// The samples of a ping, beam by beam; the head's fields before them are read.
+/// A ping whose head has been read and whose samples have been decompressed. `samples`: 16 bits each, beam by beam.
 struct DecodedPing {
   PingHead head;
   wire::Bytes samples;
 };
-/// bad_data: an invalid ping.
+/// bad_data: an invalid ping. The payload cannot be read with fields(PingHead): that describes a ping of the emulated sonar,
+/// which fills five of the eleven navigation fields, whereas the protocol allows any of them.
 Result<DecodedPing> read_ping(wire::BytesView payload) {
-  constexpr std::size_t fixed = wire::wire_size<PingHead>() - 8 - 4 * 4 - 4;  // up to the navigation data
+  constexpr std::size_t fixed = wire::wire_size<PingHead>() - 8 - 4 * 4 - 4;  // bytes before the navigation data
   DecodedPing ping;
   PingHead& h = ping.head;
   wire::Reader reader(payload);
@@ -138,7 +139,8 @@ Result<PolarImage> picture_of(const DecodedPing& ping) {
       image.samples.push_back(
           static_cast<float>(std::to_integer<int>(ping.samples[at]) + 256 * std::to_integer<int>(ping.samples[at + 1])));
     }
-  image.full_scale = image.brightest(990);  // no gamma lifts weak echoes
+  // Samples are linear, so the weak ones would be black at full scale. The brightest 1 % may saturate in the picture.
+  image.full_scale = image.brightest(990);
   return image;
 }
 
@@ -162,7 +164,7 @@ class BlueViewHost final : public protocol::Host {
     HostActions actions;
     framer_.append(received);
     while (const auto frame = framer_.next()) {
-      if (last_id_ == 0)
+      if (last_id_ == 0)  // on_open() was not called: the bytes come from a recording
         on_recorded(*frame, actions);
       else if (frame->header.request_id == last_id_)
         on_answer(*frame, now, actions);
@@ -176,7 +178,7 @@ class BlueViewHost final : public protocol::Host {
     if (now >= next_tick()) send(FrameType::keep_alive, 0, {}, now, actions);
     return actions;
   }
-  std::optional<Time> next_tick() const override { return sent_at_ + silence_of_host; }
+  std::optional<Time> next_tick() const override { return sent_at_ + keep_alive_after; }
 
   HostActions on_demand(Time now) override {
     HostActions actions;
@@ -201,12 +203,14 @@ class BlueViewHost final : public protocol::Host {
     actions.emplace_back(protocol::HostSend{0, make_frame(type, id, payload)});
   }
 
-  /// This host has requested nothing, so the answers are for another host.
+  /// Reads frames of a recording. They answer the requests of the host that was recorded, so their request ids do not count.
   void on_recorded(const Frame& frame, HostActions& actions) {
     if (frame.header.type == FrameType::hello_ok) greeting_ = read_greeting(frame.payload).value_or(greeting_);
     if (frame.header.type == FrameType::ping_data) on_ping(frame, actions);
   }
 
+  /// Handles the answer to the last request. Requests go out one by one: HELLO, a SET for each setting, then pings. Each answer
+  /// triggers the next SET; without a further one the host is open.
   void on_answer(const Frame& frame, Time now, HostActions& actions) {
     const auto fail = [&actions](ErrorKind kind, std::string text) { actions.emplace_back(Error{kind, std::move(text)}); };
     if (frame.header.type == FrameType::error)
@@ -234,7 +238,7 @@ class BlueViewHost final : public protocol::Host {
     send(FrameType::set, ++last_id_, payload, now, actions);
   }
 
-  /// Why the sonar cannot use these settings; empty when it can.
+  /// Queues the settings to send. Returns the reason if the sonar cannot use them, else an empty text.
   std::string plan_settings() {
     if (head_ >= greeting_.heads.size())
       return greeting_.model + " has " + std::to_string(greeting_.heads.size()) + " head(s), no mode " +

@@ -9,12 +9,12 @@ std::span<const protocol::Option> options() {
       {option_name::heads_base,
        {"0", "1", "strict"},
        "0",
-       "id of the first head: 0 or 1, the other one being accepted too; strict = 0, and no other"},
+       "id of the first head; a sonar of one head accepts both 0 and 1, unless this is strict (0 only)"},
       {option_name::strict_range,
        {"off", "on"},
        "off",
-       "a range beyond the product's is refused with 4009 instead of moved into it"},
-      {option_name::compression, {"none", "deflate"}, "none", "of the samples: deflate for slow links"},
+       "a range outside that of the product is refused with error 4009 (on) or clamped (off)"},
+      {option_name::compression, {"none", "deflate"}, "none", "compression of the samples; deflate is for slow links"},
   }};
   return all;
 }

@@ -5,11 +5,12 @@
 
 namespace sonar::blueview {
 
-/// The gain adjustment for 0 to 100 % of its range.
+/// Converts between per cent and the gain adjustment [dB]: 0 % is -48 dB, 100 % is 48 dB.
 float gain_db_from(double percent);
 double gain_percent_from(double gain_db);
 
-/// Changes only the fields that are set, of the head that is or becomes active. Refuses values that the product does not support.
+/// Selects the head `wanted.mode`, if set, and changes on the active head only the fields that are set. Refuses values that the
+/// product does not support.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
 }  // namespace sonar::blueview

@@ -5,7 +5,7 @@
 namespace sonar::control {
 namespace {
 
-/// Reads a varint off the front; nothing if it does not end within the bytes.
+/// Removes a varint from the front of `bytes`. nullopt: it does not end within them, or is longer than 10 bytes.
 std::optional<std::uint64_t> take_varint(BytesView& bytes) {
   std::uint64_t value = 0;
   for (std::size_t i = 0; i < bytes.size() && i < 10; ++i) {
@@ -34,6 +34,8 @@ tl::expected<Request, RefusedRequest> decode_request(BytesView bytes) {
 }
 
 bool is_unasked_pose(BytesView rest) {
+  // Reads only the keys of the outermost message, each `field number << 3 | wire type` (protobuf encoding guide), and skips the
+  // values. Wire types above 2 (groups, fixed 32 bits) do not occur in Request.
   constexpr std::uint64_t varint = 0, with_length = 2;
   bool has_id = false, is_pose = false;
   while (!rest.empty()) {

@@ -1,5 +1,5 @@
-// Attitudes and places that arrive in different messages, joined by the sender's clock into whole poses.
-// protocol/mavlink/mavlink_poses.hpp keeps one for local and one for satellite positions; both see the same attitudes.
+// Joins attitudes and positions, which arrive in different messages, into whole poses by the time stamps of the sender.
+// protocol/mavlink/mavlink_poses.hpp has one queue for local and one for satellite positions; both use the same attitudes.
 #pragma once
 
 #include <deque>
@@ -13,16 +13,17 @@ namespace sonar::mavlink {
 /// The newest attitudes, by their own time.
 class Attitudes {
  public:
-  /// Longest time between two attitudes that are interpolated. An attitude older than this is too old for a position.
+  /// Two attitudes further apart than this are not interpolated; a position between them gets no attitude.
   static constexpr std::int64_t longest_gap_ms = 1000;
-  /// Limit of extrapolation of the newest attitude by its rates.
+  /// The newest attitude is extrapolated by its angular rates for at most this time.
   static constexpr std::int64_t longest_carry_ms = 20;
 
+  /// `later`: a newer reading is needed first. `never`: the moment is before the first reading, or in a gap that is too long.
   enum class Answer { known, later, never };
   void put(const AttitudeReading& reading);
   void clear() { readings_.clear(); }
   bool empty() const { return readings_.empty(); }
-  /// The attitude at a moment: interpolated, or extrapolated for a short time. `later`: needs the next reading.
+  /// The attitude at a moment, interpolated between two readings or extrapolated from the newest. `out` is set only if `known`.
   Answer at(std::int64_t at_ms, AttitudeReading& out) const;
 
  private:
@@ -30,7 +31,7 @@ class Attitudes {
   std::deque<AttitudeReading> readings_;
 };
 
-/// Positions that wait for their attitude.
+/// Positions that wait for an attitude of the same moment, the oldest first.
 template <class Place>
 class PairedPlaces {
  public:
@@ -43,7 +44,7 @@ class PairedPlaces {
     if (waiting_.size() > most) waiting_.pop_front();
   }
   void clear() { waiting_.clear(); }
-  /// The next position with a known attitude, in order of arrival.
+  /// The next position, in order of arrival, whose attitude is known. Drops positions whose attitude will never be known.
   std::optional<Paired> next(const Attitudes& attitudes) {
     while (!waiting_.empty()) {
       Paired paired;
