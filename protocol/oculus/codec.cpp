@@ -28,6 +28,8 @@ bool is_known(MessageType type) {
   return false;
 }
 
+/// Length of the message with this header. The magic number has only two bytes, so samples may contain it: `strict` also demands
+/// a known type of message.
 std::optional<std::size_t> length_of(wire::BytesView header, Origin from, bool strict) {
   const MessageHeader read = header_of(header);
   if (strict && !is_known(read.type)) return std::nullopt;
@@ -45,6 +47,7 @@ std::optional<recording::Sender> sender_of(const RecordedMessage& message) {
   return recording::Sender{is_named ? *found : models().front(), header.source, is_named};
 }
 
+/// The samples of a ping result without the row gains that lie between them.
 std::optional<recording::Samples> samples_of(wire::BytesView message) {
   if (message.size() < header_size || header_of(message).type != MessageType::ping_result) return std::nullopt;
   const auto ping = decode_ping(message);

@@ -14,7 +14,7 @@
 
 namespace sonar::oculus {
 
-/// One ping result. Always complete in its fixed part; tables and image only as far as the message really holds them.
+/// A ping result. Its fixed part is complete; tables and image are there as far as the message holds them.
 struct DecodedPing {
   PingHead head;                            // version 0 and 1: extension, attitude and ping_start_time_s are 0
   std::vector<std::int16_t> bearings_cdeg;  // [beams], positive to starboard

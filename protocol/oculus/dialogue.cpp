@@ -20,12 +20,14 @@ using protocol::RequestPing;
 using protocol::StoreAddress;
 
 constexpr std::size_t notices_per_call = 8;               // bounds the log output that a hostile client can cause
-constexpr auto greeting_after = std::chrono::seconds(2);  // silence before the text of 6.1; drivers that do not wait fire earlier
+constexpr auto greeting_after = std::chrono::seconds(2);  // known drivers send their first fire message within a second
 
 /// One client's conversation (docs/protocols/oculus.md, section 1). Three states:
-/// - Until the first valid fire message: a dummy after each period of silence, and the text of 6.1 to a client that stays silent.
-/// - Pinging: no dummies, however long a ping takes. With network trigger they fill the time in which no ping is requested.
-/// - Standby (ping rate 5): a dummy at once, then one after each period of silence.
+/// - Before the first valid fire message the device sends a dummy after each period of silence. A client that stays silent gets
+///   the log text of section 6.1.
+/// - While it pings it sends no dummy, however long a ping takes. With network trigger it sends dummies while no ping is
+/// requested.
+/// - In standby (ping rate 5) it sends a dummy at once, then one after each period of silence.
 class OculusDialogue final : public protocol::Dialogue {
  public:
   OculusDialogue(const DeviceState& device, Time now) : device_(device) {
@@ -39,7 +41,7 @@ class OculusDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
-    // The events of this call act after it: a write is kept here for a read in the same bytes.
+    // The daemon carries out the events of this call after it. `stored_` lets a read see a write that is in the same bytes.
     stored_ = device_.stored_address;
     const std::uint64_t skipped_before = framer_.skipped_bytes();
     framer_.append(received);
@@ -68,7 +70,7 @@ class OculusDialogue final : public protocol::Dialogue {
   }
   void on_ping_queued(Time now) override {
     is_not_waiting();
-    // Remembered, because another client's settings may replace those that this one fired.
+    // The result is kept, because another client may replace the settings that this client sent.
     is_heard_ = is_heard();
     requested_ping_ = false;
     postpone_dummy(now);
@@ -107,15 +109,16 @@ class OculusDialogue final : public protocol::Dialogue {
     const bool standby = resolved.settings.rate_hz <= 0;
     const bool repeated = request == last_request_;
     last_request_ = request;
-    // Drivers repeat a fire message for every ping: a repeat is applied again, but its standby is not acknowledged again.
     const bool one_ping = resolved.settings.triggered && !standby;
-    // Before fired_ is replaced: is_heard() compares it with the settings of the device.
+    // is_heard() compares fired_ with the settings of the device, so it is called before fired_ is replaced.
     is_heard_ = is_heard();
     fired_ = std::make_shared<HeldFire>(*fire);
     reaction.events.emplace_back(ChangeSettings{resolved.settings, fired_, summary(*fire, resolved)});
     if (one_ping) reaction.events.emplace_back(RequestPing{});
     requested_ping_ = one_ping;
-    if (standby && !repeated) {  // drivers expect a dummy as the acknowledgement of standby
+    // Drivers take a dummy as the acknowledgement of standby (ENS). Some repeat a fire message for every ping (VND) or ten times
+    // a second (MRG); a repeated standby is applied again but not acknowledged again, or dummies would flood the client.
+    if (standby && !repeated) {
       reaction.replies.push_back(make_dummy(device_.id));
       postpone_dummy(now);
     }
@@ -152,7 +155,7 @@ class OculusDialogue final : public protocol::Dialogue {
     // By default a write is not answered, because the vendor's viewer reads the values back itself.
     if (write && text_option(device_.options, option_name::user_config_write) != "reply") return;
     reaction.replies.push_back(make_user_config(device_.id, stored_, device_));
-    postpone_dummy(now);  // the only client that reads it accepts the first 28 bytes as its answer
+    postpone_dummy(now);  // VND takes the first 28 bytes after its request as the reply, so no dummy may come first
   }
 
   void notice(Reaction& reaction, std::string text) {
@@ -171,12 +174,13 @@ class OculusDialogue final : public protocol::Dialogue {
   const DeviceState& device_;
   Framer framer_{Sender::client};
   protocol::Bytes last_request_;
-  protocol::StoredAddress stored_;  // as of this call: a read may follow its write in the same bytes
+  protocol::StoredAddress stored_;  // the device's, read at the begin of each call, and changed by writes in it
   Time dummy_at_{};
   std::shared_ptr<const VendorSettings> fired_;  // settings of the last fire message
-  bool is_heard_ = false, requested_ping_ = false;
+  bool is_heard_ = false;                        // the device has used settings of this client at some time
+  bool requested_ping_ = false;                  // by network trigger, and the ping has not been sent yet
   std::optional<Time> greeting_at_;
-  bool greets_silent_ = false;  // the text is for a client that by then has neither fired nor been sent a ping
+  bool greets_silent_ = false;  // a fire message, or a ping sent to the client, cancels the text
   std::size_t notices_ = 0;
 };
 

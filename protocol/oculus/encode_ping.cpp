@@ -11,11 +11,12 @@
 namespace sonar::oculus {
 namespace {
 
-/// Rounding tolerance: floats near 65 deg have an error of 4e-4 of 0.01 deg; non-integers of the capture's formula differ by
-/// more.
+/// Added before the truncation to 0.01 deg, because a float near 65 deg has an error of 4e-4 of that unit: 29.99999 deg must give
+/// 3000. The values of the capture's formula that are no integers are further from an integer than this.
 constexpr double truncation_guard_cdeg = 1e-3;
 
-/// The short form of versions 0 and 1: without extension and attitude, the start time as a 32-bit counter.
+/// Converts to the short form of versions 0 and 1, which has no extension and no attitude, and states the start time as a 32-bit
+/// counter.
 PingResultV1 version_1(const PingHead& head) {
   const PingResultV2& from = head.fixed;
   PingResultV1 to;
@@ -36,7 +37,7 @@ PingResultV1 version_1(const PingHead& head) {
   return to;
 }
 
-/// Row by row, nearest first: the row's gain, if gains were requested, then its samples from port to starboard.
+/// Appends the rows, the nearest first. A row is its gain, if gains were requested, and its samples from port to starboard.
 void append_image(wire::Bytes& out, const PingBlocks& blocks, std::size_t rows) {
   const std::size_t row_bytes = rows == 0 ? 0 : blocks.samples.size() / rows;
   wire::Writer write(out);
@@ -64,7 +65,8 @@ std::uint16_t reply_version(const FireRequest& fire, std::string_view option) {
   if (option == "0") return 0;
   if (option == "1") return 1;
   if (option == "2") return 2;
-  return std::min<std::uint16_t>(fire.version, 2);  // echoes the version; the highest is 2
+  // MRG reads only the short form, BLU only the long one, so a ping has the version of the fire message.
+  return std::min<std::uint16_t>(fire.version, 2);
 }
 
 void set_attitude(PingResultV2& fixed, const Quatd& vehicle_in_world) {
@@ -80,14 +82,16 @@ void set_environment(PingResultV2& fixed, const PingRequest& request) {
   set_attitude(fixed, request.vehicle_in_world.orientation);
 }
 
-/// Seconds of the power-up clock in both versions' forms.
+/// Sets the time since power-up as both versions state it. CAP's 32-bit counter rises by 62 502 100 a ping at 16 Hz, so its unit
+/// is a nanosecond and it overflows every 4.3 s; option ping_start_time_unit has microseconds for another reading.
 void set_start_time(PingHead& head, std::chrono::nanoseconds since_power_up, std::string_view unit) {
   const auto microseconds = std::chrono::floor<std::chrono::microseconds>(since_power_up).count();
   head.fixed.ping_start_time_s = static_cast<double>(microseconds) * 1e-6;
   head.ping_start_counter = static_cast<std::uint32_t>(unit == "microseconds" ? microseconds : since_power_up.count());
 }
 
-/// The client's double when it was applied; settings store a float.
+/// The sound speed that the device used. PingSettings hold it as a float; if the request was applied unchanged, the ping must
+/// state the client's double exactly.
 double sound_speed_used(const FireSettings& asked, const PingSettings& settings) {
   const bool as_asked = static_cast<float>(asked.sound_speed_mps) == settings.device_sound_speed_mps;
   return as_asked ? asked.sound_speed_mps : static_cast<double>(settings.device_sound_speed_mps);
@@ -122,7 +126,7 @@ wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks) {
   return out;
 }
 
-/// Truncated towards 0, as in the captured pings (docs/protocols/oculus.md, 5.3). The wire's bearings are positive to starboard.
+/// Truncates towards 0, as the captured pings do (docs/protocols/oculus.md, 5.3). Bearings on the wire are positive to starboard.
 std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad) {
   const double bearing_cdeg = -100 * deg_from_rad(azimuth_rad);
   return static_cast<std::int16_t>(std::trunc(bearing_cdeg + std::copysign(truncation_guard_cdeg, bearing_cdeg)));

@@ -26,13 +26,13 @@ struct PingBlocks {
 /// Fills in payload size, image offset, image size and message size; no trailing bytes. row_count and beam_count must be set.
 wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks);
 
-/// 0.01 deg, truncated toward zero as the capture is, guarded so that 29.99999 deg of a float stays 3000.
+/// Bearing in 0.01 deg, positive to starboard, truncated towards 0 as in the captured pings.
 std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad);
 
 /// The fire settings as the ping repeats them (docs/protocols/oculus.md, 5.5). `sound_speed_used` replaces a requested 0.
 FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, double sound_speed_used_mps);
 
-/// Everything: echo, environment, image. `fire`: the request the ping was made with.
+/// The whole ping result of `ping`. `fire`: the request under which the ping was made.
 wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const FireRequest& fire);
 
 }  // namespace sonar::oculus

@@ -15,7 +15,8 @@ std::optional<FireRequest> parse_fire(wire::BytesView message) {
   reader.block("header", header_size);
   fields(reader, fire.settings);
   if (fire.version >= 2) {
-    wire::Bytes tail(wire::wire_size<FireExtension>());  // zeros where the client sent less
+    // The message of a client may end early; the missing fields read as 0.
+    wire::Bytes tail(wire::wire_size<FireExtension>());
     const auto sent = message.subspan(fire_v1_size, std::min(tail.size(), message.size() - fire_v1_size));
     std::copy(sent.begin(), sent.end(), tail.begin());
     wire::Reader tail_reader(tail);
@@ -44,6 +45,7 @@ FireRequest stored_fire() {
   return fire;
 }
 
+// Fire messages are compared as bytes: a client sees a difference in any field, also in those that the device only echoes.
 bool HeldFire::equals(const VendorSettings& other) const {
   const auto* held = dynamic_cast<const HeldFire*>(&other);
   return held != nullptr && make_fire(fire) == make_fire(held->fire);

@@ -24,7 +24,8 @@ std::optional<FireRequest> parse_fire(wire::BytesView message);
 /// as several public clients send it.
 wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination = 0, bool payload_size_zero = false);
 
-/// The device's stored configuration before any client spoke. Version 0 fits all clients (docs/protocols/oculus.md, 5.1).
+/// The configuration stored in the device, which holds until a client sends a fire message. Its version is 0: the
+/// short form fits every driver (docs/decisions/0025-oculus-evidence.md).
 FireRequest stored_fire();
 
 /// The request that a device's settings come from; equal when its bytes are.
@@ -33,7 +34,7 @@ struct HeldFire final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
   FireRequest fire;
 };
-/// stored_fire() for null.
+/// The request in `settings`; if they are null, stored_fire().
 FireRequest fire_of(const VendorSettings* settings);
 
 }  // namespace sonar::oculus

@@ -3,6 +3,7 @@
 namespace sonar::oculus {
 namespace {
 
+/// Length of a client's message that states a payload size of 0.
 std::size_t natural_length(const MessageHeader& header) {
   switch (header.type) {
     case MessageType::fire:
@@ -31,7 +32,7 @@ std::optional<std::size_t> message_length(const MessageHeader& header, Sender se
     if (header.payload_size > reply_limit - header_size) return std::nullopt;
     return header_size + header.payload_size;
   }
-  // Several drivers send payload size 0 before 37 bytes of payload: 0 means the natural length of the type.
+  // VND, BAS, MRG, TID and ALD send payload size 0 before 37 bytes of payload, so 0 means the natural length of the type.
   if (header.payload_size > request_payload_limit) return std::nullopt;
   return header.payload_size == 0 ? natural_length(header) : header_size + header.payload_size;
 }
@@ -46,7 +47,7 @@ std::optional<wire::BytesView> Framer::next() {
   while (buffered_bytes() > 0) {
     const auto waiting = wire::BytesView(buffer_).subspan(begin_);
     const bool starts_like_header = waiting[0] == first_magic && (waiting.size() < 2 || waiting[1] == second_magic);
-    // Bytes that may become a header wait for the rest of it.
+    // These bytes may be the begin of a header; its rest has not arrived.
     if (starts_like_header && waiting.size() < header_size) return std::nullopt;
     const auto length = starts_like_header ? message_length(header_of(waiting), sender_) : std::nullopt;
     if (length) {
@@ -54,7 +55,7 @@ std::optional<wire::BytesView> Framer::next() {
       begin_ += *length;
       return waiting.first(*length);
     }
-    // Skips one byte at a time, so that a false start hides no message.
+    // Only one byte is skipped, because a header may begin at the next one.
     ++begin_;
     ++skipped_;
   }

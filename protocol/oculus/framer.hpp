@@ -9,7 +9,7 @@
 
 namespace sonar::oculus {
 
-/// Who sends the stream: clients put 0 into payload_size as they like (docs/protocols/oculus.md, 2), devices are exact.
+/// The sender of a stream. Some clients send payload_size 0 (docs/protocols/oculus.md, 2); devices send the true size.
 enum class Sender { client, device };
 
 /// Total length of the message with this header; nullopt for a header that this sender never sends.

@@ -25,8 +25,9 @@ Result<PolarImage> picture_of(const DecodedPing& ping) {
   image.samples.reserve(image.rows * image.beams);
   for (std::size_t row = 0; row < image.rows; ++row)
     for (std::size_t beam = 0; beam < image.beams; ++beam) image.samples.push_back(static_cast<float>(ping.sample(row, beam)));
-  image.full_scale = 254;                                                    // saturation of 8 bits
-  if (ping.bytes_per_sample() > 1) image.full_scale = image.brightest(999);  // wider samples rarely come near their maximum
+  image.full_scale = 254;  // samples of 8 bits saturate there
+  // Wider samples seldom come near their maximum, so the picture would be black.
+  if (ping.bytes_per_sample() > 1) image.full_scale = image.brightest(999);
   return image;
 }
 
@@ -42,6 +43,8 @@ protocol::PingFacts facts_of(const DecodedPing& ping) {
           ping.message.size()};
 }
 
+/// Sends a fire message when the connection is open, and again with each ping until the echo agrees with it, as ENS does. Nothing
+/// else is sent: the device pings by itself. `asked` is absent if the sonar's settings are to stay as they are.
 class OculusHost final : public protocol::Host {
  public:
   OculusHost(std::optional<FireRequest> asked, bool triggered) : asked_(std::move(asked)), triggered_(triggered) {}
@@ -93,7 +96,7 @@ class OculusHost final : public protocol::Host {
     is_satisfied_ = is_satisfied_ || out.echo_mismatches.empty();
     out.picture = [kept = std::make_shared<const DecodedPing>(std::move(ping))] { return picture_of(*kept); };
     actions.emplace_back(std::move(out));
-    // As strict drivers do, the request is repeated until an echo matches it. With network trigger each ping needs a request.
+    // With network trigger each ping needs a request of its own.
     if (triggered_ || !is_satisfied_) ask(actions);
   }
 

@@ -10,8 +10,8 @@ namespace sonar::oculus {
 
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
 
-/// The fire message of the settings; what is not wanted: high frequency, 10 m, 10 Hz, 50 %, 512 beams, 8 bits; rates are the
-/// nearest that a fire message can ask for. usage: a mode or setting that it has not.
+/// The fire message for the wanted settings. Defaults: high frequency, 10 m, 10 Hz, 50 %, 512 beams, 8 bits. The rate is the
+/// nearest one that a fire message can request. usage: a mode or setting that a fire message does not have.
 Result<FireRequest> fire_from(const protocol::Wanted& wanted);
 
 /// Reads a status message.

@@ -17,7 +17,7 @@ std::string number(double value) {
 }
 std::string number(std::uint64_t value) { return std::to_string(value); }
 
-/// Collects a sentence for every statement that does not hold.
+/// Collects a sentence for each condition that a message violates.
 class Check {
  public:
   template <class A, class B>
@@ -43,6 +43,8 @@ class Check {
   std::vector<std::string> violations_;
 };
 
+/// VND, BAS and MRG drop a ping with trailing bytes; APL drops one whose image size contradicts the echoed flags
+/// (docs/protocols/oculus.md, 5.1).
 void check_sizes(Check& check, const DecodedPing& ping) {
   const PingResultV2& fixed = ping.head.fixed;
   const ImageSizes& sizes = fixed.sizes;
@@ -99,6 +101,7 @@ std::vector<std::string> identity_violations(const DecodedPing& ping) {
   return check.violations();
 }
 
+/// ENS and BLU compare these fields of request and echo, and repeat the request until they agree (docs/protocols/oculus.md, 5.5).
 std::vector<std::string> echo_violations(const FireRequest& sent, const DecodedPing& ping, std::string_view gain_echo) {
   Check check;
   const FireSettings& asked = sent.settings;
@@ -128,6 +131,7 @@ std::vector<std::string> status_violations(const StatusMessage& status, std::siz
   check.holds(status.device_id != 0, "device_id is 0");
   check.equal("device_type", status.device_type, "an imaging sonar's", 1u);
   check.equal("part_number in the header", status.header.part_number, "that in the body", status.part_number);
+  // APL aborts when these bits are 0 or 1.
   check.holds((status.status & 7u) == 2 || (status.status & 7u) == 3, "status bits 0-2 say that the main firmware does not run");
   check.holds(status.ip_address != std::array<std::uint8_t, 4>{}, "ip_addr is 0.0.0.0");
   return check.violations();

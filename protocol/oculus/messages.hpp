@@ -160,7 +160,7 @@ constexpr void fields(V& visit, M& m) {
   visit("messageSize", m.message_size, means::message_size);
 }
 
-/// Fixed part; bearings (i16 per beam, 0.01 deg, positive to starboard), filler and image follow.
+/// The fixed part of a ping result. Bearings (i16 per beam, 0.01 deg, positive to starboard), filler and image follow.
 struct PingResultV1 {
   MessageHeader header;
   FireSettings fire;
@@ -228,7 +228,8 @@ constexpr void fields(V& visit, M& m) {
   visit("sizes", m.sizes);
 }
 
-/// ip 0 asks for the stored values, anything else writes them. Plain integers: 192.168.1.2 = 0xC0A80102.
+/// A client reads the stored values with address 0 and writes them with any other. Addresses are integers: 192.168.1.2 is
+/// 0xC0A80102.
 struct UserConfigMessage {
   MessageHeader header;
   std::uint32_t ip_address = 0, ip_mask = 0, dhcp_enable = 0;

@@ -1,5 +1,5 @@
-// Everything the public sources leave unknown or contradictory about the device, as named options of a sonar's configuration.
-// The first allowed value of each is the default; read through the accessors here by dialogue, frame and beacon.
+// Options of an emulated Oculus, by name, under `options:` of a sonar in the configuration. Each stands for a behaviour that the
+// public sources leave open or contradict each other about. The first allowed value is the default.
 #pragma once
 
 #include <span>

@@ -9,7 +9,7 @@
 namespace sonar::oculus {
 namespace {
 
-constexpr std::uint32_t main_firmware_runs = 3, main_connection = 1u << 7;
+constexpr std::uint32_t main_firmware_runs = 3, main_connection = 1u << 7;  // APL aborts if bits 0 to 2 are 0 or 1
 // unknown: versions of the real firmware; major 8 bits, minor 8, build 16. Assumed: 1.0 build 0.
 constexpr std::uint32_t firmware_version = 0x01000000, firmware_date = 0;
 // unknown: dstDeviceId of the status, 0xFFFF in the notes of ALD on a real M750d; assumed: 0, as in CAP's pings. No driver reads
@@ -38,7 +38,9 @@ wire::Bytes make_status(const protocol::DeviceState& device) {
   status.ip_mask = device.netmask;
   status.connected_ip = device.connected_client;
   status.mac = device.mac;
-  status.temperature_c.fill(device.water.temperature_c);  // all eight: drivers command standby at 35 degrees
+  // All eight sensors read the temperature of the water. A warmer electronics would be realistic, but ENS commands standby at 35
+  // degrees.
+  status.temperature_c.fill(device.water.temperature_c);
   status.pressure_bar = absolute_pressure_bar(device.water, device.depth_m);
   return wire::bytes_of(status);
 }

@@ -11,12 +11,12 @@
 namespace sonar::oculus {
 namespace {
 
-constexpr double rest_per_ping_s = 0.002;  // assumed: between the last echo and the next transmission
+constexpr double rest_per_ping_s = 0.002;  // assumed: time from the last echo to the next transmission
 constexpr double surface_pressure_bar = 1.013;
 
-constexpr int most_samples_per_row = 32;
+constexpr int most_samples_per_row = 32;  // chosen: bounds the computing time of a row at long ranges
 
-/// Clamps, with a message: "range 20 m is outside 0.1..10 m, 10 m is used".
+/// Clamps a value and adds a message if that changed it: "range 20 m is outside 0.1..10 m, 10 m is used".
 double clamped(double value, double low, double high, const char* what, const char* unit, std::vector<std::string>& messages) {
   const double used = std::clamp(value, low, high);
   if (used != value) {
@@ -28,17 +28,18 @@ double clamped(double value, double low, double high, const char* what, const ch
   return used;
 }
 
-/// Option `row_origin`; unknown: behaviour of the device.
+/// Range of row 0 in row spacings. unknown: drivers assume all three of these values, hence option `row_origin`.
 double row_centre(const protocol::OptionValues& options) {
   const std::string_view origin = text_option(options, option_name::row_origin);
   return origin == "near_edge" ? 0 : origin == "far_edge" ? 1 : 0.5;
 }
 
-/// Pulse and range sampling of one row, option `pulse`.
+/// Sets the pulse width and the number of samples whose mean power makes a row (option `pulse`).
 void set_pulse(PingSettings& settings, double spacing_m, bool native) {
   settings.pulse_width_m = static_cast<float>(native ? native_pulse_m : 0.9 * spacing_m);
   if (!native) return;
-  // F_s = 2b, b = 0.5887 c / pulse. Long ranges get a longer pulse rather than samples without end.
+  // Sampling rate 2 b for the bandwidth b = 0.5887 c / pulse. At long ranges the pulse is made longer, so that the number of
+  // samples stays bounded.
   constexpr double samples_per_pulse = 4 * 0.5887;
   const double pulse_m = std::max(native_pulse_m, spacing_m * samples_per_pulse / most_samples_per_row);
   settings.pulse_width_m = static_cast<float>(pulse_m);
@@ -46,6 +47,7 @@ void set_pulse(PingSettings& settings, double spacing_m, bool native) {
       std::clamp(static_cast<int>(std::ceil(spacing_m * samples_per_pulse / pulse_m - 1e-9)), 1, most_samples_per_row);
 }
 
+/// Rates of a fire message are maxima: a ping begins after the echoes of the previous one have come back.
 double highest_rate_hz(const FireSettings& fire, const PingSettings& settings, const protocol::DeviceState& device) {
   double rate = std::min(table_rate_hz(fire.ping_rate), static_cast<double>(device.model->max_rate_hz));
   const double echo_time_s = 2.0 * settings.range_m / static_cast<double>(settings.device_sound_speed_mps);
@@ -107,8 +109,8 @@ bool asks_for_gain_assist(const FireSettings& fire, std::string_view option) {
   return (option == "flag_set" && bit) || (option == "flag_clear" && !bit);
 }
 
-/// In the high mode the echo is 40 + 0.6 g, which the driver of ENSTA inverts. With gain assist it repeats the request, as in the
-/// captured pings (docs/protocols/oculus.md, 5.5).
+/// In the high mode the echo of a gain g is 40 + 0.6 g, which ENS inverts. With gain assist the echo repeats the request, as in
+/// the captured pings (docs/protocols/oculus.md, 5.5).
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo) {
   const bool high_frequency = fire.mode == 2;
   const bool mapped = gain_echo == "mapped" || (gain_echo != "verbatim" && (fire.flags & flag::gain_assist) == 0);
@@ -132,6 +134,7 @@ bool has_non_finite(const FireSettings& fire) {
          !std::isfinite(fire.salinity_ppt);
 }
 
+// The wire counts modes from 1: 1 is the low frequency, 2 the high one. Other values count as 1 (chosen).
 int mode_index(const SonarModel& model, std::uint8_t wire_mode) { return wire_mode == 2 && model.modes.size() > 1 ? 1 : 0; }
 
 double device_sound_speed_mps(const protocol::DeviceState& device, double salinity_ppt) {
@@ -155,6 +158,7 @@ ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& d
   const double speed = asked.sound_speed_mps == 0 ? device_sound_speed_mps(device, salinity)
                                                   : clamped(asked.sound_speed_mps, 1300, 1700, "sound speed", "m/s", out.clamped);
   settings.device_sound_speed_mps = static_cast<float>(speed);
+  // The device compensates the absorption for the salinity that the client states, which may differ from that of the water.
   Water believed = device.water;
   believed.salinity_psu = salinity;
   settings.device_absorption_db_per_m = static_cast<float>(absorption_db_per_m(believed, device.depth_m, mode.centre_hz));
@@ -175,7 +179,7 @@ ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& d
   FireSettings used = asked;
   used.gain_percent = clamped(asked.gain_percent, 0, 100, "gain", "%", out.clamped);
   const bool scientific = settings.format.bits == 32;
-  // 32 bits carry the gain as requested, without the mapping of the echo.
+  // Samples of 32 bits have the gain that was requested: its mapping to 40 + 0.6 g concerns the other formats.
   const double percent =
       scientific ? used.gain_percent : echoed_gain_percent(used, text_option(device.options, option_name::gain_echo));
   settings.gain_db = static_cast<float>(db_per_percent * percent);

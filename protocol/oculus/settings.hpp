@@ -1,5 +1,5 @@
-// The laws that turn a fire message into PingSettings: rows, rates, gain, gamma, limits, the device's own sound speed.
-// Pure functions, called by the dialogue; the way back (echo and ping result) is encode_ping.hpp.
+// Converts a fire message to PingSettings: rows, rates, gain, gamma, limits, the device's own sound speed. Pure functions, called
+// by the dialogue; encode_ping.hpp converts in the other direction.
 #pragma once
 
 #include <string>
@@ -29,7 +29,7 @@ RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz = row_ra
 double table_rate_hz(PingRate rate);
 /// Exponent of the samples: value / 255, and 1 for 0.
 float gamma_from_byte(std::uint8_t value);
-/// Bits, saturation, gamma and row gains that a fire message asks for.
+/// The format of the samples that a fire message requests: bits, saturation, gamma, row gains.
 SampleFormat sample_format(const FireRequest& fire);
 /// The gain as echoed, per cent (docs/protocols/oculus.md, 5.5): in mode 2 without flag bit 4 a gain of g is echoed as 40 + 0.6
 /// g, see option gain_echo.

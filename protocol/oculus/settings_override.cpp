@@ -72,7 +72,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
           bits == 32 ? fire.extension.flags | flag::extended_32_bit : fire.extension.flags & ~flag::extended_32_bit;
   }
   if (wanted.row_gains) set(asked, flag::row_gains, *wanted.row_gains);
-  // The request is written, sent and read like that of a driver.
+  // The request is encoded and parsed again, so that the result is the same as for a driver that sends it: version 0 and 1 have
+  // no extension.
   const FireRequest received = parse_fire(make_fire(fire)).value_or(fire);
   return protocol::ChangeSettings{resolve(received, device).settings, std::make_shared<HeldFire>(received), describe(received)};
 }

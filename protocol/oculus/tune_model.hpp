@@ -10,7 +10,7 @@
 
 namespace sonar::oculus {
 
-/// The model itself when no option asks for a change. Error: a figure of a mode this product lacks.
+/// The model with the values of the options; without any, the model itself. Error: a value for a mode that the product lacks.
 Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model, const protocol::OptionValues& options);
 
 }  // namespace sonar::oculus
