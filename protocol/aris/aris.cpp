@@ -48,7 +48,7 @@ class ArisVendor final : public protocol::Vendor {
   }
   std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
                                        protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // the beacon is of varints
+    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // fields of the beacon have no fixed place
   }
   bool change_integer(protocol::Part part, protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change,
                       protocol::Bytes& message) const override {

@@ -9,6 +9,8 @@ namespace {
 
 constexpr std::uint32_t most_beams = 128;
 
+/// The first fields of the file header, from the vendor's aris-file-sdk. Readers take the numbers of beams and samples from here,
+/// not from the frames.
 struct FileHeader {
   std::uint32_t version = aris::file_version, frames = 0;
   std::array<std::uint32_t, 2> reserved0{};
@@ -81,6 +83,7 @@ class ArisFileReader final : public RecordingReader {
                    " is damaged: its version or number of samples is not the file's");
       return true;
     }
+    // The frames are turned into datagrams again, so that the host that reads live frames reads files too.
     at_ = Time(std::chrono::microseconds(header.frame_time_us % longest_time_us));
     for (Bytes& part : aris::parts_of(++frames_, bytes.first(aris::header_size), bytes.subspan(aris::padded_header_size)))
       parts_.push_back(std::move(part));
@@ -120,14 +123,14 @@ class ArisFileWriter final : public RecordingWriter {
       return failure(ErrorKind::bad_data,
                      "the settings were changed, and frames now have another size; an .aris file holds frames of one size");
     frame->header.frame_index = header_.frames;
-    frame->header.reordered = 1;
+    frame->header.reordered = 1;  // FrameAssembler has put the samples into the order of the picture
     const std::size_t at = record.size();
     wire::append(record, frame->header);
     record.resize(at + aris::padded_header_size);
     record.insert(record.end(), frame->picture.begin(), frame->picture.end());
     if (auto written = sink_->append(record); !written) return written;
     ++header_.frames;
-    return sink_->overwrite(0, wire::bytes_of(header_));  // so that the count is right even if the program is killed
+    return sink_->overwrite(0, wire::bytes_of(header_));  // after each frame, so that the count is right if the program is killed
   }
 
   Result<void> close() override { return sink_->close(); }

@@ -9,7 +9,7 @@
 namespace sonar::aris {
 namespace {
 
-/// The sender, from the first datagram of a frame.
+/// The sender of the first datagram of a frame; only that one has the header, which names the product.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   FramePart part;
   if (message.by != recording::Carrier::datagram || !protobuf::read(message.bytes, part)) return std::nullopt;

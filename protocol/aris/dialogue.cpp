@@ -18,13 +18,13 @@ using protocol::DeviceState;
 using protocol::Notice;
 using protocol::Reaction;
 
-constexpr std::size_t most_waiting = 256;    // changes of settings that a fault holds back
+constexpr std::size_t most_waiting = 256;    // changes of settings that a fault (D01, D02) may hold back
 constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hostile controller can cause
 
 bool is_multicast(protocol::Ipv4 ip) { return ip[0] >= 224 && ip[0] < 240; }
 
-/// One controller's conversation (docs/protocols/aris.md, "Session"). The device never answers over TCP: its state is in beacons
-/// and frame headers. Frames flow once acoustic settings were valid and a receiver is set, in any order of the two.
+/// One controller's conversation (docs/protocols/aris.md, "Session"). The device never answers over TCP; beacons and frame
+/// headers state what it does. It sends frames after it has got both valid acoustic settings and a receiver, in either order.
 class ArisDialogue final : public protocol::Dialogue {
  public:
   explicit ArisDialogue(const DeviceState& device) : device_(device), seen_(device.settings), first_ping_(device.last_ping) {}
@@ -35,7 +35,8 @@ class ArisDialogue final : public protocol::Dialogue {
     // All commands of one call become one change of settings, with the result of the last command.
     settings_ = base();
     settings_.streaming |= streaming_;
-    settings_.first_ping = std::min(settings_.first_ping, first_ping_);  // that of the controller that connected first
+    // frame_index counts from the first ping of a connection. If several controllers are connected, it is that of the first one.
+    settings_.first_ping = std::min(settings_.first_ping, first_ping_);
     changed_ = false;
     framer_.append(received);
     while (const auto message = framer_.next()) on_message(*message, now, reaction);
@@ -51,8 +52,8 @@ class ArisDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  private:
-  /// The settings that the next command changes. These are the settings commanded last (a fault may hold them back), or others
-  /// that replaced them.
+  /// The settings that the next command starts from. These are the ones commanded last, even if a fault still holds them back, or
+  /// the device's if something else has replaced them, such as the control interface.
   Settings base() {
     if (device_.settings != seen_) {
       const auto applied = std::find(waiting_.begin(), waiting_.end(), device_.settings);
@@ -93,7 +94,7 @@ class ArisDialogue final : public protocol::Dialogue {
       case CommandType::home_focus:
         return move_focus(0, now);
       default:
-        break;  // keep-alives, and commands to a rotator and a log receiver that are not there
+        break;  // keep-alives have no effect; a rotator and a log receiver, which have commands too, are not emulated
     }
     if (command.type > CommandType::set_syslog_receiver)
       notice(reaction, "ignored a command of type " + std::to_string(static_cast<unsigned>(command.type)));
@@ -106,7 +107,8 @@ class ArisDialogue final : public protocol::Dialogue {
     changed_ = true;
   }
 
-  /// An empty address stands for the controller's own, 0.0.0.0 in the event; the address 0.0.0.0 stops the frames.
+  /// On the wire an empty address is the controller's own and "0.0.0.0" stops the frames. In SetReceivers 0.0.0.0 is the
+  /// controller's own and an empty list stops the frames.
   void on_receiver(const Command& command, Reaction& reaction) {
     const Receiver wanted = command.receiver.value_or(Receiver{});
     protocol::SetReceivers receivers;
@@ -136,8 +138,9 @@ class ArisDialogue final : public protocol::Dialogue {
     changed_ = true;
   }
 
-  /// A host that does not know the product sends settings for several of them, one after the other. Refusals are reported when
-  /// none of these was accepted: with the next other command, such as the keep-alive of each second.
+  /// A controller that does not know the product sends the settings of each product, one after the other, and the device accepts
+  /// those of its own. So refusals are logged only if none was accepted: at the next command of another type, at the latest the
+  /// keep-alive, which comes every second.
   void on_acoustics(const Command& command) {
     const Verdict verdict = apply(settings_, command.acoustics.value_or(Acoustics{}), device_);
     accepts_ |= verdict.refusal.empty();
@@ -175,14 +178,14 @@ class ArisDialogue final : public protocol::Dialogue {
   }
 
   const DeviceState& device_;
-  std::shared_ptr<const VendorSettings> seen_;                 // the device's, at the last call
-  std::deque<std::shared_ptr<const VendorSettings>> waiting_;  // commanded since, oldest first
+  std::shared_ptr<const VendorSettings> seen_;                 // the settings of the device at the last call
+  std::deque<std::shared_ptr<const VendorSettings>> waiting_;  // settings commanded since, the oldest first
   std::uint32_t first_ping_;
   bool streaming_ = false;             // this controller has set a receiver
-  std::vector<std::string> refusals_;  // of acoustic settings since the last other command
-  bool accepts_ = false;               // other such settings were accepted
+  std::vector<std::string> refusals_;  // refusals of SET_ACOUSTICS since the last command of another type
+  bool accepts_ = false;               // a SET_ACOUSTICS since then was accepted
   CommandFramer framer_;
-  Settings settings_;  // as of this call
+  Settings settings_;  // those of base(), changed by the commands of this call
   bool changed_ = false;
   std::size_t notices_ = 0;
 };

@@ -37,14 +37,15 @@ bool change_part(protocol::FieldName name, const std::function<std::int64_t(std:
 /// 0x4000 too hot, 0x8000 stopped by heat).
 bool change_beacon(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& beacon);
 
-/// A whole frame, as its parts say.
+/// A frame put together from all its parts.
 struct DecodedFrame {
   std::int32_t index = 0;
   FrameHeader header;
   Bytes picture;  // [samples][beams], beam 0 most to starboard
   std::size_t samples = 0, beams = 0;
 };
-/// Puts datagrams together; a frame that lacks a part is dropped when the next one begins.
+/// Collects datagrams of a frame until it is complete. If the next frame begins earlier, the incomplete one is dropped and
+/// counted.
 class FrameAssembler {
  public:
   std::optional<DecodedFrame> add(BytesView datagram);

@@ -14,12 +14,12 @@ namespace {
 using namespace std::chrono_literals;
 using protocol::HostActions;
 
-constexpr auto ping_after = 1s;
-constexpr double nominal_sound_speed_mps = 1490;
+constexpr auto ping_after = 1s;                   // keep-alive; the device disconnects a controller after 10 s of silence
+constexpr double nominal_sound_speed_mps = 1490;  // converts a wanted range to time before a frame states the sound speed
 constexpr std::uint32_t most_pulse_us = 80;
 constexpr std::size_t commands = 0, frames = 1;  // ports
 
-/// The settings for a product; nothing if it has no such range or mode.
+/// The acoustic settings for a product. nullopt: it has no such range or mode.
 std::optional<Acoustics> acoustics_for(const SonarModel& model, const protocol::SettingsOverride& wanted) {
   const Product& product = product_of(model);
   Acoustics a = product.initial;
@@ -44,7 +44,7 @@ std::optional<Acoustics> acoustics_for(const SonarModel& model, const protocol::
   const double rate_hz = wanted.rate_hz.value_or(static_cast<double>(a.frame_rate_hz));
   a.frame_rate_hz = static_cast<float>(std::clamp(rate_hz, 1.0, highest_frame_rate_hz(product, a, std::nullopt)));
   a.cookie = 1;
-  return judge(a, product, false).used;  // with the longest pulse of the product
+  return judge(a, product, false).used;  // judge() limits the pulse to the longest of the product
 }
 
 PolarImage picture_of(const DecodedFrame& frame, const std::vector<double>& azimuth_rad) {
@@ -56,12 +56,13 @@ PolarImage picture_of(const DecodedFrame& frame, const std::vector<double>& azim
   image.azimuth_rad = azimuth_rad;
   image.samples.reserve(image.rows * image.beams);
   for (std::size_t row = 0; row < image.rows; ++row)
-    for (std::size_t beam = image.beams; beam > 0; --beam)
+    for (std::size_t beam = image.beams; beam > 0; --beam)  // beam 0 of an ARIS is at starboard, that of a picture at port
       image.samples.push_back(static_cast<float>(std::to_integer<int>(frame.picture[row * image.beams + beam - 1])));
   return image;
 }
 
-/// The mode that a frame states; null: a product or mode that we do not know.
+/// The mode that a frame states. Null: the product or the mode is unknown, or the frame has another number of beams than the
+/// mode.
 const FrequencyMode* mode_of(const DecodedFrame& frame) {
   for (const auto& model : models()) {
     const Product& product = product_of(*model);
@@ -79,8 +80,8 @@ class ArisHost final : public protocol::Host {
  public:
   explicit ArisHost(const protocol::Wanted& wanted) : wanted_(wanted) {}
 
-  /// Only beacons name the product, and they may not arrive here. So settings for each product are sent, and the device refuses
-  /// those of other products. The order matters to an ARIS 1800, which also accepts those of a 1200. Frames begin when the
+  /// Only beacons name the product, and they may not arrive here. So the host sends settings for each product, and the device
+  /// refuses those of other products. An ARIS 1800 also accepts those of a 1200, so its own are sent later. Frames begin when the
   /// receiver is set.
   HostActions on_open(std::span<const std::uint16_t> own, Time now) override {
     HostActions actions;
@@ -118,7 +119,7 @@ class ArisHost final : public protocol::Host {
                   length_m / static_cast<double>(frame->samples), static_cast<double>(h.window_start_m) + length_m,
                   static_cast<double>(mode->centre_hz),           std::exchange(bytes_, 0)};
     ping.picture = [kept = std::make_shared<const DecodedFrame>(*std::move(frame)), mode]() -> Result<PolarImage> {
-      return picture_of(*kept, mode->beam_azimuths_rad);  // a row of models(), which stays
+      return picture_of(*kept, mode->beam_azimuths_rad);  // `mode` points into models(), which is never destroyed
     };
     actions.emplace_back(std::move(ping));
     return actions;
@@ -142,9 +143,9 @@ class ArisHost final : public protocol::Host {
     actions.emplace_back(protocol::HostSend{commands, framed(command)});
   }
 
-  /// Notes that are given once each: settings that the sonar does not use, and frames that lost datagrams.
+  /// Adds two notices, each at most once: the sonar does not use the settings that were sent; frames were lost.
   void warn_of(const DecodedFrame& frame, HostActions& actions) {
-    constexpr int settled = 3;  // the first frames may still have the settings of before
+    constexpr int settled = 3;  // the first frames may have been made before the settings arrived
     const FrameHeader& h = frame.header;
     if (frame.index >= settled && !asked_.empty() && !warned_of_settings_) {
       const auto cookie = asked_.find(static_cast<SystemType>(h.system));

@@ -1,5 +1,5 @@
-// Where the first datagram of a frame and the beacon have their fields. Integers of the part itself are varints, which have no
-// fixed place; fields of the frame header do.
+// Finds fields in the first datagram of a frame and in the beacon. Integers of the protobuf messages are varints, whose place and
+// size change with other values, so they are read, changed and written anew; fields of the frame header have a fixed place.
 #include <algorithm>
 
 #include "protocol/aris/encode_frame.hpp"
@@ -36,7 +36,7 @@ std::optional<Field> locate(FieldName name, BytesView first_part) {
 }
 
 std::optional<Place> locate(protocol::Region region, BytesView first_part) {
-  if (region == protocol::Region::bearings) return std::nullopt;  // a table of the ping mode
+  if (region == protocol::Region::bearings) return std::nullopt;  // frames have no table: the ping mode determines the bearings
   if (first_part.empty()) return Place{};
   const auto part = first_of(first_part);
   if (!part) return std::nullopt;
@@ -54,6 +54,7 @@ bool change_part(FieldName name, const std::function<std::int64_t(std::int64_t)>
   if (name == FieldName::image_size) {
     part.total_size = static_cast<std::int32_t>(change(part.total_size));
   } else {
+    // Two fields hold the number: frame_index of the part counts from 1, FrameIndex of the header from 0.
     part.frame_index = static_cast<std::int32_t>(change(part.frame_index - 1) + 1);
     const auto number = static_cast<std::uint32_t>(part.frame_index - 1);
     Bytes index;
@@ -74,6 +75,7 @@ bool change_beacon(FieldName name, const std::function<std::int64_t(std::int64_t
   } else if (name == FieldName::connected_address) {
     a.busy = change(a.busy) != 0;
   } else {
+    // An ARIS has no status word. The bits that faults set in that of an Oculus become the fields with the same meaning.
     const std::int64_t status = change(0);
     if (status & (too_hot | stopped_by_heat)) a.cpu_c = a.hot_limit_c + 2;
     if (status & stopped_by_heat) a.power_down_reason = 0;

@@ -120,7 +120,7 @@ template <class V, wire::Like<StreamSettings> M>
 void fields(V& visit, M& m) {
   visit(1, m.delay);
 }
-/// Times in microseconds, as the vendor has them.
+/// The fields of SET_ACOUSTICS, with times in microseconds as on the wire.
 struct Acoustics {
   std::uint32_t cookie = 0;
   float frame_rate_hz = 0;
@@ -164,7 +164,7 @@ void fields(V& visit, M& m) {
   visit(2, m.range_m);
 }
 
-/// The sub-messages that change something. A missing type is 0: controllers with proto3 leave zeros out.
+/// A command, with those sub-messages that have an effect. A missing type is 0, because proto3 does not send zeros.
 struct Command {
   CommandType type{};
   std::optional<DateTime> date_time;
@@ -188,7 +188,7 @@ void fields(V& visit, M& m) {
   visit(16, m.ping);
 }
 
-/// One datagram of a frame; `header` in the first only. Views point into the datagram.
+/// One datagram of a frame; only the first has `header`. The views point into the datagram.
 struct FramePart {
   std::int32_t frame_index = 0, total_size = 0;
   std::optional<BytesView> header;
@@ -204,10 +204,10 @@ void fields(V& visit, M& m) {
   visit(5, m.data_offset);
 }
 
-/// A command as it travels: length and message.
+/// A command as it is sent over TCP: length and message.
 Bytes framed(const Command& command);
 
-/// Takes commands out of the bytes of a controller in pieces of any size. Keeps at most longest_command bytes.
+/// Splits the stream of a controller, which arrives in pieces of any size, into commands. Keeps at most longest_command bytes.
 class CommandFramer {
  public:
   void append(BytesView received);

@@ -41,13 +41,13 @@ struct Product {
   double pulse_energy_us_hz = 0;           // longest pulse times frame rate
   double window_end_m = 0;
   double small_period_margin = 0, period_margin = 0;  // margins of a cycle, with sample periods up to 4 us and above
-  Acoustics initial;                                  // before a controller spoke, as the vendor's sample program has them
+  Acoustics initial;                                  // until a controller sends some; those of the vendor's sample program
 };
 
 std::span<const std::shared_ptr<const SonarModel>> models();
 const Product& product_of(const SonarModel& model);
 
-/// Which mode of the model; nothing: the product has no such ping mode.
+/// Selects a mode of the model. mode_index() returns nullopt if the product has no such ping mode.
 struct ModeChoice {
   std::uint32_t ping_mode = 0;
   Frequency frequency{};

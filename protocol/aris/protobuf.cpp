@@ -5,6 +5,7 @@
 
 namespace sonar::aris::protobuf {
 
+// The format is that of the protobuf encoding guide: a field is a varint `number << 3 | wire type` and its value.
 void append_varint(Bytes& out, std::uint64_t value) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::byte>((value & 0x7F) | 0x80));
   out.push_back(static_cast<std::byte>(value));
@@ -28,6 +29,7 @@ void Writer::operator()(unsigned number, BytesView value) {
   out_.insert(out_.end(), value.begin(), value.end());
 }
 
+// A varint has 7 bits a byte, the lowest first; the top bit says that another byte follows. More than 10 bytes are an error.
 std::optional<std::uint64_t> RawReader::varint() {
   std::uint64_t value = 0;
   for (unsigned shift = 0; shift < 64 && !rest_.empty(); shift += 7) {

@@ -67,7 +67,7 @@ struct RawField {
 class RawReader {
  public:
   explicit RawReader(BytesView message) : rest_(message) {}
-  /// The next field; nothing at the end, or at bytes that are no field: see ok().
+  /// The next field. nullopt: the end of the message, or, if ok() is false, bytes that are no field.
   std::optional<RawField> next();
   bool ok() const { return ok_; }
 
@@ -81,7 +81,7 @@ class RawReader {
 template <class M>
 bool read(BytesView bytes, M& message);
 
-/// Offers one field to a message's description, which takes it where the number and the type are those of a field.
+/// Visits the description of a message with one field, and stores its value where number and type agree.
 class Reader {
  public:
   explicit Reader(const RawField& field) : field_(field) {}

@@ -9,16 +9,16 @@
 namespace sonar::aris {
 namespace {
 
-constexpr std::uint32_t rest_us = 360;                  // rest of a cycle after its last sample
-constexpr double lenient_share = 0.05;                  // assumed, for the option cycle
-constexpr auto focus_travel = std::chrono::seconds(1);  // whole way; the device's log has about a second
+constexpr std::uint32_t rest_us = 360;                  // the SDK document: a cycle lasts so long after its last sample
+constexpr double lenient_share = 0.05;                  // assumed: the vendor's C++ sample sends cycles that are too short
+constexpr auto focus_travel = std::chrono::seconds(1);  // from 0 to 1000; the device's log has about a second
 
 struct Limits {
   const char* name;
   double low, high;
 };
 
-/// Empty, or why a value is out of the vendor's documented range.
+/// The reason if a value is outside the range that the vendor documents, else an empty text.
 std::string out_of_range(const Acoustics& a, const Product& product) {
   if (find_ping_mode(product, a.ping_mode) == nullptr) return "has no ping mode " + std::to_string(a.ping_mode);
   if (a.frequency != Frequency::low && a.frequency != Frequency::high) return "frequency must be 0 or 1";
@@ -58,6 +58,8 @@ Settings settings_from(const VendorSettings* held, const protocol::DeviceState& 
   return of != nullptr ? of->settings : initial_settings(device);
 }
 
+// The vendor's formula, by which clients place the samples. Other formulas differ by some tenths of a metre a second, which would
+// shift the ranges that a client computes from the header.
 double sound_speed_mps(double t, double s, double z) {
   return 1402.5 + 5 * t - 5.44e-2 * t * t + 2.1e-4 * t * t * t + 1.33 * s - 1.23e-2 * s * t + 8.7e-5 * s * t * t + 1.56e-2 * z +
          2.55e-7 * z * z - 7.3e-12 * z * z * z;
@@ -67,6 +69,8 @@ std::uint32_t shortest_cycle_us(const Acoustics& a) {
   return a.start_delay_us + a.sample_period_us * a.samples_per_beam + rest_us;
 }
 
+// The formula of the vendor's SDK: the time of a frame is that of its cycles with a margin, which depends on the product, and of
+// its packets if they are sent with a delay.
 double highest_frame_rate_hz(const Product& product, const Acoustics& a, std::optional<std::uint32_t> packet_delay_us) {
   constexpr double overhead_us = 420, per_packet_us = 16.6;
   const PingMode& mode = *find_ping_mode(product, a.ping_mode);
@@ -86,6 +90,8 @@ Verdict judge(const Acoustics& asked, const Product& product, bool lenient_cycle
   if (!verdict.refusal.empty()) return verdict;
   Acoustics& used = verdict.used;
   const std::uint32_t needed_us = shortest_cycle_us(asked);
+  // The order is that of docs/protocols/aris.md, "Acoustic settings": first settings that are refused, then those that are
+  // limited.
   const double accepted_us = needed_us * (lenient_cycle ? 1 - lenient_share : 1.0);
   char text[128] = "";
   if (asked.cycle_us < accepted_us)
@@ -96,6 +102,7 @@ Verdict judge(const Acoustics& asked, const Product& product, bool lenient_cycle
     std::snprintf(text, sizeof text, "%d cycles of %u us do not fit a frame of %g us", pings, asked.cycle_us, frame_us);
   verdict.refusal = text;
   if (!verdict.refusal.empty()) return verdict;
+  // The cycle limits the frame rate, and the frame rate limits the pulse: the energy of the pulses per second is bounded.
   used.cycle_us = std::max(asked.cycle_us, needed_us);
   used.frame_rate_hz = std::min(asked.frame_rate_hz, static_cast<float>(highest_frame_rate_hz(product, used, packet_delay_us)));
   const double limit_us = product.pulse_limit_us[static_cast<std::size_t>(asked.frequency)];
@@ -110,7 +117,7 @@ Verdict apply(Settings& settings, const Acoustics& asked, const protocol::Device
   const bool lenient = text_option(device.options, option_name::cycle) == "lenient";
   const Verdict verdict = judge(asked, product_of(*device.model), lenient, delay);
   if (!verdict.refusal.empty()) {
-    settings.invalid = asked.cookie;
+    settings.invalid = asked.cookie;  // a refused request changes nothing else
     return verdict;
   }
   settings.acoustics = verdict.used;

@@ -34,7 +34,8 @@ Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, con
   return refused(device.model->name + " forms " + counts + " beams, as its mode says, not " + std::to_string(*wanted.beams));
 }
 
-/// Keeps the start of the window, the sample period where it can, and a pulse that is not shorter than it.
+/// Changes the end of the window and keeps its start. It keeps the sample period too, if the number of samples then is valid, and
+/// makes the pulse at least as long as the sample period.
 Result<void> set_range(Settings& s, double range_m, const protocol::DeviceState& device) {
   const PingSettings now = ping_settings(s, device);
   const double speed = static_cast<double>(now.device_sound_speed_mps), end_m = product_of(*device.model).window_end_m;
@@ -49,7 +50,7 @@ Result<void> set_range(Settings& s, double range_m, const protocol::DeviceState&
       std::clamp(period_us, static_cast<double>(shortest_period_us), static_cast<double>(longest_period_us)));
   a.samples_per_beam =
       std::clamp(static_cast<std::uint32_t>(std::lround(window_us / a.sample_period_us)), least_samples, most_samples);
-  a.pulse_us = std::max(a.pulse_us, std::min(a.sample_period_us, longest_pulse_us));  // judge() shortens it
+  a.pulse_us = std::max(a.pulse_us, std::min(a.sample_period_us, longest_pulse_us));  // judge() limits it
   return {};
 }
 
@@ -76,6 +77,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   if (wanted.range_m || wanted.mode || wanted.beams) a.cycle_us = shortest_cycle_us(a);
   const Product& product = product_of(*device.model);
   a.frame_rate_hz = std::min(a.frame_rate_hz, static_cast<float>(highest_frame_rate_hz(product, a, std::nullopt)));
+  // judge() refuses a cookie of 0, which the settings have before a controller has sent any.
   Acoustics numbered = a;
   numbered.cookie = std::max(a.cookie, 1u);
   const Verdict verdict = judge(numbered, product, true);

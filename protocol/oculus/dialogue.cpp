@@ -26,7 +26,7 @@ constexpr auto greeting_after = std::chrono::seconds(2);  // known drivers send 
 /// - Before the first valid fire message the device sends a dummy after each period of silence. A client that stays silent gets
 ///   the log text of section 6.1.
 /// - While it pings it sends no dummy, however long a ping takes. With network trigger it sends dummies while no ping is
-/// requested.
+///   requested.
 /// - In standby (ping rate 5) it sends a dummy at once, then one after each period of silence.
 class OculusDialogue final : public protocol::Dialogue {
  public:
