@@ -12,6 +12,7 @@ namespace sonar::blueview {
 namespace {
 
 using PortKind = protocol::Port::Kind;
+// The drop-in libraries find sonars by a broadcast question, so there is no beacon.
 constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::tcp_stream, .number = tcp_port}, {.kind = PortKind::udp_answer, .number = discovery_port}}};
 
@@ -52,7 +53,7 @@ class BlueViewVendor final : public protocol::Vendor {
   }
   std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
                                        protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // it has no beacon
+    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // a BlueView has no beacon
   }
   std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
     return locate(region, ping);

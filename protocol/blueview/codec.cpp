@@ -20,7 +20,7 @@ std::optional<std::size_t> length_of(wire::BytesView bytes, recording::Origin, b
   return header ? std::optional(header_size + header->payload_length) : std::nullopt;
 }
 
-/// The greeting names the model; pings do not.
+/// The sender of a message. Only the greeting names the model; for others it is the first of the make, with names_model false.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   const auto header = header_of(message.bytes);
   if (!header || message.by != recording::Carrier::stream) return std::nullopt;
@@ -41,7 +41,7 @@ constexpr recording::Framing framing{{magic[0], magic[1]}, header_size, length_o
 
 recording::Codec codec() {
   return {.framing = &framing, .sender = sender_of, .message = [](wire::BytesView payload) {
-            return make_frame(FrameType::ping_data, 0, payload);  // id 0: it answers no request
+            return make_frame(FrameType::ping_data, 0, payload);  // id 0: no request caused it
           }};
 }
 

@@ -7,7 +7,7 @@
 namespace sonar::blueview {
 
 wire::Bytes deflated(wire::BytesView plain) {
-  // zlib uses its own byte type: copying in and out avoids casts of buffers.
+  // zlib has a byte type of its own. The bytes are copied, because the code of a wire casts no buffers.
   std::vector<Bytef> in(plain.size()), out(compressBound(static_cast<uLong>(plain.size())));
   if (!plain.empty()) std::memcpy(in.data(), plain.data(), plain.size());
   auto size = static_cast<uLongf>(out.size());
@@ -18,7 +18,8 @@ wire::Bytes deflated(wire::BytesView plain) {
 }
 
 wire::Bytes inflated(wire::BytesView packed, std::size_t size) {
-  constexpr std::size_t best = 1032;  // zlib's own bound: no stream grows by more than this
+  // A stream of deflate grows at most 1032-fold (zlib's technical notes). A host must not make this allocate more.
+  constexpr std::size_t best = 1032;
   if (size > best * packed.size() + 64 || size == 0) return {};
   std::vector<Bytef> in(packed.size()), out(size);
   if (!packed.empty()) std::memcpy(in.data(), packed.data(), packed.size());

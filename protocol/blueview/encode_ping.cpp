@@ -12,7 +12,7 @@
 namespace sonar::blueview {
 namespace {
 
-/// A whole message except for the samples.
+/// A PING_DATA message up to the samples, for locate().
 struct PingMessage {
   FrameHeader header;
   PingHead ping;
@@ -35,13 +35,13 @@ void set_nav(PingHead& to, const PingRequest& request) {
   to.heading_deg = static_cast<float>(deg_from_rad(heading_rad(vehicle.orientation)));
 }
 
-/// Rows from the start range on, turned so that a beam's samples lie side by side. Little-endian already.
+/// The samples from the start range on, transposed from row by row to beam by beam. They are little-endian in both.
 wire::Bytes beam_major(const Ping& ping, const HeadGrid& grid) {
   const auto beams = static_cast<std::size_t>(ping.request.settings.beam_count);
   const auto bins = static_cast<std::size_t>(grid.bins), skipped = static_cast<std::size_t>(grid.skipped);
   assert(ping.samples.size() == 2 * beams * (skipped + bins));
   wire::Bytes out(2 * beams * bins);
-  constexpr std::size_t block = 32;  // square blocks: both sides stay in cache
+  constexpr std::size_t block = 32;  // square blocks, so that the rows read and the beams written stay in cache
   for (std::size_t j0 = 0; j0 < beams; j0 += block)
     for (std::size_t k0 = 0; k0 < bins; k0 += block)
       for (std::size_t j = j0; j < std::min(beams, j0 + block); ++j)
@@ -62,7 +62,7 @@ wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, c
   const wire::Bytes samples = beam_major(ping, grid);
   wire::Bytes packed;
   if (text_option(device.options, option_name::compression) == "deflate") packed = deflated(samples);
-  const wire::Bytes& body = packed.empty() ? samples : packed;
+  const wire::Bytes& body = packed.empty() ? samples : packed;  // deflated() returns nothing if zlib has no memory
   const float half_deg = static_cast<float>(0.5 * deg_from_rad(static_cast<double>(ping.mode().horizontal_aperture_rad)));
   const int base = text_option(device.options, option_name::heads_base) == "1" ? 1 : 0;
 

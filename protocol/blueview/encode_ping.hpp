@@ -7,7 +7,7 @@
 
 namespace sonar::blueview {
 
-/// Which fields of the navigation data follow the bitmap, in this order.
+/// Bits of the mask that states which navigation fields follow it. They follow in the order of the bits.
 enum NavField : std::uint16_t {
   nav_time = 1 << 0,              // f64, seconds since 1970 UTC
   nav_latitude = 1 << 1,          // f64, degrees
@@ -66,11 +66,11 @@ constexpr void fields(V& visit, M& m) {
   visit("raw_len", m.raw_length, means::image_size);
 }
 
-/// As Vendor::field and Vendor::region, of the whole message.
+/// Vendor::field and Vendor::region for a PING_DATA message, header included.
 std::optional<protocol::Field> locate(protocol::FieldName name, wire::BytesView ping);
 std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping);
 
-/// `settings`: those the ping was made with.
+/// The payload of PING_DATA. `settings`: those under which the ping was made.
 wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const SonarSettings& settings);
 
 }  // namespace sonar::blueview

@@ -48,7 +48,7 @@ std::optional<Value> read_value(wire::Reader& reader, Key key) {
       reader("value", integer);
       return reader.ok() ? std::optional<Value>(integer) : std::nullopt;
     case Kind::number:
-      reader("value", number);
+      reader("value", number);  // Key::range has two numbers after one kind byte
       if (key == Key::range) {
         reader("value", second);
         return reader.ok() ? std::optional<Value>(FloatPair{number, second}) : std::nullopt;
@@ -94,7 +94,7 @@ std::optional<Frame> Framer::next() {
   Frame frame;
   wire::Reader reader(left.first(header_size));
   fields(reader, frame.header);
-  // Lengths of a broken frame cannot be trusted, so there is no way back into the stream: the connection ends.
+  // The length of a broken frame cannot be trusted, so the begin of the next frame is unknown and the connection ends.
   if (frame.header.magic != magic) {
     broken_ = "is not a BVE1 link: a frame has another magic number";
     return std::nullopt;

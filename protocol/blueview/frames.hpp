@@ -41,7 +41,7 @@ struct FloatPair {
 };
 using Value = std::variant<std::int32_t, float, std::string, FloatPair>;
 
-/// Appends values as a Writer appends fields.
+/// Appends single values to a message whose layout depends on its content, which fields() cannot describe.
 class Put {
  public:
   explicit Put(wire::Bytes& out) : out_(out) {}
@@ -58,12 +58,12 @@ class Put {
 /// A text is a 16-bit length and that number of bytes of UTF-8; longer texts are cut.
 void put_text(wire::Bytes& out, std::string_view text);
 std::string read_text(wire::Reader& reader, std::string_view name);
-/// Kind byte and value.
+/// Appends the kind of a value, one byte, and the value.
 void put_value(wire::Bytes& out, const Value& value);
 std::optional<Value> read_value(wire::Reader& reader, Key key);
 
 wire::Bytes make_frame(FrameType type, std::uint32_t request_id, wire::BytesView payload);
-/// The 16 bytes before a payload of that length.
+/// The header of a frame, 16 bytes, which states the length of the payload.
 wire::Bytes make_header(FrameType type, std::uint32_t request_id, std::size_t payload_length);
 wire::Bytes make_error(std::uint32_t request_id, Code code, std::string_view text);
 
@@ -72,7 +72,7 @@ struct Frame {
   wire::BytesView payload;
 };
 
-/// Splits a stream into frames. Other bytes end it: broken() then states why, and next() returns nothing more.
+/// Splits a stream into frames. After bytes that are no frame next() returns nothing more, and broken() states the reason.
 class Framer {
  public:
   /// `longest`: longest accepted payload; a host passes longest_payload.

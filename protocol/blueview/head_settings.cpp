@@ -10,7 +10,7 @@
 namespace sonar::blueview {
 namespace {
 
-constexpr int most_bins = 2400;     // limit for a ping: bins are coarser beyond
+constexpr int most_bins = 2400;     // in a ping; longer ranges get longer bins (chosen)
 constexpr float base_gain_db = 48;  // unknown: gain at an adjustment of 0 dB
 constexpr float longest_interval_ms = 3600e3f;
 
@@ -19,6 +19,8 @@ const FrequencyMode& mode_of(const protocol::DeviceState& device, int head) {
 }
 bool strict_range(const protocol::DeviceState& device) { return text_option(device.options, option_name::strict_range) == "on"; }
 
+/// The number in a value. Hosts may send integers and floats for any numeric key, as the interface of the SDK does. NaN and
+/// infinity are no numbers.
 std::optional<double> number_in(const Value& value) {
   if (const auto* i = std::get_if<std::int32_t>(&value)) return *i;
   if (const auto* f = std::get_if<float>(&value)) return std::isfinite(*f) ? std::optional<double>(*f) : std::nullopt;
@@ -27,7 +29,8 @@ std::optional<double> number_in(const Value& value) {
 
 Applied refused(Code code, std::string text) { return {std::nullopt, {code, std::move(text)}}; }
 
-/// Sets start and stop together, because the start must lie before the stop.
+/// Sets start and stop together, because the start must lie before the stop. Values out of range are clamped, or refused if
+/// `strict`; the answer has the applied values, so that a host sees the difference.
 Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, float stop, bool strict, Key key) {
   if (!std::isfinite(start) || !std::isfinite(stop)) return refused(Code::bad_parameter, "a range must be a finite number");
   const bool fine = start >= mode.min_range_m && stop <= mode.max_range_m && start < stop;
@@ -36,7 +39,7 @@ Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, 
                 static_cast<double>(stop), static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m));
   if (!fine && strict) return refused(Code::bad_range, text);
   const float shortest = std::max(0.1f, 0.01f * mode.max_range_m);
-  // The stop is set first, so that the start has room below it.
+  // The stop is clamped first; then the start, to leave a window of `shortest` below it.
   head.stop_m = std::clamp(stop, mode.min_range_m + shortest, mode.max_range_m);
   head.start_m = std::clamp(start, 0.0f, head.stop_m - shortest);
   if (key == Key::range) return {Value(FloatPair{head.start_m, head.stop_m}), {}};
@@ -49,6 +52,8 @@ Applied keep(T& at, double value, double low, double high) {
   return {Value(at), {}};
 }
 
+/// Clamps a number to the limits of its key. The keys from dynamic_power on are only stored: their effect on a real head is
+/// unknown.
 Applied apply_number(HeadSettings& head, SonarSettings& all, Key key, double value) {
   switch (key) {
     case Key::sound_speed:
@@ -165,7 +170,8 @@ HeadGrid grid_of(const HeadSettings& head, double finest_bin_m) {
   const double start = static_cast<double>(head.start_m), stop = static_cast<double>(head.stop_m);
   grid.bin_m = std::max(finest_bin_m, (stop - start) / most_bins);
   grid.bins = std::max(1, static_cast<int>(std::lround((stop - start) / grid.bin_m)));
-  // The first bin's centre lies half a bin beyond the start, wherever that falls on the grid from the sonar on.
+  // The pipeline makes rows from the sonar on. The rows before the start are dropped, and the grid is shifted by a part of a row,
+  // so that the centre of the first bin lies half a bin beyond the start.
   const double rows_before = start / grid.bin_m;
   grid.skipped = static_cast<int>(std::floor(rows_before + 0.5));
   grid.row_centre = std::clamp(0.5 + rows_before - grid.skipped, 0.0, 1.0);
@@ -193,11 +199,11 @@ PingSettings ping_settings(const SonarSettings& all, const protocol::DeviceState
   s.transmit = head.transmit != 0;
   s.gain_db = base_gain_db + head.gain_db;
   s.device_sound_speed_mps = static_cast<float>(head.sound_speed_mps);
-  // Salt and fresh water are assumptions of the host; `other` takes the water as it is.
+  // The device compensates the absorption for the fluid that the host states; with `other` for the water as it is.
   Water believed = device.water;
   if (head.fluid == 0) believed.salinity_psu = std::max(believed.salinity_psu, 30.0);
   if (head.fluid == 1) believed.salinity_psu = 0;
-  // The TVG slope is added to absorption; both apply to the two-way path.
+  // The slope is added to the absorption. A host gives it per metre of range, the absorption counts the way there and back.
   s.device_absorption_db_per_m =
       static_cast<float>(absorption_db_per_m(believed, device.depth_m, static_cast<double>(mode.centre_hz)) +
                          0.5 * static_cast<double>(head.tvg_db_per_m));

@@ -38,7 +38,7 @@ struct SonarSettings final : VendorSettings {
   std::vector<HeadSettings> heads;
 };
 SonarSettings initial_sonar_settings(const protocol::DeviceState& device);
-/// initial_sonar_settings() for null.
+/// The settings in `settings`; if they are null, initial_sonar_settings().
 SonarSettings settings_from(const VendorSettings* settings, const protocol::DeviceState& device);
 
 struct Refusal {
