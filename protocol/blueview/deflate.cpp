@@ -7,7 +7,7 @@
 namespace sonar::blueview {
 
 wire::Bytes deflated(wire::BytesView plain) {
-  // zlib has a byte type of its own. The bytes are copied, because the code of a wire casts no buffers.
+  // zlib has a byte type of its own. Copying the bytes avoids casts of buffers.
   std::vector<Bytef> in(plain.size()), out(compressBound(static_cast<uLong>(plain.size())));
   if (!plain.empty()) std::memcpy(in.data(), plain.data(), plain.size());
   auto size = static_cast<uLongf>(out.size());
@@ -18,7 +18,7 @@ wire::Bytes deflated(wire::BytesView plain) {
 }
 
 wire::Bytes inflated(wire::BytesView packed, std::size_t size) {
-  // A stream of deflate grows at most 1032-fold (zlib's technical notes). A host must not make this allocate more.
+  // A stream of deflate grows at most 1032-fold (zlib's technical notes). A false size must not make this allocate more.
   constexpr std::size_t best = 1032;
   if (size > best * packed.size() + 64 || size == 0) return {};
   std::vector<Bytef> in(packed.size()), out(size);

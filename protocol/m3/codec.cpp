@@ -1,4 +1,5 @@
-// The packets of an M3, for recordings. A file of its program has the packets of the stream, one behind the other.
+// The packets of an M3, for recordings. A file of the maker's program (.imb) has the packets of the stream, one after the other
+// (CLI).
 #include <array>
 
 #include "protocol/m3/host.hpp"
@@ -20,7 +21,7 @@ constexpr std::array<recording::FileKind, 1> kinds{{{
     .holds = "packets of an M3",
     .begins =
         [](BytesView front) {
-          return recording::begins_with(front, {0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80});
+          return recording::begins_with(front, {0x00, 0x80, 0x00, 0x80, 0x00, 0x80, 0x00, 0x80});  // sync_word four times
         },
     .read = [](std::unique_ptr<recording::Source> source) { return recording::read_raw_dump(std::move(source), framing); },
     .write = [](std::unique_ptr<recording::Sink> sink) { return recording::write_raw_dump(std::move(sink)); },

@@ -12,7 +12,8 @@ namespace {
 
 using protocol::HostActions;
 
-/// As most clients take them: positive angles are to port, so that the last beam is the first of a picture.
+/// Positive angles are to port, as most clients take them (protocol/m3/README.md, "Left and right"). So the beam with the
+/// greatest angle, the last of the packet, is the first of the picture.
 PolarImage picture_of(const Packet& packet) {
   PolarImage image;
   const DataFront& front = packet.header.front;
@@ -32,11 +33,11 @@ PolarImage picture_of(const Packet& packet) {
       const float size = std::hypot(i, q);
       image.samples[row * image.beams + beam - 1] = std::isfinite(size) ? size : 0;
     }
-  image.full_scale = image.brightest(999);  // wide samples rarely come near their maximum
+  image.full_scale = image.brightest(999);  // samples of 32 bits seldom come near their maximum
   return image;
 }
 
-/// Why it is no picture; empty: it is one.
+/// The reason if the packet cannot be drawn, else an empty text.
 std::string why_no_picture(const Packet& packet) {
   const auto& angles = packet.header.beam_deg;
   for (std::size_t i = 0; i < packet.header.front.beams; ++i)
@@ -46,6 +47,7 @@ std::string why_no_picture(const Packet& packet) {
   return {};
 }
 
+/// Sends nothing: the maker's program streams to every client that connects (API).
 class M3Host final : public protocol::Host {
  public:
   HostActions on_open(std::span<const std::uint16_t>, Time) override { return {}; }

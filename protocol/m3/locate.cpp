@@ -1,4 +1,4 @@
-// Where a packet has the fields and regions that faults change.
+// Finds in a packet the fields and regions that faults change.
 #include "protocol/m3/packet.hpp"
 
 namespace sonar::m3 {
@@ -11,7 +11,7 @@ Place place_of(protocol::Region region, std::size_t size) {
   switch (region) {
     case protocol::Region::header:
       return {0, head_size};
-    case protocol::Region::metadata:  // up to the table
+    case protocol::Region::metadata:  // the data header up to the table of bearings
       return {head_size, data_front_size};
     case protocol::Region::bearings:
       return {head_size + data_front_size, sizeof(float) * most_beams};

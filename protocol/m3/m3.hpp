@@ -1,4 +1,4 @@
-// Kongsberg Mesotech M3, as its program streams beam-formed data, as a Vendor.
+// The Kongsberg Mesotech M3 as a Vendor: the stream of beam-formed data that the maker's program sends to its clients.
 #pragma once
 
 #include "protocol/vendor.hpp"

@@ -210,7 +210,7 @@ constexpr void fields(V& visit, M& m) {
   visit("back", m.back);
 }
 
-/// All that comes before the samples.
+/// The part of a packet before the samples.
 struct PacketFront {
   PacketHead head;
   DataHeader data;

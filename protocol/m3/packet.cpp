@@ -24,15 +24,15 @@ void put(float value, std::byte* at) {
   for (unsigned b = 0; b < 4; ++b) at[b] = static_cast<std::byte>(bits >> (8 * b));
 }
 
-/// Amplitudes are those of the samples, with gain and faults; phases are those of the beams before detection. A ping without
-/// phases, as in expected power, has phase 0.
+/// Appends the complex samples beam by beam. Their amplitudes are the samples of the ping, which include gain and faults; their
+/// phases are those of the beam signals before detection. A ping with expected power has no phases: its samples have phase 0.
 void append_samples(const Ping& ping, bool from_starboard, Bytes& out) {
   const auto beams = static_cast<std::size_t>(ping.request.settings.beam_count);
   const auto rows = static_cast<std::size_t>(ping.request.settings.range_bin_count);
   const bool has_phase = ping.beam_signal_upa.size() == rows * beams;
   const std::size_t begin = out.size();
   out.resize(begin + sample_size * rows * beams);
-  constexpr std::size_t block = 32;  // square blocks: both sides stay in cache
+  constexpr std::size_t block = 32;  // square blocks, so that the rows read and the beams written stay in cache
   constexpr double per_code = full_scale / 4294967296.0;
   for (std::size_t j0 = 0; j0 < beams; j0 += block)
     for (std::size_t k0 = 0; k0 < rows; k0 += block)
@@ -100,6 +100,7 @@ DataHeader header_of(const Ping& ping, const protocol::DeviceState& device) {
   back.frequency_hz = static_cast<std::uint32_t>(device.model->modes.front().centre_hz);
   back.pulse_us = static_cast<std::uint32_t>(window.pulse_us);
   back.ping_number = static_cast<std::uint32_t>(r.number);
+  // In PKT the filter has half the sampling rate, and the resolution is that of the pulse at about 1450 m/s.
   back.filter_hz = static_cast<float>(0.5 / window.interval_s);
   back.resolution_m = static_cast<float>(1e-6 * window.pulse_us * 1450 / 2);
   back.ping_rate_hz = r.settings.rate_hz;
@@ -116,6 +117,8 @@ DataHeader header_of(const Ping& ping, const protocol::DeviceState& device) {
   return header;
 }
 
+/// The part of a packet that tells its length. The size in the head alone does not protect from a false begin within samples, so
+/// the numbers of beams and samples have to agree with it.
 struct StreamFront {
   PacketHead head;
   DataFront data;

@@ -9,7 +9,8 @@
 
 namespace sonar::m3 {
 
-/// Boundaries of packets in a stream. The header is as long as is needed to know that the size fits beams and samples.
+/// The boundaries of packets in a stream. The header that is read for it reaches to the numbers of beams and samples, which have
+/// to agree with the size.
 extern const recording::Framing framing;
 
 Bytes encode_packet(const Ping& ping, const protocol::DeviceState& device);
@@ -21,7 +22,7 @@ struct Packet {
   double start_m() const;
   double spacing_m() const;
 };
-/// Returns nothing if it is no whole packet of complex samples.
+/// Reads a packet. nullopt: `whole` is not exactly one packet of complex samples.
 std::optional<Packet> read_packet(BytesView whole);
 
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packet);

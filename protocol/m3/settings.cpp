@@ -13,7 +13,7 @@ namespace {
 
 constexpr double shortest_interval_s = 10.24e-6;  // PKT
 constexpr int shortest_pulse_us = 20;             // PKT
-constexpr int most_samples = 2048;                // LOG: 1681 and less; twice as many would be 2745 and more
+constexpr int most_samples = 2048;                // LOG: packets have up to 1681 samples, at half the interval 2745 and more
 constexpr int samples_multiple = 4;               // PKT
 constexpr double near_per_far = 0.02;             // PKT, LOG: 0.2 of 10 m, 0.4 of 20 m
 
@@ -21,6 +21,8 @@ constexpr double near_per_far = 0.02;             // PKT, LOG: 0.2 of 10 m, 0.4 
 
 double near_of(double far_m) { return std::max(nearest_m, near_per_far * far_m); }
 
+// The window does not depend on the true sound speed: it fits every speed from slowest_mps to fastest_mps (PKT, LOG). The
+// interval is doubled until the samples fit.
 Window window_of(double near_m, double far_m) {
   Window window;
   window.start_s = 1e-6 * std::round(1e6 * (2 * near_m / fastest_mps + transmit_s)) - transmit_s;  // PKT, LOG: whole microseconds
@@ -50,7 +52,8 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.pulse_width_m = static_cast<float>((2 - std::sqrt(2.0)) * 1e-6 * window.pulse_us * half_mps);
   s.rate_hz = settings.rate_hz;
   s.gain_db = settings.c_db;
-  s.device_absorption_db_per_m = static_cast<float>(GainLaw{}.b / 1000.0 / 2);  // the law counts the range once
+  // The gain law has b dB per 1000 m of range; the absorption counts the way there and back.
+  s.device_absorption_db_per_m = static_cast<float>(GainLaw{}.b / 1000.0 / 2);
   s.format = {.bits = 32, .max_code = 0xFFFFFFFF};
   return s;
 }

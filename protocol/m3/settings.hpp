@@ -13,7 +13,7 @@
 namespace sonar::m3 {
 
 inline constexpr double transmit_s = 25e-6;  // PKT: begin of the pulse after that of the ping
-/// unknown: how far the gain law's c can be turned; half way is that of PKT.
+/// unknown: limits of the gain law's c [dB]; the c of PKT is half way between them.
 inline constexpr double least_c_db = -56, most_c_db = 24;
 
 struct Settings {
@@ -23,10 +23,10 @@ struct Settings {
   bool operator==(const Settings&) const = default;
 };
 using HeldSettings = protocol::Held<Settings, PhasedSettings>;
-/// Settings{} for null.
+/// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// The near range that goes with a far one.
+/// The near range that the program sets for a far range.
 double near_of(double far_m);
 
 /// When the receiver samples; `start_s` counts from the pulse's begin.

@@ -13,10 +13,16 @@ using protocol::Reaction;
 
 constexpr auto alive_period = std::chrono::seconds(1);
 constexpr auto boot_time = std::chrono::seconds(2);  // unknown: hosts wait 2.5 s before they read
-constexpr int recentring_alives = 2;                 // the first states that the head is away from its centre
-constexpr std::size_t user_size = 250, calibration_size = 66, fpga_version_size = 14;  // of their payloads
+constexpr int recentring_alives = 2;                 // signs of life after a restart: 5D, 4D, then 4A (ENS)
+constexpr std::size_t user_size = 250, calibration_size = 66, fpga_version_size = 14;  // sizes of the payloads; ROCK, ENS
 constexpr std::size_t notices_per_call = 8;                                            // bounds the log output of a hostile host
 
+/// One host's conversation (docs/protocols/micron.md, "Session"):
+/// - After power-up or a reboot the head has no parameters: it sends mtAlive once a second and ignores requests for scan lines.
+/// - mtHeadCommand sets the parameters. The next mtAlive says that they were received, the one after it that they are valid.
+/// - mtSendData requests one or two scan lines (`wanted_`). For each the head turns (`arrives_`), a ping is requested and awaited
+///   (`awaited_`), and the head turns on. mtAlive pauses meanwhile.
+/// The protocol has no refusal, so invalid messages are logged and ignored.
 class MicronDialogue final : public protocol::Dialogue {
  public:
   MicronDialogue(const protocol::DeviceState& device, Time now)
@@ -26,7 +32,7 @@ class MicronDialogue final : public protocol::Dialogue {
     Reaction reaction;
     splitter_.append(now, received);
     while (const auto whole = splitter_.next()) {
-      if (now < boots_until_) continue;  // it hears nothing
+      if (now < boots_until_) continue;  // while it restarts, the head ignores all messages
       if (const auto message = read_frame(whole->bytes))
         on_message(*message, now, reaction);
       else
@@ -74,7 +80,7 @@ class MicronDialogue final : public protocol::Dialogue {
         reaction.replies.push_back(from_head(Id::version_data, wire::bytes_of(version)));
         return;
       }
-      case Id::send_user:  // drivers of the first message wait for the others, too
+      case Id::send_user:  // ENS waits for all three answers
         reaction.replies.push_back(from_head(Id::user_data, Bytes(user_size)));
         reaction.replies.push_back(from_head(Id::fpga_calibration_data, Bytes(calibration_size)));
         reaction.replies.push_back(from_head(Id::fpga_version_data, Bytes(fpga_version_size)));
@@ -86,6 +92,7 @@ class MicronDialogue final : public protocol::Dialogue {
       case Id::send_data: {
         if (!settings_after(reaction).has_parameters) return notice("it has no parameters: send mtHeadCommand first", reaction);
         const int lines = protocol::text_option(device_.options, option_name::lines) == "2" ? 2 : 1;
+        // At most two requests wait: a driver that repeats its request after a time-out must not get more and more lines.
         wanted_ = std::min(wanted_ + lines, 2 * lines);
         next_alive_ = now + alive_period;
         return;
@@ -100,7 +107,7 @@ class MicronDialogue final : public protocol::Dialogue {
 
   void on_command(BytesView payload, Time now, Reaction& reaction) {
     Settings s = settings_after(reaction);
-    if (payload.size() == 1 && payload.front() == std::byte{reverse_command}) {
+    if (payload.size() == 1 && payload.front() == std::byte{reverse_command}) {  // MCG: turns the scan around
       scan_.to_right = !scan_.to_right;
       return;
     }
@@ -132,7 +139,7 @@ class MicronDialogue final : public protocol::Dialogue {
     const bool centred = recentring_ == 0;
     std::uint8_t info = motor_on | (centred ? head_info::centred : static_cast<std::uint8_t>(recentring | motoring));
     if (recentring_ == recentring_alives || (s.has_parameters && scan_.to_right)) info |= to_right;
-    // Parameters are received in one sign of life and valid from the next one on.
+    // ENS waits for both steps: the first mtAlive with parameters still has the bit no_parameters, the second has not.
     if (!s.has_parameters || !knows_parameters_) info |= no_parameters;
     if (s.has_parameters) info |= received_parameters;
     knows_parameters_ = s.has_parameters;
@@ -146,7 +153,8 @@ class MicronDialogue final : public protocol::Dialogue {
     return from_head(Id::alive, wire::bytes_of(message));
   }
 
-  /// Call it after a ping: the head turns on when the bins were taken and sent.
+  /// Ends the ping that was awaited. The head turns on after the samples have been taken and the line has been sent: with a slow
+  /// link (option link_rate) the transfer limits the rate of the scan.
   void advance(Time now) {
     --wanted_;
     const HeadCommand command = settings().command;
@@ -160,7 +168,7 @@ class MicronDialogue final : public protocol::Dialogue {
   }
 
   Settings settings() const { return settings_from(device_.settings.get()); }
-  /// With the changes of the same call, which are not in force yet.
+  /// The settings after the changes of this call, which the daemon has not made yet.
   Settings settings_after(const Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
@@ -175,11 +183,11 @@ class MicronDialogue final : public protocol::Dialogue {
   const protocol::DeviceState& device_;
   recording::MessageSplitter splitter_{recording::Origin::client, framing};
   Time next_alive_{}, boots_until_{};
-  int recentring_ = 0;  // signs of life that still say so
-  Scan scan_;           // where the head is or goes to
-  Time arrives_{};      // there
-  bool knows_parameters_;
-  int wanted_ = 0;  // scan lines
+  int recentring_ = 0;     // messages mtAlive that still have to say that the head returns to its centre
+  Scan scan_;              // the bearing that the head has, or turns to
+  Time arrives_{};         // when the head has that bearing
+  bool knows_parameters_;  // an mtAlive has said that parameters were received
+  int wanted_ = 0;         // scan lines that were requested and not sent yet
   protocol::AwaitedPing awaited_;
 };
 

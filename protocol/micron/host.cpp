@@ -14,10 +14,10 @@ namespace {
 using protocol::HostActions;
 using protocol::HostPing;
 
-constexpr double usual_range_m = 10, sound_mps = 1500;
-constexpr auto patience = std::chrono::milliseconds(500);  // for a scan line
+constexpr double usual_range_m = 10, sound_mps = 1500;     // bins are intervals of time; drivers assume 1500 m/s
+constexpr auto patience = std::chrono::milliseconds(500);  // time after which a request without a scan line is repeated
 
-/// The half circle ahead in steps of a grad.
+/// Parameters for a scan of the half circle ahead in steps of a grad.
 HeadCommand command_of(const protocol::SettingsOverride& wanted) {
   HeadCommand c;
   c.control &= static_cast<std::uint16_t>(~control::continuous);
@@ -40,7 +40,7 @@ class MicronHost final : public protocol::Host {
     if (!command_) return {};
     return {protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*command_))}, request(now)};
   }
-  /// A request or its answer may be lost.
+  /// Repeats the request, because it or its answer may be lost.
   HostActions on_tick(Time now) override { return command_ && now >= *next_tick() ? HostActions{request(now)} : HostActions{}; }
   std::optional<Time> next_tick() const override { return command_ ? std::optional(requested_at_ + patience) : std::nullopt; }
   HostActions on_bytes(std::size_t, BytesView received, Time now) override {
@@ -72,7 +72,7 @@ class MicronHost final : public protocol::Host {
     return {0, from_host(Id::send_data, Bytes(4))};
   }
 
-  /// A head that has restarted lacks its parameters.
+  /// Sends the parameters again to a head that has lost them by a restart.
   void on_alive(BytesView payload, HostActions& actions) const {
     const auto alive = read_front<Alive>(payload);
     if (alive && command_ && (alive->head_info & head_info::received_parameters) == 0)
@@ -94,6 +94,7 @@ class MicronHost final : public protocol::Host {
     ping.facts = {++pings_, 1, rows, eight_bits ? 8u : 4u, row_m, rows * row_m, frequency_hz, 0};
     ping.facts.note = text::format("bearing %.1f deg", (data->bearing - ahead) * 360.0 / turn);
     protocol::Line line;
+    // 17 = 255 / 15: bins of 4 bits get the scale of those of 8.
     for (const std::byte bin : bins) line.push_back(static_cast<float>(std::to_integer<int>(bin) * (eight_bits ? 1 : 17)));
     const auto directions = static_cast<std::size_t>(std::max(turn / data->step, 4));
     if (sweep_.directions() != directions) sweep_ = protocol::Sweep(directions);
@@ -104,7 +105,7 @@ class MicronHost final : public protocol::Host {
     return ping;
   }
 
-  std::optional<HeadCommand> command_;  // nullopt: nothing is sent
+  std::optional<HeadCommand> command_;  // nullopt: this host sends nothing, as for a recording
   recording::MessageSplitter splitter_{recording::Origin::device, framing};
   protocol::Sweep sweep_{400};
   Time requested_at_{};

@@ -1,4 +1,4 @@
-// Where mtHeadData has the fields and regions that faults change.
+// Finds in mtHeadData the fields and regions that faults change.
 #include "protocol/micron/settings.hpp"
 
 namespace sonar::micron {
@@ -15,7 +15,7 @@ std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region regio
   if (frame.size() <= data) return std::nullopt;
   if (region == protocol::Region::header) return std::pair{std::size_t{0}, header_size};
   return region == protocol::Region::metadata ? std::pair{header_size, data - header_size}
-                                              : std::pair{data, frame.size() - 1 - data};
+                                              : std::pair{data, frame.size() - 1 - data};  // without the line feed
 }
 
 }  // namespace sonar::micron

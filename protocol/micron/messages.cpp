@@ -7,6 +7,7 @@
 namespace sonar::micron {
 namespace {
 
+/// The length as four hexadecimal digits, upper case, as all public drivers expect it.
 std::array<std::uint8_t, 4> digits_of(std::uint16_t length) {
   const std::string text = text::format("%04X", static_cast<unsigned>(length));
   std::array<std::uint8_t, 4> digits{};
@@ -33,7 +34,8 @@ bool is_known(Id id) {
   return false;
 }
 
-/// Both lengths have to agree, so that two bytes of an image are rarely taken for a begin.
+/// Length of the frame with this header. A frame states its length twice, as digits and as a number. Both have to agree, so that
+/// bytes of an image that look like the begin of a frame are seldom taken for one.
 std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
   const auto header = read_front<Header>(bytes);
   if (!header || header->hex_length != digits_of(header->length) || (strict && !is_known(header->id))) return std::nullopt;
@@ -43,12 +45,13 @@ std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool st
 
 }  // namespace
 
+// The first digit of a length is 0, because the longest frame has less than 0x1000 bytes behind its first five.
 const recording::Framing framing{{'@', '0'}, header_size, length_of};
 
 Bytes framed(Id id, std::uint8_t source, std::uint8_t destination, BytesView payload) {
   const auto length = static_cast<std::uint16_t>(payload.size() + frame_size - uncounted);
   Header header{.hex_length = digits_of(length), .length = length, .source = source, .destination = destination, .id = id};
-  header.count = id == Id::head_data ? 0 : static_cast<std::uint8_t>(length - 5);
+  header.count = id == Id::head_data ? 0 : static_cast<std::uint8_t>(length - 5);  // MCG: head data in one piece have 0
   header.node = source == host_node ? destination : source;
   Bytes frame = wire::bytes_of(header);
   frame.insert(frame.end(), payload.begin(), payload.end());

@@ -27,7 +27,7 @@ class MicronVendor final : public protocol::Vendor {
   double gain_percent(const protocol::DeviceState& device) const override {
     return 100.0 * settings_from(device.settings.get()).command.gain / most_gain;
   }
-  /// To and fro over the half circle ahead.
+  /// Scans the half circle ahead to and fro, in steps of a grad.
   std::optional<ScanStep> scan_step(std::uint32_t number, const protocol::DeviceState& device) const override {
     constexpr std::uint32_t steps = 200;
     Settings s = settings_from(device.settings.get());

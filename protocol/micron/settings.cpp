@@ -12,11 +12,11 @@
 namespace sonar::micron {
 namespace {
 
-constexpr double receiver_db = 80;  // span of an 8-bit bin, and of the gain
-constexpr double farthest_m = 200;  // of the last bin, so that a ping stays affordable; unknown: the device's limit
-constexpr double pulse_m = 0.0075;  // of a chirp 100 kHz wide, compressed: recalled
-constexpr auto turn_of_a_sixteenth = std::chrono::microseconds(500);  // unknown: a turn in 3.2 s
-constexpr double fastest_hz = 1000;                                   // hosts set the rhythm
+constexpr double receiver_db = 80;  // ENS: span of an 8-bit bin, and of the gain
+constexpr double farthest_m = 200;  // chosen: range of the last bin, which bounds the work for a ping; the device's is unknown
+constexpr double pulse_m = 0.0075;  // length after compression of a chirp of 100 kHz: recalled from the data sheet
+constexpr auto turn_of_a_sixteenth = std::chrono::microseconds(500);  // unknown: time for 1/16 grad; a turn takes 3.2 s
+constexpr double fastest_hz = 1000;                                   // no limit: hosts request each scan line
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
@@ -29,8 +29,8 @@ SonarModel make_model() {
   mode.source_level_db = 200;  // unknown, like full scale; set so that a gain of 50 % shows the demo well
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
-  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(3));     // rock
-  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(35));  // rock
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(3));     // ROCK
+  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(35));  // ROCK
   mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;
   mode.receiver.tvg_slope_db = 20;  // unknown: the law
   mode.receiver.tvg_ceiling_db = 60;
@@ -45,10 +45,10 @@ SonarModel make_model() {
 
 int wrapped(int bearing) { return (bearing % turn + turn) % turn; }
 bool is_continuous(const HeadCommand& c) { return (c.control & control::continuous) != 0; }
-/// Width of the sector; limits that are equal allow a full turn.
+/// Width of the sector. If both limits are equal, it is a full turn.
 int width_of(const HeadCommand& c) { return c.left == c.right ? turn - 1 : wrapped(c.right - c.left); }
 
-/// Reference of an 8-bit value.
+/// Level that an 8-bit value of ADSpan or ADLow stands for: 255 is 80 dB.
 float db_of(int value) { return static_cast<float>(receiver_db * value / 255); }
 
 }  // namespace
@@ -74,6 +74,7 @@ bool same_settings(const Settings& a, const Settings& b) {
 std::string complaint(const HeadCommand& c) {
   if (c.bins < 1 || c.bins > 1500) return text::format("%d bins are not in 1..1500", c.bins);
   if (c.interval < 1) return "the interval of the bins is 0";
+  // 750 m/s is half of the nominal sound speed: the way there and back.
   if (c.bins * c.interval * bin_unit_s * 750 > farthest_m) return text::format("the bins reach beyond %g m", farthest_m);
   if (c.step < 1) return "the step of the motor is 0";
   if (c.left >= turn || c.right >= turn) return text::format("a limit is not in 0..%d", turn - 1);
@@ -84,7 +85,7 @@ std::string complaint(const HeadCommand& c) {
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
   const HeadCommand& c = settings.command;
-  // The device counts time and has no setting for the sound speed. Rows are placed with the true one.
+  // The device samples at intervals of time and has no setting for the sound speed. Each row lies where sound has come from.
   const double speed = true_sound_speed_mps(device.water, device.depth_m);
   PingSettings s;
   s.beam_count = 1;
@@ -98,6 +99,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.gain_db = static_cast<float>(receiver_db * c.gain / most_gain);
   s.device_sound_speed_mps = static_cast<float>(speed);
   s.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = 0, .ceiling_db = receiver_db};
+  // ADLow and ADSpan select the window of 4-bit bins. They do not apply to bins of 8 bits (ENS; MCG differs).
   if ((c.control & control::eight_bits) == 0) {
     s.format.max_code = 15;
     s.format.floor_db = db_of(c.ad_low);
@@ -138,6 +140,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   return change_to(s, device);
 }
 
+// Bearings grow clockwise from above; 3200 is ahead (ROCK, MCG). The head of an inverted sonar hangs upside down, so for it they
+// grow counter-clockwise in its own frame.
 double head_rad(const Settings& settings) {
   const double to_starboard = (settings.bearing - ahead) * 2 * pi / turn;
   return (settings.command.control & control::inverted) != 0 ? to_starboard : -to_starboard;
@@ -153,12 +157,15 @@ std::chrono::nanoseconds transfer(const HeadCommand& c, const protocol::OptionVa
 
 std::chrono::nanoseconds turning(int sixteenths) { return std::abs(sixteenths) * turn_of_a_sixteenth; }
 
+// A head outside of the sector goes first to the limit from which it scans. Within the sector, or with a full turn, it scans from
+// its present bearing. With `stare` it goes to the left limit and stays there.
 int Scan::begin(const HeadCommand& c) {
   to_right = (c.control & control::to_right) != 0;
   const bool stares = (c.control & control::stare) != 0;
   if (!stares && (is_continuous(c) || wrapped(bearing - c.left) <= width_of(c))) return 0;
   const int way = wrapped((to_right || stares ? c.left : c.right) - bearing);
   bearing = wrapped(bearing + way);
+  // The head takes the shorter way.
   return way <= turn / 2 ? way : way - turn;
 }
 
@@ -168,7 +175,7 @@ int Scan::advance(const HeadCommand& c) {
   if (is_continuous(c)) return bearing = wrapped(bearing + step), step;
   const int at = wrapped(bearing - c.left), width = width_of(c);
   int next = at + step;
-  if (next < 0 || next > width) {
+  if (next < 0 || next > width) {  // at a limit of the sector the scan turns around
     to_right = !to_right;
     next = std::clamp(at - step, 0, width);
   }

@@ -1,4 +1,4 @@
-// The laws of a Micron: its product, its settings, where its head goes, and the message of a ping. Pure functions; sources:
+// The Micron: its product, the checks of its settings, the scan of its head, and the message of a ping. Pure functions; sources:
 // docs/protocols/micron.md.
 #pragma once
 
@@ -27,38 +27,38 @@ struct Settings {
   bool has_parameters = false;    // a host has sent the command since the last reboot
   std::uint16_t bearing = ahead;  // of a ping
 };
-/// But for the bearing, which changes with every ping.
+/// Compares settings without the bearing, which changes with every ping.
 bool same_settings(const Settings& a, const Settings& b);
 using HeldSettings = protocol::Held<Settings>;
-/// The settings of a new device, for null.
+/// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Why the device ignores it; empty = it does not.
+/// The reason if the device ignores the command, else an empty text.
 std::string complaint(const HeadCommand& command);
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// How far the sonar is turned to port for the head to look there.
+/// Angle by which the sonar is turned to port, so that it looks to the bearing of its head [rad].
 double head_rad(const Settings& settings);
-/// Time the bins of a ping take, and its answer on its link.
+/// listening(): time in which the bins of a ping are taken. transfer(): time in which the scan line is sent on the link.
 std::chrono::nanoseconds listening(const HeadCommand& command);
 std::chrono::nanoseconds transfer(const HeadCommand& command, const protocol::OptionValues& options);
 std::chrono::nanoseconds turning(int sixteenths);
 
-/// Where a scan goes. A sector is the part from the left limit clockwise to the right one.
+/// The bearing of the head in a scan, and its direction. A sector is the part from the left limit clockwise to the right one.
 struct Scan {
   int bearing = ahead;
   bool to_right = true;
-  /// Into the sector, as a new command demands. Returns the way, in 1/16 grad.
+  /// Turns the head into the sector of a new command. Returns the way in 1/16 grad, positive to the right.
   int begin(const HeadCommand& command);
-  /// To the next ping's bearing; likewise.
+  /// Turns the head to the bearing of the next ping. Returns the way likewise.
   int advance(const HeadCommand& command);
 };
 /// HeadData::sweep: 0 within a scan, 1 at its left limit, 2 at its right one.
 std::uint8_t sweep_code(const HeadCommand& command, int bearing);
 
-/// mtHeadData of a ping.
+/// The message mtHeadData for a ping.
 Bytes encode(const Ping& ping, const protocol::DeviceState& device);
 
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView frame);
