@@ -6,6 +6,7 @@
 namespace sonar::dvl {
 namespace {
 
+// Messages are lines: Framing::length is null, so a message ends with the line.
 constexpr recording::Framing framing{.magic = {'{', '"'}, .header_size = 2};
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace sonar::dvl {
 namespace {
 
-constexpr const char* version = "2.7.2";  // whose protocol is json_v3.3
+constexpr const char* version = "2.7.2";  // a version of the software with protocol json_v3.3
 
 std::string time_text(Time at) {
   const auto day = std::chrono::floor<std::chrono::days>(at);
@@ -46,7 +46,7 @@ Json configuration(const Settings& s) {
           {"periodic_cycling_enabled", s.cycles}};
 }
 
-/// An error's text; empty: the value is set.
+/// Sets a value, or returns the text of an error. These texts are ours: the device's are unknown.
 std::string set_number(const Json& value, const std::string& name, double lowest, double highest, double& to) {
   if (!value.is_number() || !(value.get<double>() >= lowest && value.get<double>() <= highest))
     return text::format("%s must be a number from %g to %g", name.c_str(), lowest, highest);
@@ -74,6 +74,7 @@ std::string set_value(const std::string& name, const Json& value, Settings& s) {
   return {};
 }
 
+/// Sets all parameters, or none if one of them is invalid.
 Outcome set_config(const Json& parameters, Settings& settings) {
   if (!parameters.is_object()) return {.error = "set_config needs parameters"};
   Settings changed = settings;
@@ -101,6 +102,7 @@ std::optional<Outcome> carry_out(const std::string& command, const Json& paramet
     settings.ntp_address = address->get<std::string>();
     return Outcome{};
   }
+  // The emulated clock is always synchronised, so setting it fails.
   if (command == "set_time_manual") return Outcome{.error = "Manual time not allowed when NTP is synchronized"};
   if (command == "force_sync_ntp")
     return Outcome{{{"success", true}, {"message", "NTP force-sync successful"}, {"status", time_status(device, now, settings)}}};
@@ -114,7 +116,7 @@ protocol::Bytes response_line(const std::string& to, const Outcome& outcome) {
                      {"result", outcome.result},
                      {"format", format_name},
                      {"type", "response"}};
-  // A client's text may be no UTF-8.
+  // `to` is a text of the client and may be no UTF-8, at which dump() would throw.
   return line_of(message.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 

@@ -1,4 +1,4 @@
-// The commands of clients, but for trigger_ping.
+// Carries out the commands of clients, except trigger_ping, which is part of the dialogue.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -14,7 +14,7 @@ struct Outcome {
   Json result = nullptr;
   std::string error = {};
 };
-/// Carries out a command; the settings that it changes. nullopt: there is no such command.
+/// Carries out a command, and changes `settings` if it sets some. nullopt: there is no such command.
 std::optional<Outcome> carry_out(const std::string& command, const Json& parameters, const protocol::DeviceState& device,
                                  Time now, Settings& settings);
 protocol::Bytes response_line(const std::string& to, const Outcome& outcome);

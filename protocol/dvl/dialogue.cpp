@@ -12,11 +12,11 @@ namespace {
 using protocol::Reaction;
 
 constexpr std::size_t longest_command = 4096;
-constexpr int deepest_command = 8, most_waiting = 15;  // braces within braces; DOC: triggered pings
+constexpr int deepest_command = 8, most_waiting = 15;  // nested braces (chosen); triggered pings that may wait (DOC)
 constexpr std::chrono::nanoseconds report_period = std::chrono::milliseconds(200);
-constexpr auto longest_wait = std::chrono::seconds(2);  // for a triggered ping, after which it is taken as lost
+constexpr auto longest_wait = std::chrono::seconds(2);  // after that a triggered ping counts as lost and is requested again
 
-/// Cuts JSON objects out of a stream. Clients end them with a line end or with nothing.
+/// Finds the JSON objects in a stream by counting braces. Lines do not separate them: libwaterlinked sends no line ends.
 class ObjectSplitter {
  public:
   /// Returns the object that ends with this byte.
@@ -32,7 +32,7 @@ class ObjectSplitter {
       return std::nullopt;
     }
     object_ += c;
-    if (in_text_) {
+    if (in_text_) {  // braces within a text do not count, and an escaped quote does not end it
       if (!std::exchange(escapes_, !escapes_ && c == '\\') && c == '"') in_text_ = false;
     } else if (c == '"') {
       in_text_ = true;
@@ -41,6 +41,7 @@ class ObjectSplitter {
     } else if (c == '}' && --depth_ == 0) {
       return std::exchange(object_, {});
     }
+    // An object that is too long or too deep is dropped. What follows it is read as a new stream.
     if (object_.size() < longest_command && depth_ <= deepest_command) return std::nullopt;
     junk_ += object_.size();
     depth_ = 0;
@@ -56,6 +57,8 @@ class ObjectSplitter {
   std::size_t junk_ = 0;
 };
 
+/// One client's conversation. Every client gets all reports. With acoustics enabled the device pings by itself and trigger_ping
+/// is refused; with acoustics disabled it pings only for triggers, which each client queues for itself (`waiting_`).
 class DvlDialogue final : public protocol::Dialogue {
  public:
   DvlDialogue(const protocol::DeviceState& device, Time now) : device_(device), due_(next_report_after(now)) {}
@@ -92,9 +95,10 @@ class DvlDialogue final : public protocol::Dialogue {
   }
 
  private:
+  /// Reports of dead reckoning come at multiples of the period, so that all clients get them at the same times.
   static Time next_report_after(Time now) { return now - now.time_since_epoch() % report_period + report_period; }
   Settings settings() const { return settings_from(device_.settings.get()); }
-  /// With the changes of the same call, which are not in force yet.
+  /// The settings after the changes of this call, which the daemon has not made yet.
   Settings settings_after(const Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
@@ -113,7 +117,7 @@ class DvlDialogue final : public protocol::Dialogue {
     const auto parameters = message.find("parameters");
     const auto outcome = carry_out(command, parameters != message.end() ? *parameters : Json(), device_, now, s);
     if (s.configured() != before || command == "reset_dead_reckoning") reaction.events.emplace_back(change_to(s, device_));
-    if (s.acoustics) waiting_ = 0;
+    if (s.acoustics) waiting_ = 0;  // enabled acoustics end the triggers
     reaction.replies.push_back(response_line(command, outcome.value_or(Outcome{.error = "there is no such command"})));
   }
 
@@ -123,7 +127,7 @@ class DvlDialogue final : public protocol::Dialogue {
     };
     if (s.acoustics) return answer("acoustic_enabled must be false");
     if (waiting_ >= most_waiting) return answer("the queue is full");
-    if (!s.is_triggered) {
+    if (!s.is_triggered) {  // the rate of the settings is 0 while acoustics are disabled; a triggered ping needs another one
       s.is_triggered = true;
       reaction.events.emplace_back(change_to(s, device_));
     }
@@ -136,9 +140,9 @@ class DvlDialogue final : public protocol::Dialogue {
 
   const protocol::DeviceState& device_;
   ObjectSplitter splitter_;
-  Time due_;             // of the next report of dead reckoning
-  int waiting_ = 0;      // pings that this client has triggered
-  Time requested_at_{};  // the ping that they wait for
+  Time due_;             // time of the next report of dead reckoning
+  int waiting_ = 0;      // pings that this client has triggered and not got yet
+  Time requested_at_{};  // when the first of them was requested
 };
 
 }  // namespace

@@ -7,7 +7,7 @@
 namespace sonar::dvl {
 namespace {
 
-constexpr auto processing_time = std::chrono::milliseconds(2);  // unknown: assumed
+constexpr auto processing_time = std::chrono::milliseconds(2);  // unknown: assumed; from the last echo to the report
 
 class DvlVendor final : public protocol::PushingVendor {
  public:
@@ -24,7 +24,8 @@ class DvlVendor final : public protocol::PushingVendor {
     const Measurement measured = measure(ping);
     Settings s = settings_from(device.settings.get());
     s.reckoning = reckoned(s.reckoning, measured, ping.request, s);
-    // A ping that was fired in another mode, before a client's change, says nothing about this one.
+    // The search among range modes goes on only after a ping of the present mode. A ping that was fired before a client changed
+    // the mode does not tell whether the new one fits.
     if (settings_from(ping.request.vendor_settings.get()).mode == s.mode)
       s.mode = next_mode(measured, s, product_of(*device.model));
     return change_to(s, device);
@@ -35,6 +36,7 @@ class DvlVendor final : public protocol::PushingVendor {
   }
   std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
     const Measurement measured = measure(ping);
+    // "time" of a report is the time since the previous report; the first has 0.
     const Time before = device.framed_at, fired = ping.request.fired_at;
     const auto since = before != Time{} && fired > before ? fired - before : std::chrono::nanoseconds(0);
     return std::make_shared<const protocol::Bytes>(velocity_line(measured, since, measured.heard_at + processing_time));

@@ -14,7 +14,7 @@ using protocol::HostActions;
 using protocol::HostPing;
 
 constexpr std::string_view title = "a DVL";
-constexpr std::size_t points = 200;  // of a line of the waterfall
+constexpr std::size_t points = 200;  // points of a line of the waterfall
 constexpr float silent_db = -2000;   // below every echo, so that lines without one are dark
 
 Bytes request(const protocol::SettingsOverride& wanted, const Product& product) {
@@ -26,7 +26,7 @@ Bytes request(const protocol::SettingsOverride& wanted, const Product& product) 
   return line_of(message.dump());
 }
 
-/// The distance to which a range mode reaches: the least one that covers the distance.
+/// The reach of the shortest range mode that covers the distance. The picture has this range, so that its scale is steady.
 double window_m(double distance_m) {
   double far_m = 0;
   for (const auto& model : models())  // reports do not have the model
@@ -94,9 +94,9 @@ class DvlHost final : public protocol::Host {
     return ping;
   }
 
-  const Product& product_ = product_of(*models().front());  // reports do not have the model
+  const Product& product_ = product_of(*models().front());  // the first: reports do not name the model
   std::optional<Bytes> request_;
-  double window_m_ = 0;  // the least one, where a range is wanted
+  double window_m_ = 0;  // the picture has at least the wanted range
   Bytes line_;
   std::uint32_t number_ = 0;
   protocol::Waterfall waterfall_;

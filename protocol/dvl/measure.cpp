@@ -10,10 +10,10 @@ namespace {
 
 constexpr double rssi_at_full_scale_dbm = 20;  // unknown: at 1 m; sand is then at -30 dBm at 0.5 m, as in the example of DOC
 constexpr double fom_without_velocity = 2.5;   // LOG: 2.4 to 2.7
-constexpr auto longest_gap = std::chrono::seconds(3);  // between pings; over longer ones no velocity is known
-constexpr double drift_mps = 0.1;                      // unknown: of a position that no velocity supports
+constexpr auto longest_gap = std::chrono::seconds(3);  // over a longer gap between pings the velocity is unknown
+constexpr double drift_mps = 0.1;                      // unknown: growth of the error of a position without a valid velocity
 
-/// In the streams of Domain::range_noise, beyond those of the pixels.
+/// First number of the random streams of the beams. Those of the pixels, which have the same domain, are lower.
 constexpr std::uint32_t noise_stream = 1u << 16;
 
 double standard_normal(const PingRequest& r, std::size_t beam) {
@@ -22,7 +22,8 @@ double standard_normal(const PingRequest& r, std::size_t beam) {
   return std::sqrt(2.0) * static_cast<double>(complex_normal(bits.v[0], bits.v[1]).re);
 }
 
-/// unknown: the law. LOG: fom of 0.2 mm/s at rest and 1.3 mm/s at 0.5 m/s, 1.6 m above the ground.
+/// Standard deviation of a beam's velocity. unknown: the law. It was fitted to LOG, which has a fom of 0.2 mm/s at rest and 1.3
+/// mm/s at 0.5 m/s, 1.6 m above the ground.
 double sigma_of(double along_mps, double speed_mps, double distance_m) {
   const double moving = std::hypot(0.003 * along_mps, 0.001 * speed_mps);
   return std::hypot(0.0001, moving) * (1 + distance_m / 25);
@@ -38,7 +39,7 @@ Beam beam_of(const Ping& ping, std::size_t index, Vec3d velocity_mps) {
   if (echo.range == 0 || echo.strength == 0 || distance_m < s.range_start_m || distance_m > s.range_m) return beam;
   beam.is_valid = true;
   beam.distance_m = distance_m;
-  // The strength is that of a receiver whose gain grows by 40 dB a decade.
+  // The receiver's gain grows by 40 dB a decade of distance (models.cpp). It is taken out of the level.
   beam.rssi_dbm = rssi_at_full_scale_dbm + db_from_amplitude(echo.strength / static_cast<double>(RangePixel::most_strength)) -
                   40 * std::log10(distance_m);
   const double along_mps = dot(beam_direction(index), velocity_mps);
@@ -48,8 +49,8 @@ Beam beam_of(const Ping& ping, std::size_t index, Vec3d velocity_mps) {
   return beam;
 }
 
-/// Where the device's axis meets the plane through the ends of the beams: for a pair of opposite beams the harmonic mean of their
-/// distances.
+/// The distance along the device's axis to the plane through the ends of the beams. For a pair of opposite beams it is the
+/// harmonic mean of their distances, times the cosine of the tilt. -1: no pair of opposite beams is valid.
 double altitude_of(const std::array<Beam, beam_count>& beams) {
   double sum = 0;
   int pairs = 0;
@@ -62,7 +63,8 @@ double altitude_of(const std::array<Beam, beam_count>& beams) {
   return pairs > 0 ? altitude_per_distance * sum / pairs : -1;
 }
 
-/// The inverse of a symmetric matrix that has one.
+/// The inverse of a symmetric matrix, by its minors. Three valid beams are enough for it: their directions are linearly
+/// independent.
 Covariance inverse(const Covariance& m) {
   Covariance inverse{};
   const auto minor = [&](std::size_t i, std::size_t j) {
@@ -89,10 +91,10 @@ Covariance turned(const Covariance& m, double rad) {
   return out;
 }
 
-/// The vehicle's axes in the world.
+/// Orientation in the world of the vehicle's axes, which differ from those of the device by the mounting rotation.
 Quatd vehicle_in_world(const PingRequest& request, const Settings& settings) {
   const double h = std::sqrt(0.5);
-  const Quatd device_in_sonar{0, h, 0, h};  // as device_from_sonar()
+  const Quatd device_in_sonar{0, h, 0, h};  // the same rotation as device_from_sonar()
   return request.sonar_in_world.orientation * device_in_sonar *
          turned_by(Vec3d{0, 0, -rad_from_deg(settings.mounting_rotation_deg)});
 }
@@ -123,7 +125,7 @@ Estimate estimate(const std::array<Beam, beam_count>& beams) {
 }
 
 double largest_eigenvalue(const Covariance& m) {
-  // By the trigonometric solution of the characteristic polynomial.
+  // Trigonometric solution of the characteristic polynomial of a symmetric 3 x 3 matrix, whose roots are all real.
   const double mean = (m[0][0] + m[1][1] + m[2][2]) / 3;
   const double off = m[0][1] * m[0][1] + m[0][2] * m[0][2] + m[1][2] * m[1][2];
   double spread = 2 * off;
@@ -144,7 +146,8 @@ Measurement measure(const Ping& ping) {
   const double speed_mps = static_cast<double>(r.settings.device_sound_speed_mps);
   const double true_mps = true_sound_speed_mps(r.water, depth_from_z(r.sonar_in_world.position_m.z));
   const Vec3d moves = device_from_sonar(rotate(conjugate(r.sonar_in_world.orientation), r.sonar_moves.velocity_mps));
-  const Vec3d seen = speed_mps / true_mps * moves;  // the device turns a Doppler shift into a velocity with its own sound speed
+  // The device computes the velocity from the Doppler shift with its own sound speed, so a wrong one scales the velocity.
+  const Vec3d seen = speed_mps / true_mps * moves;
   Measurement m;
   std::size_t valid = 0;
   double farthest_m = 0;
@@ -153,7 +156,7 @@ Measurement measure(const Ping& ping) {
     valid += m.beams[i].is_valid;
     farthest_m = std::max(farthest_m, m.beams[i].distance_m);
   }
-  if (valid == 0) farthest_m = r.settings.range_m;
+  if (valid == 0) farthest_m = r.settings.range_m;  // without an echo the device listens to the end of the range
   m.reflected_at = r.fired_at + nanoseconds_from(farthest_m / speed_mps);
   m.heard_at = r.fired_at + nanoseconds_from(2 * farthest_m / speed_mps);
   m.fom = fom_without_velocity;
@@ -168,6 +171,8 @@ Measurement measure(const Ping& ping) {
   return m;
 }
 
+// unknown: the search. Without a velocity the next higher mode is tried, after the highest the lowest; with one the device keeps
+// its mode while the altitude belongs to it (docs/protocols/dvl.md, "Range modes").
 int next_mode(const Measurement& measured, const Settings& settings, const Product& product) {
   if (!measured.is_valid) return settings.mode < settings.highest_mode ? settings.mode + 1 : settings.lowest_mode;
   const auto has = [&](int index) {
@@ -190,6 +195,7 @@ Reckoning reckoned(const Reckoning& before, const Measurement& measured, const P
     const double passed_s = seconds(request.fired_at - before.at);
     const double fom = measured.is_valid ? measured.fom : drift_mps;
     if (measured.is_valid) now.velocity_mps = rotate(conjugate(now.first) * now.last, measured.velocity_mps);
+    // Trapezoidal rule: the mean of both velocities over the time between the pings.
     now.position_m = before.position_m + passed_s / 2 * (before.velocity_mps + now.velocity_mps);
     now.std_m = before.std_m + fom * passed_s;
   }

@@ -1,4 +1,5 @@
-// The measurement in a ping: four beams and the velocity that they make, and dead reckoning from one to the next. Pure functions.
+// Computes from a ping the measurement that the device reports (four beams, velocity, altitude), and dead reckoning from one ping
+// to the next. Pure functions.
 #pragma once
 
 #include "protocol/dvl/settings.hpp"
@@ -15,7 +16,7 @@ struct Beam {
 
 using Covariance = std::array<std::array<double, 3>, 3>;
 
-/// In the vehicle's frame: that of the device, turned by the mounting rotation.
+/// The report of the device for a ping. Vectors are in the vehicle's frame: that of the device, turned by the mounting rotation.
 struct Measurement {
   std::array<Beam, beam_count> beams;
   bool is_valid = false;
@@ -33,7 +34,7 @@ Measurement measure(const Ping& ping);
 int next_mode(const Measurement& measured, const Settings& settings, const Product& product);
 
 Reckoning reckoned(const Reckoning& before, const Measurement& measured, const PingRequest& request, const Settings& settings);
-/// Where the vehicle is by its last velocity, some time after the last ping.
+/// The position at `now`, some time after the last ping, extrapolated with the last velocity.
 Reckoning extrapolated(const Reckoning& last, Time now);
 
 /// Weighted least squares of the velocities of the valid beams, at least three, in the device's frame.

@@ -5,14 +5,17 @@
 namespace sonar::dvl {
 namespace {
 
+// Columns: profile, name, part number, carrier [Hz], beam width [deg], source level [dB], highest altitude [m], fastest velocity
+// [m/s], unit of the ranges in a ping [m].
 constexpr std::array<Product, 2> products{{
     {"dvl-a50", "DVL A50", 21035, 1e6, 4.4, 197, 50, 3.75, 0.001},
     {"dvl-a125", "DVL A125", 21037, 420e3, 4.1, 198, 125, 9, 0.0025},
 }};
 constexpr std::array<double, beam_count> azimuth_deg{135, -135, -45, 45};  // from forward to starboard
 
-constexpr int margin = 3, steps_between = grid_size - 1 - 2 * margin;  // steps of the grid beyond the beams, and between two
-/// Azimuth and elevation of the beams in the sonar's axes.
+// The grid has `margin` steps beyond each beam, so that a beam's width lies within it, and `steps_between` between two beams.
+constexpr int margin = 3, steps_between = grid_size - 1 - 2 * margin;
+/// Azimuth and elevation of the beam ahead to port in the sonar's axes; the others differ by signs.
 struct Corner {
   double azimuth_rad, elevation_rad;
 };
@@ -28,7 +31,8 @@ SonarModel model_of(const Product& product) {
   const double extent = 2.0 * (grid_size - 1) / steps_between;
   mode.horizontal_aperture_rad = static_cast<float>(extent * corner().azimuth_rad);
   mode.pattern.elevation_width_rad = static_cast<float>(extent * corner().elevation_rad);
-  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(product.beam_deg) / std::sqrt(2.0));  // there and back
+  // A beam transmits and receives, so the two-way width is less by a factor of sqrt(2).
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(product.beam_deg) / std::sqrt(2.0));
   mode.beam_spacing = BeamSpacing::uniform_in_angle;
   mode.min_range_m = 0;
   mode.max_range_m = static_cast<float>(product.highest_m / altitude_per_distance);
@@ -75,7 +79,7 @@ Vec3d beam_direction(std::size_t beam) {
 
 std::size_t pixel_of(std::size_t beam) {
   const Vec3d at = beam_direction(beam);
-  // Columns begin at port, rows below, where the sonar's z is forward.
+  // Columns begin at port, rows below. The sonar looks down the device's z axis with its own z forward, so row 0 is aft.
   const int column = at.y < 0 ? margin : margin + steps_between, row = at.x < 0 ? margin : margin + steps_between;
   return static_cast<std::size_t>(row * grid_size + column);
 }

@@ -16,7 +16,7 @@ std::int64_t microseconds(Time at) {
 
 Bytes line_of(const Json& message) { return dvl::line_of(message.dump()); }
 
-/// A member that is a finite number.
+/// A member of an object. nullopt: there is none, or it is no finite number below 1e18, so that conversions cannot overflow.
 std::optional<double> number(const Json& from, const char* name) {
   const auto found = from.find(name);
   if (found == from.end() || !found->is_number()) return std::nullopt;
@@ -32,6 +32,7 @@ std::string text(const Json& from, const char* name) {
   return found != from.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
+/// A report without time_of_validity is accepted; the time of the ping is then unknown.
 std::optional<VelocityReport> velocity_from(const Json& message) {
   const auto vx = number(message, "vx"), vy = number(message, "vy"), vz = number(message, "vz");
   const auto altitude = number(message, "altitude"), at_us = number(message, "time_of_validity");

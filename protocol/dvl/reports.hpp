@@ -34,7 +34,7 @@ struct Response {
   std::string to, error;
   bool success = false;
 };
-/// A line of the device: one of these, or neither for other lines and for what is no JSON.
+/// A line of the device. Both members are absent for lines of other kinds and for text that is no JSON.
 struct Line {
   std::optional<VelocityReport> velocity;
   std::optional<Response> response;

@@ -9,7 +9,7 @@ namespace sonar::dvl {
 HeldSettings::HeldSettings(const Settings& s, const Product& product) : settings(s) {
   beam_height_rad = rad_from_deg(product.beam_deg) / std::sqrt(2.0);
   range_unit_m = product.range_unit_m;
-  range_sample_m = 0.0096;  // DOC: distances of its example are multiples
+  range_sample_m = 0.0096;  // DOC: the distances of its example are multiples of this
 }
 
 bool HeldSettings::equals(const VendorSettings& other) const {
@@ -17,6 +17,7 @@ bool HeldSettings::equals(const VendorSettings& other) const {
   return of != nullptr && of->settings.configured() == settings.configured();
 }
 
+// The device begins with the highest allowed mode, from which the search goes on.
 bool allow_modes(std::string_view text, Settings& settings) {
   const auto mode = [](char c) { return c >= '0' && c < '0' + range_mode_count ? std::optional(c - '0') : std::nullopt; };
   std::optional<int> lowest, highest;
@@ -46,7 +47,7 @@ PingSettings ping_settings(const Settings& settings, const Product& product) {
   const RangeMode mode = range_mode(settings.mode, product);
   PingSettings s;
   s.beam_count = s.range_bin_count = grid_size;
-  s.range_start_m = mode.lowest_m;  // a beam over rising ground is shorter than the altitude's
+  s.range_start_m = mode.lowest_m;  // not divided by the cosine: over rising ground a beam may be as short as the altitude
   s.range_m = mode.highest_m / altitude_per_distance;
   s.range_bin_m = (s.range_m - s.range_start_m) / grid_size;
   s.pulse_width_m = static_cast<float>(mode.pulse_m);

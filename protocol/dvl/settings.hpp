@@ -28,7 +28,7 @@ struct Settings {
   int lowest_mode = 0, highest_mode = range_mode_count - 1;  // that range_mode allows
   bool is_triggered = false;                                 // a client has requested a ping while acoustics are off
 
-  int mode = 2;  // where the device is
+  int mode = 2;  // range mode of the next ping
   Reckoning reckoning;
 
   /// The values that clients set.
@@ -42,7 +42,7 @@ struct HeldSettings final : RangeImageSettings {
   bool equals(const VendorSettings& other) const override;
   Settings settings;
 };
-/// As the device comes, for null.
+/// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// Allows the modes of "auto", "=a" or "a<=b". False: the text is none of these.

@@ -1,4 +1,4 @@
-// The driver's end, and the part of the make that recordings need.
+// The driver's side of an M3, and its codec for recordings.
 #pragma once
 
 #include "protocol/host.hpp"
