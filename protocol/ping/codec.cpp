@@ -82,6 +82,8 @@ bool is_known(Id id) {
   return false;
 }
 
+/// Length of the frame with this header. `BR` is no more than two bytes, which samples may contain: `strict` also demands a known
+/// message.
 std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
   Header header;
   wire::Reader reader(bytes);
@@ -90,7 +92,8 @@ std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool st
   return reader.ok() ? std::optional(header_size + header.length + sum_size) : std::nullopt;
 }
 
-/// A frame with one of the pings of a product.
+/// Whether the message has a frame with one of these numbers and the right sum. The pings of each product have numbers of their
+/// own, so they tell which product sent them.
 bool holds(const RecordedMessage& message, std::initializer_list<Id> pings) {
   Framer framer(longest_payload, true);
   framer.append(message.bytes);

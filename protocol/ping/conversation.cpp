@@ -30,12 +30,14 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
   return reaction;
 }
 
-/// The address of a datagram's sender may be forged. So there is one datagram of answers, little longer than what was received.
+/// The sender of a datagram may be forged, and its answers would then go to another computer. So they are one datagram, little
+/// longer than the one received.
 protocol::Reaction Conversation::on_datagram(std::size_t size, Time now) {
   protocol::Reaction reaction;
   Bytes answers;
   std::size_t frames = 0;
   while (const auto frame = framer_.next()) {
+    // A wrong sum is refused if the frame is the whole datagram. Else it may be a false begin within another frame.
     const bool is_all = header_size + frame->header.length + sum_size == size;
     if (!frame->sum_is_right && !is_all) continue;
     const std::size_t before = reaction.replies.size();
@@ -43,7 +45,7 @@ protocol::Reaction Conversation::on_datagram(std::size_t size, Time now) {
     ++frames;
     for (std::size_t i = before; i < reaction.replies.size(); ++i)
       answers.insert(answers.end(), reaction.replies[i].begin(), reaction.replies[i].end());
-    if (answers.size() > size + most_beyond) break;
+    if (answers.size() > size + most_beyond) break;  // the rest of the requests is ignored
   }
   framer_.drop_rest();
   if (frames > 1 && !answers.empty()) reaction.replies = {std::move(answers)};
@@ -56,7 +58,7 @@ std::optional<std::chrono::milliseconds> Conversation::longest_silence() const {
 }
 
 void Conversation::on_frame(const Frame& frame, Time now, protocol::Reaction& reaction) {
-  if (is_of_device(frame.header.id)) return;
+  if (is_of_device(frame.header.id)) return;  // answering it would let two devices answer each other without end
   if (!frame.sum_is_right) return refuse(frame, "wrong checksum", reaction);
   if (frame.header.id == Id::general_request) return on_general_request(frame, now, reaction);
   if (frame.header.id == Id::set_device_id) return set_id(frame, reaction);

@@ -18,9 +18,9 @@ using protocol::HostPing;
 using text::format;
 
 constexpr double sample_unit_s = 25e-9, sound_mps = 1500;
-constexpr int grads = 400, sector = 201, first_grad = 300;  // a scan is half a circle, port to starboard
-constexpr int astern = 200;                                 // where the beams of a turn begin
-constexpr std::size_t point_rows = 300;                     // rows in a picture of points
+constexpr int grads = 400, sector = 201, first_grad = 300;  // a scan covers the half circle ahead, from port to starboard
+constexpr int astern = 200;                                 // angle at which the beams of a Sweep begin
+constexpr std::size_t point_rows = 300;                     // rows of a picture of points
 
 Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
   PingParameters p{.end_mm = static_cast<std::int32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
@@ -48,7 +48,7 @@ Bytes ping360_request(const protocol::SettingsOverride& wanted) {
 
 using Points = std::vector<std::pair<double, double>>;  // azimuth, range
 
-/// The points up to the first bad one, or to the end of the message.
+/// The points up to the first invalid one, or to the end of the message.
 Points points_in(const YzPointData& data, BytesView rest) {
   Points polar;
   wire::Reader reader(rest);
@@ -77,7 +77,8 @@ Points points_in(const AtofPointData& data, BytesView rest) {
 }
 
 double end_m(const YzPointData& data, const Points&) { return static_cast<double>(data.end_m); }
-/// The message does not have the far end. It has the time for which the sonar listened, from the near end on.
+/// The message does not state the far end of the range. The time for which the sonar listened, which begins at the near end, is a
+/// lower bound.
 double end_m(const AtofPointData& data, const Points& polar) {
   double far_m = static_cast<double>(data.listening_s) * static_cast<double>(data.speed_mps) / 2;
   for (const auto& point : polar) far_m = std::max(far_m, point.second);
@@ -125,7 +126,7 @@ class SurveyorHost final : public PingHost {
     if (frame.header.id == Id::atof_point_data) return read(frame, AtofPointData{});
     return frame.header.id == Id::yz_point_data ? read(frame, YzPointData{}) : std::nullopt;
   }
-  /// A ping may have its points in both messages; the first message counts.
+  /// A ping may have its points in both messages. Only the first message that arrives is used.
   template <class Data>
   std::optional<HostPing> read(const Frame& frame, Data data) {
     const auto rest = read_front(frame, data);
@@ -136,10 +137,11 @@ class SurveyorHost final : public PingHost {
     return ping_of(data.ping, far_m, std::move(polar));
   }
 
-  std::pair<std::optional<std::uint32_t>, Id> newest_{};  // a ping's number, and which message it came in
+  std::pair<std::optional<std::uint32_t>, Id> newest_{};  // number of the newest ping, and the message that is used of it
 };
 
-/// Asks for the protocol version first, which changes nothing: a sonar by UDP is there when it answers.
+/// First requests the protocol version, which changes nothing. UDP has no connection, so the answer shows that a sonar is there;
+/// then the host requests a scan.
 class Ping360Host final : public PingHost {
  public:
   using PingHost::PingHost;
@@ -147,7 +149,7 @@ class Ping360Host final : public PingHost {
     constexpr std::array<std::byte, 2> wanted{std::byte{static_cast<std::uint8_t>(Id::protocol_version)}};
     return {protocol::HostSend{0, framed(Id::general_request, 0, wanted)}};
   }
-  /// The sonar does not continue to scan, unless another driver requested the scan.
+  /// Stops the scan that this host has requested. It does not stop that of another driver.
   HostActions on_leave() override {
     if (!is_open_ || !asks()) return {};
     return {protocol::HostSend{0, framed(Id::motor_off, 0, {})}};

@@ -11,7 +11,7 @@ using protocol::Field;
 using protocol::FieldName;
 using protocol::Region;
 
-/// In the header of the first frame, else in a message, whose frame begins at `offset`.
+/// Finds a field in the header of the first frame, else in message M, whose frame begins at `offset`.
 template <class M>
 std::optional<Field> in_frame(FieldName name, std::size_t offset, BytesView frames) {
   const auto header = wire::locate<Header>(name, frames);
@@ -25,7 +25,7 @@ bool is_of(Id id, BytesView frame) {
   return reader.ok() && header.id == id;
 }
 
-/// Offset of the frame of that message among the frames of a ping; of no frames: 0.
+/// Offset of the frame with that message among the frames of a ping. nullopt: there is none. Without frames: 0.
 std::optional<std::size_t> frame_of(Id id, BytesView frames) {
   std::size_t at = 0;
   while (!frames.empty() && at < frames.size() && !is_of(id, frames.subspan(at))) {
@@ -38,7 +38,7 @@ std::optional<std::size_t> frame_of(Id id, BytesView frames) {
   return frames.empty() || at < frames.size() ? std::optional(at) : std::nullopt;
 }
 
-/// A region of a frame that is fields, then samples.
+/// A region of a frame whose payload is fields and then samples.
 std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields_size) {
   if (region == Region::bearings) return std::nullopt;
   if (frame.empty()) return Place{};
@@ -48,7 +48,7 @@ std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields
   return region == Region::metadata ? Place{header_size, fields_size} : Place{data, frame.size() - sum_size - data};
 }
 
-/// A region of the frame of that message, of fields M and then samples, among the frames of a ping.
+/// A region of the frame with that message among the frames of a ping. Its payload is the fields M and then samples.
 template <class M>
 std::optional<Place> samples_among(Id id, Region region, BytesView frames) {
   const auto at = frame_of(id, frames);
@@ -60,7 +60,8 @@ std::optional<Place> samples_among(Id id, Region region, BytesView frames) {
 
 constexpr std::size_t attitude_size = header_size + wire::wire_size<AttitudeReport>() + sum_size;
 
-/// Offset of the frame of points (3012) in all frames of a ping, or in the datagram that has this frame.
+/// Offset of the frame of points (3012). By TCP it follows the attitude report (504); by UDP it is a datagram of its own, offset
+/// 0.
 std::optional<std::size_t> atof_frame(BytesView frames) {
   const std::size_t at = frames.empty() || is_of(Id::attitude_report, frames) ? attitude_size : 0;
   const bool there = frames.empty() || (frames.size() > at && is_of(Id::atof_point_data, frames.subspan(at)));
@@ -109,7 +110,7 @@ std::optional<Field> locate_surveyor(FieldName name, BytesView frames) {
 }
 
 std::optional<Place> locate_surveyor(Region region, BytesView frames) {
-  if (region == Region::bearings) return std::nullopt;  // each point has its own
+  if (region == Region::bearings) return std::nullopt;  // there is no table: each point has its own bearing
   if (frames.empty()) return Place{};
   const auto at = atof_frame(frames);
   const std::size_t fields_end = at.value_or(0) + header_size + wire::wire_size<AtofPointData>();

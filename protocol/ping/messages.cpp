@@ -25,6 +25,8 @@ Bytes framed(Id id, std::uint8_t source, BytesView payload) {
   return out;
 }
 
+// The lengths are those of `before`, because a fault may have changed them. Only frames that differ get a new sum, so that a sum
+// that a fault made wrong stays wrong.
 void reseal(BytesView before, Bytes& frames) {
   for (BytesView left = before; left.size() >= header_size + sum_size;) {
     const std::size_t at = before.size() - left.size();
@@ -59,7 +61,7 @@ Bytes nack(Id id, std::uint8_t source, std::string_view why) {
 
 void Framer::append(BytesView received) {
   last_size_ = 0;
-  if (begin_ > buffer_.size() / 2) {
+  if (begin_ > buffer_.size() / 2) {  // erases rarely, so that the work stays proportional to the bytes
     const auto searched = static_cast<std::ptrdiff_t>(begin_);
     buffer_.erase(buffer_.begin(), buffer_.begin() + searched);
     sums_.erase(sums_.begin(), sums_.begin() + searched);
@@ -80,7 +82,7 @@ std::optional<Frame> Framer::next() {
   last_size_ = 0;
   for (; begin_ < buffer_.size(); ++begin_) {
     const BytesView left = BytesView(buffer_).subspan(begin_);
-    if (left[0] != std::byte{'B'} || (left.size() > 1 && left[1] != std::byte{'R'})) continue;
+    if (left[0] != std::byte{'B'} || (left.size() > 1 && left[1] != std::byte{'R'})) continue;  // a last 'B' may begin a frame
     Frame frame;
     if (left.size() >= header_size) {
       wire::Reader reader(left);
@@ -95,12 +97,14 @@ std::optional<Frame> Framer::next() {
     std::uint16_t stated = 0;
     wire::Reader behind(left.subspan(summed));
     behind("checksum", stated);
+    // The sum of the frame is the difference of two sums from the begin of the buffer, so no byte is added twice.
     frame.sum_is_right = stated == static_cast<std::uint16_t>(sums_[begin_ + summed] - sums_[begin_]);
     if (frame.sum_is_right) {
       const BytesView payload = left.subspan(header_size, frame.header.length);
       frame.payload.assign(payload.begin(), payload.end());
       last_size_ = summed + sum_size;
     }
+    // After a wrong sum the length may be wrong too, so the search goes on at the next byte.
     begin_ += std::max<std::size_t>(last_size_, 1);
     return frame;
   }

@@ -13,7 +13,7 @@ using protocol::Reaction;
 constexpr auto port_table = streaming_ports(51200);
 
 class OmniscanDialogue final : public StreamingConversation<Settings, settings_from> {
-  /// ping-python does; hosts of a Surveyor answer its requests for the time.
+  /// ping-python sends nothing while it reads an Omniscan. A Surveyor asks its hosts for the time, so they do send.
   bool hosts_fall_silent() const override { return settings().parameters.enable != 0; }
 
  public:
@@ -26,7 +26,7 @@ class OmniscanDialogue final : public StreamingConversation<Settings, settings_f
       if (!read(frame, parameters, reaction)) return true;
       if (const std::string why = complaint(parameters); !why.empty()) return refuse(frame, why, reaction), true;
       change(reaction, [&](Settings& s) { s.parameters = parameters; });
-    } else if (frame.header.id == Id::set_sound_speed || frame.header.id == Id::set_sound_speed_before) {
+    } else if (frame.header.id == Id::set_sound_speed || frame.header.id == Id::set_sound_speed_before) {  // older definitions
       SoundSpeed speed;
       if (!read(frame, speed, reaction)) return true;
       if (speed.mm_per_s < 1000000 || speed.mm_per_s > 2000000)

@@ -13,11 +13,11 @@
 namespace sonar::ping::omniscan {
 namespace {
 
-constexpr double db_per_gain = 6;  // unknown: assumed, like full scale and the source level
+constexpr double db_per_gain = 6;  // unknown: assumed, as are full scale and the source level
 constexpr int most_gain = 7;
 constexpr double longest_m = 150;
 constexpr std::uint32_t least_length_mm = 100;
-constexpr double processing_s = 0.01;
+constexpr double processing_s = 0.01;  // assumed: time from the last echo to the next ping
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
@@ -30,9 +30,9 @@ SonarModel make_model() {
   mode.source_level_db = 205;
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
-  mode.pattern.azimuth_width_rad =
-      static_cast<float>(rad_from_deg(0.8));  // along the track: the maker's, of its 450 kHz transmitter
-  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(50));  // across it: recalled
+  // Along the track: as the maker states it for the Omniscan 3D 450 SS. Across it: recalled.
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(0.8));
+  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(50));
   mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;
   mode.receiver.full_scale_upa = 1e5f;
   SonarModel model;
@@ -79,7 +79,7 @@ PingSettings ping_settings(const Settings& settings) {
   const double shortest_s = 2 * s.range_m / static_cast<double>(settings.speed_mps) + processing_s;
   s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
   s.gain_db = static_cast<float>(db_per_gain * std::max<int>(p.gain, 0));
-  s.tvg = false;  // hosts apply it
+  s.tvg = false;  // powers are sent without a time-varied gain
   s.device_sound_speed_mps = settings.speed_mps;
   s.format = {.bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -80, .ceiling_db = 80};
   return s;
@@ -121,7 +121,7 @@ Bytes profile_of(const Ping& ping, const protocol::DeviceState& device) {
   const Settings s = settings_from(ping.request.vendor_settings.get());
   const PingSettings& made = ping.request.settings;
   OsMonoProfile profile;
-  profile.ping = static_cast<std::uint32_t>(ping.request.number) - 1;  // from 0
+  profile.ping = static_cast<std::uint32_t>(ping.request.number) - 1;  // ping_number counts from 0
   profile.start_mm = s.parameters.start_mm;
   profile.length_mm = s.parameters.length_mm;
   profile.power_up_ms = static_cast<std::uint32_t>(

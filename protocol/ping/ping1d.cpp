@@ -8,7 +8,7 @@
 namespace sonar::ping::ping1d {
 namespace {
 
-constexpr auto port_table = streaming_ports(9090);  // a bridge to its serial line that vehicles have
+constexpr auto port_table = streaming_ports(9090);  // port of the bridge by which vehicles serve the serial line
 
 class Ping1DVendor final : public StreamingVendor {
  public:
@@ -34,7 +34,7 @@ class Ping1DVendor final : public StreamingVendor {
     const Parameters before = settings_from(ping.request.vendor_settings.get()).parameters;
     if (before.range.start_mm != s.parameters.range.start_mm || before.range.length_mm != s.parameters.range.length_mm ||
         before.gain != s.parameters.gain)
-      return std::nullopt;  // a host has changed them since
+      return std::nullopt;  // a host has changed range or gain since: the ping does not tell whether the new ones fit
     const Parameters next = adjusted(s.parameters, find_echo(ping));
     if (next == s.parameters) return std::nullopt;
     s.parameters = next;

@@ -11,6 +11,8 @@ using protocol::Reaction;
 constexpr std::uint16_t firmware_major = 3, firmware_minor = 29, supply_mv = 5000;
 constexpr double housing_above_water_c = 8;  // assumed
 
+/// One host's conversation. Each setting has a message of its own; SoundingConversation fires the pings that the host requests or
+/// streams.
 class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
  public:
   Ping1DDialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
@@ -43,7 +45,7 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
         return true;
       case Id::ping1d_set_enable:
         set_value(frame, reaction, &Parameters::enable);
-        forget_ping(now);  // its request ends with the pings
+        forget_ping(now);  // disabling pings ends the request of the ping that is being made
         return true;
       case Id::ping1d_continuous_start:
       case Id::ping1d_continuous_stop:
@@ -52,7 +54,7 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
       case Id::ping1d_goto_bootloader:
         refuse(frame, "it has no bootloader", reaction);
         return true;
-      default:  // a request of older hosts: the number of the message, without a payload
+      default:  // older hosts request a message by its number, without a payload (CLI)
         if (frame.payload.empty()) answer(id, now, reaction);
         return frame.payload.empty();
     }

@@ -20,7 +20,8 @@ void add_value(Bytes& to, Id id, T value) {
   to.insert(to.end(), frame.begin(), frame.end());
 }
 
-/// Sends the settings one by one, then requests a stream of profiles. Without range and gain the sonar finds both itself.
+/// The requests of this host: each setting in a message of its own, then a stream of profiles. Without range and gain the mode is
+/// automatic, and the sonar chooses both.
 Bytes request(const protocol::SettingsOverride& wanted) {
   Bytes all;
   const bool manual = wanted.range_m || wanted.gain_percent;

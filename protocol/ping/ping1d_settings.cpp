@@ -13,11 +13,11 @@
 namespace sonar::ping::ping1d {
 namespace {
 
-constexpr std::array<double, 7> gains{0.6, 1.8, 5.5, 12.9, 30.2, 66.1, 144};  // DEF: of gain_setting
+constexpr std::array<double, 7> gains{0.6, 1.8, 5.5, 12.9, 30.2, 66.1, 144};  // DEF: amplification of each gain_setting
 constexpr int most_gain = static_cast<int>(gains.size()) - 1;
-constexpr int points = 200;                // recalled, like the ones that follow
-constexpr std::uint32_t most_mm = 100000;  // manual
-constexpr double shortest_pulse_us = 26;   // at 1 m, as a user saw (ping-python, issue 157); unknown farther away: assumed there
+constexpr int points = 200;                // recalled
+constexpr std::uint32_t most_mm = 100000;  // MAN
+constexpr double shortest_pulse_us = 26;   // USR: pulse at 1 m. unknown: pulses at longer ranges
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
@@ -30,9 +30,9 @@ SonarModel make_model() {
   mode.source_level_db = 190;  // unknown: level and full scale; set so that sand takes the lowest gain at 0.5 m
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
-  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(30));  // manual; a newer edition has 25
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(30));  // MAN; a newer edition has 25
   mode.pattern.elevation_width_rad = mode.pattern.azimuth_width_rad;
-  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(76));  // its main lobe down to -20 dB
+  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(76));  // rays cover the main lobe down to -20 dB
   mode.receiver.full_scale_upa = 1.4e8f;
   SonarModel model;
   model.profile = "ping1d";
@@ -83,7 +83,7 @@ PingSettings ping_settings(const Settings& settings) {
   s.rate_hz = p.enable == 0 ? 0 : 1000.0f / static_cast<float>(std::max<int>(p.interval_ms, 1));
   s.triggered = true;
   s.gain_db = static_cast<float>(20 * std::log10(gains[p.gain]));
-  s.tvg = false;  // unknown: assumed, since its gains reach from the nearest bottom to the farthest
+  s.tvg = false;  // unknown: assumed, because the seven gains alone reach from the nearest bottom to the farthest
   s.device_sound_speed_mps = static_cast<float>(speed_mps);
   s.format = {.bits = 8, .max_code = 255};
   return s;
@@ -142,7 +142,7 @@ std::vector<Bytes> frames_of(const Ping& ping) {
   profile.distance_mm = static_cast<std::uint32_t>(std::lround(1000 * echo.range_m));
   profile.confidence = static_cast<std::uint16_t>(echo.confidence);
   profile.ping = static_cast<std::uint32_t>(ping.request.number);
-  // The settings with which the ping was made, because the present settings may differ.
+  // Range, pulse and gain are those under which the ping was made; the present ones may differ.
   profile.start_mm = static_cast<std::uint32_t>(std::lround(1000 * made.range_start_m));
   profile.length_mm = static_cast<std::uint32_t>(std::lround(1000 * (made.range_m - made.range_start_m)));
   profile.transmit_us = static_cast<std::uint16_t>(

@@ -24,7 +24,8 @@ std::string text_of(protocol::BytesView bytes) {
   return text;
 }
 
-/// One datagram to the host that asked, in five parts.
+/// The answer to "Discovery": four lines, each ended by CR LF, in one datagram to the host that asked. The numbers of the address
+/// have three digits.
 protocol::Bytes discovery_answer(const protocol::DeviceState& device) {
   const auto& m = device.mac;
   const auto& ip = device.advertise_ip;
@@ -38,7 +39,7 @@ protocol::Bytes discovery_answer(const protocol::DeviceState& device) {
   return bytes;
 }
 
-/// "SetSS1IP 192.168.002.010"; all zeros = by DHCP.
+/// The address in "SetSS1IP 192.168.002.010". An address of zeros selects DHCP.
 std::optional<protocol::StoredAddress> address_in(const std::string& text) {
   unsigned a = 0, b = 0, c = 0, d = 0;
   if (std::sscanf(text.c_str(), "SetSS1IP %3u.%3u.%3u.%3u", &a, &b, &c, &d) != 4 || std::max({a, b, c, d}) > 255) return {};
@@ -65,7 +66,7 @@ class Ping360Vendor final : public protocol::Vendor {
     return 50.0 * settings_from(device.settings.get()).ping.gain;
   }
   protocol::PingsBy pings_by() const override { return protocol::PingsBy::datagrams; }
-  /// To and fro over the half circle ahead, 10 m far unless other settings were requested.
+  /// Scans the half circle ahead to and fro, with a range of 10 m unless a host or the configuration has set another.
   std::optional<ScanStep> scan_step(std::uint32_t number, const protocol::DeviceState& device) const override {
     Settings s = settings_from(device.settings.get());
     if (HeldSettings(s).equals(HeldSettings(Settings{})))

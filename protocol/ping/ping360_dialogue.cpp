@@ -23,6 +23,9 @@ DeviceInformation identity(const protocol::OptionValues& options) {
   return info;
 }
 
+/// One host's conversation: a request starts a task (`Task`), which replaces the one in progress. Each ping of a task has two
+/// waits: until the head has turned (`due_`), then until the ping is computed (`awaited_`). on_tick() ends the first, on_ping()
+/// the second.
 class Ping360Dialogue final : public Conversation {
  public:
   Ping360Dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
@@ -32,13 +35,13 @@ class Ping360Dialogue final : public Conversation {
     Reaction reaction;
     if (now < next_tick()) return reaction;
     if (awaited_.is_under_way()) {
-      if (awaited_.lose(ping_pending, now)) advance(now);  // the task continues
+      if (awaited_.lose(ping_pending, now)) advance(now);  // the ping is late: the scan goes on without it
       return reaction;
     }
     Settings s = settings();
     s.id = id_;
     s.ping.angle = head_.target();
-    // The head has arrived. A request without transmission is answered by the state of the device alone.
+    // The head has arrived. A request without transmission is answered by message 2300 without samples.
     if (task_ == Task::turn) {
       reaction.replies.push_back(state_message(now));
       task_ = Task::none;
@@ -56,7 +59,7 @@ class Ping360Dialogue final : public Conversation {
   }
   std::optional<Time> next_ping_request() const override {
     return task_ != Task::none && !awaited_.is_under_way() ? std::optional(due_)
-                                                           : std::nullopt;  // a turn without a ping counts too
+                                                           : std::nullopt;  // stepped time also stops at the end of a turn
   }
   bool hosts_fall_silent() const override { return task_ != Task::none; }  // ping-python sends nothing while it scans
   protocol::Delivery on_ping(const VendorSettings* made_with, std::size_t, Time now) override {
@@ -99,12 +102,13 @@ class Ping360Dialogue final : public Conversation {
   Bytes message_now(Id wanted, Time now) override { return wanted == Id::device_data ? state_message(now) : Bytes{}; }
 
  private:
-  /// turn: 2300 without samples when the head has arrived. ping: one ping on arrival. scan: ping and turn until another request.
+  /// turn: sends 2300 without samples when the head has arrived. ping: fires one ping then. scan: pings and turns until another
+  /// request.
   enum class Task { none, turn, ping, scan };
 
   Settings settings() const { return settings_from(device_.settings.get()); }
 
-  /// 2300 without samples.
+  /// Message 2300 without samples: the settings and the present angle of the head.
   Bytes state_message(Time now) const {
     const Transducer t = settings().ping;
     return framed_message(Id::device_data, id_,
@@ -131,7 +135,8 @@ class Ping360Dialogue final : public Conversation {
     head_ = {head_.angle_at(now), head_.angle_at(now), now};
   }
 
-  /// Call it after a ping. A scan continues when the samples were taken and sent, and the head has turned.
+  /// Ends the ping that was awaited. The next ping of a scan is due after the samples have been taken and sent, and the head has
+  /// turned.
   void advance(Time now) {
     if (task_ != Task::scan) {
       task_ = Task::none;
@@ -148,7 +153,7 @@ class Ping360Dialogue final : public Conversation {
 
   Head head_;
   Task task_ = Task::none;
-  bool back_ = false;  // a scan that oscillates goes back
+  bool back_ = false;  // a scan that oscillates is on its way back to the start angle
   Time due_{};
   protocol::AwaitedPing awaited_;
 };

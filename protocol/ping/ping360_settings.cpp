@@ -15,10 +15,10 @@ namespace sonar::ping::ping360 {
 namespace {
 
 constexpr double sample_unit_s = 25e-9;
-constexpr int shortest_period = 80, longest_period = 40000;    // of samples, in units
-constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn in 2.4 s
+constexpr int shortest_period = 80, longest_period = 40000;    // DEF: sample periods, in sample_unit_s
+constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn takes 2.4 s
 constexpr double db_per_gain = 6;                              // unknown: assumed
-constexpr double fastest_hz = 1000;                            // hosts set the rhythm
+constexpr double fastest_hz = 1000;                            // no limit: hosts request each line, or the head limits the scan
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
@@ -87,8 +87,7 @@ bool same_settings(const Settings& a, const Settings& b) {
 std::string complaint(const Transducer& t) {
   return out_of_range({{"mode", t.mode, 0, 1},
                        {"gain_setting", t.gain, 0, 2},
-                       {"angle", t.angle, 0, grads},  // hosts send 400 for 0
-
+                       {"angle", t.angle, 0, grads},  // one host sends 400 for 0
                        {"transmit_duration", t.transmit_us, 1, 1000},
                        {"sample_period", t.period, shortest_period, longest_period},
                        {"transmit_frequency", t.khz, 500, 1000},
@@ -116,7 +115,7 @@ Settings settings_of(const AutoTransmit& t) {
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
   const Transducer& t = settings.ping;
-  // The device counts time and has no setting for the sound speed. Rows are samples in time, placed with the true sound speed.
+  // The device samples at intervals of time and has no setting for the sound speed. Each row lies where sound has come from.
   const double speed = true_sound_speed_mps(device.water, device.depth_m);
   PingSettings s;
   s.beam_count = 1;
@@ -129,7 +128,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.triggered = true;
   s.gain_db = static_cast<float>(db_per_gain * t.gain);
   s.device_sound_speed_mps = static_cast<float>(speed);
-  // unknown: the law. Assumed: linear in dB over 60 dB.
+  // unknown: how samples follow from levels. Assumed: linear in dB, 0 to 255 for 60 dB.
   s.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = 0, .ceiling_db = 60};
   return s;
 }
@@ -149,7 +148,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Settings s = settings_from(device.settings.get());
   if (wanted.range_m) {
     const double speed = true_sound_speed_mps(device.water, device.depth_m);
-    const double period_m = s.ping.samples * sample_unit_s * speed / 2;  // range by unit of the sample period
+    const double period_m = s.ping.samples * sample_unit_s * speed / 2;  // range for a sample period of one unit
     const std::string why = protocol::range_complaint(*wanted.range_m, "a Ping360", shortest_period * period_m,
                                                       longest_period * period_m, "sample_period x number_of_samples");
     if (!why.empty()) return refused(why);
@@ -166,7 +165,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 }
 
 double head_rad(std::uint16_t angle, const protocol::OptionValues& options) {
-  return -(angle + number_option(options, option_name::mount_grad)) * 2 * pi / grads;  // unknown: assumed to starboard
+  // Angles grow clockwise seen from above, as in Ping Viewer (protocol/ping/README.md, "Direction of a Ping360").
+  return -(angle + number_option(options, option_name::mount_grad)) * 2 * pi / grads;
 }
 
 std::chrono::nanoseconds listening(const Transducer& t) { return nanoseconds_from(t.samples * t.period * sample_unit_s); }
@@ -186,7 +186,7 @@ std::uint16_t Head::angle_at(Time at) const {
 
 void Head::turn_to(std::uint16_t angle, Time at) {
   from = angle_at(at);
-  // Turns the shorter way. `to` may lie outside of one turn; angle_at() folds it.
+  // The head takes the shorter way. `to` may lie outside of 0 to 399; angle_at() takes it modulo a turn.
   const int ahead = ((angle - from) % grads + grads) % grads;
   to = from + (ahead <= grads / 2 ? ahead : ahead - grads);
   since = at;
@@ -205,7 +205,7 @@ std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, 
   if (next > width || next < 0) {
     if (oscillates) back = !back;
     next = !oscillates ? 0 : back ? at - scan.steps : at + scan.steps;
-    if (next < 0 || next > width) next = 0;  // steps wider than the sector
+    if (next < 0 || next > width) next = 0;  // the steps are wider than the sector
   }
   return static_cast<std::uint16_t>((scan.start + next) % grads);
 }

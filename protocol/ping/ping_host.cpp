@@ -12,6 +12,7 @@ using protocol::HostPing;
 
 namespace {
 
+/// The number of the request that a nack refuses.
 Id refused_in(const Frame& nack) {
   Id id{};
   wire::Reader reader(nack.payload);
@@ -53,6 +54,7 @@ HostActions PingHost::on_bytes(std::size_t, BytesView received, Time) {
     on_frame(*frame, actions);
     if (frame->header.id == Id::nack && !on_nack(refused_in(*frame), actions)) {
       std::string why;
+      // The text of the reason follows the number of the request.
       for (std::size_t i = 2; i < frame->payload.size(); ++i) why += static_cast<char>(frame->payload[i]);
       actions.emplace_back(Error{ErrorKind::bad_data, "refused a request: " + why});
     }

@@ -15,19 +15,19 @@ ping::Id first_id(BytesView message) {
   fields(reader, header);
   return header.id;
 }
-/// Whether this is a device's answer to a host: it may come before the pings, and does not name the product.
+/// Whether the message answers a host. Such answers may come before the pings and do not tell which product it is.
 bool is_answer(ping::Id id) {
   using enum ping::Id;
   return ping::is_of_device(id) || id == device_information || id == protocol_version;
 }
 
-/// The start of a log as the makers' own programs write it, without the description of their computer.
+/// The JSON text with which the maker's programs begin a log, without the parts that describe their computer.
 std::string beginning(ping::Id first) {
   return std::string(R"({"session_id":1,"session_uptime":0.0,"session_devices":[{"product_id":")") +
          (first == ping::Id::os_mono_profile ? "os450" : "mbes24016") + R"("}],"is_recording":true})";
 }
 
-/// Milliseconds since power-up, of the messages that have them.
+/// The time since power-up in a message. nullopt: messages of this kind do not have it.
 std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
   const auto of = [&](auto message) -> std::optional<std::uint32_t> {
     wire::Reader reader(frame.payload);
@@ -77,7 +77,7 @@ class PingLogReader final : public RecordingReader {
   }
 
  private:
-  /// The frame with the right checksum.
+  /// The next frame with the right checksum.
   std::optional<ping::Frame> next_frame() {
     for (bool ended = false;;) {
       while (auto frame = framer_.next())
@@ -98,7 +98,7 @@ class PingLogReader final : public RecordingReader {
   std::unique_ptr<Source> source_;
   Scan scan_;
   ping::Framer framer_{longest_payload};
-  std::uint64_t whole_to_ = 0;  // where the last frame ends
+  std::uint64_t whole_to_ = 0;  // offset of the end of the last frame
   Time at_{};
   Damages damages_;
 };

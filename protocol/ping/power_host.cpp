@@ -1,4 +1,5 @@
-// The host of an Omniscan and of an S500. They have one port, so each finds out by its request which of them it has reached.
+// The host of an Omniscan and of an S500. Both have the same port. If the sonar refuses the request of the one product, the host
+// sends that of the other.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -24,7 +25,7 @@ Bytes omniscan_request(const protocol::SettingsOverride& wanted) {
   return framed_message(Id::os_ping_params, 0, p);
 }
 
-/// Without range and gain the sonar finds both itself.
+/// Without a wanted range or gain it is automatic: the sonar chooses it.
 Bytes s500_request(const protocol::SettingsOverride& wanted) {
   SetPingParams p{.length_mm = 0, .gain = -1, .period_ms = 100, .report = wanted.rate_hz == 0.0 ? Id{} : Id::s500_profile6};
   if (wanted.range_m) p.length_mm = static_cast<std::uint32_t>(std::lround(std::max(1000 * *wanted.range_m, 1.0)));
@@ -41,7 +42,7 @@ struct Product {
 constexpr Product omniscan_product{"an Omniscan", Id::os_ping_params, omniscan_request};
 constexpr Product s500_product{"an S500", Id::s500_set_ping_params, s500_request};
 
-/// A ping of `rows` powers, without its distance.
+/// A ping of `rows` powers; its note, such as the distance, is not set yet.
 HostPing ping_of(std::uint32_t number, std::uint32_t start_mm, double row_m, std::size_t rows, double hz,
                  std::string_view title) {
   const double start_m = 1e-3 * start_mm;
@@ -101,7 +102,7 @@ class PowerHost final : public PingHost {
     return format("distance %.3f m, confidence %d %%", static_cast<double>(data.depth_m), data.confidence);
   }
 
-  std::string_view title_;  // of the sonar, as far as is known
+  std::string_view title_;  // the product whose request was sent last
   Id refusable_;
   const Product& other_;
   protocol::SettingsOverride settings_;

@@ -15,6 +15,7 @@ constexpr auto port_table = streaming_ports(51200);
 constexpr std::uint16_t firmware_major = 2, firmware_minor = 2;
 constexpr double processor_above_water_c = 20;  // assumed
 
+/// One host's conversation. One message (1015) sets everything and starts or ends the pings; SoundingConversation fires them.
 class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
  public:
   S500Dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
@@ -27,6 +28,7 @@ class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, s
       if (!read(frame, wanted, reaction)) return true;
       if (const std::string why = complaint(wanted); !why.empty()) return refuse(frame, why, reaction), true;
       change(reaction, [&](Settings& s) { s.parameters = requested(s.parameters, wanted); });
+      // The request replaces the one before: a ping under way and the stream belong to that one.
       forget_ping(now);
       stop_stream(~no_result);
       const Results result = results_of(wanted.report);

@@ -15,14 +15,14 @@
 namespace sonar::ping::s500 {
 namespace {
 
-constexpr int points = 1024;               // DEF, of pings of one frequency
-constexpr std::uint32_t most_mm = 142000;  // as hosts limit it
-constexpr int fastest_ms = 100;            // maker's specification: at most 10 pings a second
-constexpr double shortest_pulse_us = 20;   // unknown: assumed
-constexpr double db_per_gain = 4;          // unknown: assumed, like the level and full scale
-constexpr std::size_t averaged_pings = 20;
+constexpr int points = 1024;                // DEF: powers of a ping of one frequency
+constexpr std::uint32_t most_mm = 142000;   // CLI: limit of the hosts
+constexpr int fastest_ms = 100;             // MAN: at most 10 pings a second
+constexpr double shortest_pulse_us = 20;    // unknown: assumed
+constexpr double db_per_gain = 4;           // unknown: assumed, as are the level and full scale
+constexpr std::size_t averaged_pings = 20;  // DEF
 
-/// Amplifications by gain_index.
+/// The amplification of each gain_index.
 const std::array<double, 14>& gains() {
   static const auto all = [] {
     std::array<double, 14> made{};
@@ -44,9 +44,9 @@ SonarModel make_model() {
   mode.source_level_db = 205;
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
-  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(5));  // as hosts state it
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(5));  // CLI
   mode.pattern.elevation_width_rad = mode.pattern.azimuth_width_rad;
-  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(13));  // its main lobe down to -20 dB
+  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(13));  // rays cover the main lobe down to -20 dB
   mode.receiver.full_scale_upa = 1e9f;
   SonarModel model;
   model.profile = "s500";
@@ -56,7 +56,7 @@ SonarModel make_model() {
   return model;
 }
 
-/// Over the newest pings: mean distance of those with an echo, mean confidence of all.
+/// The mean distance of the pings with an echo, and the mean confidence of all.
 Echo average(std::span<const Echo> echoes) {
   Echo mean;
   int sure = 0, confidence = 0;
@@ -175,7 +175,7 @@ Settings after(const Ping& ping, const Settings& now) {
   next.earlier = with(now.earlier, echo);
   Parameters& p = next.parameters;
   const Reach made_with = settings_from(ping.request.vendor_settings.get()).parameters.reach;
-  // Otherwise a host has changed them since.
+  // If a host has changed range or gain since, the ping does not tell whether the new ones fit.
   if (made_with.length_mm != p.reach.length_mm || made_with.gain != p.reach.gain) return next;
   const Reach chosen = adjusted(made_with, echo, {gains(), most_mm});
   if (p.ping.length_mm == 0)
@@ -201,7 +201,7 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
                                               static_cast<std::uint8_t>(averaged.confidence), power_up_ms}));
   if ((results & profile_result) == 0) return frames;
   Profile6 profile;
-  profile.ping = static_cast<std::uint32_t>(ping.request.number) - 1;  // from 0
+  profile.ping = static_cast<std::uint32_t>(ping.request.number) - 1;  // ping_number counts from 0
   profile.start_mm = mm(made.range_start_m);
   profile.length_mm = mm(made.range_m - made.range_start_m);
   profile.start_hz = profile.end_hz = static_cast<std::uint32_t>(device.model->modes.front().centre_hz);

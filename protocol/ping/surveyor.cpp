@@ -11,6 +11,7 @@ using protocol::Reaction;
 constexpr auto port_table = streaming_ports(62312);
 constexpr auto utc_period = std::chrono::seconds(10);
 
+/// One host's conversation. The device asks each host for the time, at once and every 10 s; pings flow while they are enabled.
 class SurveyorDialogue final : public StreamingConversation<Settings, settings_from> {
  public:
   SurveyorDialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
@@ -37,7 +38,7 @@ class SurveyorDialogue final : public StreamingConversation<Settings, settings_f
       }
       case Id::utc_response: {
         UtcResponse told;
-        if (read(frame, told, reaction) && told.utc_ms < 4000000000000)
+        if (read(frame, told, reaction) && told.utc_ms < 4000000000000)  // later than the year 2096 is no time
           change(reaction,
                  [&](Settings& s) { s.utc_ahead = Time(std::chrono::milliseconds(told.utc_ms)) - (now + device_.skipped); });
         return true;

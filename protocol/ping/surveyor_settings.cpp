@@ -14,12 +14,12 @@
 namespace sonar::ping::surveyor {
 namespace {
 
-constexpr int beams = 64, directions = 16;         // directions: as many as receive elements
-constexpr double swath_deg = 80;                   // recalled, like the width along the track and the number of elements
-constexpr double beam_width_deg = 7;               // that of 16 elements half a wavelength apart
-constexpr double above_db = 15;                    // unknown: assumed
-constexpr double usual_end_m = 20;                 // assumed for end 0, which the device sets by the bottom itself
-constexpr double longest_m = 200, least_m = 0.01;  // end of the range; length of the range
+constexpr int beams = 64, directions = 16;         // a point is sought in as many directions as there are receive elements
+constexpr double swath_deg = 80;                   // recalled, as are the width along the track and the number of elements
+constexpr double beam_width_deg = 7;               // of an array of 16 elements half a wavelength apart
+constexpr double above_db = 15;                    // unknown: assumed; level of a point above the median of its beam
+constexpr double usual_end_m = 20;                 // assumed for end_mm 0, with which the device follows the bottom
+constexpr double longest_m = 200, least_m = 0.01;  // highest end of the range; least length of the range
 constexpr double db_per_gain = 0.4;                // unknown: assumed
 constexpr auto processing = std::chrono::milliseconds(10);
 
@@ -53,7 +53,8 @@ std::uint64_t milliseconds_of(std::chrono::nanoseconds t) {
   return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::milliseconds>(t).count());
 }
 
-/// The world's up in axes of the device: ahead, to port, up. Its fan looks down, so that up is behind the sonar's own axis.
+/// The upward direction of the world in the axes of the device: ahead, to port, up. The fan looks down, so the device's up is
+/// opposite to the sonar's x axis.
 std::array<float, 3> up_of(const Pose& sonar_in_world) {
   const Vec3d up = rotate(conjugate(sonar_in_world.orientation), Vec3d{0, 0, 1});
   return {static_cast<float>(up.z), static_cast<float>(up.y), static_cast<float>(-up.x)};
@@ -102,7 +103,7 @@ PingSettings ping_settings(const Settings& settings) {
   const double shortest_s = 2 * s.range_m / speed + seconds(processing);
   s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
   s.gain_db = static_cast<float>(p.gain < 0 ? 0 : db_per_gain * p.gain);
-  s.tvg = false;  // detection needs noise that is the same at all ranges
+  s.tvg = false;  // the detector compares with the median of a beam, so the noise must be the same at all ranges
   s.device_sound_speed_mps = p.speed_mps;
   s.format = {.bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -80, .ceiling_db = 80};
   return s;
@@ -196,6 +197,7 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
     data.points = static_cast<std::uint16_t>(yz.size());
     frames.push_back(framed(Id::yz_point_data, s.id, payload_of(data, yz)));
   }
+  // The water's temperature and pressure follow the first ping of each second.
   const auto period_ms = static_cast<std::uint32_t>(std::lround(1000 / std::max(static_cast<double>(made.rate_hz), 1e-3)));
   if (power_up_ms % 1000 < period_ms) frames.push_back(framed_message(Id::water_stats, s.id, water));
   return frames;
