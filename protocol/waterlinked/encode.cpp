@@ -10,10 +10,11 @@ namespace sonar::waterlinked {
 namespace {
 
 constexpr double gravity_mps2 = 9.81;
-constexpr std::chrono::nanoseconds imu_period = std::chrono::milliseconds(10), longest_batch = std::chrono::seconds(1);
+constexpr std::chrono::nanoseconds imu_period = std::chrono::milliseconds(10);
+constexpr std::chrono::nanoseconds longest_batch = std::chrono::seconds(1);  // bounds a batch after a pause of the acoustics
 
-/// A range beyond 16 bits, or a strength below the first pixel value, counts as no return, so that both images have the same
-/// mask.
+/// A pixel of both images. Where one of them has no return, such as a strength below the first pixel value, both have 0, so that
+/// their masks agree.
 struct Pixel {
   std::uint32_t range = 0;
   std::uint8_t strength = 0;
@@ -64,7 +65,8 @@ StrengthMessage strength_message(const Ping& ping, const Settings& settings, con
   return m;
 }
 
-/// Samples of the IMU at whole periods of the device's clock.
+/// Samples are taken at whole periods of the device's clock, whatever the time of the shot. A batch goes on where the previous
+/// one ended; after a pause, or at first, it begins one period of the mode before the shot.
 ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
   ImuMessage m;
   m.sequence = static_cast<std::uint32_t>(ping.request.number);

@@ -9,7 +9,7 @@
 
 namespace sonar::waterlinked {
 
-/// 100 log10(lin / 30), at most 255; 0 up to 30.
+/// The pixel of a linear strength: 100 log10(strength / 30), at most 255; 0 for strengths up to 30.
 std::uint8_t strength_pixel(std::uint32_t linear);
 
 RangeMessage range_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
@@ -17,7 +17,7 @@ StrengthMessage strength_message(const Ping& ping, const Settings& settings, con
 /// The inertial samples since the shot before, or, where that is long ago, of one period of the mode.
 ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
 
-/// Range image, strength image and, where it is enabled, IMU samples.
+/// The datagrams of a shot: range image, strength image and, if enabled, IMU samples.
 std::vector<Bytes> encode_shot(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
 
 }  // namespace sonar::waterlinked

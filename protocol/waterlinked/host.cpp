@@ -17,10 +17,11 @@ using Json = nlohmann::json;
 using protocol::HostActions;
 
 constexpr std::size_t picture_rows = 300;
-constexpr double darkest = 0.85;  // in a range image: how much less bright the farthest is than the nearest
+constexpr double darkest = 0.85;  // the farthest pixel of a range image is darker by this part than the nearest
 constexpr std::size_t most_pixels = 1 << 20;
 constexpr std::string_view title = "a Sonar 3D-15", api = "/api/v1/integration";
 
+/// The carrier of the shot's mode. The field `frequency` has the rate instead, so the horizontal field of view tells the mode.
 double centre_hz_of(const Shot& shot) {
   for (const auto& mode : mode_rows())
     if (std::abs(mode.horizontal_deg - static_cast<double>(shot.horizontal_deg)) < 1) return mode.centre_hz;
@@ -83,6 +84,8 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
 
 namespace {
 
+/// Opens the sonar by HTTP requests, one after the other: GET /udp, then a POST for each setting (`posts_`). Images arrive as
+/// datagrams: ranges, then the strengths of the same shot (`half_`).
 class WaterlinkedHost final : public protocol::Host {
  public:
   explicit WaterlinkedHost(const protocol::Wanted& wanted) : may_set_(!wanted.as_it_is) {
@@ -95,8 +98,8 @@ class WaterlinkedHost final : public protocol::Host {
 
   HostActions on_open(std::span<const std::uint16_t>, Time) override { return {ask("GET", "/udp", "")}; }
 
-  /// First sets the receiver of the images; if the output is disabled, it switches multicast on. Then sends the settings, one by
-  /// one.
+  /// The first reply is that of GET /udp. If the output is disabled, the host switches multicast on; if it is unicast to another
+  /// program, the host leaves it alone and gives up. Then it sends the settings.
   HostActions on_reply(const protocol::ResourceReply& reply, Time) override {
     const auto fail = [](ErrorKind kind, std::string text) { return HostActions{Error{kind, std::move(text)}}; };
     if (!std::exchange(knows_output_, true)) {
@@ -130,6 +133,7 @@ class WaterlinkedHost final : public protocol::Host {
     const Decoded decoded = decode(*content);
     std::optional<protocol::HostPing> ping;
     if (decoded.ranges) {
+      // If the strengths of the previous shot were lost, its ranges make a ping without them.
       if (half_) ping = ping_from(*half_, nullptr);
       half_ = decoded.ranges;
     } else if (decoded.strengths && half_ && half_->shot.sequence == decoded.strengths->shot.sequence) {
@@ -154,10 +158,10 @@ class WaterlinkedHost final : public protocol::Host {
   }
 
   bool may_set_, knows_output_ = false, is_open_ = false;
-  std::string asked_;                                      // the last request
-  std::deque<std::pair<std::string, std::string>> posts_;  // path and body, not sent yet
-  std::optional<RangeMessage> half_;                       // its strengths have not arrived yet
-  std::size_t bytes_ = 0;                                  // received since the last ping
+  std::string asked_;                                      // the last request, for errors
+  std::deque<std::pair<std::string, std::string>> posts_;  // path and body of the requests that are not sent yet
+  std::optional<RangeMessage> half_;                       // ranges whose strengths have not arrived yet
+  std::size_t bytes_ = 0;                                  // bytes received since the last ping
 };
 
 }  // namespace

@@ -14,8 +14,8 @@ inline constexpr std::array<protocol::HostPort, 2> host_ports{
     {{protocol::HostPort::Kind::http, http_port},
      {protocol::HostPort::Kind::udp_listen, multicast_group.port, multicast_group.ip}}};
 
-/// Seen from above: of every column of pixels the strengths at their horizontal ranges; without strengths all the same. Nothing:
-/// the messages are not of one image.
+/// A ping with a picture from above: each column of pixels becomes a beam with its strengths at their horizontal ranges. Without
+/// `strengths` all returns are equally bright. nullopt: the messages do not describe one image.
 std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const StrengthMessage* strengths);
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);

@@ -20,7 +20,7 @@ using protocol::ResourceReply;
 constexpr std::string_view base = "/api/v1/integration";
 constexpr std::size_t longest_body = 1024;
 constexpr double slowest_mps = 1000, fastest_mps = 2000;  // unknown: assumed
-constexpr double electronics_warmer_c = 9.5;              // unknown: than the water
+constexpr double electronics_warmer_c = 9.5;              // unknown: difference to the temperature of the water
 
 struct Call {
   const DeviceState& device;
@@ -28,14 +28,14 @@ struct Call {
   Time now;
   bool synchronised() const { return text_option(device.options, option_name::clock) == "utc"; }
 };
-/// The outcome of a POST: the status, and the answer's JSON or an error's text.
+/// The outcome of a POST: the HTTP status, and the JSON of the answer or of an error.
 struct Outcome {
   unsigned status = 204;
   Json body = {};
 };
 Outcome malformed(const std::string& why) { return {400, {{"error", why}}}; }
 
-// ---- what is read
+// ---- resources that GET reads
 
 std::string rfc_3339(Time at) {
   const auto day = std::chrono::floor<std::chrono::days>(at);
@@ -64,7 +64,7 @@ Json about(const Call& call) {
 
 double temperature_c(const Call& call) { return call.device.water.temperature_c + electronics_warmer_c; }
 
-/// Names changed with release 1.7.0; unknown: the ids.
+/// Release 1.7.0 renamed "severity" to "status" and "calibration" to "systems_check"; 1.7.1 added "time". unknown: the ids.
 Json status(const Call& call) {
   const std::string_view release = text_option(call.device.options, option_name::release);
   const bool older = release < "1.7.0";
@@ -92,7 +92,7 @@ Json time_status(const Call& call) {
           {"ntp_seconds_since_last_sync", synchronised ? Json(since) : Json()}};
 }
 
-// ---- what is written
+// ---- resources that POST writes
 
 Outcome set_bool(bool& value, const Json& posted) {
   if (!posted.is_boolean()) return malformed("not a boolean");
@@ -137,7 +137,7 @@ Outcome set_udp(Call& call, const Json& posted) {
     return malformed("mode: \"multicast\", \"unicast\" or \"disabled\"");
   const Json ip = posted.value("unicast_destination_ip", Json("")), port = posted.value("unicast_destination_port", Json(0));
   if (!ip.is_string() || !port.is_number_integer() || port < 0 || port > 65535) return malformed("no such destination");
-  if (mode == Json(unicast)) {
+  if (mode == Json(unicast)) {  // the destination of other modes is stored without a check of its address
     const auto to = text::parse_ipv4(ip.get<std::string>());
     if (!to || port == 0) return malformed("unicast needs a destination");
     constexpr unsigned first_multicast = 224;
@@ -257,7 +257,8 @@ ResourceReply answer(const protocol::ResourceRequest& request, const DeviceState
     return refused;
   }
   if (request.body.size() > longest_body) return reply_of(413, {{"error", "the body is longer than 1024 bytes"}});
-  // Without a body nothing is set. force-sync needs no body; every other resource replies what it needs.
+  // A missing body counts as an empty object. That suits force-sync, whose body is optional; other resources refuse it and say
+  // what they need.
   const Json posted = request.body.empty() ? Json::object() : Json::parse(request.body, nullptr, false);
   if (posted.is_discarded()) return reply_of(400, {{"error", "not JSON"}});
   return changed(call, path->post(call, posted));

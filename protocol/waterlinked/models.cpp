@@ -33,7 +33,8 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
       mode.beam_spacing = BeamSpacing::uniform_in_angle;
       mode.min_range_m = 0;
       mode.max_range_m = static_cast<float>(longest_range_m);
-      // unknown: levels. The level of SMP falls with range about as 20 log r does beside the one-way spreading twice.
+      // unknown: levels. In SMP the level falls with range by about 20 log r less than two-way spreading, so the gain grows by
+      // that.
       mode.source_level_db = 200;
       mode.receiver.tvg_slope_db = 20;
       mode.receiver.tvg_ceiling_db = 60;

@@ -22,7 +22,7 @@ Bytes bytes_of(const std::string& text) {
   return bytes;
 }
 
-/// CRC-32 of IEEE 802.3.
+/// CRC-32 of IEEE 802.3, as zlib computes it.
 std::uint32_t crc_of(BytesView bytes) {
   return static_cast<std::uint32_t>(crc32_z(0, static_cast<const Bytef*>(static_cast<const void*>(bytes.data())), bytes.size()));
 }
@@ -62,7 +62,7 @@ std::size_t rip_length(BytesView beginning) {
 
 std::optional<Bytes> rip_content(BytesView packet) {
   if (packet.empty() || rip_length(packet) != packet.size()) return std::nullopt;
-  const bool packed = packet[3] == std::byte{'2'};
+  const bool packed = packet[3] == std::byte{'2'};  // "RIP2" has a Snappy block, "RIP1" the content itself
   const std::size_t crc_at = packet.size() - 4;
   if (u32_at(packet, crc_at) != crc_of(packet.first(crc_at))) return std::nullopt;
   const BytesView block = packet.subspan(head_bytes, crc_at - head_bytes);
@@ -70,6 +70,7 @@ std::optional<Bytes> rip_content(BytesView packet) {
   const std::string text = text_of(block);
   std::size_t size = 0;
   std::string plain;
+  // The stated size is checked before it is allocated.
   if (!snappy::GetUncompressedLength(text.data(), text.size(), &size) || size > largest_content) return std::nullopt;
   if (!snappy::Uncompress(text.data(), text.size(), &plain)) return std::nullopt;
   return bytes_of(plain);

@@ -33,7 +33,7 @@ struct HeldSettings final : RangeImageSettings {
   Settings settings;
 };
 Settings initial_settings(const protocol::DeviceState& device);
-/// initial_settings() for null.
+/// The settings in `held`; if it is null, initial_settings().
 Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device);
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);

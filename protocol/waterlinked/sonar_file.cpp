@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t head_bytes = 8;  // magic and length
 
+/// The time in a packet. nullopt: a packet of another kind, or without samples.
 std::optional<Time> time_of(BytesView content) {
   const waterlinked::Decoded message = waterlinked::decode(content);
   if (message.ranges) return message.ranges->shot.at;
@@ -33,6 +34,7 @@ class SonarFileReader final : public RecordingReader {
         scan_.skip(length);
         return message;
       }
+      // A damaged place is reported once; the search goes on byte by byte, because a length in it may be wrong.
       if (!std::exchange(searching, true)) damages_.add(why(at, length, packet.size()));
       scan_.skip(1);
     }

@@ -10,7 +10,7 @@ namespace sonar::waterlinked {
 namespace {
 
 using PortKind = protocol::Port::Kind;
-// No gap between the two images: clients pair them within 25 ms.
+// There is no gap between the two images of a shot, because clients pair images that arrive within 25 ms.
 constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::http, .number = 80}, {.kind = PortKind::udp_stream, .group = multicast_group}}};
 
@@ -20,7 +20,7 @@ class WaterLinkedVendor final : public protocol::Vendor {
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return waterlinked::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return waterlinked::options(); }
-  int default_max_clients() const override { return 1; }  // counts TCP streams; this sonar has none
+  int default_max_clients() const override { return 1; }  // has no effect: it counts TCP streams, and this sonar has none
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(waterlinked::initial_settings(device), device);
