@@ -18,7 +18,7 @@ enum Orientation : std::uint8_t {
   down = 25,  // MAV_SENSOR_ROTATION_PITCH_270
   custom = 100,
 };
-constexpr double axis_tolerance = 0.966;  // cosine of 15 degrees: a mount is seldom turned more by intent
+constexpr double axis_tolerance = 0.966;  // cosine of 15 degrees (chosen): within it a sensor counts as along an axis
 
 std::uint16_t centimetres(double m) { return static_cast<std::uint16_t>(std::lround(std::clamp(100 * m, 0.0, 65535.0))); }
 
@@ -47,7 +47,7 @@ DistanceSensor distance_sensor_of(const Measured& measured) {
       std::find_if(axes.begin(), axes.end(), [&](const auto& axis) { return dot(looks, axis.first) >= axis_tolerance; });
   m.orientation = along != axes.end() ? along->second : custom;
   if (m.orientation == custom) {
-    // FRD in FRD: a half turn about x, before and after, changes the signs of y and z.
+    // The message has the rotation between FRD axes. Half turns about x, before and after it, change the signs of y and z.
     const Quatd& q = measured.sensor_in_body;
     m.wxyz = {static_cast<float>(q.w), static_cast<float>(q.x), static_cast<float>(-q.y), static_cast<float>(-q.z)};
   }
@@ -67,7 +67,7 @@ bool DistanceRequests::set_interval_us(float wanted) {
 bool DistanceRequests::is_due(const DistanceSensor& measured) {
   const auto last = sent_.find(measured.sensor);
   const double passed_us = last == sent_.end() ? INFINITY : 1e3 * static_cast<double>(measured.boot_ms - last->second);
-  // Stamps have whole milliseconds: half of one is no reason to skip a ping.
+  // Stamps are whole milliseconds, so an interval that is met may look shorter by half a millisecond.
   const bool due = std::exchange(once_, false) || (interval_us_ && passed_us + 500 >= *interval_us_);
   if (due) sent_[measured.sensor] = measured.boot_ms;
   return due;

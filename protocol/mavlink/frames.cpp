@@ -8,8 +8,9 @@ namespace {
 constexpr std::byte magic_1{0xFE}, magic_2{0xFD};
 constexpr std::size_t header_1 = 6, header_2 = 10;  // magic included
 constexpr std::size_t checksum_size = 2, signature_size = 13;
-constexpr std::uint8_t is_signed = 0x01;  // the only supported incompatible flag
+constexpr std::uint8_t is_signed = 0x01;  // the only incompatibility flag that is supported; signatures are skipped, not verified
 
+/// Table of CRC-16/MCRF4XX, reflected polynomial 0x8408: the CRC of each value of a byte.
 constexpr std::array<std::uint16_t, 256> checksum_steps = [] {
   std::array<std::uint16_t, 256> steps{};
   for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -65,11 +66,11 @@ static_assert(wire::wire_size<Header2>() == header_2);
 
 struct FrameReader::Header {
   Frame frame;                      // the frame, except for the payload
-  std::size_t before = 0, end = 0;  // where the payload begins; where the frame ends, with checksum and signature
-  bool readable = true;             // no flags that change the payload
+  std::size_t before = 0, end = 0;  // offsets of the payload, and of the end of the frame with checksum and signature
+  bool readable = true;             // the frame has no incompatibility flag that is not supported
 };
 
-/// The header at the front, if its frame fits into the datagram.
+/// The header at the front. nullopt: there is none, or its frame does not fit into the datagram.
 std::optional<FrameReader::Header> FrameReader::header() const {
   const auto byte = [this](std::size_t i) { return std::to_integer<std::uint8_t>(rest_[i]); };
   Header h;
@@ -96,8 +97,8 @@ bool FrameReader::begins_a_frame(std::size_t at) const {
   return at == rest_.size() || rest_[at] == magic_1 || rest_[at] == magic_2;
 }
 
-/// The whole frame when it is valid. Otherwise counts and skips it: whole if another frame follows and the message is unknown,
-/// else one byte, so that a false start hides no frame.
+/// The whole frame if it is valid. Otherwise counts and skips it. A frame with an unknown message is skipped whole if another
+/// frame follows it; in all other cases one byte is skipped, because a frame may begin at the next one.
 std::optional<Frame> FrameReader::checked(const Header& h) {
   const MessageInfo* const message = find_message(h.frame.id);
   if (message == nullptr || !h.readable) {

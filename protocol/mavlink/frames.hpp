@@ -38,7 +38,7 @@ struct FrameCounts {
   std::uint64_t junk_bytes = 0;    // belong to no frame
 };
 
-/// The frames of one datagram, one after the other. `datagram` must outlive it.
+/// Reads the frames of one datagram, one after the other. `datagram` must outlive the reader.
 class FrameReader {
  public:
   explicit FrameReader(BytesView datagram) : rest_(datagram) {}

@@ -11,16 +11,16 @@ using control::ClockDomain;
 using control::RawPose;
 using control::Stamp;
 
-constexpr std::int64_t late_ms = 1000;  // a clock that goes back further than this has been restarted
+constexpr std::int64_t late_ms = 1000;  // late packets go back less; a clock that goes back further has been restarted
 constexpr std::int64_t late_ns = late_ms * 1'000'000;
-constexpr double farthest_m = 100e3;  // from the origin; beyond, the tangent plane is not valid
-constexpr double moved_origin_m = 0.01;
+constexpr double farthest_m = 100e3;               // distance from the origin up to which the tangent plane is valid
+constexpr double moved_origin_m = 0.01;            // an origin that moves by more causes a jump of the poses
 constexpr double highest_hud_m = 1e5;              // keeps the results finite
-constexpr std::int64_t longest_sinking_ms = 1000;  // at the last vertical speed
+constexpr std::int64_t longest_sinking_ms = 1000;  // the depth is extrapolated with its last speed for so long
 
 std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
-/// Messages that only vehicles or their simulators send.
+/// Whether only vehicles or their simulators send this message. Ground stations send the others too.
 bool contains_pose(std::uint32_t id) { return id != Heartbeat::id && id != SystemTime::id && id != GpsGlobalOrigin::id; }
 
 Stamp boot_stamp(std::int64_t at_ms) { return {ClockDomain::sim, at_ms * 1'000'000}; }
@@ -60,7 +60,7 @@ MavlinkPoses::MavlinkPoses(Settings settings, InjectFailure inject, HasRangeFind
 // ---- selection of the vehicle
 
 void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
-  // The state below belongs to the previous vehicle.
+  // All that was received from the previous vehicle is dropped.
   system_ = self_.system = system;
   found_at_ = now;
   next_request_ = now;
@@ -76,7 +76,7 @@ void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
   clear_histories();
 }
 
-/// Later messages must not be paired with earlier messages.
+/// Drops what was received, so that messages after a restart are not paired with those before it.
 void MavlinkPoses::clear_histories() {
   attitudes_.clear();
   local_.clear();
@@ -86,6 +86,9 @@ void MavlinkPoses::clear_histories() {
   ++resets_;
 }
 
+/// Whether the frame is from the selected system. Selects one if there is none: the configured system, or else the first that
+/// sends a pose or the heartbeat of an autopilot. Another one is selected only after the first has been silent for
+/// system_silence.
 bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
   if (frame.system == self_.system && frame.component == own_component)
     return false;  // sent by this component, returned by a router
@@ -103,7 +106,8 @@ bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
   return identifies_vehicle;
 }
 
-/// Accepts each message from one component only; heartbeats from all.
+/// Accepts each message from one component only, because two components may send different estimates of the same pose. Heartbeats
+/// are accepted from all.
 bool MavlinkPoses::is_selected_component(const Frame& frame, Time now) {
   const auto known = received_.find(frame.id);
   const bool other = known != received_.end() && known->second.component != frame.component;
@@ -143,8 +147,8 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
   return out;
 }
 
-/// Accepts these commands only, addressed to this component: other components of the system have failures and messages of their
-/// own.
+/// Carries out MAV_CMD_INJECT_FAILURE, and requests for DISTANCE_SENSOR, if they are addressed to this component. Commands for
+/// other components of the system are not answered: they answer themselves.
 void MavlinkPoses::on_command(const CommandLong& command, const Frame& frame, Reaction& out) {
   const bool is_ours = command.target_system == self_.system && command.target_component == own_component;
   const bool asks_for_message =
@@ -201,7 +205,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
     case Heartbeat::id:
       return handle(message_in<Heartbeat>(frame), frame);
     case Attitude::id:
-      // Autopilots send one attitude in both forms: that with a quaternion has priority.
+      // Autopilots send the same attitude in both forms. The one with a quaternion has priority, so that none is used twice.
       if (!received_within(AttitudeQuaternion::id, at.now, source_silence)) handle(attitude_of(message_in<Attitude>(frame)), at);
       return;
     case AttitudeQuaternion::id:
@@ -253,7 +257,7 @@ void MavlinkPoses::handle(const GlobalPositionInt& m, Moment at) {
   const auto fix = geodetic_of(m);
   global_has_fix_ = fix && fix->has_value();
   const auto place = placed(GlobalPositionInt::name, fix, at);
-  // Without a fix, or of a submarine without world.origin, the message still gives the depth.
+  // Without a fix, or from a submarine without world.origin, the message has no usable position but still gives the depth.
   const bool is_depth = fix && !place && (!global_has_fix_ || (is_submarine_ && !settings_.origin));
   if (is_depth)
     depth_ = Depth{m.boot_ms, -1e-3 * m.height_mm, 0.01 * m.down_cmps, at.now, GlobalPositionInt::id};
@@ -272,8 +276,8 @@ void MavlinkPoses::handle(const GpsGlobalOrigin& m, Moment at) {
   local_in_world_ = *place;
 }
 
-/// In VFR_HUD ArduSub sends its altitude relative to the surface; other vehicles send that above mean sea level or home. The
-/// message has no stamp.
+/// The altitude in VFR_HUD is relative to the surface only from ArduSub; other vehicles send it above mean sea level or home. The
+/// message has no time stamp, so the newest boot time is taken.
 void MavlinkPoses::handle(const VfrHud& m, Moment at) {
   const double altitude_m = static_cast<double>(m.altitude_m);
   if (!is_submarine_ || receives(GlobalPositionInt::id, at.now) || !(std::abs(altitude_m) <= highest_hud_m)) return;
@@ -315,7 +319,7 @@ void MavlinkPoses::join_pairs(Moment at) {
              boot_stamp(pair->place.at_ms), pair->place.enu_in_world, at);
 }
 
-/// Each attitude gives a pose, with the newest depth, because attitudes come more often and depth changes slowly.
+/// Makes a pose of each attitude and the newest depth. Attitudes come more often, and the depth changes slowly.
 void MavlinkPoses::add_pose_of_depth(const AttitudeReading& reading, Moment at) {
   if (!depth_ || at.now - depth_->received > system_silence || received_within(LocalPositionNed::id, at.now, source_silence))
     return;
@@ -326,7 +330,8 @@ void MavlinkPoses::add_pose_of_depth(const AttitudeReading& reading, Moment at) 
   add_pose(Source::depth, raw, boot_stamp(reading.at_ms), Pose{{settings_.held_m.x, settings_.held_m.y, 0}, {}}, at);
 }
 
-/// The local ENU frame in the world; nullopt without an origin or a fix, or for an implausible position.
+/// The ENU axes at the place, in the world. nullopt: there is no world.origin or no fix, or the position is implausible, which is
+/// reported.
 std::optional<Pose> MavlinkPoses::placed(std::string_view message, const Result<std::optional<Geodetic>>& place, Moment at) {
   if (!place) {
     refuse(message, place.error().text, at);
@@ -361,7 +366,7 @@ void MavlinkPoses::add_pose(Source source, const RawPose& raw, Stamp stamp, cons
   at.out.poses.push_back({*std::move(pose), "system " + std::to_string(*system_) + " " + std::string(name_of(source))});
 }
 
-/// The stamp is UNIX time or time since boot, both of the sender's own clock. If there is none, or an absurd one, the pose gets
+/// The stamp of a message, UNIX time or time since boot, both by the clock of the sender. Without a plausible one the pose gets
 /// the time of its arrival.
 Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
   if (time_us == 0 || time_us > control::largest_stamp_ns / 1000) return {};

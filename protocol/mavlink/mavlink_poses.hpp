@@ -31,7 +31,7 @@ struct Settings {
   std::optional<Geodetic> origin;  // origin of the world; needed for latitudes and longitudes
   bool needs_time = false;         // messages without a time stamp are not used
   bool sends_distances = false;    // DISTANCE_SENSOR with every ping of a range finder, until a command changes it
-  Vec3d held_m = {};               // x and y in the world, ENU, of a vehicle that sends its depth and no place
+  Vec3d held_m = {};               // x and y in the world, ENU, of a vehicle that sends its depth and no position
 };
 
 /// FAILURE_TYPE of common.xml.

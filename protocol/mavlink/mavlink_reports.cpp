@@ -1,4 +1,5 @@
-// Output of MavlinkPoses: heartbeats and requests to the autopilot, reports on the system found and on missing parts of poses.
+// The messages and reports that MavlinkPoses makes: heartbeats, requests to the autopilot, reports on the system that was found
+// and on missing parts of poses.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,8 +11,8 @@ namespace sonar::mavlink {
 namespace {
 
 constexpr std::chrono::nanoseconds heartbeat_period = std::chrono::seconds(1);
-constexpr std::chrono::nanoseconds listen_before_report = std::chrono::seconds(1);
-constexpr std::chrono::nanoseconds silence_before_report = std::chrono::seconds(5);  // from the start, without any message
+constexpr std::chrono::nanoseconds listen_before_report = std::chrono::seconds(1);   // after a system was found
+constexpr std::chrono::nanoseconds silence_before_report = std::chrono::seconds(5);  // after the start, if no system was found
 constexpr std::chrono::nanoseconds request_period = std::chrono::seconds(5);
 constexpr std::chrono::nanoseconds first_reminder = std::chrono::seconds(15), longest_reminder = std::chrono::minutes(10);
 
@@ -30,6 +31,7 @@ std::string name_of_autopilot(std::uint8_t autopilot) {
 Reaction MavlinkPoses::on_tick(Time now) {
   Reaction out;
   if (now >= next_heartbeat_) {
+    // Heartbeats stay in step after a late call. After a longer pause, missed ones are not sent.
     const bool in_step = now - next_heartbeat_ < heartbeat_period;
     next_heartbeat_ = (in_step ? next_heartbeat_ : now) + heartbeat_period;
     Heartbeat beat;
@@ -51,7 +53,8 @@ bool MavlinkPoses::has_poses(Time now) const {
                      [now](const std::optional<Time>& at) { return at && now - *at <= system_silence; });
 }
 
-/// Repeats the report, so that it is at the end of the log when the vehicle is started or changed much later.
+/// Reports when poses start or stop. Without poses it repeats the report at growing intervals, so that the end of the log says
+/// what is missing, however long ago sonard was started.
 void MavlinkPoses::report_changes(Time now, Reaction& out) {
   if (!first_tick_) first_tick_ = now;
   if (system_ ? now - found_at_ < listen_before_report : now - *first_tick_ < silence_before_report) return;
@@ -78,13 +81,13 @@ void MavlinkPoses::request_messages(Reaction& out) {
   };
   for (const std::uint32_t message : {Odometry::id, AttitudeQuaternion::id, LocalPositionNed::id})
     ask(message, settings_.rate_hz);
-  ask(GlobalPositionInt::id, settings_.rate_hz);  // with a place, or with the depth alone
+  ask(GlobalPositionInt::id, settings_.rate_hz);  // gives a position, or the depth alone
   if (!settings_.origin) return;
   ask(SimState::id, settings_.rate_hz);
   ask(GpsGlobalOrigin::id, 1);
 }
 
-/// Why x and y do not change, and which messages would change them.
+/// The reason why x and y do not change, and the messages that would change them.
 std::string MavlinkPoses::held_text() const {
   std::string why = " has no fix, and there is no LOCAL_POSITION_NED: no DVL or the like";
   if (depth_ && depth_->message == VfrHud::id)
@@ -146,7 +149,7 @@ std::string MavlinkPoses::missing_inputs(Time now) const {
 
   const bool refused = receives(Odometry::id, now) || receives(AttPosMocap::id, now) || receives(VisionPositionEstimate::id, now);
   if (refused && missing.empty()) missing.emplace_back("the received messages were refused");
-  if (refused || sim_state) {  // each of them would be enough
+  if (refused || sim_state) {  // one of these messages would be enough, so nothing more is missing
   } else if (attitude && (local || global)) {
     if (missing.empty()) missing.emplace_back("positions and attitudes have no common time");
   } else {

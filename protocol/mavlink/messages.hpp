@@ -305,7 +305,7 @@ constexpr void extensions(V& visit, M& m) {
   visit("reset_counter", m.reset_counter), visit("estimator_type", m.estimator_type), visit("quality", m.quality);
 }
 
-/// Base fields, then extensions where there are any.
+/// Visits the base fields, then the extensions, if the message has some.
 template <class V, class M>
 constexpr void all_fields(V& visit, M& m) {
   fields(visit, m);

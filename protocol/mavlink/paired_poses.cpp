@@ -16,7 +16,7 @@ Quatd between(Quatd a, Quatd b, double u) {
 }  // namespace
 
 void Attitudes::put(const AttitudeReading& reading) {
-  if (!readings_.empty() && reading.at_ms < readings_.back().at_ms) return;  // arrived late
+  if (!readings_.empty() && reading.at_ms < readings_.back().at_ms) return;  // it arrived late; the readings are in order of time
   if (!readings_.empty() && reading.at_ms == readings_.back().at_ms) readings_.pop_back();
   readings_.push_back(reading);
   if (readings_.size() > most) readings_.pop_front();
@@ -26,7 +26,7 @@ Attitudes::Answer Attitudes::at(std::int64_t at_ms, AttitudeReading& out) const 
   if (readings_.empty()) return Answer::later;
   const auto after = std::lower_bound(readings_.begin(), readings_.end(), at_ms,
                                       [](const AttitudeReading& r, std::int64_t t) { return r.at_ms < t; });
-  if (after == readings_.end()) {
+  if (after == readings_.end()) {  // later than the newest reading: extrapolates for a short time
     const AttitudeReading& last = readings_.back();
     const std::int64_t ahead_ms = at_ms - last.at_ms;
     if (ahead_ms > longest_carry_ms) return Answer::later;

@@ -21,9 +21,9 @@ enum MavFrame : std::uint8_t {
   local_flu = 21,
 };
 
-constexpr double highest_m = 1e5;         // above any vehicle with a sonar; keeps the results finite
-const Quatd half_turn_ahead{0, 1, 0, 0};  // FRD and FLU into each other
-const Quatd enu_and_ned{0, std::sqrt(0.5), std::sqrt(0.5), 0};
+constexpr double highest_m = 1e5;                               // keeps the results finite; no vehicle with a sonar is higher
+const Quatd half_turn_ahead{0, 1, 0, 0};                        // turns FRD into FLU, and back
+const Quatd enu_and_ned{0, std::sqrt(0.5), std::sqrt(0.5), 0};  // turns ENU into NED, and back
 
 std::array<double, 3> array_of(Vec3d v) { return {v.x, v.y, v.z}; }
 std::array<double, 4> array_of(Quatd q) { return {q.w, q.x, q.y, q.z}; }
@@ -32,14 +32,14 @@ Quatd quat_of(const std::array<float, 4>& wxyz) { return {wxyz[0], wxyz[1], wxyz
 RawPose raw_pose(Vec3d ned_m, Quatd frd_in_ned) {
   return {Frame::ned_frd, array_of(ned_m), array_of(frd_in_ned), std::nullopt, std::nullopt};
 }
-/// Velocities that are not known are sent as NaN.
+/// Senders set velocities that they do not know to NaN.
 void set_motion(RawPose& pose, Vec3d frd_mps, Vec3d frd_radps) {
   if (is_finite(frd_mps)) pose.velocity_mps = array_of(frd_mps);
   if (is_finite(frd_radps)) pose.angular_velocity_radps = array_of(frd_radps);
 }
 
 Result<std::optional<Geodetic>> geodetic(double latitude_deg, double longitude_deg, double altitude_m) {
-  if (latitude_deg == 0 && longitude_deg == 0) return std::nullopt;
+  if (latitude_deg == 0 && longitude_deg == 0) return std::nullopt;  // autopilots send this without a fix
   const bool on_earth = std::abs(latitude_deg) <= 90 && std::abs(longitude_deg) <= 180 && std::abs(altitude_m) <= highest_m;
   if (!on_earth)
     return failure(ErrorKind::bad_data, "latitude " + std::to_string(latitude_deg) + ", longitude " +
@@ -103,7 +103,7 @@ Result<RawPose> raw_pose(const Odometry& m) {
   Vec3d ned_m{m.x_m, m.y_m, m.z_m};
   switch (m.frame_id) {
     case local_ned:
-    case local_frd:  // ahead as it was at the start counts as north
+    case local_frd:  // the direction ahead at the start counts as north
       break;
     case local_enu:
       ned_m = enu_from_ned(ned_m);  // its own inverse

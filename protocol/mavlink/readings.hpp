@@ -20,7 +20,7 @@ struct AttitudeReading {
 AttitudeReading attitude_of(const Attitude& m);
 AttitudeReading attitude_of(const AttitudeQuaternion& m);
 
-/// A place, and the velocity north, east, down [m/s].
+/// A position and the velocity, both north, east, down [m, m/s].
 struct PlaceReading {
   std::int64_t at_ms = 0;
   Vec3d ned_m;
@@ -32,11 +32,11 @@ PlaceReading place_of(const LocalPositionNed& m);
 /// Errors: a latitude or longitude beyond the globe's.
 Result<std::optional<Geodetic>> geodetic_of(const GlobalPositionInt& m);
 Result<std::optional<Geodetic>> geodetic_of(const GpsGlobalOrigin& m);
-/// Reads the integers where the message has them, else the floats.
+/// The position in the integers of the message; if they are 0, that in the floats.
 Result<std::optional<Geodetic>> geodetic_of(const SimState& m);
 
 control::RawPose raw_pose(const AttitudeReading& attitude, const PlaceReading& place);
-/// The position stays 0: geodetic_of() has it.
+/// Attitude and velocities. The position stays 0, because geodetic_of() reads it.
 control::RawPose raw_pose(const SimState& m);
 control::RawPose raw_pose(const AttPosMocap& m);
 control::RawPose raw_pose(const VisionPositionEstimate& m);
