@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t block_bytes = 256 << 10;
 
+/// Owns a file descriptor and closes it.
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -38,7 +39,7 @@ class FileSource final : public Source {
     while (done < into.size()) {
       const ssize_t n = ::pread(file_.fd(), into.data() + done, into.size() - done, static_cast<off_t>(offset + done));
       if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) break;
+      if (n <= 0) break;  // the end, or an error: the caller sees fewer bytes
       done += static_cast<std::size_t>(n);
     }
     return done;
@@ -98,8 +99,9 @@ class FileSink final : public Sink {
   }
 
  private:
+  /// Removes a record that was written in part. If the file system refuses that too, a cut record remains at the end, which
+  /// readers accept.
   Result<void> give_up(int error) {
-    // If the file system refuses this too, a cut record remains at the end, which readers accept.
     const bool taken_back =
         ::ftruncate(file_.fd(), static_cast<off_t>(size_)) == 0 && ::lseek(file_.fd(), static_cast<off_t>(size_), SEEK_SET) >= 0;
     broken_ = Error{ErrorKind::io, "cannot write on to " + name_ + ": " + std::strerror(error) + "; its first " +
@@ -134,7 +136,7 @@ class MemorySink final : public Sink {
 }  // namespace
 
 Result<std::unique_ptr<Source>> open_source(const std::filesystem::path& file) {
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // does not wait for the other end of a pipe
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // does not block at a pipe
   if (fd < 0) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": " + std::strerror(errno));
   Descriptor opened(fd);
   struct stat about {};
@@ -165,6 +167,7 @@ Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file)
 
 std::unique_ptr<Sink> sink_into(Bytes& bytes) { return std::make_unique<MemorySink>(bytes); }
 
+// Reads blocks, so that records of a few bytes do not cost a system call each.
 BytesView Scan::peek(std::size_t count) {
   count = static_cast<std::size_t>(std::min<std::uint64_t>(count, left()));
   const bool buffered = position_ >= buffered_from_ && position_ + count <= buffered_from_ + buffer_.size();

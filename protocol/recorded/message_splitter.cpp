@@ -11,7 +11,7 @@ bool begins_with(wire::BytesView bytes, const std::array<std::uint8_t, 2>& magic
 
 constexpr std::size_t longest_line = 1 << 16;
 
-/// Up to and with the line end; 0: it has not come yet.
+/// Length of the line with its end. 0: its end has not come yet. nullopt: it is too long for a line.
 std::optional<std::size_t> length_of_line(wire::BytesView waiting) {
   const auto end = std::find(waiting.begin(), waiting.end(), std::byte{'\n'});
   if (end != waiting.end()) return static_cast<std::size_t>(end - waiting.begin()) + 1;
@@ -52,8 +52,8 @@ void MessageSplitter::break_off() {
   lost_ = strict_ = true;
 }
 
-/// Length of the message that begins here; 0 = not yet known; nullopt = no message begins here. After lost bytes only headers
-/// of known types count: two bytes of an image soon look like the magic number.
+/// Length of the message that begins here. 0: it is not known yet. nullopt: no message begins here. After lost bytes (strict_)
+/// only headers of known types count, because the two bytes of the magic number soon occur in an image by chance.
 std::optional<std::size_t> MessageSplitter::length_at_front(wire::BytesView waiting) const {
   if (!starts_like_header(waiting)) return std::nullopt;
   if (waiting.size() < framing_->header_size) return 0;
@@ -70,7 +70,8 @@ std::optional<RecordedMessage> MessageSplitter::next() {
         return cut(*length);
       }
       if (!finished_) return std::nullopt;
-      if (!lost_) ++losses_;  // a message begins and never ends
+      // The stream ends within this message. The search goes on inside it: it may have been a false begin.
+      if (!lost_) ++losses_;
       lost_ = strict_ = true;
       lose(1);
       continue;
@@ -78,6 +79,7 @@ std::optional<RecordedMessage> MessageSplitter::next() {
     strict_ = true;
     std::size_t none = 1;
     while (none < waiting.size() && !starts_like_header(waiting.subspan(none))) ++none;
+    // Bytes between messages are returned as they are, except after a gap, where they may be the rest of a message.
     if (!lost_) return cut(none);
     lose(none);
   }

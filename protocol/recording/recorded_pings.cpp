@@ -13,6 +13,8 @@ Result<RecordedPings> RecordedPings::open(std::unique_ptr<RecordingReader> reade
   return pings;
 }
 
+/// The host decodes messages of a recording as it decodes those of a sonar. It sends nothing (as_it_is), and its sequence and
+/// pictures of a scan begin anew with it.
 Result<void> RecordedPings::make_host() {
   protocol::Wanted wanted;
   wanted.as_it_is = true;
@@ -39,7 +41,7 @@ std::optional<RecordedPing> RecordedPings::next() {
 void RecordedPings::rewind() {
   reader_->rewind();
   decoded_.clear();
-  static_cast<void>(make_host());  // as the first time
+  static_cast<void>(make_host());  // succeeds, as it did in open()
 }
 
 }  // namespace sonar::recording

@@ -13,7 +13,7 @@ namespace {
 constexpr std::uint64_t most_searched_bytes = 64u << 20;
 
 bool is_mcap(BytesView front) { return begins_with(front, {0x89, 'M', 'C', 'A', 'P'}); }
-/// Micro- and nanoseconds in either byte order, pcapng.
+/// Magic numbers of pcap, with micro- or nanoseconds in either byte order, and of pcapng.
 bool is_capture(BytesView front) {
   return begins_with(front, {0xD4, 0xC3, 0xB2, 0xA1}) || begins_with(front, {0xA1, 0xB2, 0xC3, 0xD4}) ||
          begins_with(front, {0x4D, 0x3C, 0xB2, 0xA1}) || begins_with(front, {0xA1, 0xB2, 0x3C, 0x4D}) ||
@@ -35,7 +35,8 @@ Result<Recording> opened(std::string_view format, OpenedReader reader) {
   return Recording{format, std::move(*reader)};
 }
 
-/// A file that holds one sonar.
+/// Opens a file that holds one sonar: a kind of file of some make, else a raw dump. Kinds come first, because the files of some
+/// makes begin like messages of their stream.
 Result<Recording> open_file(std::unique_ptr<Source> source, BytesView front, const std::string& sonar) {
   const auto complaint = [&](std::string_view format) {
     const bool vowel = std::string_view("aeio").find(format[format[0] == '.' ? 1 : 0]) != std::string_view::npos;
@@ -87,6 +88,7 @@ Result<Recording> open_recording(const std::filesystem::path& file, const std::s
 
 std::optional<SentBy> find_sender(RecordingReader& reader) {
   std::optional<SentBy> found;
+  // A later message is better only if it names the model of the same sonar.
   const auto tells_more = [&found](const SentBy& by) {
     return !found || (by.sender.names_model && by.make == found->make && by.sender.serial == found->sender.serial);
   };

@@ -9,7 +9,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Invalid UTF-8 in names is replaced, not refused.
+/// Names of scenes may be no UTF-8; such bytes are replaced, because a recording must not fail by a name.
 std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json json_of(Time at) {

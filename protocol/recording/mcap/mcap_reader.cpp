@@ -53,7 +53,8 @@ std::optional<Message> Reader::next() {
   return std::nullopt;
 }
 
-/// One record that ends before `end`; a message if it is one. Damage inside a chunk leaves out the rest of the chunk.
+/// Reads one record, which ends before `end`, and returns its message if it is one. After damage inside a chunk the rest of the
+/// chunk is skipped; outside of chunks damage ends the reading, because the begin of the next record is unknown.
 std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   const std::uint64_t at = scan_.position();
   const auto give_up = [&](std::string why) {
@@ -71,6 +72,7 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   RecordReader front(scan_.read(record_front_bytes));
   const auto code = front.number<Opcode>();
   const auto length = front.number<std::uint64_t>();
+  // A program that was killed leaves a cut chunk at the end. Its whole records are still good.
   if (code == Opcode::chunk && !in_chunk && length > end - scan_.position()) {
     damages_.add("the chunk" + at_byte(at) + " is cut short by the end of the file");
     enter_chunk(at, end - scan_.position(), true);
@@ -103,7 +105,7 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   return std::nullopt;
 }
 
-/// A schema or a channel. Files may repeat them; the first applies.
+/// Keeps a schema or a channel. Files may repeat them in each chunk; the first one applies.
 void Reader::take_description(Opcode code, BytesView content, std::uint64_t at) {
   bool is_new = false;
   if (code == Opcode::schema) {
@@ -136,9 +138,11 @@ std::optional<Message> Reader::take_message(BytesView content, std::uint64_t at)
   return message;
 }
 
-/// Sets chunk_end_, or leaves the chunk out. If a chunk is cut short, its whole records are read without a check.
+/// Enters a chunk, whose end is then chunk_end_, or skips it if it is damaged or compressed. The checksum of a chunk that is cut
+/// short cannot be compared, so its whole records are read unchecked.
 void Reader::enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut) {
   const std::uint64_t end = scan_.position() + length;
+  // 40 bytes of numbers, and the name of a compression, which is short.
   const std::size_t front_bytes = static_cast<std::size_t>(std::min<std::uint64_t>(length, 40 + 256));
   const std::uint64_t content = scan_.position();
   RecordReader front(scan_.peek(front_bytes));

@@ -9,7 +9,7 @@ namespace sonar::recording {
 namespace {
 
 constexpr std::size_t most_names = 16;
-constexpr const char* world = "world";  // the frame of poses
+constexpr const char* world = "world";  // name of the frame in which poses are
 
 Bytes bytes_of(const std::string& text) {
   Bytes bytes(text.size());
@@ -17,6 +17,8 @@ Bytes bytes_of(const std::string& text) {
   return bytes;
 }
 
+/// Reads the channels whose encoding is the name of a make: those with the vendor's bytes. Their metadata say which sonar, which
+/// end and which carrier a message is of.
 class McapRecordingReader final : public RecordingReader {
  public:
   McapRecordingReader(mcap::Reader reader, std::string sonar)
@@ -117,7 +119,7 @@ Result<void> McapSession::write_image(Time at, const std::shared_ptr<const Ping>
   return writer_.write(image_, at, foxglove::raw_image(at, sonar_, foxglove::image_of(ping)));
 }
 
-/// Full scale is the largest code of that many bits, because messages state no other.
+/// Messages do not state their full scale, so it is the largest code of their bits.
 Result<void> McapSession::write_image(Time at, const Samples& samples) {
   const auto image =
       foxglove::image_of(samples.beams, samples.rows, samples.bits, 0xFFFFFFFFu >> (32 - samples.bits), samples.codes);

@@ -16,6 +16,7 @@ std::uint16_t Writer::add_channel(Channel channel) {
   channel.id = static_cast<std::uint16_t>(channels_.size());
   channels_.push_back(std::move(channel));
   next_sequence_.push_back(0);
+  // Channels without a message are not written at all.
   announced_.push_back(false);
   announced_before_.push_back(false);
   return channels_.back().id;
@@ -44,7 +45,7 @@ Result<void> Writer::begin() {
   return put(front);
 }
 
-/// Writes the channel and, unless already marked, its schema.
+/// Writes a channel, and before it its schema, unless `schemas` marks it as written.
 void Writer::announce(Bytes& out, const Channel& channel, std::vector<bool>& schemas) const {
   if (channel.schema != 0 && !schemas[channel.schema - 1u]) {
     append(out, schemas_[channel.schema - 1u]);
@@ -62,7 +63,7 @@ Result<void> Writer::write(std::uint16_t channel, Time at, BytesView data) {
   if (entries_.empty()) chunk_first_ = chunk_last_ = at;
   chunk_first_ = std::min(chunk_first_, at);
   chunk_last_ = std::max(chunk_last_, at);
-  if (!announced_[channel]) {
+  if (!announced_[channel]) {  // before its first message, as readers need it
     std::vector<bool> schemas(schemas_.size());
     for (const Channel& each : channels_)
       if (announced_[each.id] && each.schema != 0) schemas[each.schema - 1u] = true;
@@ -170,7 +171,7 @@ void Writer::append_statistics(Bytes& out) const {
   record.end();
 }
 
-/// Writes groups of records of one kind each, then the position of each group, then the footer without its checksum.
+/// The summary: groups of records, one group for each kind; the position of each group; the footer up to its checksum.
 Bytes Writer::summary() const {
   Bytes out;
   const std::uint64_t start = position_;
@@ -218,6 +219,7 @@ Bytes Writer::summary() const {
 Result<void> Writer::close() {
   if (!broken_)
     if (begin()) static_cast<void>(end_chunk());
+  // After an error, as on a full disk, the chunk that failed is left out. The summary of the others is smaller and may still fit.
   const std::optional<Error> first_error = broken_;
   if (first_error) sink_->try_again();
   Bytes end;

@@ -10,6 +10,7 @@ namespace {
 
 using wire::BytesView;
 
+// LINKTYPE_ numbers of tcpdump.org; EtherTypes and IP protocols of IANA.
 constexpr std::uint32_t null_link = 0, ethernet = 1, raw_bsd = 12, raw_openbsd = 14, raw_ip = 101, loop_link = 108, cooked = 113,
                         ipv4 = 228, cooked2 = 276;
 constexpr std::uint16_t ip_type = 0x0800, vlan_type = 0x8100, provider_type = 0x88A8;
@@ -19,6 +20,7 @@ unsigned u8_at(BytesView bytes, std::size_t offset) {
   return offset < bytes.size() ? std::to_integer<unsigned>(bytes[offset]) : 0;
 }
 
+/// The packet in an Ethernet frame, behind any number of VLAN tags.
 std::optional<BytesView> behind_ethernet(BytesView frame) {
   std::size_t at = 12;
   while (u16_at(frame, at) == vlan_type || u16_at(frame, at) == provider_type) at += 4;
@@ -44,7 +46,7 @@ std::optional<BytesView> ip_packet(std::uint32_t link_type, BytesView frame) {
       return behind(frame, 16, u16_at(frame, 14) == ip_type);
     case cooked2:
       return behind(frame, 20, u16_at(frame, 0) == ip_type);
-    case null_link:  // family 2 in the byte order of the capturing host
+    case null_link:  // address family 2 (IPv4) in the byte order of the computer that captured
       return behind(frame, 4, u32_at(frame, 0) == 2 || u32_at(frame, 0) == 0x02000000);
     case loop_link:
       return behind(frame, 4, u32_at(frame, 0) == 2);
@@ -90,7 +92,7 @@ std::optional<Segment> parse_packet(std::uint32_t link_type, BytesView packet) {
   const auto ip = ip_packet(link_type, packet);
   if (!ip || ip->size() < 20 || u8_at(*ip, 0) >> 4 != 4) return std::nullopt;
   const std::size_t header = (u8_at(*ip, 0) & 0x0Fu) * std::size_t{4};
-  // With segmentation offload, segments too long for the 16-bit field have the length 0.
+  // With segmentation offload a captured segment may be too long for the 16-bit field, which is then 0.
   const std::size_t total = u16_at(*ip, 2) == 0 ? ip->size() : std::min<std::size_t>(u16_at(*ip, 2), ip->size());
   const bool is_fragment = (u16_at(*ip, 6) & 0x3FFFu) != 0;
   if (header < 20 || total < header || is_fragment) return std::nullopt;

@@ -13,12 +13,13 @@ constexpr std::uint16_t end_option = 0, resolution_option = 9;
 
 Time time_of(std::uint64_t ticks, std::uint64_t ticks_per_s) {
   const std::uint64_t whole_s = ticks / ticks_per_s, rest = ticks % ticks_per_s;
-  if (whole_s > 4'000'000'000u) return {};  // 2096 and later is damage
+  if (whole_s > 4'000'000'000u) return {};  // a time in 2096 or later is damage
   const double rest_ns = 1e9 * static_cast<double>(rest) / static_cast<double>(ticks_per_s);
   return Time(std::chrono::seconds(whole_s) + std::chrono::nanoseconds(static_cast<std::int64_t>(rest_ns)));
 }
 
-/// The resolution of pcapng: a power of ten, or of two if the top bit is set. Anything finer than 10^18 a second is damage.
+/// The unit of an interface's times in pcapng: a power of ten, or of two if the top bit is set. A unit finer than 10^-18 s is
+/// damage and counts as a microsecond.
 std::uint64_t ticks_per_s(unsigned resolution) {
   const unsigned base = (resolution & 0x80u) != 0 ? 2 : 10, exponent = resolution & 0x7Fu;
   std::uint64_t ticks = 1;
@@ -61,7 +62,7 @@ bool PacketReader::read_front() {
     const BytesView header = scan_.read(24);
     if (header.size() < 24) return false;
     endian_ = endian;
-    // The upper bits hold the length of the frame checksum.
+    // The lower 16 bits are the link type; the upper ones hold the length of the frame checksum.
     interfaces_.push_back({u32_at(header, 20, endian) & 0xFFFFu, found == nano_magic ? 1'000'000'000u : 1'000'000u});
     return true;
   }
@@ -105,7 +106,7 @@ void PacketReader::add_interface(BytesView body) {
     const std::uint16_t code = u16_at(body, at, endian_), size = u16_at(body, at + 2, endian_);
     if (code == end_option || at + 4 + size > body.size()) break;
     if (code == resolution_option && size >= 1) made.ticks_per_s = ticks_per_s(std::to_integer<unsigned>(body[at + 4]));
-    at += 4 + (size + 3u) / 4 * 4;
+    at += 4 + (size + 3u) / 4 * 4;  // values are padded to 4 bytes
   }
   interfaces_.push_back(made);
 }
@@ -121,7 +122,7 @@ std::optional<Packet> PacketReader::enhanced(BytesView body) const {
 std::optional<Packet> PacketReader::simple(BytesView body) const {
   if (body.size() < 4 || interfaces_.empty()) return std::nullopt;
   const std::size_t size = std::min<std::size_t>(u32_at(body, 0, endian_), body.size() - 4);
-  return Packet{{}, interfaces_.front().link_type, body.subspan(4, size)};
+  return Packet{{}, interfaces_.front().link_type, body.subspan(4, size)};  // simple packets have no time
 }
 
 std::optional<Packet> PacketReader::next_block() {
@@ -139,7 +140,7 @@ std::optional<Packet> PacketReader::next_block() {
     }
     if (size > most_block) return stop(place + " would have " + std::to_string(size) + " bytes");
     const BytesView rest = scan_.read(size - 8);
-    const BytesView body = rest.first(rest.size() - 4);  // the length once more
+    const BytesView body = rest.first(rest.size() - 4);  // a block ends with its length, as it begins
     if (u32_at(rest, body.size(), endian_) != size) return stop(place + " does not end as it begins");
     if (type == interface_block) {
       add_interface(body);

@@ -34,8 +34,8 @@ struct Found {
   std::string note;
 };
 
-/// The make whose messages a segment begins with; clients may send such messages too. Of the makes whose stream begins so, the
-/// one whose usual port the source has, else the first.
+/// The make with whose messages a segment begins; null: there is none. Clients may send such messages too. If several makes
+/// match, it is the one whose usual port is that of the source, else the first.
 const Make* make_of(const Segment& segment) {
   const Make* found = nullptr;
   if (!segment.tcp) {
@@ -46,7 +46,8 @@ const Make* make_of(const Segment& segment) {
     const Framing* const framing = make.codec.framing;
     if (framing == nullptr || !framing->begins_message(segment.payload, Origin::device)) continue;
     const std::uint16_t usual = make.ports.front().number;
-    if (framing->length == nullptr && usual != segment.source.port && usual != segment.target.port) continue;  // many send lines
+    if (framing->length == nullptr && usual != segment.source.port && usual != segment.target.port)
+      continue;  // many programs send lines
     if (found == nullptr || usual == segment.source.port) found = &make;
   }
   return found;
@@ -93,6 +94,7 @@ Result<Found> find_device(Source& source, const PcapReading& reading) {
 
 // ---- second pass: messages of the sonar and its clients
 
+/// A TCP connection of a client with the sonar. Each direction is put in order (TcpStream), then split into messages.
 struct Connection {
   explicit Connection(const Framing& framing) : device(Origin::device, framing), client(Origin::client, framing) {}
 
@@ -153,14 +155,15 @@ class PcapReader final : public RecordingReader {
     if (segment.target == device) add(at, segment, segment.source, Origin::client);
   }
 
-  /// Takes pings, or the status beside pings by TCP.
+  /// Takes a datagram of a sonar that sends its pings by UDP, or the status of one that sends them by TCP.
   void add_datagram(Time at, const Segment& segment) {
     const auto take = [&](Origin from) {
       ready_.push_back({at, from, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});
     };
     const bool from_device = segment.source.address == found_.device.at.address;
     if (!found_.device.tcp) {
-      if (segment.target == found_.device.at) return take(Origin::client);  // first: both ends may have one address
+      if (segment.target == found_.device.at)
+        return take(Origin::client);  // tested first, because both ends may have one address
       if (from_device) take(Origin::device);
       return;
     }
@@ -186,6 +189,7 @@ class PcapReader final : public RecordingReader {
     stream_of(place->second, from).add(at, segment.sequence, segment.payload, syn);
     drain(place->second, client, from);
     if ((segment.flags & tcp_flag::rst) != 0) finish(place);
+    // A capture with gaps in many connections must not take all memory.
     while (held_bytes() > most_held_bytes) finish_oldest();
   }
 
@@ -225,6 +229,7 @@ class PcapReader final : public RecordingReader {
     MessageSplitter& splitter = from == Origin::device ? connection.device : connection.client;
     while (const auto run = stream_of(connection, from).next()) {
       const std::uint64_t lost = splitter.lost_bytes();
+      // After a gap, or at the begin of a capture, the bytes may lie within a message.
       if (run->missing_before > 0 || run->from_middle) splitter.break_off();
       splitter.append(run->at, run->bytes);
       while (auto message = splitter.next()) ready_.push_back(std::move(*message));
@@ -239,7 +244,7 @@ class PcapReader final : public RecordingReader {
   std::unique_ptr<Source> source_;
   PacketReader packets_;
   Found found_;
-  std::uint64_t packet_number_ = 0;  // as Wireshark counts
+  std::uint64_t packet_number_ = 0;  // from 1, as Wireshark counts
   std::map<IpEnd, Connection> connections_;
   std::deque<RecordedMessage> ready_;
   Damages damages_;

@@ -17,19 +17,21 @@ void TcpStream::add(Time at, std::uint32_t sequence, wire::BytesView payload, bo
     begin(sequence, syn);
   }
   if (payload.empty()) return;
-  // Sequence numbers wrap: each is taken as the one nearest to the expected number.
+  // Sequence numbers wrap after 4 GiB. The difference as a signed number is right for segments up to 2 GiB early or late.
   const auto expected = static_cast<std::uint32_t>(first_ + position_);
   const auto ahead = static_cast<std::int32_t>(sequence + (syn ? 1u : 0u) - expected);
-  if (ahead <= 0) {
+  if (ahead <= 0) {  // a segment that continues the stream, or repeats bytes of it
     const auto known = static_cast<std::size_t>(-static_cast<std::int64_t>(ahead));
     if (known >= payload.size()) return;
     give(at, payload.subspan(known));
     return give_what_follows();
   }
+  // An early segment waits for those before it. Of two at the same place the longer one is kept.
   Early& early = waiting_[position_ + static_cast<std::uint32_t>(ahead)];
   if (early.bytes.size() >= payload.size()) return;
   waiting_bytes_ += payload.size() - early.bytes.size();
   early = {at, {payload.begin(), payload.end()}};
+  // Too much waits: the capture lacks the bytes before it.
   if (waiting_bytes_ > most_waiting_bytes || waiting_.size() > most_waiting) {
     skip_to_first_waiting();
     give_what_follows();

@@ -7,7 +7,7 @@ namespace sonar::recording {
 namespace {
 
 constexpr std::size_t most_segment = 65'495;  // capacity of an IPv4 packet after two headers of 20 bytes
-constexpr std::uint8_t window_scale = 7;      // windows of 8 MB: no message waits for an acknowledgement
+constexpr std::uint8_t window_scale = 7;      // a window of 8 MB holds any message without an acknowledgement
 constexpr std::uint8_t ip_tcp = 6, ip_udp = 17;
 
 struct PcapFileHeader {
@@ -67,7 +67,7 @@ constexpr void fields(V& visit, M& m) {
 }
 static_assert(wire::wire_size<PcapFileHeader>() == 24 && wire::wire_size<IpHeader>() == 20 && wire::wire_size<TcpHeader>() == 20);
 
-/// Ones' complement sum of 16-bit words, not yet folded.
+/// Sum of 16-bit words, big-endian, for the Internet checksum (RFC 1071). checksum_of() folds the carries into it.
 std::uint64_t word_sum(BytesView bytes, std::uint64_t sum = 0) {
   for (std::size_t i = 0; i < bytes.size(); ++i) sum += std::to_integer<std::uint64_t>(bytes[i]) << (i % 2 == 0 ? 8 : 0);
   return sum;
@@ -81,10 +81,10 @@ void put_u16(Bytes& bytes, std::size_t at, std::uint16_t value) {
   bytes[at + 1] = static_cast<std::byte>(value & 0xFF);
 }
 
-/// One end of the connection, as the other end sees it.
+/// One end of the connection, and the sequence number of the next byte that it sends.
 struct End {
   IpEnd place;
-  std::uint32_t sequence = 0;  // sequence number of its next byte
+  std::uint32_t sequence = 0;
 };
 
 class PcapWriter final : public RecordingWriter {
@@ -97,6 +97,7 @@ class PcapWriter final : public RecordingWriter {
 
   Result<void> write(const RecordedMessage& message) override {
     Bytes packets;
+    // If the sink fails, the next message goes on from here, as if this one had not been written.
     const auto before = std::tuple(device_, client_, identification_, begun_, connected_);
     last_ = message.at;
     begin(packets);
@@ -174,7 +175,7 @@ class PcapWriter final : public RecordingWriter {
     for (const std::uint16_t value : {from.port, to.port, size, std::uint16_t{0}}) writer("u16", value);
     body.insert(body.end(), message.bytes.begin(), message.bytes.begin() + (size - 8));
     const std::uint16_t sum = transport_checksum(ip_udp, from, to, body);
-    put_u16(body, 6, sum == 0 ? 0xFFFF : sum);  // 0 means no checksum
+    put_u16(body, 6, sum == 0 ? 0xFFFF : sum);  // 0 would say that there is no checksum (RFC 768)
     packet(packets, ip_udp, from, to, body);
   }
 
@@ -204,8 +205,8 @@ class PcapWriter final : public RecordingWriter {
     };
     u32(whole.count());
     u32((since - whole).count());
-    u32(header.total_length);  // kept
-    u32(header.total_length);  // was
+    u32(header.total_length);  // bytes in the file
+    u32(header.total_length);  // bytes on the wire
     packets.insert(packets.end(), front.begin(), front.end());
     packets.insert(packets.end(), body.begin(), body.end());
   }
