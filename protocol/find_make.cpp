@@ -25,7 +25,7 @@ bool is_number_of(const Option& option, std::string_view text) {
   return option.highest > 0 ? value >= option.lowest && value <= option.highest : value > 0;
 }
 
-/// Empty when the pair is fine.
+/// The reason if the option or its value is refused, else an empty text.
 std::string complaint(const Vendor& vendor, const std::string& name, const std::string& value) {
   const Option* option = find_option(vendor, name);
   if (option == nullptr) {

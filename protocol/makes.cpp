@@ -54,7 +54,7 @@ std::vector<Make> product_makes() {
        .codec = aris::codec(),
        .own_numbers = true,
        .demo_profile = "aris-3000",
-       .demo_mount = RollPitchYaw{0, 40 * pi / 180, 0}},  // its window ends at 3.4 m
+       .demo_mount = RollPitchYaw{0, 40 * pi / 180, 0}},  // looks down to the bed, because its window ends at 3.4 m
       {.device = &waterlinked::vendor(),
        .title = "a Sonar 3D-15",
        .request = "request",

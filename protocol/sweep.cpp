@@ -12,6 +12,8 @@ double Sweep::bearing_rad(std::size_t direction) const {
   return (all / 2 - static_cast<double>(direction)) * 2 * pi / all;
 }
 
+// A sector scan of the half ahead would fill half a picture, so the picture is then that half. It becomes a whole turn with the
+// first line outside of it.
 PolarImage Sweep::shown() const {
   bool only_ahead = lines_.size() % 4 == 0;
   for (std::size_t i = 0; i < lines_.size(); ++i)
@@ -31,10 +33,12 @@ PolarImage Sweep::shown() const {
 }
 
 void Sweep::add(std::size_t direction, Line line, double row_m, HostPing& ping) {
+  // Lines of another range cannot be in one picture with the earlier ones.
   if (rows_ != line.size() || row_m_ != row_m) lines_.assign(lines_.size(), nullptr);
   rows_ = line.size();
   row_m_ = row_m;
   lines_[direction] = std::make_shared<const Line>(std::move(line));
+  // The picture is drawn later, perhaps by another thread, so it gets a copy. Lines are shared, which makes the copy cheap.
   const auto now = std::make_shared<const Sweep>(*this);
   ping.picture = [now]() -> Result<PolarImage> { return now->shown(); };
   ping.drawing = [now, head_rad = bearing_rad(direction)] {

@@ -6,7 +6,7 @@
 namespace sonar::protocol {
 namespace {
 
-constexpr double shown_db = 60;  // of a waterfall, below its strongest echo
+constexpr double shown_db = 60;  // levels down to this far below the strongest echo are shown
 
 SonarPicture picture_of(const std::deque<std::shared_ptr<const Line>>& waterfall, double start_m, double row_m) {
   SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};

@@ -35,7 +35,7 @@ tl::expected<Request, RefusedRequest> decode_request(BytesView bytes) {
 
 bool is_unasked_pose(BytesView rest) {
   // Reads only the keys of the outermost message, each `field number << 3 | wire type` (protobuf encoding guide), and skips the
-  // values. Wire types above 2 (groups, fixed 32 bits) do not occur in Request.
+  // values. Request has only varints and messages.
   constexpr std::uint64_t varint = 0, with_length = 2;
   bool has_id = false, is_pose = false;
   while (!rest.empty()) {
@@ -48,7 +48,7 @@ bool is_unasked_pose(BytesView rest) {
       continue;
     }
     if ((*key & 7) != with_length || *value > rest.size()) return false;
-    // A request may repeat its operation; the last one on the wire holds.
+    // If a request has several operations, protobuf keeps the last one.
     is_pose = field == v1::Request::kPoseFieldNumber || field == v1::Request::kObjectFieldNumber;
     rest = rest.subspan(static_cast<std::size_t>(*value));
   }

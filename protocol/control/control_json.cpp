@@ -14,11 +14,11 @@ namespace sonar::control {
 namespace {
 
 using google::protobuf::Message;
-constexpr std::size_t deepest_request = 16, most_values = 4096;  // the longest request needs some dozen
+constexpr std::size_t deepest_request = 16, most_values = 4096;  // chosen: the longest request has some dozen values
 
 std::string in_quotes(const std::string& name) { return '"' + name.substr(0, 64) + '"'; }
 
-/// protobuf takes "range_m" and "rangeM" for the same field.
+/// The name in the form in which protobuf compares names: "range_m" and "rangeM" are the same field.
 std::string as_protobuf_reads(const std::string& name) {
   std::string read;
   bool behind_line = false;
@@ -29,10 +29,11 @@ std::string as_protobuf_reads(const std::string& name) {
   return read;
 }
 
-/// protobuf's reader also takes names without quotes, 'text' and trailing commas, and the last of two equal keys.
+/// Checks that a text is JSON (RFC 8259) without duplicate keys. protobuf's reader alone would also accept names without quotes,
+/// 'text' and trailing commas, and use the last of two equal keys.
 class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
  public:
-  std::string why;  // empty = it is JSON
+  std::string why;  // the reason if the text is refused, else empty
 
   bool null() override { return count(); }
   bool boolean(bool) override { return count(); }
@@ -72,11 +73,11 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
     keys_.pop_back();
     return true;
   }
-  std::vector<std::set<std::string>> keys_;  // keys of each open object
+  std::vector<std::set<std::string>> keys_;  // keys of each object that is open
   std::size_t values_ = 0;
 };
 
-/// The expected value for a protobuf type; empty where protobuf's own text is enough.
+/// The kind of value that a protobuf type expects. Empty: protobuf's own text is clear enough.
 std::string kind_of(const std::string& type) {
   if (type == "DOUBLE" || type == "FLOAT") return "a number";
   if (type == "BOOL") return "true or false";
@@ -85,8 +86,8 @@ std::string kind_of(const std::string& type) {
   return type == "STRING" ? "a text in quotes" : "";
 }
 
-/// protobuf's own words: "(mount.xyz_m): Cannot find field." or "(range_m.value): invalid value \"far\" for type TYPE_DOUBLE",
-/// sometimes with a word in front, sometimes without brackets, and then several lines that show the place.
+/// Makes a sentence of protobuf's text, such as "(mount.xyz_m): Cannot find field." or "(range_m.value): invalid value \"far\"
+/// for type TYPE_DOUBLE". The text may have a word in front, may lack the brackets, and may go on with lines that show the place.
 std::string sentence_from(const std::string& words) {
   std::string what = words.substr(0, words.find('\n'));
   const auto colon = what.find(": ");
@@ -105,7 +106,7 @@ std::string sentence_from(const std::string& words) {
   return in_quotes(key) + ": " + what;
 }
 
-/// Sets the name from the path; false if the message has another name.
+/// Sets the name that the path of the request has. False: the message has another name, or none can be set.
 bool set_name(Message& message, const std::string& name) {
   const auto& of = *message.GetDescriptor();
   const auto* field = of.FindFieldByName("sonar") != nullptr ? of.FindFieldByName("sonar") : of.FindFieldByName("object");
@@ -123,7 +124,7 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
   const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
   if (field == nullptr || field->containing_oneof() == nullptr) return refused("unknown request");
   if (json.size() > largest_json) return refused("longer than 1 MiB");
-  // The strict reader would stop at a zero byte, protobuf's reader would go on.
+  // The strict reader takes a zero byte as the end of the text, protobuf's reader does not: what follows would be unchecked.
   if (const auto zero = json.find('\0'); zero != std::string_view::npos)
     return refused("not JSON: a zero byte at character " + std::to_string(zero + 1));
   StrictReader reader;
@@ -148,7 +149,8 @@ std::string json_of(const Message& message) {
   options.always_print_primitive_fields = true;
   options.preserve_proto_field_names = true;
   std::string out;
-  if (!google::protobuf::util::MessageToJsonString(*repaired, &out, options).ok()) return "{}";  // never: we made it
+  if (!google::protobuf::util::MessageToJsonString(*repaired, &out, options).ok())
+    return "{}";  // cannot happen: the texts were repaired
   return out;
 }
 std::string json_of(StatusCode code, const std::string& text) { return json_of(status_of(code, text)); }

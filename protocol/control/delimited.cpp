@@ -2,10 +2,12 @@
 
 namespace sonar::control {
 namespace {
-constexpr std::size_t longest_length_field = 5;  // a varint of 32 bits
+constexpr std::size_t longest_length_field = 5;  // bytes of a varint of 32 bits
 }
 
 Result<std::optional<std::vector<std::byte>>> DelimitedParser::next() {
+  // The length is read anew at each call until the whole message is there; its limit is checked before any memory is reserved for
+  // it.
   std::uint64_t length = 0;
   std::size_t used = 0;
   while (true) {
@@ -24,7 +26,8 @@ Result<std::optional<std::vector<std::byte>>> DelimitedParser::next() {
   const auto first = buffer_.begin() + static_cast<std::ptrdiff_t>(start_ + used);
   std::vector<std::byte> message(first, first + static_cast<std::ptrdiff_t>(length));
   start_ += used + static_cast<std::size_t>(length);
-  if (start_ == buffer_.size() || start_ > (64u << 10)) {  // give the front back now and then, not byte by byte
+  // The front is erased rarely, so that many small messages do not move the rest each time.
+  if (start_ == buffer_.size() || start_ > (64u << 10)) {
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(start_));
     start_ = 0;
   }

@@ -58,7 +58,7 @@ Result<Frame> frame_of(const json& object) {
   return refused("frame must be \"NED_FRD\" or \"ENU_FLU\"");
 }
 
-/// Attitude angles or quaternion, body to world, in the frame of the message.
+/// The orientation of the body in the world, in the axes of the message, from `quaternion` or, without it, from `attitude`.
 Result<std::array<double, 4>> orientation_of(const json& object, std::string& fields, double& largest_angle_rad) {
   const auto quaternion = numbers<4>(object, "quaternion");
   if (!quaternion) return tl::unexpected(quaternion.error());
@@ -128,9 +128,9 @@ bool is_json_object(std::string_view line) {
 }
 
 void LineParser::feed(std::span<const std::byte> received) {
-  buffer_.erase(0, start_);  // once for all lines that next() gave out
+  buffer_.erase(0, start_);  // erases all lines at once that next() has returned
   start_ = 0;
-  if (in_gap_) {
+  if (in_gap_) {  // the rest of a line whose begin was lost
     const auto end = std::find(received.begin(), received.end(), std::byte{'\n'});
     if (end == received.end()) return;
     received = received.subspan(static_cast<std::size_t>(end - received.begin()) + 1);
@@ -139,6 +139,7 @@ void LineParser::feed(std::span<const std::byte> received) {
   for (const std::byte b : received) buffer_.push_back(static_cast<char>(b));
 }
 
+// Keeps whole lines, and drops the line that has begun: its end is lost. The next bytes are the middle of some line.
 void LineParser::skip_gap() {
   begun_ = in_gap_ = true;
   const std::size_t last = buffer_.rfind('\n');
@@ -147,7 +148,7 @@ void LineParser::skip_gap() {
   buffer_.resize(whole_lines ? last + 1 : std::min(start_, buffer_.size()));
 }
 
-/// False: the first bytes may yet become a byte order mark.
+/// Skips a byte order mark at the start of the stream. False: more bytes are needed to know whether there is one.
 bool LineParser::begin() {
   if (begun_) return true;
   if (buffer_.size() < byte_order_mark.size() && byte_order_mark.starts_with(buffer_)) return false;
@@ -172,7 +173,7 @@ std::optional<LineParser::Line> LineParser::next() {
     }
     std::string text = buffer_.substr(start_, end - start_);
     start_ = end + 1;
-    if (std::exchange(swallowing_, false)) continue;  // the tail of a line already reported
+    if (std::exchange(swallowing_, false)) continue;  // the end of a line that was reported as too long
     const bool object = begins_object(text);
     if (text.size() > longest_line) return Line{{}, true, object};
     if (!text.empty() && text.back() == '\r') text.pop_back();

@@ -15,14 +15,14 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
 
-/// Wrappers such as DoubleValue are named like their value.
+/// The path with the name of a field. The `value` of wrappers such as DoubleValue is left out, since users write none.
 std::string joined(const std::string& path, const FieldDescriptor& field) {
   if (field.containing_type()->full_name().starts_with("google.protobuf.")) return path;
   return path.empty() ? field.name() : path + "." + field.name();
 }
 
-using Predicate = std::function<bool(const Message&, const FieldDescriptor*)>;  // null: of the message as a whole
-/// Path of the first part for which `bad` is true.
+using Predicate = std::function<bool(const Message&, const FieldDescriptor*)>;  // a null field: asks for the message as a whole
+/// Path of the first field or message for which `bad` is true.
 std::optional<std::string> find_first(const Message& message, const std::string& path, const Predicate& bad) {
   if (bad(message, nullptr)) return path;
   std::vector<const FieldDescriptor*> given;
@@ -45,7 +45,7 @@ std::optional<std::string> find_first(const Message& message, const std::string&
   return std::nullopt;
 }
 
-/// Length of the well-formed character that starts `rest`; 0 = none (Unicode 15, table 3-7).
+/// Length of the UTF-8 character at the begin of `rest`. 0: it is not well-formed (Unicode 15, table 3-7).
 std::size_t utf8_length(std::string_view rest) {
   const auto at = [&](std::size_t i) { return i < rest.size() ? static_cast<unsigned char>(rest[i]) : 0u; };
   const auto follows = [&](std::size_t i, unsigned low = 0x80, unsigned high = 0xbf) { return at(i) >= low && at(i) <= high; };
@@ -97,7 +97,7 @@ Bytes serialized(const Message& message) {
 std::optional<std::string> first_unreal_number(const Message& message) {
   return find_first(message, "", [](const Message& m, const FieldDescriptor* field) {
     return field != nullptr && field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE &&
-           !std::isfinite(m.GetReflection()->GetDouble(m, field));  // none of our numbers are repeated
+           !std::isfinite(m.GetReflection()->GetDouble(m, field));  // no field of control.proto is a list of doubles
   });
 }
 

@@ -32,7 +32,7 @@ Result<Stamp> stamp_from(const v1::Time& time) {
   }
 }
 
-/// PoseUpdate, ObjectUpdate and Placement share these.
+/// Reads frame, position and orientation, which PoseUpdate, ObjectUpdate and Placement have.
 template <class Message>
 Result<RawPose> raw_from(const Message& m) {
   if (m.frame() != v1::FRAME_UNSPECIFIED && m.frame() != v1::NED_FRD && m.frame() != v1::ENU_FLU)
@@ -47,7 +47,7 @@ Result<RawPose> raw_from(const Message& m) {
   return raw;
 }
 
-/// PoseUpdate and ObjectUpdate share all but their first and last fields.
+/// Reads the fields that PoseUpdate and ObjectUpdate have in common: all but the name and `hidden`.
 template <class Message>
 Result<PoseSample> sample_from(const Message& m, PoseSample sample) {
   auto raw = raw_from(m);
@@ -73,7 +73,7 @@ Result<PoseSample> sample_from(const Message& m, PoseSample sample) {
 template <class Message>
 void fill_common(Message& m, const PoseSample& s) {
   const bool ned = s.sent_in == Frame::ned_frd;
-  const Pose pose = ned ? enu_flu_from_ned_frd(s.pose) : s.pose;  // its own inverse
+  const Pose pose = ned ? enu_flu_from_ned_frd(s.pose) : s.pose;  // the conversion is its own inverse
   m.set_seq(s.seq);
   m.set_frame(ned ? v1::NED_FRD : v1::ENU_FLU);
   m.set_reset_counter(s.reset_counter);
@@ -89,7 +89,7 @@ void fill_common(Message& m, const PoseSample& s) {
 }
 
 bool all_within(const v1::Vec3& v, double limit) {
-  return std::abs(v.x()) <= limit && std::abs(v.y()) <= limit && std::abs(v.z()) <= limit;  // false for NaN too
+  return std::abs(v.x()) <= limit && std::abs(v.y()) <= limit && std::abs(v.z()) <= limit;  // also false for NaN
 }
 
 }  // namespace

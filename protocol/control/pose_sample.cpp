@@ -8,14 +8,14 @@
 namespace sonar::control {
 namespace {
 
-constexpr double largest_position_m = 1e8;  // beyond any local world; keeps later sums exact to micrometres
-constexpr double largest_speed_mps = 1e4;   // nothing that carries a sonar
+constexpr double largest_position_m = 1e8;  // chosen: larger than any local world, and sums stay exact to micrometres
+constexpr double largest_speed_mps = 1e4;   // chosen, as the next: faster than anything that carries a sonar
 constexpr double largest_turn_radps = 1e3;
 
 template <std::size_t N>
 bool all_within(const std::array<double, N>& values, double limit) {
   for (const double v : values)
-    if (!(std::abs(v) <= limit)) return false;  // false for NaN too
+    if (!(std::abs(v) <= limit)) return false;  // the comparison is false for NaN
   return true;
 }
 template <std::size_t N>

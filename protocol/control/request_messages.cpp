@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t longest_name = 256, longest_path = 4096;
 
-/// Names end up in log lines and answers.
+/// Names are printed in log lines and answers, so control characters are refused: they could forge lines.
 Result<std::string> checked_text(const std::string& text, const char* key, bool needed, std::size_t longest = longest_name) {
   if (needed && text.empty()) return refused(std::string(key) + " is missing");
   if (text.size() > longest) return refused(std::string(key) + " is longer than " + std::to_string(longest) + " bytes");
@@ -135,7 +135,7 @@ Result<StopRecording> from(const v1::StopRecording& m) {
 
 Subscribe from(const v1::Subscribe& m) { return {m.pings(), m.clients(), m.poses(), m.scene(), m.faults()}; }
 
-/// A parameter as text; JSON and protobuf give numbers, strings and booleans.
+/// A parameter of a fault as text. JSON and protobuf may give it as a number, a string or a boolean.
 Result<std::string> text_from(const std::string& key, const google::protobuf::Value& value) {
   if (value.kind_case() == google::protobuf::Value::kStringValue) return checked_text(value.string_value(), key.c_str(), false);
   if (value.kind_case() == google::protobuf::Value::kBoolValue) return std::string(value.bool_value() ? "yes" : "no");
@@ -233,6 +233,7 @@ Result<Operation> operation_of(const v1::Request& message) {
   return Unsupported{};
 }
 
+/// The way back: a struct as the message of its operation, for clients and tests.
 struct FillRequest {
   v1::Request& out;
   void operator()(const Unsupported&) const {}

@@ -8,7 +8,7 @@
 namespace sonar::doctor {
 namespace {
 
-/// True when the daemon reports faults of the vehicle's poses.
+/// Whether the daemon has a note on the poses of the vehicle, which then stands in place of the finding that they are well.
 bool has_notes(const v1::DaemonStatus& status, const std::string& vehicle) {
   return std::any_of(status.notes().begin(), status.notes().end(),
                      [&vehicle](const v1::Note& note) { return note.vehicle() == vehicle; });

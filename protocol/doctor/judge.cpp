@@ -13,10 +13,10 @@ namespace {
 
 using text::format;
 
-constexpr double soon_s = 1;     // a correct driver has fired and has read within
-constexpr double recent_s = 60;  // older visits are not reported
-constexpr double enough_of_rate = 0.9;
-constexpr std::size_t most_elsewhere = 4;
+constexpr double soon_s = 1;               // within this time a correct driver has requested pings, and reads what was sent
+constexpr double recent_s = 60;            // visits that are longer ago are not reported
+constexpr double enough_of_rate = 0.9;     // a lower part of the requested rate is reported
+constexpr std::size_t most_elsewhere = 4;  // connections to wrong addresses that are reported at a time
 
 std::string seconds_text(double s) { return format("%.0f s", s); }
 
@@ -37,7 +37,8 @@ std::string addresses_of(const v1::SonarStatus& sonar) {
   return all;
 }
 
-/// "127.0.0.2, TCP port 52100"; only its address when it is controlled by HTTP.
+/// The address at which a driver connects, such as "127.0.0.2, TCP port 52100"; without a port if the sonar is controlled by
+/// HTTP.
 std::string where_to_connect(const v1::SonarStatus& sonar) {
   std::string at = sonar.listens();
   for (const v1::SonarAddress& address : sonar.addresses())
@@ -63,7 +64,8 @@ const v1::ClientStatus* find(const v1::SonarStatus* in, const std::string& addre
   return nullptr;
 }
 
-/// One finding for each fault or trouble that acts; a trouble lists its kinds, which are faults of their own.
+/// Makes one finding for each fault or trouble that acts. The kinds of a trouble are faults of their own in the status, so they
+/// are collected under its name.
 void check_faults(const v1::DaemonStatus& status, std::vector<Finding>& findings) {
   std::map<std::pair<std::string, std::string>, std::string> codes;  // codes by sonar and check
   std::set<std::pair<std::string, std::string>> ending;
@@ -83,7 +85,7 @@ void check_faults(const v1::DaemonStatus& status, std::vector<Finding>& findings
   if (codes.empty()) findings.push_back({Level::ok, "fault", "No fault acts", ""});
 }
 
-/// The findings of one sonar.
+/// Makes the findings of one sonar. `before_` is its earlier status, for values that are judged by their change.
 class SonarJudge {
  public:
   SonarJudge(const v1::DaemonStatus& status, const v1::SonarStatus& sonar, const v1::DaemonStatus* before,
@@ -248,7 +250,7 @@ class SonarJudge {
   std::vector<Finding>& findings_;
 };
 
-/// In stepped time: finds the client or request for which time waits.
+/// Finds the reason why stepped time does not advance: a client that has not read, a step, or a pose.
 void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, std::vector<Finding>& findings) {
   if (now.clock() == "realtime") return findings.push_back({Level::ok, "clock", "Time runs: clock: realtime", ""});
   const v1::ClientStatus* slowest = nullptr;
@@ -285,7 +287,7 @@ void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, st
                         ""});
 }
 
-/// Programs of this computer that connect to a port of sonars at an address where no sonar is.
+/// Finds programs of this computer that connect to the port of a sonar, but at an address without one.
 void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere, std::vector<Finding>& findings) {
   std::set<std::string> ports, ours;
   std::string where;
@@ -295,7 +297,7 @@ void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere,
     ports.insert(sonar.listens().substr(colon + 1));
     ours.insert(sonar.listens());
     where += (where.empty() ? "" : "; or at ") + where_to_connect(sonar);
-    if (sonar.listens().starts_with("0.0.0.0:")) return;  // every address of this computer
+    if (sonar.listens().starts_with("0.0.0.0:")) return;  // it listens at every address of this computer, so none is wrong
   }
   if (ports.empty()) return;
   const std::string cure = "point the driver at " + where;

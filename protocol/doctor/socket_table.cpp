@@ -16,13 +16,14 @@ std::optional<std::uint32_t> hexadecimal(std::string_view text) {
   return value;
 }
 
-/// A word of an address as the kernel prints it: the bytes of the network in the order of this computer, which is little-endian.
+/// The text of an IPv4 address. The kernel prints the four bytes of an address as a number of this computer, which is
+/// little-endian, so the first byte is the lowest.
 std::string ipv4_text(std::uint32_t word) {
   return std::to_string(word & 0xff) + "." + std::to_string(word >> 8 & 0xff) + "." + std::to_string(word >> 16 & 0xff) + "." +
          std::to_string(word >> 24);
 }
 
-/// "0200007F:CB84", or 32 digits for IPv6.
+/// Reads an address and a port such as "0200007F:CB84"; an IPv6 address has 32 digits.
 bool read_endpoint(std::string_view text, std::string& host, std::uint16_t& port) {
   const std::size_t colon = text.find(':');
   if (colon != 8 && colon != 32) return false;
@@ -35,7 +36,7 @@ bool read_endpoint(std::string_view text, std::string& host, std::uint16_t& port
     if (!word) return false;
     words[i] = *word;
   }
-  const bool mapped = words[0] == 0 && words[1] == 0 && words[2] == 0xffff0000;
+  const bool mapped = words[0] == 0 && words[1] == 0 && words[2] == 0xffff0000;  // ::ffff:a.b.c.d, an IPv4 peer of an IPv6 socket
   if (colon == 8)
     host = ipv4_text(words[0]);
   else if (mapped)
@@ -67,6 +68,7 @@ std::vector<SocketLine> parse_proc_net(std::string_view text) {
   return sockets;
 }
 
+// /proc/net/snmp has two lines that begin with "Tcp:": the names, then the values in the same order.
 std::uint64_t failed_attempts(std::string_view text) {
   std::istringstream lines{std::string(text)};
   std::string names, values;

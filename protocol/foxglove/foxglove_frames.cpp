@@ -5,12 +5,13 @@
 namespace sonar::foxglove {
 namespace {
 
-// Opcodes; what a number means differs by direction.
+// Opcodes. The same number has different meanings in the two directions.
 constexpr std::uint8_t to_viewer_message = 1, to_viewer_time = 2, to_viewer_answer = 3, to_viewer_playback = 5;
 constexpr std::uint8_t of_viewer_data = 1, of_viewer_call = 2, of_viewer_playback = 3;
 
 std::uint64_t ns_of(Time at) { return static_cast<std::uint64_t>(at.time_since_epoch().count()); }
 
+/// Writes a binary message field by field.
 class Frame {
  public:
   explicit Frame(std::uint8_t opcode) { writer_("opcode", opcode); }
@@ -23,7 +24,7 @@ class Frame {
     std::transform(text.begin(), text.end(), std::back_inserter(bytes_), [](char c) { return static_cast<std::byte>(c); });
     return *this;
   }
-  /// With its length.
+  /// Adds a text, preceded by its length (u32).
   Frame& counted(const std::string& counted) { return add(static_cast<std::uint32_t>(counted.size())).text(counted); }
   Bytes take() { return std::move(bytes_); }
 

@@ -48,6 +48,7 @@ void fill(fg::Pose& out, const Pose& pose) {
   fill(*out.mutable_orientation(), pose.orientation);
 }
 
+/// Adds a file after those that it imports, each file once: readers need them in this order.
 void add_with_imports(const pb::FileDescriptor& file, std::set<std::string>& known, pb::FileDescriptorSet& out) {
   if (!known.insert(file.name()).second) return;
   for (int i = 0; i < file.dependency_count(); ++i) add_with_imports(*file.dependency(i), known, out);
@@ -65,6 +66,7 @@ fg::SceneEntity& entity(fg::SceneUpdate& update, Time at, const std::string& id,
 
 using Stamp = std::function<Time(Time)>;
 
+/// Changes all times in a message and in those inside it: google.protobuf.Timestamp, and our own fields whose names end in _ns.
 void change_stamps(pb::Message& message, const Stamp& stamp) {
   if (auto* const at = dynamic_cast<pb::Timestamp*>(&message)) {
     const Time was{std::chrono::seconds(at->seconds()) + std::chrono::nanoseconds(at->nanos())};
@@ -98,7 +100,7 @@ Bytes with_stamps(const Channel& of, BytesView message, const Stamp& stamp) {
 }
 
 Bytes descriptor_set(const std::string& name) {
-  // Names the messages that are looked up only by name, so that the linker keeps them.
+  // These messages are looked up only by name. The calls keep the linker from dropping their files.
   fg::RawImage::descriptor();
   v1::PingGeometry::descriptor();
   v1::Picture::descriptor();
@@ -145,6 +147,7 @@ Bytes image_head(Time at, const std::string& frame, const Image& image) {
   message.set_height(image.height);
   message.set_encoding(image.encoding);
   message.set_step(static_cast<std::uint32_t>(image.width * image.bytes_per_sample));
+  // The samples are the last field, `data`. Its key and length end the head, so that the samples need not be copied behind it.
   Bytes head = bytes_of(message);
   constexpr unsigned length_delimited = 2;
   head.push_back(static_cast<std::byte>(fg::RawImage::kDataFieldNumber << 3 | length_delimited));

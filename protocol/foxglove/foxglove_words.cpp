@@ -11,11 +11,12 @@
 namespace sonar::foxglove {
 namespace {
 
-using Json = nlohmann::ordered_json;  // for writing; a look-up searches all keys
-using Read = nlohmann::json;          // for reading from viewers, which may send thousands of keys
+using Json =
+    nlohmann::ordered_json;   // for writing: keeps the order of keys, but a look-up takes time proportional to their number
+using Read = nlohmann::json;  // for reading from viewers, which may send thousands of keys
 constexpr int deepest = 16;
 
-/// Invalid UTF-8 in names is replaced, not refused.
+/// Names may be no UTF-8; such bytes are replaced, because a message must not fail by a name.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json json_of(Time at) {
@@ -41,7 +42,7 @@ Json json_of(const Parameter& parameter) {
   return json;
 }
 
-// ---- what viewers say
+// ---- messages of viewers
 
 tl::unexpected<Error> refused(const std::string& why) { return failure(ErrorKind::bad_data, why); }
 
@@ -49,7 +50,7 @@ bool is_u32(const Read& json) {
   return json.is_number_unsigned() && json.get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max();
 }
 
-/// The members of a list, each as `take` reads it; nothing = one is of a wrong type.
+/// The items of a list, each read by `take`. nullopt: there is no list, or an item is of a wrong type.
 template <class T, class Take>
 std::optional<std::vector<T>> list(const Read& word, const char* key, Take take) {
   const auto found = word.find(key);
@@ -93,7 +94,7 @@ std::string stray_field(const Read& object, std::span<const std::string_view> kn
     if (std::find(known.begin(), known.end(), key) == known.end()) return key.substr(0, 64);
   return {};
 }
-/// The first unknown field of a message or of an object in its lists.
+/// Name of the first unknown field of a message, or of an object in its lists. Empty: all fields are known.
 std::string stray_field(const Read& word) {
   constexpr std::array<std::string_view, 6> fields{"op",        "id", "subscriptions", "subscriptionIds", "parameterNames",
                                                    "parameters"};

@@ -10,13 +10,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Numbers of the format.
+// Constants of glTF 2.0: magic number and chunk types (section 4.4), component types and targets of buffer views.
 constexpr std::uint32_t magic = 0x46546C67, version = 2, chunk_json = 0x4E4F534A, chunk_bin = 0x004E4942;
 constexpr int type_float = 5126, type_u32 = 5125, target_vertices = 34962, target_indices = 34963;
 
 Vec3 y_up(Vec3 v) { return {v.x, v.z, -v.y}; }
 Json list(Vec3 v) { return Json::array({v.x, v.y, v.z}); }
 
+/// The normal of a vertex is the mean of those of its triangles, weighted by area, which is the length of the cross product.
 std::vector<Vec3> normals_of(std::span<const Vec3> vertices, std::span<const std::array<std::uint32_t, 3>> triangles) {
   std::vector<Vec3> normals(vertices.size());
   for (const auto& [a, b, c] : triangles) {
@@ -45,7 +46,7 @@ void put(wire::Bytes& out, std::span<const Vec3> vectors) {
 wire::Bytes glb(std::span<const Vec3> vertices, std::span<const std::array<std::uint32_t, 3>> triangles,
                 const std::array<double, 3>& colour) {
   const std::size_t of_vectors = 12 * vertices.size(), of_indices = 12 * triangles.size();
-  const std::size_t of_data = 2 * of_vectors + of_indices;  // a multiple of 4, as chunks must be
+  const std::size_t of_data = 2 * of_vectors + of_indices;  // always a multiple of 4, which the format demands of chunks
   Vec3 least = vertices.empty() ? Vec3{} : y_up(vertices.front()), most = least;
   for (const Vec3& v : vertices) {
     const Vec3 t = y_up(v);

@@ -16,7 +16,7 @@ wire::Bytes figures(const std::array<double, figure_names.size()>& values) {
 }
 
 wire::Bytes with_stamp(wire::BytesView figures, const std::function<Time(Time)>& stamp) {
-  constexpr std::size_t at = 4;  // behind the head
+  constexpr std::size_t at = 4;  // offset of the first field, stamp_s: behind the head of CDR
   wire::Reader reader(figures.subspan(at));
   double stamp_s = 0;
   reader("stamp_s", stamp_s);
