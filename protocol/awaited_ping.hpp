@@ -13,10 +13,10 @@ class AwaitedPing {
  public:
   bool is_under_way() const { return fired_ != nullptr; }
   Time fired_at() const { return fired_at_; }
-  /// Time at which it is taken as lost. It is still sent if it comes later.
+  /// Time at which the ping counts as lost. It is still sent if it comes later.
   Time lost_at() const { return fired_at_ + longest_wait; }
 
-  /// `with`: RequestPing::with.
+  /// Begins to wait for a ping. `with`: RequestPing::with, by which arrive() recognises it.
   void begin(std::shared_ptr<const VendorSettings> with, Time now) {
     fired_ = std::move(with);
     fired_at_ = now;
@@ -35,7 +35,7 @@ class AwaitedPing {
     if (fired_ && made_with == fired_.get()) return fired_.reset(), Arrival::awaited;
     return Arrival::other;
   }
-  /// A ping that still comes is then of another request.
+  /// Stops waiting. If the ping still comes, arrive() returns `other`.
   void forget() {
     fired_.reset();
     late_.reset();

@@ -9,8 +9,8 @@
 
 namespace sonar::protocol {
 
-/// "the range of a Surveyor is 0.01 to 200 m, not 400 m (end_mm)"; empty when `range_m` is from `low_m` to `high_m`. `of`: "a
-/// Surveyor".
+/// The refusal of a range, such as "the range of a Surveyor is 0.01 to 200 m, not 400 m (end_mm)". Empty: `range_m` is from
+/// `low_m` to `high_m`. `of`: the sonar, such as "a Surveyor".
 inline std::string range_complaint(double range_m, std::string_view of, double low_m, double high_m,
                                    std::string_view field = {}) {
   if (range_m >= low_m && range_m <= high_m) return {};

@@ -12,10 +12,12 @@ namespace sonar::protocol {
 /// Cheap to copy.
 class Sweep {
  public:
-  /// At least 4 directions of a turn: 0 looks astern, the next ones over port back to astern.
+  /// `directions`: number of directions in a turn, at least 4. Direction 0 looks astern; the others follow over port, ahead and
+  /// starboard.
   explicit Sweep(std::size_t directions) : lines_(directions) {}
   std::size_t directions() const { return lines_.size(); }
-  /// Begins anew where the rows are others. `ping` gets the picture, which is whole once the half ahead was scanned.
+  /// Adds a line. If it has other rows than the lines before, those are dropped. `ping` gets the picture, which is whole when the
+  /// half ahead has been scanned.
   void add(std::size_t direction, Line line, double row_m, HostPing& ping);
 
  private:

@@ -14,7 +14,7 @@ using Line = std::vector<float>;  // by range, [dB]
 /// The lines of the last pings.
 class Waterfall {
  public:
-  /// Begins anew where the rows are others. `ping` gets the drawing.
+  /// Adds a line. If it has other rows than the lines before, those are dropped. `ping` gets the drawing.
   void add(Line line, double start_m, double row_m, HostPing& ping);
 
  private:

@@ -20,7 +20,7 @@ inline constexpr std::size_t longest_datagram = 1400;  // an older sample progra
 Bytes raw_from_picture(BytesView picture, std::size_t samples, int pings);
 Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings);
 
-/// Datagrams of a frame, of at most `longest` bytes, 1400 or more: the header is in the first, the samples in all.
+/// The datagrams of a frame. The first has the header; all have samples. `longest`: at most so many bytes each, 1400 or more.
 std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples,
                             std::size_t longest = longest_datagram);
 std::vector<Bytes> encode_frame(const Ping& ping, const protocol::DeviceState& device, const Settings& settings);
@@ -33,8 +33,8 @@ Bytes make_beacon(const protocol::DeviceState& device);
 
 /// Vendor::change_integer of a datagram of a frame: ping_id (FrameIndex, which counts from 0) and image_size (total_data_size).
 bool change_part(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& part);
-/// The same of a beacon: device_id; connected_address (not 0: a controller is connected); device_status (bits of an Oculus:
-/// 0x4000 too hot, 0x8000 stopped by heat).
+/// Vendor::change_integer of a beacon: device_id; connected_address (not 0: a controller is connected); device_status (bits of an
+/// Oculus: 0x4000 too hot, 0x8000 stopped by heat).
 bool change_beacon(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& beacon);
 
 /// A frame put together from all its parts.

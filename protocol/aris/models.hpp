@@ -25,7 +25,7 @@ inline constexpr int channels = 16;  // beams that one ping of a frame forms
 inline constexpr std::array<float, channels> channel_gain_db{-1.13f, 1.39f, -0.99f, 0.55f, -0.07f, -0.12f, -0.18f, 0.72f,
                                                              -0.48f, 0.63f, -0.74f, 0.67f, 0.23f,  -0.56f, 0.53f,  -0.45f};
 
-/// How the beams of a frame are formed: `pings` pings of 16 interleaved beams.
+/// A ping mode: a frame consists of `pings` pings of 16 beams each, which interleave.
 struct PingMode {
   std::uint32_t number = 0;
   int pings = 0;

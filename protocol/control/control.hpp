@@ -31,20 +31,21 @@ tl::expected<Request, RefusedRequest> decode_request(BytesView message);
 /// Whether a message of the stream is a pose without an id, which gets no answer. Looks at its outline only: much cheaper than
 /// decode_request().
 bool is_unasked_pose(BytesView message);
-/// Bytes of texts that are no UTF-8 are sent as '?'.
+/// The bytes of a response. Bytes of its texts that are no UTF-8 become '?'.
 Bytes encode_response(v1::Response response);
 
-/// For senders. The sample's pose is sent as ENU_FLU, or turned into NED_FRD depending on `sent_in`.
+/// The datagram of a pose, for senders. The pose is sent in the frame `sent_in`.
 Bytes encode_pose_datagram(const PoseSample& sample);
 Bytes encode_request(const Request& request);
-/// bad_data: not a Response, numbers that are NaN or infinite, orientations of another norm than 1, an event of an unknown kind.
+/// Reads a response. bad_data: the bytes are not a Response, a number is NaN or infinite, an orientation has another norm than 1,
+/// or an event is of an unknown kind.
 Result<std::shared_ptr<const v1::Response>> decode_response(BytesView message);
 
 // ---- the same in protobuf's JSON mapping, for HTTP and for people
 
-/// `op` is the name of a member of Request.op ("sonar", "set_object"), `json` its message. Refused with one sentence: not JSON,
-/// an unknown key, a wrong type, and whatever decode_request refuses. `name`: of the sonar or object that the message is about,
-/// when it is given elsewhere, as in a path.
+/// Reads a request from JSON. `op` is the name of a member of Request.op ("sonar", "set_object"), `json` its message. `name`: the
+/// sonar or object that the message is about, if it is given elsewhere, as in a path. Text that is not JSON, an unknown key, a
+/// wrong type, and whatever decode_request() refuses are refused with one sentence.
 Result<Request> request_from_json(std::string_view op, std::string_view json, std::string_view name = {});
 /// One line, no newline; names as in control.proto, numbers that are 0 and empty lists too. 64-bit numbers are strings, as
 /// protobuf's mapping has it.

@@ -13,10 +13,10 @@
 
 namespace sonar::control {
 
-/// How far the length of an orientation quaternion may be from 1.
+/// An orientation quaternion whose length differs from 1 by more than this is refused.
 inline constexpr double largest_norm_error = 1e-3;
 
-/// Whose clock a stamp was read from (docs/poses.md, "Time and order").
+/// The clock of a time stamp (docs/poses.md, "Time and order").
 enum class ClockDomain {
   wall,     // UNIX time of a computer whose clock agrees with ours
   sim,      // the sender's own, any origin
@@ -28,7 +28,7 @@ struct Stamp {
   ClockDomain domain = ClockDomain::arrival;
   std::int64_t ns = 0;
 };
-/// Axes a sender speaks in. World and body change together.
+/// The axes in which a sender gives poses: those of the world and those of the body together.
 enum class Frame { ned_frd, enu_flu };
 std::string_view name_of(Frame frame);  // "NED/FRD"
 
@@ -48,7 +48,7 @@ struct PoseSample {
   std::string fields;              // for the log: what the message contained
 };
 
-/// The numbers of a message before anybody believed them. Velocities are in body axes of `frame`.
+/// The numbers of a message before checked() has validated them. Velocities are in the body axes of `frame`.
 struct RawPose {
   std::optional<Frame> frame;
   std::array<double, 3> position_m{};

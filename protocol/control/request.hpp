@@ -25,7 +25,7 @@ struct Hello {
   std::string name;
   std::string token = {};  // the content of control.token_file
 };
-struct Unsupported {  // a request this version does not know
+struct Unsupported {  // a request that this version does not have
 };
 struct Request {
   std::uint64_t id = 0;

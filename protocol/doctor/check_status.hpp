@@ -16,10 +16,10 @@ inline constexpr const char* less_to_compute =
     "fewer beams, less range, more threads (engine.threads), or less else on this computer";
 inline constexpr const char* free_a_place = "stop the other client, or raise clients.max of the sonar";
 
-/// "computing takes 138 ms per ping: 7.2 Hz at most here".
+/// A text such as "computing takes 138 ms per ping: 7.2 Hz at most here".
 std::string computing_text(double ms_per_ping);
 
-/// Poses that have stopped, notes, refused poses.
+/// Adds findings for vehicles whose poses come or have stopped, notes, and refused poses.
 void check_poses(const v1::DaemonStatus& status, std::vector<Finding>& findings);
 
 }  // namespace sonar::doctor

@@ -20,7 +20,8 @@ struct Elsewhere {
 /// null = none.
 std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere = {});
 
-/// No driver is connected, and no fault acts, which may refuse the connections of a driver at the right address.
+/// Whether drivers at wrong addresses are searched for: none is connected, and no fault acts that may refuse connections at the
+/// right address.
 bool looks_elsewhere(const v1::DaemonStatus& status);
 
 }  // namespace sonar::doctor

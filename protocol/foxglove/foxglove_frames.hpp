@@ -19,7 +19,7 @@ using wire::BytesView;
 Bytes message_head(std::uint32_t subscription, Time at);
 Bytes time_frame(Time now);
 
-/// `payload` in `encoding`; the same both ways.
+/// A call of a service, or its answer, which has the same fields. `payload` is in `encoding`.
 struct ServiceCall {
   std::uint32_t service = 0, call = 0;
   std::string encoding;
@@ -48,7 +48,7 @@ struct PlaybackControl {
 /// opcode here.
 Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView frame);
 
-/// For tests and clients.
+/// The bytes of a call or a playback control, as a viewer sends them; for tests and clients.
 Bytes encode(const ServiceCall& call);
 Bytes encode(const PlaybackControl& control);
 

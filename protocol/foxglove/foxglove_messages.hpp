@@ -24,10 +24,10 @@ namespace sonar::foxglove {
 using wire::Bytes;
 using wire::BytesView;
 
-/// The FileDescriptorSet of a message that is linked in ("foxglove.RawImage", "sonar.v1.PingEvent"), with all that it imports.
-/// Empty: there is none of that name.
+/// The FileDescriptorSet of a message such as "foxglove.RawImage" or "sonar.v1.PingEvent", with all files that it imports. Empty:
+/// no message of this name is linked in.
 Bytes descriptor_set(const std::string& name);
-/// The same as a channel of the socket states it: in base64.
+/// The descriptor set in base64, as channels of the socket state it.
 Schema protobuf_schema(const std::string& name);
 
 /// A message of the channel with other times: its stamps, and fields of our own in nanoseconds of the daemon's time.
@@ -44,7 +44,7 @@ struct Image {
 /// `codes`: [rows][beams], little-endian, of `bits` = 8, 16, 24 or 32.
 Image image_of(std::size_t beams, std::size_t rows, int bits, std::uint32_t max_code, std::shared_ptr<const Bytes> codes);
 Image image_of(const std::shared_ptr<const Ping>& ping);
-/// foxglove.RawImage up to the samples, which end it.
+/// The bytes of a foxglove.RawImage before the samples, which are its last field.
 Bytes image_head(Time at, const std::string& frame, const Image& image);
 Bytes raw_image(Time at, const std::string& frame, const Image& image);  // whole
 

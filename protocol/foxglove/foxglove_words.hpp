@@ -19,7 +19,7 @@ namespace sonar::foxglove {
 inline constexpr std::size_t longest_word = 64u << 10;  // longest word that a viewer may send
 inline constexpr std::size_t most_parameters = 64;      // limit for one request
 
-/// How messages are described to viewers: text is base64 where the encoding is "protobuf".
+/// A description of messages for viewers. `text` is base64 if the encoding is "protobuf".
 struct Schema {
   std::string name, encoding, text;
 };
@@ -88,8 +88,8 @@ struct UnknownWord {
   std::string op;
 };
 using ViewerWord = std::variant<UnknownWord, Subscribe, Unsubscribe, GetParameters, SetParameters, WatchParameters, Incapable>;
-/// bad_data: no JSON object, nested deeper than 16, no "op", or a field of a wrong type. `stray`, if not null: the name of a
-/// field that the protocol does not have; empty = there is none.
+/// Reads a JSON message of a viewer. `stray`, if not null, gets the name of a field that the protocol does not have, or nothing.
+/// bad_data: no JSON object, nested deeper than 16, no "op", or a field of a wrong type.
 Result<ViewerWord> word_of_viewer(std::string_view text, std::string* stray = nullptr);
 
 }  // namespace sonar::foxglove

@@ -17,7 +17,7 @@ inline constexpr std::array<std::string_view, 15> figure_names = {
 /// sonard_msgs/msg/SonarFigures: float64 each, by the names above.
 Schema figures_schema();
 wire::Bytes figures(const std::array<double, figure_names.size()>& values);
-/// The same with another stamp_s.
+/// The figures with another stamp_s.
 wire::Bytes with_stamp(wire::BytesView figures, const std::function<Time(Time)>& stamp);
 
 }  // namespace sonar::foxglove

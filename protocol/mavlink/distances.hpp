@@ -33,9 +33,10 @@ class DistanceRequests {
 
   bool wanted() const { return interval_us_ || once_; }
   void ask_once() { once_ = true; }
-  /// As in MAV_CMD_SET_MESSAGE_INTERVAL: -1 = none, 0 = all. Any other number below 0, or NaN, returns false and changes nothing.
+  /// Sets the interval as MAV_CMD_SET_MESSAGE_INTERVAL gives it: -1 = no messages, 0 = one for each ping. False: another negative
+  /// number or NaN, which changes nothing.
   bool set_interval_us(float wanted);
-  /// True if this one is to be sent; it then counts as sent.
+  /// Whether this distance is to be sent. It then counts as sent.
   bool is_due(const DistanceSensor& measured);
 
  private:

@@ -109,7 +109,7 @@ constexpr void fields(V& visit, M& m) {
   visit("vx", m.north_cmps), visit("vy", m.east_cmps), visit("vz", m.down_cmps), visit("hdg", m.heading_cdeg);
 }
 
-/// Where the autopilot's local north-east-down begins.
+/// The origin of the autopilot's local north-east-down axes.
 struct GpsGlobalOrigin {
   static constexpr std::uint32_t id = 49;
   static constexpr std::uint8_t crc_extra = 39;

@@ -71,7 +71,7 @@ class Decoder {
 std::vector<std::string> identity_violations(const DecodedPing& ping);
 /// The differences between a request and its echo that drivers check. `gain_echo` as the option.
 std::vector<std::string> echo_violations(const FireRequest& sent, const DecodedPing& ping, std::string_view gain_echo = "auto");
-/// The same for a status datagram: length, type, device id, addresses, status bits, temperature.
+/// The violations of a status datagram: length, type, device id, addresses, status bits.
 std::vector<std::string> status_violations(const StatusMessage& status, std::size_t datagram_size);
 
 /// Checks between pings: one device id, rising ping ids. Skipped ids are counted, not reported as violations.

@@ -11,7 +11,8 @@
 
 namespace sonar::oculus {
 
-/// 37.5 MHz / 143, exact in the capture (M1200d mode 2). unknown: the rate of other modes; sonard uses the same.
+/// Sample rate behind the rows: 37.5 MHz / 143, exact in the capture (M1200d, mode 2). unknown: the rate of other modes; sonard
+/// uses the same.
 inline constexpr double row_rate_hz = 37.5e6 / 143.0;
 inline constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus issue 13: 0-100 % is 0-96 dB
 inline constexpr int row_limit = 720;             // liboculus node README, measured by its authors
@@ -25,7 +26,7 @@ struct RowGrid {
 };
 RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz = row_rate_hz);
 
-/// 0 = standby; unknown values count as 10 Hz (chosen).
+/// The rate that a code stands for [Hz]; 0 = standby. Unknown codes count as 10 Hz (chosen).
 double table_rate_hz(PingRate rate);
 /// Exponent of the samples: value / 255, and 1 for 0.
 float gamma_from_byte(std::uint8_t value);
@@ -42,7 +43,7 @@ bool asks_for_gain_assist(const FireSettings& fire, std::string_view option);
 /// 2^32 - 1. 32-bit samples have no time-varied gain: 10^(gain_db / 10).
 std::vector<std::uint32_t> digital_row_gains(const PingSettings& settings);
 
-/// True when a double of the message is NaN or infinite: the message must be ignored.
+/// Whether a double of the message is NaN or infinite. Such a message must be ignored.
 bool has_non_finite(const FireSettings& fire);
 /// Index into the model's modes; unknown modes count as 1.
 int mode_index(const SonarModel& model, std::uint8_t wire_mode);
@@ -58,10 +59,10 @@ struct ResolvedSettings {
 /// The fire message must be finite.
 ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& device);
 
-/// Bytes of a ping result made with these settings.
+/// Size in bytes of a ping result with these settings.
 std::size_t ping_size(const PingSettings& settings);
 
-/// "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, own sound speed, 512 beams, 8 bits, ...": for the log.
+/// A line for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, own sound speed, 512 beams, 8 bits, ...".
 std::string describe(const FireRequest& fire);
 
 }  // namespace sonar::oculus

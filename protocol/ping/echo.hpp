@@ -1,5 +1,6 @@
-// The laws by which the family's range finders read a ping of one beam: the distance to the strongest echo, and range and gain
-// for the next ping. Pure functions; the laws are assumptions (docs/protocols/ping1d.md).
+// Finds in a ping of one beam the distance to the strongest echo, and from it the range and gain of the next ping, for the range
+// finders of the family. Pure functions; how a real device does this is unknown, so all of it is assumed
+// (docs/protocols/ping1d.md).
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,7 @@ namespace sonar::ping {
 inline constexpr double nearest_echo_m = 0.3;
 inline constexpr std::uint32_t shortest_range_mm = 1000;
 
-/// Messages that come of a ping, as bits.
+/// The messages that are to be made of a ping, as bits.
 using Results = unsigned;
 inline constexpr Results no_result = 0;
 
@@ -21,10 +22,10 @@ struct Echo {
   double peak = 0;     // the highest amplitude; 255 is full scale
   int confidence = 0;  // per cent
 };
-/// The strongest echo of a profile: where it begins.
+/// Finds the strongest echo of a profile, and the range at which it begins.
 Echo find_echo(const Ping& ping);
 
-/// From the sonar on.
+/// The range of a ping, counted from the sonar, and its gain.
 struct Reach {
   std::uint32_t length_mm = 0;
   int gain = 0;  // index of a gain

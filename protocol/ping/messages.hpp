@@ -95,7 +95,7 @@ constexpr void fields(V& visit, M& m) {
   visit("dst_device_id", m.destination, means::destination_id);
 }
 
-/// The whole frame, of a device with that id to any host.
+/// The whole frame of a message. `source`: id of the device; the frame is for any host.
 Bytes framed(Id id, std::uint8_t source, BytesView payload);
 template <class M>
 Bytes framed_message(Id id, std::uint8_t source, const M& message) {
@@ -121,7 +121,7 @@ class Framer {
   explicit Framer(std::size_t longest = longest_request, bool all_is_there = false)
       : longest_(longest), all_is_there_(all_is_there) {}
   void append(BytesView received);
-  /// Call it when no more bytes come.
+  /// Call it when no more bytes will come.
   void end() { all_is_there_ = true; }
   std::optional<Frame> next();
   /// The bytes of the last frame whose sum is right, until append().
@@ -129,7 +129,7 @@ class Framer {
   /// Drops a frame that is not whole yet.
   void drop_rest();
   std::size_t waiting_bytes() const { return buffer_.size() - begin_; }
-  /// How far the search is, from the first byte of all on.
+  /// Number of bytes that have been searched, counted from the first that was ever appended.
   std::uint64_t passed() const { return erased_ + begin_; }
 
  private:

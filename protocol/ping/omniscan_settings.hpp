@@ -1,4 +1,5 @@
-// The laws of an Omniscan 450: its settings, and the frame of a ping. Pure functions; sources: docs/protocols/ping.md.
+// The Omniscan 450: its product, the checks of its settings, and the frame of a ping. Pure functions; sources:
+// docs/protocols/ping.md.
 #pragma once
 
 #include <vector>
@@ -19,10 +20,10 @@ struct Settings {
   bool operator==(const Settings&) const = default;
 };
 using HeldSettings = protocol::Held<Settings>;
-/// Null: the settings of a new device.
+/// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Why the device refuses the parameters; empty if it accepts them.
+/// The reason if the device refuses the parameters, else an empty text.
 std::string complaint(const OsPingParams& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);

@@ -1,4 +1,4 @@
-// The laws of a Ping1D: its settings, the distance in a ping, and what its automatic mode makes of it. Pure functions; sources:
+// The Ping1D: its product, the checks of its settings, its automatic mode, and the frames of a ping. Pure functions; sources:
 // docs/protocols/ping1d.md.
 #pragma once
 
@@ -41,13 +41,13 @@ struct Settings {
   Parameters parameters;
   Results results = no_result;  // results for which the ping is fired; a ping without a host has its profile
 };
-/// But for the results, which differ from ping to ping.
+/// Compares settings without the results, which differ from ping to ping.
 bool same_settings(const Settings& a, const Settings& b);
 using HeldSettings = protocol::Held<Settings>;
-/// The settings of a new device, for null.
+/// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Why the device refuses them; empty = it does not.
+/// The reason if the device refuses the parameters, else an empty text.
 std::string complaint(const Parameters& parameters);
 /// Duration of its pulse.
 std::uint16_t transmit_us(const Parameters& parameters);
@@ -60,7 +60,7 @@ using ping::find_echo;
 /// The automatic mode: range and gain after a ping in which that echo was found.
 Parameters adjusted(const Parameters& made_with, const Echo& echo);
 
-/// Those of Settings::results, in the order of their numbers.
+/// The frames for Settings::results, in the order of their numbers.
 std::vector<Bytes> frames_of(const Ping& ping);
 
 }  // namespace sonar::ping::ping1d

@@ -1,5 +1,5 @@
-// The laws of a Ping360: which settings are valid, what they mean for a ping, and where the head goes. Pure functions; sources:
-// docs/protocols/ping.md.
+// The Ping360: its product, the checks of its settings, their conversion to PingSettings, and the turning of its head. Pure
+// functions; sources: docs/protocols/ping.md.
 #pragma once
 
 #include <optional>
@@ -28,13 +28,13 @@ struct Settings {
   std::uint16_t start = 0, stop = 399;
   std::uint8_t steps = 1, delay_ms = 0;
 };
-/// But for the angle, which changes with every ping.
+/// Compares settings without the angle, which changes with every ping.
 bool same_settings(const Settings& a, const Settings& b);
 using HeldSettings = protocol::Held<Settings>;
-/// The settings of a new device, for null.
+/// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Why the device refuses it; empty = it does not.
+/// The reason if the device refuses the request, else an empty text.
 std::string complaint(const Transducer& t);
 std::string complaint(const AutoTransmit& t);
 Settings settings_of(const Transducer& t);
@@ -44,25 +44,27 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// How far the sonar is turned to port for the head to look at that angle, which grows to starboard.
+/// Angle by which the sonar is turned to port, so that it looks to the angle of its head [rad]. Angles of the head grow to
+/// starboard.
 double head_rad(std::uint16_t angle, const protocol::OptionValues& options);
-/// Time the samples of a ping take.
+/// Time in which the samples of a ping are taken.
 std::chrono::nanoseconds listening(const Transducer& t);
-/// Time the answer of a ping takes on its link.
+/// Time in which the answer of a ping is sent on the link.
 std::chrono::nanoseconds transfer(const Transducer& t, const protocol::OptionValues& options);
 
-/// Where the head is: it turns by the shorter way, a grad in 6 ms.
+/// The position of the head while it turns. It takes the shorter way, a grad in 6 ms.
 struct Head {
   int from = 0, to = 0;  // grad; `to` may lie beyond a turn
   Time since{};
   Time arrives() const;
   std::uint16_t target() const { return static_cast<std::uint16_t>((to % grads + grads) % grads); }
   std::uint16_t angle_at(Time at) const;
-  /// From where it is then.
+  /// Begins a turn at the time `at`, from the angle that the head then has.
   void turn_to(std::uint16_t angle, Time at);
 };
 
-/// The angle after `angle` in a scan. `back`: the way across a sector that holds angle 0, which option sector_scan decides.
+/// The angle that follows `angle` in a scan. `back` is kept between calls: the scan is on its way back across a sector that holds
+/// angle 0. `oscillates`: option sector_scan.
 std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, bool oscillates);
 
 }  // namespace sonar::ping::ping360

@@ -17,7 +17,7 @@ using protocol::Waterfall;
 
 inline constexpr double usual_range_m = 10;
 
-/// 0: as the device likes.
+/// The period for the wanted rate [ms]. 0: no rate is wanted, so the device chooses it.
 double period_ms_of(const protocol::SettingsOverride& wanted);
 
 /// Reads a message off the front of the payload; returns the rest.
@@ -59,7 +59,7 @@ class PingHost : public protocol::Host {
   Framer framer_{65535};
 };
 
-/// usage: settings that a sonar with these options of sonarctl, and one mode, does not have.
+/// Checks the wanted settings of a sonar with these options of sonarctl and one mode. usage: a setting that it does not have.
 Result<void> check_wanted(std::string_view title, std::initializer_list<std::string_view> known, const protocol::Wanted& wanted);
 
 template <class Product>

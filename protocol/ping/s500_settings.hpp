@@ -1,5 +1,5 @@
-// The laws of an S500: its settings, the distances over several pings, and the frames of a ping. Pure functions; sources:
-// docs/protocols/ping1d.md.
+// The S500: its product, the checks of its settings, the mean of its distances, and the frames of a ping. Pure functions;
+// sources: docs/protocols/ping1d.md.
 #pragma once
 
 #include <string>
@@ -35,13 +35,13 @@ struct Settings {
   Results results = no_result;  // results for which the ping is fired; a ping without a host has its profile
   std::vector<Echo> earlier;    // the newest is the last
 };
-/// But for the results and the echoes, which differ from ping to ping.
+/// Compares settings without the results and the echoes, which differ from ping to ping.
 bool same_settings(const Settings& a, const Settings& b);
 using HeldSettings = protocol::Held<Settings>;
-/// The settings of a new device, for null.
+/// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Why the device refuses it; empty = it does not.
+/// The reason if the device refuses the request, else an empty text.
 std::string complaint(const SetPingParams& wanted);
 /// The parameters in force after the request.
 Parameters requested(const Parameters& before, const SetPingParams& wanted);
@@ -52,9 +52,9 @@ protocol::ChangeSettings change_to(const Settings& settings);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 double gain_percent(const Parameters& parameters);
 
-/// `now` after a ping, which may have been made with others.
+/// The settings `now`, changed by the automatic range and gain after a ping. The ping may have been made under earlier settings.
 Settings after(const Ping& ping, const Settings& now);
-/// Those of Settings::results, in the order of their numbers.
+/// The frames for Settings::results, in the order of their numbers.
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device);
 
 }  // namespace sonar::ping::s500

@@ -10,7 +10,9 @@
 
 namespace sonar::ping {
 
-/// `Settings` as those of a StreamingConversation, and with `results`, for which a ping is fired; `Held` holds them.
+/// A ping is fired when results are wanted (`once_`, `streamed_`) and its interval is over (`due_`); until it comes, or two
+/// seconds have passed, no other is fired. `Settings`: as for StreamingConversation, and with `results`, for which a ping is
+/// fired. `Held` holds them.
 template <class Settings, class Held, Settings (*settings_from)(const VendorSettings*)>
 class SoundingConversation : public StreamingConversation<Settings, settings_from> {
   using Base = StreamingConversation<Settings, settings_from>;
@@ -58,7 +60,7 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
   void want_once(Results result, Time now, protocol::Reaction& reaction) { want(once_, result, now, reaction); }
   void stream(Results result, Time now, protocol::Reaction& reaction) { want(streamed_, result, now, reaction); }
   void stop_stream(Results result) { streamed_ &= ~result; }
-  /// A ping under way serves no request any more.
+  /// The ping that is being made no longer serves a request.
   void forget_ping(Time now) {
     fired_.reset();
     due_ = now;
@@ -70,15 +72,15 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
     write("value", value);
     return framed(id, this->id_, payload);
   }
-  /// Hundredths of a degree, so far above the water.
+  /// The temperature of the water plus `above_c`, in hundredths of a degree.
   std::uint16_t centidegrees(double above_c) const {
     return static_cast<std::uint16_t>(std::lround(std::max(100 * (this->device_.water.temperature_c + above_c), 0.0)));
   }
 
  private:
-  /// A ping under way does not serve the new request; the next ping does.
+  /// The ping that is being made does not serve the new request; the next one does.
   void want(Results& results, Results result, Time now, protocol::Reaction& reaction) {
-    // Pings are enabled as the device comes: now they are made.
+    // The initial settings enable pings, but the sonar pings only after a first change of settings: this one.
     if (!std::exchange(has_asked_, true)) this->change(reaction, [](Settings&) {});
     if (wanted() == no_result) due_ = now;
     results |= result;

@@ -9,13 +9,14 @@
 namespace sonar::ping {
 
 constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number) {
-  // Hosts of ping-python read one message of each packet they receive: messages written together fill their queue. Chosen.
+  // ping-python reads one message of each packet it receives, so messages that are written together would fill its queue. Chosen.
   constexpr std::chrono::milliseconds between_messages{3};
   return {{{.kind = protocol::Port::Kind::tcp_stream, .number = number, .gap = between_messages},
            {.kind = protocol::Port::Kind::udp_dialogue, .number = number}}};
 }
 
-/// `Settings` of a product have `id` and `parameters.enable`; its change_to() makes settings of pings of them.
+/// The conversation of a product that pings while a host enables it. Its `Settings` have `id` and `parameters.enable`; its
+/// change_to() converts them to PingSettings.
 template <class Settings, Settings (*settings_from)(const VendorSettings*)>
 class StreamingConversation : public Conversation {
  public:
@@ -36,7 +37,7 @@ class StreamingConversation : public Conversation {
     change(reaction, [](Settings&) {});
   }
   Settings settings() const { return settings_from(device_.settings.get()); }
-  /// With the changes of the same call, which are not in force yet.
+  /// The settings after the changes of this call, which the daemon has not made yet.
   Settings settings_after(const protocol::Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }

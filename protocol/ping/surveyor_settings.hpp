@@ -1,4 +1,5 @@
-// The laws of a Surveyor 240: its settings, and the frames of a ping. Pure functions; sources: docs/protocols/ping.md.
+// The Surveyor 240: its product, the checks of its settings, and the frames of a ping. Pure functions; sources:
+// docs/protocols/ping.md.
 #pragma once
 
 #include <optional>
@@ -21,10 +22,10 @@ struct Settings {
 /// Clocks that differ by less than a millisecond are the same.
 bool same_settings(const Settings& a, const Settings& b);
 using HeldSettings = protocol::Held<Settings>;
-/// Null: the settings of a new device.
+/// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Why the device refuses the parameters; empty if it accepts them.
+/// The reason if the device refuses the parameters, else an empty text.
 std::string complaint(const PingParameters& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);

@@ -25,7 +25,7 @@ class Source {
   /// Fills `into` from `offset` on; fewer bytes only where the source ends or cannot be read.
   virtual std::size_t read_at(std::uint64_t offset, std::span<std::byte> into) = 0;
 };
-/// missing_file, io; a folder or a pipe is bad_data.
+/// Opens a file. missing_file, io; bad_data: a folder or a pipe.
 Result<std::unique_ptr<Source>> open_source(const std::filesystem::path& file);
 std::unique_ptr<Source> source_from(std::string name, Bytes bytes);
 
@@ -59,7 +59,7 @@ class Scan {
   /// The next `count` bytes, fewer at the end; the position moves past them. Valid until the next call. Allocates no more than
   /// the source holds, but the caller must bound `count`, since sources can be large.
   BytesView read(std::size_t count);
-  /// The same, without moving.
+  /// The next `count` bytes like read(), but the position stays.
   BytesView peek(std::size_t count);
   void seek(std::uint64_t position) { position_ = position; }
   void skip(std::uint64_t count) { position_ += std::min(count, left()); }

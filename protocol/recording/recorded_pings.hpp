@@ -16,7 +16,7 @@ struct RecordedPing {
 
 class RecordedPings {
  public:
-  /// bad_data: "holds no ping of a known sonar".
+  /// bad_data: the recording holds no ping of a known sonar.
   static Result<RecordedPings> open(std::unique_ptr<RecordingReader> reader);
 
   /// nullopt at the end.

@@ -12,7 +12,7 @@
 
 namespace sonar::recording {
 
-/// ".pcap, .mcap, .raw, .oculus, ...": of every kind of file that is read and written.
+/// The endings of all kinds of files that are read and written, such as ".pcap, .mcap, .raw, .oculus".
 std::string file_endings();
 
 struct Recording {
@@ -24,8 +24,8 @@ struct Recording {
 Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});
 
-/// By the first message of a device that names its model, or else by its first message; both in the first 64 MB. Rewinds the
-/// reader.
+/// Finds the sonar of a recording by the first message that names its model, or else by its first message, within the first 64
+/// MB. Rewinds the reader.
 std::optional<SentBy> find_sender(RecordingReader& reader);
 
 }  // namespace sonar::recording

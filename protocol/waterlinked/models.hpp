@@ -17,9 +17,9 @@ inline constexpr std::uint32_t full_scale_strength = 400;  // linear; the assist
 /// with eight others round them 3 % are the largest or least of the nine, and 0.69 their median: 0.45 of independent ranges once
 /// filtered by medians of 3 x 3, 0.70 twice.
 inline constexpr int block_rows = 16, median_passes = 2;
-/// Where the ranges round a pixel span less than 4 mm 0.3 % of the pixels have no return, 4 % of 16 to 64 mm, 8 % beyond,
-/// whatever the strength beside them: returns that two of the pixels round them do not confirm are dropped. Fitted on rough
-/// slopes.
+/// A return is dropped unless at least so many of the pixels around it confirm it. In SMP pixels lack a return the more often,
+/// the more the ranges around them differ: 0.3 % where they span less than 4 mm, 4 % at 16 to 64 mm, 8 % beyond, whatever the
+/// strength beside them. Fitted on rough slopes.
 inline constexpr int least_confirming = 2;
 inline constexpr double confirming_m = 0.01;
 /// Most ranges are multiples of it.

@@ -84,7 +84,7 @@ class RecordReader {
     reader_("number", value);
     return value;
   }
-  /// 1970 for an invalid time, so that differences never overflow.
+  /// A time. An invalid one becomes 1970, so that differences of times never overflow.
   Time time() {
     const auto since_1970_ns = number<std::uint64_t>();
     return since_1970_ns > latest_time_ns ? Time{} : Time(std::chrono::nanoseconds(static_cast<std::int64_t>(since_1970_ns)));

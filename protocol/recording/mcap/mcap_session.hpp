@@ -17,7 +17,7 @@ namespace sonar::recording {
 /// /faults in JSON.
 class McapSession final : public RecordingWriter {
  public:
-  /// `make`: that of the messages; of those that hold samples (Codec::samples) images are made.
+  /// `make`: the make whose messages are written. Messages that hold samples (Codec::samples) are also written as images.
   McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make = protocol::makes().front());
 
   Result<void> write(const RecordedMessage& message) override;

@@ -23,7 +23,7 @@ class TcpStream {
     bool from_middle = false;          // the capture begins after the connection did
   };
 
-  /// `sequence` is that of the first byte, or of the SYN itself.
+  /// Adds a segment. `sequence`: its sequence number, which is that of its first byte, or that of the SYN.
   void add(Time at, std::uint32_t sequence, wire::BytesView payload, bool syn);
   /// Ends the connection or the capture: releases held segments.
   void finish();
