@@ -32,6 +32,8 @@ void for_each_sample(std::size_t samples, int pings, F copy) {
       for (std::size_t channel = 0; channel < channels; ++channel) copy(raw++, sample * beams + sixteenth[channel] * n + ping);
 }
 
+/// Repeats the acoustic settings as the controller sent them, after the limits of judge(). Only the window comes from
+/// PingSettings: it depends on the sound speed at the time of the ping.
 void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used, const Product& product) {
   const Acoustics& a = s.acoustics;
   h.window_start_m = static_cast<float>(used.range_start_m);
@@ -68,6 +70,7 @@ void set_attitude(FrameHeader& h, const Quatd& sonar_in_world) {
   h.acceleration_g = {static_cast<float>(down.x), static_cast<float>(down.y), static_cast<float>(down.z)};
 }
 
+/// All times of a frame are the same here: the emulated sonar has no delay between trigger, ping and frame.
 FrameHeader header_of(const Ping& ping, const protocol::DeviceState& device, const Settings& settings, std::int32_t index) {
   const PingRequest& request = ping.request;
   FrameHeader h;
@@ -108,6 +111,8 @@ Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings) {
   return picture;
 }
 
+// The first part has room for 620 samples beside the header, the others for 1370, in datagrams of 1400 bytes. A longer datagram
+// has so many more samples.
 std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples, std::size_t longest) {
   const std::size_t more = longest - longest_datagram;
   std::vector<Bytes> parts;
@@ -122,6 +127,7 @@ std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesVie
   return parts;
 }
 
+// Pings of the daemon are numbered through all connections; frames begin at 1 in each (docs/protocols/aris.md, "Session").
 std::vector<Bytes> encode_frame(const Ping& ping, const protocol::DeviceState& device, const Settings& settings) {
   const auto number = static_cast<std::uint32_t>(ping.request.number);
   const auto index = static_cast<std::int32_t>(number > settings.first_ping ? number - settings.first_ping : number);
@@ -173,6 +179,7 @@ std::optional<DecodedFrame> FrameAssembler::add(BytesView datagram) {
   return received_ == total_ && !header_.empty() ? whole() : std::nullopt;
 }
 
+// Older firmware sends shorter headers; the missing fields read as 0.
 std::optional<DecodedFrame> FrameAssembler::whole() {
   done_ = true;
   DecodedFrame frame;

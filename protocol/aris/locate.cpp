@@ -26,6 +26,7 @@ std::optional<FramePart> first_of(BytesView first_part) {
 
 }  // namespace
 
+// Without a datagram the place is that in the header itself, as Vendor::field() demands for an empty message.
 std::optional<Field> locate(FieldName name, BytesView first_part) {
   auto found = wire::locate<FrameHeader>(name);
   if (!found || first_part.empty()) return found;

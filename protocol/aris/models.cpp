@@ -119,6 +119,7 @@ std::vector<ModeChoice> choices(const Product& product) {
 
 }  // namespace
 
+// A cubic fits the vendor's tables of measured beams within 0.15 degrees (docs/protocols/aris.md, "Frames").
 std::vector<double> beam_azimuths(const Product& product, int beams, bool telephoto) {
   const bool is_3000 = product.system == SystemType::aris_3000;
   const auto& lens = telephoto ? telephoto_lens : is_3000 ? lens_3000 : lens_1800;

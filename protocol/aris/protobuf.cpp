@@ -53,6 +53,7 @@ std::optional<std::uint64_t> RawReader::fixed(std::size_t bytes) {
   return value;
 }
 
+// Groups (wire types 3 and 4) are not read: ARIS messages have none, and proto3 has abolished them.
 std::optional<RawField> RawReader::next() {
   if (rest_.empty() || !ok_) return std::nullopt;
   const auto key = varint();

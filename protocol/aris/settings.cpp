@@ -43,6 +43,7 @@ std::string out_of_range(const Acoustics& a, const Product& product) {
 
 }  // namespace
 
+// The salinity is the one of the three commands' values that is nearest to the water; the focus is at an eighth of the window.
 Settings initial_settings(const protocol::DeviceState& device) {
   Settings s;
   const Product& product = product_of(*device.model);

@@ -115,12 +115,14 @@ class BlueViewDialogue final : public protocol::Dialogue {
   }
 
  private:
+  /// A PING request that has not been answered. `asked_with`: the settings of its head at the request.
   struct Waiting {
     std::uint32_t request_id = 0;
     int head = 0;
     Time until{};
     HeadSettings asked_with;
   };
+  /// `wanted`: the ping of the present interval has been requested and not sent yet.
   struct Subscription {
     int head = 0;
     std::chrono::milliseconds interval{0};
@@ -200,6 +202,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reaction.replies.push_back(make_frame(reply_to(FrameType::hello), frame.header.request_id, hello_payload()));
   }
 
+  /// The greeting describes the sonar and all heads, so that the drop-in libraries can answer the SDK's questions without a
+  /// request.
   wire::Bytes hello_payload() const {
     wire::Bytes out;
     const Put write(out);
@@ -317,6 +321,7 @@ std::unique_ptr<protocol::Dialogue> make_dialogue(const DeviceState& device, Tim
   return std::make_unique<BlueViewDialogue>(device, now);
 }
 
+// Other datagrams get no answer. The answer is longer than the question, but only by the names of the model and the sonar.
 protocol::Bytes answer_discovery(protocol::BytesView datagram, const DeviceState& device) {
   std::array<std::uint8_t, 4> letters{};
   std::uint16_t version = 0;

@@ -107,6 +107,7 @@ SonarSettings settings_from(const VendorSettings* settings, const protocol::Devi
   return of != nullptr ? *of : initial_sonar_settings(device);
 }
 
+// All checks of a SET are here; a refused one changes nothing.
 Applied apply(SonarSettings& settings, int head_index, Key key, const Value& value, const protocol::DeviceState& device) {
   if (head_index < 0 || head_index >= static_cast<int>(settings.heads.size()))
     return refused(Code::no_head, "no head " + std::to_string(head_index));

@@ -34,6 +34,8 @@ struct Greeting {
   std::string model, serial;
   std::vector<GreetedHead> heads;
 };
+/// Reads HELLO_OK (docs/protocols/blueview-link.md, "Requests"). Fields that this host does not need are read and dropped.
+/// nullopt: it is cut short, or has no head.
 std::optional<Greeting> read_greeting(wire::BytesView payload) {
   wire::Reader reader(payload);
   std::uint16_t version = 0, beams = 0;

@@ -41,6 +41,8 @@ Result<std::string> text_of(const json& object, const char* key) {
   return found->get<std::string>();
 }
 
+/// The time of the sender's clock, whatever its origin: ArduPilot counts from the start of its simulation. Without one the pose
+/// gets the time of its arrival.
 Result<Stamp> stamp_of(const json& object) {
   const auto found = object.find("timestamp");
   if (found == object.end()) return Stamp{};
@@ -77,6 +79,7 @@ Result<std::array<double, 4>> orientation_of(const json& object, std::string& fi
   return std::array<double, 4>{q.w, q.x, q.y, q.z};
 }
 
+/// Reads and checks a pose. `velocity` is in world axes, unlike that of the protobuf messages, so it is rotated into the body's.
 Result<PoseSample> sample_from(const json& object) {
   PoseSample sample;
   RawPose raw;

@@ -59,6 +59,7 @@ std::size_t utf8_length(std::string_view rest) {
   return 0;
 }
 
+/// The text with '?' in place of each byte that belongs to no UTF-8 character. Receivers refuse proto3 messages with other texts.
 std::string repaired(std::string_view text) {
   std::string out;
   while (!text.empty()) {
@@ -101,6 +102,7 @@ std::optional<std::string> first_unreal_number(const Message& message) {
   });
 }
 
+// An orientation that is absent is not visited: it counts as level.
 std::optional<std::string> first_bad_orientation(const Message& message) {
   return find_first(message, "", [](const Message& m, const FieldDescriptor* field) {
     if (field != nullptr || m.GetDescriptor() != v1::Quat::descriptor()) return false;

@@ -14,6 +14,8 @@ constexpr double most_degrees = 360;
 std::array<double, 3> array_from(const v1::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 std::array<double, 4> array_from(const v1::Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
+/// A stamp without a domain is refused, because WALL and SIM times are mapped to the daemon's clock in different ways. Without
+/// any time the moment of arrival counts.
 Result<Stamp> stamp_from(const v1::Time& time) {
   if (time.ns() > largest_stamp_ns || time.ns() < -largest_stamp_ns)
     return refused("time.ns is beyond 4.5e18 ns (142 years): send nanoseconds, or ARRIVAL time");
@@ -115,6 +117,7 @@ Result<Pose> from(const v1::Placement& message) {
   return sample->pose;
 }
 
+// Zeros are missing fields in proto3, so a mount without position and angles is level at the origin of the vehicle.
 Result<Pose> from(const v1::Mount& message) {
   if (message.frame() == v1::Mount::FRAME_UNSPECIFIED) return refused("mount.frame is missing: give FRD or FLU");
   if (message.frame() != v1::Mount::FRD && message.frame() != v1::Mount::FLU) return refused("mount.frame has an unknown value");

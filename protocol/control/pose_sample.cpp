@@ -37,6 +37,7 @@ double angle_beyond_radians(const std::array<double, 3>& rpy_rad) {
   return tilt_rad > most_tilt_rad || yaw_rad > most_yaw_rad ? std::max(tilt_rad, yaw_rad) : 0;
 }
 
+// Both JSON and protobuf poses pass here, so both have the same limits and the same texts.
 Result<PoseSample> checked(PoseSample sample, const RawPose& raw) {
   if (!raw.frame) return refused("frame is missing: give NED_FRD or ENU_FLU; there is no default");
   if (!all_finite(raw.position_m)) return refused("position has a NaN or infinite component");

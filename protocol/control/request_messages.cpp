@@ -105,6 +105,7 @@ Result<SetObject> from(const v1::SetObject& m) {
   return set;
 }
 
+// Neither a vehicle nor an object is named: the only vehicle is meant, as with poses.
 Result<SetTrajectory> from(const v1::SetTrajectory& m) {
   SetTrajectory set;
   const bool object = !m.object().empty();
@@ -147,6 +148,8 @@ Result<std::string> text_from(const std::string& key, const google::protobuf::Va
   return refused("with." + key + " must be a number or a word");
 }
 
+// Only the form is checked here. Kinds, parameters and times are checked by daemon/config/faults, which also reads the
+// configuration.
 Result<AddFault> from(const v1::Fault& f) {
   FaultRecord record;
   for (const auto& [key, text, needed, to] :
@@ -189,6 +192,7 @@ Result<Operation> checked(Result<Op> op) {
   return Operation{*std::move(op)};
 }
 
+/// The operation of a request. A request without a known one, as of a newer client, is Unsupported and not an error.
 Result<Operation> operation_of(const v1::Request& message) {
   switch (message.op_case()) {
     case v1::Request::kHello:
@@ -333,6 +337,7 @@ struct FillRequest {
 
 }  // namespace
 
+// The operation is read first, because its refusals say more about a wrong field than that it is NaN.
 tl::expected<Request, RefusedRequest> from(const v1::Request& message) {
   const auto refused_here = [&](std::string why) {
     return tl::unexpected(RefusedRequest{message.id(), std::move(why), message.has_pose() || message.has_object()});

@@ -97,6 +97,7 @@ class SonarJudge {
         past_s_(before == nullptr ? 0 : status.uptime_s() - before->uptime_s()),
         findings_(findings) {}
 
+  /// Without a driver and without pings the absence of a driver is reported, and no finding on settings and rates.
   void run() {
     check_places();
     if (sonar_.clients().empty() && !sonar_.pinging()) return check_absence();
@@ -113,6 +114,7 @@ class SonarJudge {
     findings_.push_back({level, check, text, cure, sonar_.name(), client});
   }
 
+  /// Slots for clients: drivers that were refused, or wait. A driver that is connected by now is not reported.
   void check_places() {
     const v1::Visit& visit = sonar_.turned_away();
     const std::string holders = sonar_.clients().empty() ? "" : " (" + addresses_of(sonar_) + ")";
@@ -158,6 +160,7 @@ class SonarJudge {
           "point it at " + where_to_connect(sonar_), observer);
   }
 
+  /// Connections that the sonar, or a time-out, has ended; a driver that left by itself is no fault.
   void check_who_left() {
     const v1::Visit& gone = sonar_.gone();
     if (!is_recent(gone) || gone.by_itself()) return;
@@ -187,6 +190,7 @@ class SonarJudge {
         std::string(make_.remedy), client.address());
   }
 
+  /// A driver that does not read loses pings. A pause is a fault, slow reading a warning.
   void check_reading(const v1::ClientStatus& client) {
     const v1::ClientStatus* const earlier = find(before_, client.address());
     const std::uint64_t dropped =

@@ -19,6 +19,7 @@ std::string time_text(Time at) {
                       static_cast<int>(s % 60));
 }
 
+/// The answer to get_version_info. The version names sonard, so that a log shows what it came from.
 Json version_info(const protocol::DeviceState& device) {
   return {{"chipid", text::format("0x%014x", unsigned{device.id})},
           {"hardware_revision", 4},
@@ -58,6 +59,7 @@ std::string set_truth(const Json& value, const std::string& name, bool& to) {
   to = value.get<bool>();
   return {};
 }
+/// Sets a parameter of set_config, or returns the text of an error.
 std::string set_value(const std::string& name, const Json& value, Settings& s) {
   if (name == "speed_of_sound") return set_number(value, name, 1000, 2000, s.speed_of_sound_mps);
   if (name == "mounting_rotation_offset") return set_number(value, name, 0, 360, s.mounting_rotation_deg);

@@ -85,6 +85,7 @@ class DvlDialogue final : public protocol::Dialogue {
   }
   Time next_tick() const override { return due_; }
   void on_ping_queued(Time) override {}
+  // Every client gets every ping, also those that another client has triggered; each counts them for its own triggers.
   protocol::Delivery on_ping(const VendorSettings*, std::size_t, Time now) override {
     protocol::Delivery delivery{{Bytes{}}, {}};
     if (waiting_ > 0 && --waiting_ > 0) {

@@ -47,6 +47,7 @@ class DvlHost final : public protocol::Host {
     if (!request_) return {};
     return {protocol::HostSend{0, *request_}};
   }
+  /// Reports end with CR LF. A line that is too long is dropped, and reading goes on behind the next line end.
   HostActions on_bytes(std::size_t, BytesView received, Time) override {
     HostActions actions;
     for (const std::byte b : received) {
@@ -104,6 +105,7 @@ class DvlHost final : public protocol::Host {
 
 }  // namespace
 
+// The device has no command for its rate and its gain: it chooses both.
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
   if (auto accepted = protocol::accept_settings(wanted, title, {"range", "rate", "mode"}); !accepted)
     return tl::unexpected(accepted.error());

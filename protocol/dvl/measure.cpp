@@ -101,6 +101,7 @@ Quatd vehicle_in_world(const PingRequest& request, const Settings& settings) {
 
 }  // namespace
 
+// Weights are the inverse variances of the beams. The covariance of the result is then the inverse of the information matrix.
 Estimate estimate(const std::array<Beam, beam_count>& beams) {
   Covariance information{};
   std::array<double, 3> sums{};

@@ -80,6 +80,8 @@ Bytes encode(const PlaybackControl& control) {
       .take();
 }
 
+// The layouts are those of the protocol's text. Bytes that are left over are an error, except in the payload of a call, which
+// ends with the message.
 Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView frame) {
   wire::Reader reader(frame);
   std::uint8_t opcode = 0;

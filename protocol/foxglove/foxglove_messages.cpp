@@ -115,6 +115,7 @@ Bytes descriptor_set(const std::string& name) {
 
 Schema protobuf_schema(const std::string& name) { return {name, "protobuf", wire::base64(descriptor_set(name))}; }
 
+// Viewers show no integers of more than 16 bits, so those become floats from 0 to 1.
 Image image_of(std::size_t beams, std::size_t rows, int bits, std::uint32_t max_code, std::shared_ptr<const Bytes> codes) {
   const auto width = static_cast<std::size_t>(bits / 8);
   Image image{static_cast<std::uint32_t>(beams), static_cast<std::uint32_t>(rows), width == 1 ? "mono8" : "mono16", width,
@@ -233,6 +234,7 @@ Bytes log_line(Time at, Severity severity, const std::string& message, const std
   return bytes_of(line);
 }
 
+// A point takes 16 bytes: three floats, and the intensity with three bytes of padding.
 Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> points) {
   constexpr std::uint32_t stride = 16;
   fg::PointCloud message;

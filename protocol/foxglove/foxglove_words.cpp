@@ -25,6 +25,8 @@ Json json_of(Time at) {
   return {{"sec", whole.count()}, {"nsec", (since - whole).count()}};
 }
 
+/// A parameter as the protocol has it. JSON has no NaN and no infinity, so such a value is sent as unset. Numbers have
+/// the type "float64", because JSON does not tell 5.0 from 5.
 Json json_of(const Parameter& parameter) {
   Json json{{"name", parameter.name}};
   std::visit(
@@ -75,6 +77,8 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> subscription(const Read& 
   if (!id || !channel) return std::nullopt;
   return std::pair(*id, *channel);
 }
+/// A value from a viewer. One with the type "float64" may be written without a fraction. Integers beyond 63 bits are not
+/// accepted.
 Value value(const Read& json, bool is_float) {
   if (json.is_boolean()) return json.get<bool>();
   if (json.is_number_float() || (json.is_number() && is_float)) return json.get<double>();
@@ -199,6 +203,7 @@ std::string service_failure(std::uint32_t service, std::uint32_t call, const std
   return dump({{"op", "serviceCallFailure"}, {"serviceId", service}, {"callId", call}, {"message", why}});
 }
 
+// Fields that the protocol does not have are ignored, so that newer viewers work, but one of them is reported in `stray`.
 Result<ViewerWord> word_of_viewer(std::string_view message, std::string* stray) {
   if (control::nests_deeper(message, deepest)) return refused("JSON nested deeper than 16");
   const Read word = Read::parse(message, nullptr, false);

@@ -68,6 +68,7 @@ class M3Host final : public protocol::Host {
   std::optional<Counts> counts() const override { return counts_; }
 
  private:
+  /// The ping keeps the packet, and computes its picture only when it is asked for one.
   protocol::HostPing ping_from(const Packet& packet, Bytes whole) {
     const DataFront& front = packet.header.front;
     const DataBack& back = packet.header.back;

@@ -72,6 +72,7 @@ void set_attitude(DataBack& to, const PingRequest& request) {
   to.temperature_c = static_cast<float>(request.water.temperature_c);
 }
 
+/// The data header of a ping. Fields that are not set here keep the defaults of messages.hpp.
 DataHeader header_of(const Ping& ping, const protocol::DeviceState& device) {
   using namespace std::chrono;
   const PingRequest& r = ping.request;
@@ -171,6 +172,7 @@ double Packet::spacing_m() const {
   return static_cast<double>(header.back.sample_interval_s) * static_cast<double>(header.front.sound_speed_mps) / 2;
 }
 
+// The foot repeats the size of the body; a packet whose sizes differ is cut or damaged.
 std::optional<Packet> read_packet(BytesView whole) {
   if (!framing.begins_message(whole, recording::Origin::device)) return std::nullopt;
   const auto length = length_of(whole.first(stream_front_size), recording::Origin::device, true);
