@@ -8,6 +8,7 @@ namespace {
 
 constexpr double shown_db = 60;  // levels down to this far below the strongest echo are shown
 
+/// The scale follows the strongest echo of all lines shown, so that it is the same for all of them.
 SonarPicture picture_of(const std::deque<std::shared_ptr<const Line>>& waterfall, double start_m, double row_m) {
   SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};
   seen.image.rows = waterfall.size();

@@ -79,6 +79,7 @@ class MicronHost final : public protocol::Host {
       actions.emplace_back(protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*command_))});
   }
 
+  /// A scan line. Its direction is counted from astern; an inverted sonar counts bearings counter-clockwise.
   std::optional<HostPing> ping_from(BytesView payload) {
     const auto data = read_front<HeadData>(payload);
     if (!data || data->step == 0 || data->bearing >= turn) return std::nullopt;

@@ -183,6 +183,7 @@ int Scan::advance(const HeadCommand& c) {
   return next - at;
 }
 
+// A line within one step of a limit counts as at the limit: the scan turns around there.
 std::uint8_t sweep_code(const HeadCommand& c, int bearing) {
   if (is_continuous(c)) return 0;
   const int at = wrapped(bearing - c.left), width = width_of(c);

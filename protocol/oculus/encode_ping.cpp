@@ -139,6 +139,7 @@ FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, doub
   return echo;
 }
 
+// Everything in a ping comes from the request under which it was made, not from the present settings: drivers compare both.
 wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const FireRequest& fire) {
   const PingSettings& settings = ping.request.settings;
   PingHead head;

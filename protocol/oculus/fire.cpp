@@ -25,6 +25,7 @@ std::optional<FireRequest> parse_fire(wire::BytesView message) {
   return fire;
 }
 
+// The version in the header decides the length: 89 bytes from version 2 on, else 53.
 wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination, bool payload_size_zero) {
   const std::size_t length = fire.version >= 2 ? fire_v2_size : fire_v1_size;
   MessageHeader header;

@@ -64,6 +64,7 @@ void check_sizes(Check& check, const DecodedPing& ping) {
   check.holds(ping.has_image, "the image does not lie inside the message");
 }
 
+/// ENS divides samples by the root of the row gain, so a gain of 0 is a violation.
 void check_image(Check& check, const DecodedPing& ping) {
   const PingResultV2& fixed = ping.head.fixed;
   check.holds(fixed.row_count >= 1, "there is no row");
@@ -137,6 +138,7 @@ std::vector<std::string> status_violations(const StatusMessage& status, std::siz
   return check.violations();
 }
 
+// Numbers rise across clients, so a gap may be a ping for another client. It is counted and not a violation.
 std::vector<std::string> PingSequence::add(const DecodedPing& ping) {
   Check check;
   const std::uint32_t id = ping.head.fixed.ping_id;

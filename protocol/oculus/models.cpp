@@ -43,21 +43,23 @@ void fit_to_recording(ReceiverModel& receiver) {
   receiver.noise_width = 0.71f / 0.9f;
   // Small echoes within 0.5 m are 3 beams wide at half their amplitude ahead, 5 to 7 at 20 degrees.
   receiver.defocus = 0.4f;
-  // The noise of rows 620 to 702, with a stripe in the middle, of rows 20 to 150, and its neighbouring beams.
+  // Noise across the fan. `noise_db` is that of rows 620 to 702, which have a stripe in the middle, `near_noise_db` that of rows
+  // 20 to 150.
   receiver.profile.noise_db = {-5.6f, -6.2f, -3.9f, -2.3f, -1.7f, 0.3f,  -0.1f, 0.7f, 2.6f,
                                0.7f,  0.1f,  -0.1f, -1.0f, -2.7f, -3.2f, -5,    -5.3f};
   receiver.profile.near_noise_db = {-9.9f, -9.9f, -9.9f, -8.7f, -8.7f, -8.7f, -8.7f, -6.4f, -4.1f,
                                     -6.4f, -8.7f, -8.7f, -8.7f, -8.7f, -9.9f, -9.9f, -9.9f};
   receiver.profile.near_m = 0.4f;
-  // In rows 0 and 1 the leak is a comb, in rows 8 to 20 the noise has steady fringes, and in rows 10 to 180 it lies beside a
-  // dome, in grains that are wider the nearer they are: 128 channels, heard from a sine of 0.56 (half a wavelength of the low
-  // mode would be 0.57), with opposite signs in neighbours.
+  // Three traces of noise that the channels share: in rows 0 and 1 the leak is a comb across the fan; in rows 8 to 20 the noise
+  // has steady fringes; in rows 10 to 180 it lies beside a dome, in grains that are wider the nearer they are. They fit 128
+  // channels with opposite signs in neighbouring ones, and a direction with a sine of 0.56 (half a wavelength of the low mode
+  // would give 0.57).
   receiver.shared_noise = {.level_db = 3.4f, .full_m = 0.2f, .steady = 0.6f, .focus_rows = 0.5f, .nearest_focus_m = 0.0085f};
   receiver.leak_is_shared = true;
   // 255 never occurs. Codes 0 to 5 of the noise are as frequent as those of floor(255 v^gamma), with v below 1.
   receiver.truncates = true;
   receiver.profile.blend = {-0.1f, 0.07f, 0.1f, 0.13f, 0.13f, 0.13f, 0.13f, 0.06f, -0.1f};
-  // The medians of rows 0 to 8: it rings, with a null in row 2. By half a row.
+  // The leak rings, with a null in row 2. Its level is the median of rows 0 to 8, in steps of half a row.
   receiver.leak_ring_db = {-5.4f, -5.4f,  -5.2f, -5.1f,  -16, -28,    -24.5f, -22.7f, -21, -19.4f,
                            -21,   -22.6f, -25,   -28.2f, -31, -33.5f, -38,    -45,    -60};
   receiver.leak_ring_step_m = 0.001421f;
@@ -73,6 +75,7 @@ struct FamilyRow {
   double min_range_m = 0.1;  // BAS
   ModeRow low, high;         // high.centre_hz 0: one mode only
 };
+/// A product. Several have the same electronics, so they share a family.
 struct ProfileRow {
   std::string_view profile, name;
   std::uint16_t part_number = 0;
@@ -110,7 +113,7 @@ constexpr ProfileRow profiles[] = {
     {"oculus-m1200d", "Oculus M1200d", 1042, &m1200d},
     {"oculus-m3000d", "Oculus M3000d", 2203, &m3000d},
     {"oculus-c550d", "Oculus C550d", 4713, &c550d},
-    {"oculus-m750d-hf130", "Oculus M750d, 130 deg in mode 2", 1032, &m750d},  // a name that configurations may hold
+    {"oculus-m750d-hf130", "Oculus M750d, 130 deg in mode 2", 1032, &m750d},  // an earlier name, which configurations may have
     {"oculus-m750d-hf12", "Oculus M750d, older hardware", 1032, &m750d_old},
     {"oculus-m373s", "Oculus M373s", 1209, &m370s},
     {"oculus-m373s-deep", "Oculus M373s deep", 1218, &m370s},
@@ -151,7 +154,7 @@ FrequencyMode mode_from(const ModeRow& row, double min_range_m, const char* name
   mode.min_range_m = static_cast<float>(min_range_m);
   mode.max_range_m = static_cast<float>(row.max_range_m);
   mode.source_level_db = source_level_db;
-  mode.beam_spacing = BeamSpacing::uniform_in_sine;  // CAP; the same law for other apertures
+  mode.beam_spacing = BeamSpacing::uniform_in_sine;  // CAP; assumed for other apertures too
   mode.pattern.azimuth_width_rad = radians(row.azimuth_width_deg);
   mode.pattern.elevation_width_rad = radians(row.elevation_width_deg);
   mode.receiver.tvg_slope_db = tvg_slope_db;

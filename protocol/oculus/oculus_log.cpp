@@ -19,7 +19,8 @@ M read_as(BytesView bytes) {
   return message;
 }
 
-/// Today's UNIX seconds as a double are exact to 0.25 us; an invalid time becomes 1970.
+/// The time of an item's header. A double holds today's UNIX seconds exactly to 0.25 us, so items of type 1010 give the exact
+/// time. An invalid time becomes 1970.
 Time time_of(double unix_s) {
   if (!std::isfinite(unix_s) || std::abs(unix_s) > 4e9) return {};
   return Time(nanoseconds_from(unix_s));
@@ -73,7 +74,7 @@ class LogReader final : public RecordingReader {
     return std::nullopt;
   }
 
-  /// Foreign or damaged bytes: continues with the next item, or at the end.
+  /// Searches for the next item after foreign or damaged bytes. False: there is none.
   bool find_item(std::uint64_t at) {
     for (std::uint64_t from = at + 1; from + item_bytes <= source_->size(); ++from) {
       scan_.seek(from);
@@ -85,6 +86,7 @@ class LogReader final : public RecordingReader {
     return false;
   }
 
+  /// Reads the message in an item. nullopt: it is damaged, which is noted; the reader then goes on with the next item.
   std::optional<RecordedMessage> read_message(const OculusLogItem& item, std::uint64_t at) {
     const auto refuse = [&](const std::string& why) {
       damages_.add("the message at byte " + std::to_string(at) + " " + why);
@@ -114,6 +116,7 @@ class LogReader final : public RecordingReader {
     return message;
   }
 
+  /// The exact time of the message, if the next item has it. The position stays, because next() skips such items.
   std::optional<Time> exact_time() {
     constexpr std::size_t whole = item_bytes + wire::wire_size<OculusLogTime>();
     const BytesView front = scan_.peek(whole);
@@ -179,6 +182,7 @@ class LogWriter final : public RecordingWriter {
 
 }  // namespace
 
+// Version 2 is an SQLite database, whose first letter is S; the error tells users so.
 Result<std::unique_ptr<RecordingReader>> read_oculus_log(std::unique_ptr<Source> source) {
   Scan scan(*source);
   const BytesView front = scan.read(file_header_bytes);

@@ -78,6 +78,7 @@ const std::array<protocol::Option, 22> option_rows{{
 
 std::span<const protocol::Option> options() { return option_rows; }
 
+// docs_test.cpp compares the page with this table, so that an option without a row fails.
 std::string options_table() {
   std::string text;
   for (const protocol::Option& option : option_rows) {

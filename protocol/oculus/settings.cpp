@@ -143,6 +143,7 @@ double device_sound_speed_mps(const protocol::DeviceState& device, double salini
                                 std::clamp(gauge_bar, 0.0, 1000.0));
 }
 
+// Nothing is refused: values out of range are clamped for use, and echoed as they were sent (docs/protocols/oculus.md, 3).
 ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& device) {
   ResolvedSettings out;
   PingSettings& settings = out.settings;
@@ -195,6 +196,7 @@ std::size_t ping_size(const PingSettings& settings) {
   return image_offset + static_cast<std::size_t>(settings.range_bin_count) * row;
 }
 
+// The line has the values as requested, so that a user recognises what a driver sends.
 std::string describe(const FireRequest& fire) {
   const FireSettings& s = fire.settings;
   const bool metres = (s.flags & flag::range_in_metres) != 0;

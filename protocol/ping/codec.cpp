@@ -20,6 +20,7 @@ using recording::RecordedMessage;
 
 constexpr std::size_t longest_payload = 65535;
 
+/// Whether some device of the family sends or accepts this message.
 bool is_known(Id id) {
   switch (id) {
     case Id::ack:

@@ -86,6 +86,7 @@ void Conversation::answer(Id wanted, Time now, protocol::Reaction& reaction) {
   reaction.replies.push_back(answer.empty() ? nack(wanted, id_, "unknown message") : std::move(answer));
 }
 
+// The ack already has the new id.
 void Conversation::set_id(const Frame& frame, protocol::Reaction& reaction) {
   std::uint8_t id = 0;
   wire::Reader reader(frame.payload);

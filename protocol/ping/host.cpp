@@ -22,6 +22,7 @@ constexpr int grads = 400, sector = 201, first_grad = 300;  // a scan covers the
 constexpr int astern = 200;                                 // angle at which the beams of a Sweep begin
 constexpr std::size_t point_rows = 300;                     // rows of a picture of points
 
+/// The request for points as y, z pairs (3011): one number pair a point suffices for the picture.
 Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
   PingParameters p{.end_mm = static_cast<std::int32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
                    .enable = static_cast<std::uint8_t>(wanted.rate_hz == 0.0 ? 0 : 1),
@@ -32,6 +33,8 @@ Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
   return framed_message(Id::set_ping_parameters, 0, p);
 }
 
+/// The request for a scan of the half circle ahead. At short ranges the sample period is the shortest, and the number of samples
+/// is less; at long ranges there are 1000 samples.
 Bytes ping360_request(const protocol::SettingsOverride& wanted) {
   const double range_m = wanted.range_m.value_or(usual_range_m);
   AutoTransmit t;
@@ -85,6 +88,8 @@ double end_m(const AtofPointData& data, const Points& polar) {
   return far_m;
 }
 
+/// A ping of points. Its picture has one beam for each point, with the point in the row of its range; the drawing has the points
+/// themselves.
 HostPing ping_of(std::uint32_t number, double end_m, Points polar) {
   HostPing found;
   SonarPicture seen{.kind = PictureKind::points, .image = {}};
@@ -170,6 +175,7 @@ class Ping360Host final : public PingHost {
     return frame.header.id == Id::device_data ? line_of(DeviceData{}) : std::nullopt;
   }
 
+  /// A scan line. The device does not state a sound speed; 1500 m/s is assumed.
   HostPing line(std::uint16_t angle, unsigned period, unsigned khz, BytesView samples) {
     const double row_m = period * sample_unit_s * sound_mps / 2;
     Line line;

@@ -111,6 +111,7 @@ std::optional<Frame> Framer::next() {
   return std::nullopt;
 }
 
+// A datagram that only looks like the protocol must not take the dialogue away from the host that has it.
 bool holds_frame(BytesView datagram) {
   Framer framer(longest_request, true);
   framer.append(datagram);

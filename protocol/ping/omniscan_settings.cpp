@@ -117,6 +117,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   return change_to(s);
 }
 
+// "Heading" of the transducer is the bearing of the beam; that of the vehicle is 0 (unknown: what a real device sends).
 Bytes profile_of(const Ping& ping, const protocol::DeviceState& device) {
   const Settings s = settings_from(ping.request.vendor_settings.get());
   const PingSettings& made = ping.request.settings;

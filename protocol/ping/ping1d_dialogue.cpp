@@ -60,6 +60,7 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
     }
   }
 
+  /// Results come with the next ping; other values are sent at once.
   bool on_wanted(Id wanted_id, Time now, Reaction& reaction) override {
     const Settings s = settings_after(reaction);
     if (const Results result = results_of(wanted_id); result != no_result) {
@@ -82,6 +83,8 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
     return manual;
   }
 
+  /// Starts or stops the stream of one message. Streams of several messages can run at the same time: each ping then has all of
+  /// them.
   void set_stream(const Frame& frame, Time now, Reaction& reaction) {
     Id id{};
     wire::Reader reader(frame.payload);

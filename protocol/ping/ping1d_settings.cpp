@@ -125,6 +125,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   return change_to(s);
 }
 
+// The automatic mode always starts the range at the sonar.
 Parameters adjusted(const Parameters& made_with, const Echo& echo) {
   Parameters p = made_with;
   const Reach next = ping::adjusted({made_with.range.length_mm, made_with.gain}, echo, {.gains = gains, .most_mm = most_mm});

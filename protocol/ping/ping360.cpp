@@ -81,6 +81,7 @@ class Ping360Vendor final : public protocol::Vendor {
                     ping_settings(s, device)};
   }
   bool is_request(const protocol::Port&, protocol::BytesView datagram) const override { return holds_frame(datagram); }
+  /// The discovery port has a text protocol of its own. SetSS1IP changes the address of a real device; here it is stored only.
   protocol::Reaction on_datagram(const protocol::Port&, protocol::BytesView datagram, const protocol::DeviceState& device,
                                  Time) const override {
     protocol::Reaction reaction;

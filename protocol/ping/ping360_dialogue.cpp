@@ -70,6 +70,7 @@ class Ping360Dialogue final : public Conversation {
   }
 
  protected:
+  /// 2601 and 2602 begin a task and are answered by its pings; the others are acknowledged.
   bool on_request(const Frame& frame, Time now, Reaction& reaction) override {
     switch (frame.header.id) {
       case Id::transducer: {

@@ -108,6 +108,7 @@ Settings settings_of(const Transducer& t) {
   return s;
 }
 
+// A scan begins with a ping at its start angle.
 Settings settings_of(const AutoTransmit& t) {
   const Transducer ping{t.mode, t.gain, t.start, t.transmit_us, t.period, t.khz, t.samples, 1, 0};
   return {.ping = ping, .scans = true, .start = t.start, .stop = t.stop, .steps = t.steps, .delay_ms = t.delay_ms};

@@ -93,6 +93,7 @@ bool same_settings(const Settings& a, const Settings& b) {
   return all(a) == all(b);
 }
 
+// A length of 0 and a gain of -1 select the automatic ones (DEF).
 std::string complaint(const SetPingParams& p) {
   if ((p.length_mm != 0 && p.length_mm < shortest_range_mm) || p.length_mm > most_mm || p.start_mm > most_mm ||
       p.start_mm + p.length_mm > most_mm)
@@ -103,6 +104,7 @@ std::string complaint(const SetPingParams& p) {
   return p.chirp > 1 ? "chirp is 0 or 1" : "";
 }
 
+// An automatic range or gain goes on from the value in force.
 Parameters requested(const Parameters& before, const SetPingParams& wanted) {
   Parameters p = before;
   p.ping = wanted;

@@ -74,6 +74,7 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   return all;
 }
 
+// Each answer to the time request gives a slightly different offset; it must not count as a change of settings every 10 s.
 bool same_settings(const Settings& a, const Settings& b) {
   if (a.id != b.id || a.parameters != b.parameters || a.utc_ahead.has_value() != b.utc_ahead.has_value()) return false;
   return !a.utc_ahead || std::chrono::abs(*a.utc_ahead - *b.utc_ahead) < std::chrono::milliseconds(1);

@@ -69,6 +69,7 @@ std::string file_endings() {
   return endings;
 }
 
+// The kind of a file is known by its first bytes, never by its name.
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar) {
   std::array<std::byte, 16> front{};
   const std::size_t there = source->read_at(0, front);

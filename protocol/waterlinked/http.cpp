@@ -165,6 +165,7 @@ Outcome force_sync(Call& call, const Json& posted) {
       {{"success", done}, {"message", done ? "Time is synchronized." : "No server answered."}, {"status", time_status(call)}}};
 }
 
+/// Sets the clock of a device that is not synchronised. Its offset counts from power-up, because device_time() counts from there.
 Outcome set_time(Call& call, const Json& posted) {
   const Json now = posted.is_object() ? posted.value("now", Json()) : Json();
   int year = 0, hour = 0, minute = 0;

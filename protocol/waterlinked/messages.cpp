@@ -84,6 +84,7 @@ Bytes packet_of(const ImuMessage& message) {
   return packed(m);
 }
 
+// A packet holds a google.protobuf.Any, whose type says which of the three messages it is.
 Decoded decode(BytesView bytes) {
   Decoded out;
   pb::Packet packet;

@@ -38,6 +38,7 @@ std::uint32_t u32_at(BytesView bytes, std::size_t at) {
 
 }  // namespace
 
+// The length counts the whole packet, and the CRC everything before itself.
 Bytes rip_packet(BytesView content, Rip version) {
   Bytes block(content.begin(), content.end());
   if (version == Rip::two) {

@@ -43,6 +43,7 @@ Json moving_bodies(const PingTruth& truth) {
 
 }  // namespace
 
+// Beams refer to objects by number. The names are listed once, which keeps the text of 512 beams short.
 std::string truth_json(const PingTruth& truth) {
   Json ranges_m = Json::array(), objects = Json::array();
   for (const BeamTruth& beam : truth.beams) {
@@ -59,6 +60,7 @@ std::string truth_json(const PingTruth& truth) {
                   {"bodies", moving_bodies(truth)}});
 }
 
+// Only the instances that occur in the labels are listed. 0 is "no instance".
 std::string instances_json(const PingTruth& truth, const PingLabels& labels) {
   std::set<std::size_t> named(labels.instance.begin(), labels.instance.end());
   named.insert(labels.caster.begin(), labels.caster.end());

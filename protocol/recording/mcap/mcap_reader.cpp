@@ -122,6 +122,7 @@ void Reader::take_description(Opcode code, BytesView content, std::uint64_t at) 
   if (is_new) described_bytes_ += content.size();
 }
 
+/// Reads the content of a message record. nullopt: it is damaged, or belongs to a channel that was not read.
 std::optional<Message> Reader::take_message(BytesView content, std::uint64_t at) {
   RecordReader record(content);
   Message message;
@@ -166,6 +167,7 @@ void Reader::enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut) {
   if (begin < end) chunk_end_ = end;
 }
 
+/// Compares the checksum of a chunk block by block, so that a large chunk does not take as much memory.
 bool Reader::is_chunk_sound(std::uint64_t from, std::uint64_t size, std::uint32_t crc) {
   std::uint32_t found = 0;
   scan_.seek(from);

@@ -32,6 +32,7 @@ void RecordWriter::strings(const std::map<std::string, std::string>& map) {
   }
 }
 
+// The length of a record is not known yet; end() writes it into this place.
 void RecordWriter::begin(Opcode code) {
   number(code);
   length_at_ = out_.size();
@@ -42,6 +43,7 @@ void RecordWriter::end() { set_u64(out_, length_at_, out_.size() - length_at_ - 
 
 std::string RecordReader::string() { return text_from(bytes(number<std::uint32_t>())); }
 
+// A map states its length in bytes, not the number of its entries.
 std::map<std::string, std::string> RecordReader::strings() {
   RecordReader inside(bytes(number<std::uint32_t>()));
   std::map<std::string, std::string> map;

@@ -135,6 +135,7 @@ Result<void> McapSession::write_truth(Time at, const mcap::PingTruth& truth) {
   return write_json(truth_, at, mcap::truth_json(truth));
 }
 
+// Labels are images with the rows and beams of the ping, so that viewers can lay them over its image.
 Result<void> McapSession::write_labels(Time at, const mcap::PingTruth& truth, const PingLabels& labels) {
   const auto put = [&](std::uint16_t channel, const auto& values) {
     const BytesView bytes = std::as_bytes(std::span(values));

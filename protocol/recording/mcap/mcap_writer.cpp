@@ -22,6 +22,7 @@ std::uint16_t Writer::add_channel(Channel channel) {
   return channels_.back().id;
 }
 
+/// Appends to the file, and keeps position and checksum of the data section. After an error all later calls fail.
 Result<void> Writer::put(const Bytes& bytes) {
   if (broken_) return tl::unexpected(*broken_);
   if (Result<void> written = sink_->append(bytes); !written) {
@@ -107,6 +108,7 @@ Result<void> Writer::end_chunk() {
   return {};
 }
 
+/// A message index lists time and offset of each message of one channel in the chunk before it.
 void Writer::append_message_indexes(Bytes& out, ChunkPlace& place) const {
   for (const auto& [channel, entries] : entries_) {
     place.index_offsets[channel] = position_ + out.size();
@@ -123,6 +125,7 @@ void Writer::append_message_indexes(Bytes& out, ChunkPlace& place) const {
   place.index_length = out.size() - place.length;
 }
 
+/// Viewers find the chunks of a time by these records, without reading the others.
 void Writer::append_chunk_index(Bytes& out, const ChunkPlace& place) {
   RecordWriter record(out);
   record.begin(Opcode::chunk_index);

@@ -55,6 +55,7 @@ std::optional<BytesView> ip_packet(std::uint32_t link_type, BytesView frame) {
   }
 }
 
+/// RFC 9293, 3.1: sequence number at offset 4, length of the header in words in the upper half of byte 12, flags in byte 13.
 std::optional<Segment> tcp_segment(Segment found, BytesView body) {
   const std::size_t header = (u8_at(body, 12) >> 4) * std::size_t{4};
   if (header < 20 || body.size() < header) return std::nullopt;
@@ -64,6 +65,7 @@ std::optional<Segment> tcp_segment(Segment found, BytesView body) {
   return found;
 }
 
+/// RFC 768: length at offset 4, payload from offset 8. The capture may have cut the payload.
 std::optional<Segment> udp_datagram(Segment found, BytesView body) {
   const std::size_t size = u16_at(body, 4);
   if (body.size() < 8 || size < 8) return std::nullopt;
@@ -83,6 +85,7 @@ bool is_known_link_type(std::uint32_t link_type) {
   return std::find(std::begin(known), std::end(known), link_type) != std::end(known);
 }
 
+// RFC 791: bit "more fragments" and offset 0. Only first fragments are counted, so that each datagram counts once.
 bool begins_fragments(std::uint32_t link_type, BytesView packet) {
   const auto ip = ip_packet(link_type, packet);
   return ip && ip->size() >= 20 && u8_at(*ip, 0) >> 4 == 4 && (u16_at(*ip, 6) & 0x3FFFu) == 0x2000;

@@ -74,6 +74,8 @@ std::optional<Packet> PacketReader::next() {
   return ng_ ? next_block() : next_classic();
 }
 
+// A packet has 16 bytes in front: seconds, micro- or nanoseconds, captured length, length on the wire. There is no mark by which
+// a reader could find the next packet after a damaged length, so reading ends there.
 std::optional<Packet> PacketReader::next_classic() {
   const std::string at = "byte " + std::to_string(scan_.position());
   const BytesView header = scan_.read(16);
@@ -86,6 +88,7 @@ std::optional<Packet> PacketReader::next_classic() {
   return Packet{time_of(whole_s * per_s + rest, per_s), interfaces_.front().link_type, bytes};
 }
 
+/// Reads the byte order of a section, which the number at offset 8 tells. A new section has interfaces of its own.
 bool PacketReader::begin_section(std::uint64_t at) {
   scan_.seek(at);
   const BytesView front = scan_.peek(12);
@@ -99,6 +102,7 @@ bool PacketReader::begin_section(std::uint64_t at) {
   return false;
 }
 
+/// Reads an interface description: link type, and from the options the unit of its times (a microsecond without that option).
 void PacketReader::add_interface(BytesView body) {
   if (interfaces_.size() >= most_interfaces) return;
   Interface made{u16_at(body, 0, endian_), 1'000'000};
@@ -111,6 +115,7 @@ void PacketReader::add_interface(BytesView body) {
   interfaces_.push_back(made);
 }
 
+/// Reads a packet with interface, time and captured length. nullopt: its numbers contradict each other.
 std::optional<Packet> PacketReader::enhanced(BytesView body) const {
   const std::uint32_t interface = u32_at(body, 0, endian_), size = u32_at(body, 12, endian_);
   if (body.size() < 20 || interface >= interfaces_.size() || size > body.size() - 20) return std::nullopt;

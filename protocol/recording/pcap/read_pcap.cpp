@@ -53,6 +53,8 @@ const Make* make_of(const Segment& segment) {
   return found;
 }
 
+/// Reads the whole capture once. An end that sends messages of a make counts as a sonar; the one at the make's usual port comes
+/// first, then the one that sent most bytes. Tables are bounded, because a capture of a port scan has thousands of ends.
 Result<Found> find_device(Source& source, const PcapReading& reading) {
   auto packets = PacketReader::open(source);
   if (!packets) return tl::unexpected(packets.error());
@@ -173,6 +175,8 @@ class PcapReader final : public RecordingReader {
       take(Origin::device);
   }
 
+  /// Adds a segment to its connection. A SYN with another number on the same ports begins a new one. A connection whose begin
+  /// is not in the capture begins with its first bytes.
   void add(Time at, const Segment& segment, const IpEnd& client, Origin from) {
     const bool syn = (segment.flags & tcp_flag::syn) != 0;
     Place place = connections_.find(client);
@@ -206,6 +210,7 @@ class PcapReader final : public RecordingReader {
     finish(oldest);
   }
 
+  /// Ends a connection: returns the messages that are whole, and notes those that are not.
   void finish(Place place) {
     for (const Origin from : {Origin::device, Origin::client}) {
       stream_of(place->second, from).finish();

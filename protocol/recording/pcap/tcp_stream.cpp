@@ -43,6 +43,7 @@ void TcpStream::give(Time at, wire::BytesView bytes) {
   position_ += bytes.size();
 }
 
+/// Returns early segments that now continue the stream, without bytes that are already known.
 void TcpStream::give_what_follows() {
   while (!waiting_.empty() && waiting_.begin()->first <= position_) {
     const Early early = std::move(waiting_.begin()->second);

@@ -26,6 +26,7 @@ constexpr void fields(V& visit, M& m) {
   visit("linkType", m.link_type);
 }
 
+/// RFC 791, without options. 0x4000: do not fragment.
 struct IpHeader {
   std::uint8_t version_and_length = 0x45, service = 0;
   std::uint16_t total_length = 0, identification = 0, fragment = 0x4000;
@@ -47,6 +48,7 @@ constexpr void fields(V& visit, M& m) {
   visit("target", m.target);
 }
 
+/// RFC 9293, 3.1. 0x50: five words without options.
 struct TcpHeader {
   std::uint16_t source = 0, target = 0;
   std::uint32_t sequence = 0, acknowledged = 0;
@@ -136,6 +138,7 @@ class PcapWriter final : public RecordingWriter {
     if (!std::exchange(begun_, true)) wire::append(packets, PcapFileHeader{});
   }
 
+  /// The handshake. Wireshark needs it to know the window scale.
   void connect(Bytes& packets) {
     if (std::exchange(connected_, true)) return;
     segment(packets, client_, device_, tcp_flag::syn, {});
@@ -221,6 +224,7 @@ class PcapWriter final : public RecordingWriter {
 
 }  // namespace
 
+// Datagrams go where the make's hosts receive them: at the beacon's port, at the port of the dialogue, or in the multicast group.
 PcapConversation usual_ends(const protocol::Make& make, std::uint32_t device, std::uint32_t client) {
   using Kind = protocol::HostPort::Kind;
   PcapConversation ends;
