@@ -25,7 +25,7 @@ constexpr double elevation_1800_deg = 14, elevation_3000_deg = 15, telephoto_ele
 constexpr double frequencies_hz[3][2] = {{1.108e6, 1.8e6}, {1.8e6, 3.0e6}, {0.692e6, 1.2e6}};    // DOC, by SystemType
 
 // unknown: levels. Assumed: no TVG beyond 20 log r, and no absorption, since the level of SMP falls with range all the way; full
-// scale so that the demo scene under SMP's settings has SMP's level at an ARIS 1200, and a like one at the others.
+// scale so that the demo scene under SMP's settings has the level of SMP at an ARIS 1200, and a similar level at the others.
 constexpr float source_level_db = 210, tvg_slope_db = 20, tvg_ceiling_db = 60;
 constexpr float full_scale_upa[3] = {2.5e4f, 1e4f, 4e4f};  // by SystemType
 
@@ -67,8 +67,8 @@ const std::vector<Product>& products() {
   return all;
 }
 
-/// -3 dB widths: the space between the midpoints to the neighbours. unknown: of the low frequency; a lens' width grows with the
-/// wavelength.
+/// -3 dB widths of the beams: each reaches half way to its neighbours. unknown: widths at the low frequency; `factor` makes them
+/// grow with the wavelength, as with any lens.
 std::vector<float> beam_widths(const std::vector<double>& azimuths, double factor) {
   std::vector<float> widths;
   const auto n = azimuths.size();

@@ -14,14 +14,14 @@
 
 namespace sonar::aris {
 
-/// A row is the mean power of samples so close together, at most: the receiver integrates over a sample period. SMP: the spread
-/// of levels about their local mean is that of 1.7 looks a sample, not of 1.
+/// The receiver integrates over a sample period, so a row is the mean power of samples that are at most 1 / 1.5 pulses apart.
+/// Evidence in SMP: levels spread about their local mean like the mean of 1.7 independent values, and not like a single one.
 inline constexpr double samples_per_pulse = 1.5;
-inline constexpr int most_samples_per_row = 8;  // 1: no integration
+inline constexpr int most_samples_per_row = 8;  // 1 would be no integration
 
 inline constexpr int channels = 16;  // beams that one ping of a frame forms
-/// Gains of the channels from starboard [dB]. SMP, frames 1 to 3: levels of each channel's beams less those of the beams around
-/// it, which in frames 4 to 6 are the same within 0.25 dB rms. unknown: of other units, which have the same here.
+/// Gains of the channels from starboard [dB], from SMP: the level of each channel's beams in frames 1 to 3, relative to the beams
+/// beside them. Frames 4 to 6 give the same within 0.25 dB rms. unknown: the gains of other units; here they are the same.
 inline constexpr std::array<float, channels> channel_gain_db{-1.13f, 1.39f, -0.99f, 0.55f, -0.07f, -0.12f, -0.18f, 0.72f,
                                                              -0.48f, 0.63f, -0.74f, 0.67f, 0.23f,  -0.56f, 0.53f,  -0.45f};
 

@@ -27,7 +27,7 @@ class BlueViewVendor final : public protocol::Vendor {
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     const SonarSettings settings = initial_sonar_settings(device);
     return {ping_settings(settings, device), std::make_shared<SonarSettings>(settings),
-            "as it comes: " + describe(settings, device)};
+            "initial settings: " + describe(settings, device)};
   }
   Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
                                                   const protocol::DeviceState& device) const override {

@@ -24,7 +24,7 @@ constexpr auto keep_alive_after = 2s;  // since the sonar sent its last message
 constexpr auto longest_host_silence = 10s;
 constexpr std::size_t most_waiting = 8;  // PING requests of one host that may be unanswered at a time
 constexpr std::uint32_t longest_wait_ms = 600000;
-constexpr float housing_above_water_c = 2;  // unknown: how warm the housing of a real head is
+constexpr float housing_above_water_c = 2;  // unknown: difference of the housing's temperature to that of the water
 
 /// A connection has one state, `greeted_`: before HELLO every request but HELLO is refused. After it a host gets pings in two
 /// ways that do not exclude each other: single PING requests, which wait in `waiting_` for a ping of their head and settings, and
@@ -158,7 +158,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
         return refuse(frame, Code::bad_packet_type, "unknown frame type " + std::to_string(static_cast<int>(frame.header.type)),
                       reaction);
     }
-    if (!greeted_) return refuse(frame, Code::bad_packet_version, "HELLO comes first", reaction);
+    if (!greeted_) return refuse(frame, Code::bad_packet_version, "a HELLO must be sent first", reaction);
     std::int32_t id = 0;
     reader("head", id);
     const auto head = head_of(id);
@@ -193,8 +193,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     read_text(reader, "client");
     if (!reader.ok()) return refuse(frame, Code::bad_parameter, reader.failure_text(), reaction);
     if (version != protocol_version) {
-      refuse(frame, Code::bad_packet_version, "speaks version " + std::to_string(version) + " of the link, this is version 1",
-             reaction);
+      refuse(frame, Code::bad_packet_version,
+             "version " + std::to_string(version) + " of the link is not supported, only version 1", reaction);
       reaction.events.emplace_back(Close{"speaks another version of the link"});
       return;
     }
@@ -273,7 +273,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reader("timeout_ms", timeout_ms);
     if (!reader.ok()) return;
     if (waiting_.size() >= most_waiting)
-      return refuse(frame, Code::bad_parameter, "8 triggers wait for their pings already", reaction);
+      return refuse(frame, Code::bad_parameter, "8 requests of this host wait for their pings already", reaction);
     const std::chrono::milliseconds wait(std::min(timeout_ms == 0 ? longest_wait_ms : timeout_ms, longest_wait_ms));
     Time until = now + wait;
     if (!waiting_.empty()) until = std::max(until, waiting_.back().until);  // answers go out in the order of the requests

@@ -1,5 +1,5 @@
-// Settings of the heads of one sonar: checked, kept with the device's settings and converted to PingSettings. All hosts of a
-// sonar share them.
+// The settings of the heads of one sonar, which all its hosts share: checks them, and converts them to PingSettings. The device
+// keeps them.
 #pragma once
 
 #include <cstdint>
@@ -48,7 +48,7 @@ struct Refusal {
 /// Sets one key of a head and returns the applied value, which may be the nearest valid one.
 struct Applied {
   std::optional<Value> value;
-  Refusal refusal;  // without a value
+  Refusal refusal;  // if there is no value
 };
 Applied apply(SonarSettings& settings, int head, Key key, const Value& value, const protocol::DeviceState& device);
 std::optional<Value> read_back(const SonarSettings& settings, int head, Key key);

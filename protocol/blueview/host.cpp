@@ -250,7 +250,7 @@ class BlueViewHost final : public protocol::Host {
       const auto range_m = static_cast<float>(*wanted_.range_m);
       if (range_m <= head.start_m || range_m > head.longest_m)
         return greeting_.model + " has a range of " + std::to_string(std::lround(head.start_m)) + " to " +
-               std::to_string(std::lround(head.longest_m)) + " m: give --range between";
+               std::to_string(std::lround(head.longest_m)) + " m: give a --range within it";
       settings_.emplace_back(Key::stop_range, range_m);
     }
     if (wanted_.gain_percent) settings_.emplace_back(Key::gain, gain_db_from(*wanted_.gain_percent));

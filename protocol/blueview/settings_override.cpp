@@ -11,7 +11,7 @@
 namespace sonar::blueview {
 namespace {
 
-constexpr double half_gain_db = 48;  // assumed: 0 to 100 % turn the gain adjustment from -48 to 48 dB, as an Oculus' 96 dB
+constexpr double half_gain_db = 48;  // assumed: 0 to 100 % are -48 to 48 dB, a span like that of an Oculus
 
 constexpr double least_window_m = 0.01;
 
@@ -35,7 +35,8 @@ Result<void> set_range(SonarSettings& all, double range_m, const protocol::Devic
 
 Result<void> set_rate(SonarSettings& all, double rate_hz, const protocol::DeviceState& device) {
   if (rate_hz < 0) return refused("a ping rate must be above 0");
-  if (rate_hz == 0) return refused("BlueView sonars have no standby: they ping when a host asks; transmit: false stops one");
+  if (rate_hz == 0)
+    return refused("BlueView sonars have no standby: they ping when a host asks; to silence one, set transmit: false");
   const double interval_ms = std::max(1.0, std::round(1000 / rate_hz));
   return set(all, Key::ping_interval, static_cast<std::int32_t>(std::min(interval_ms, 3600e3)), device);
 }

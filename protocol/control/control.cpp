@@ -80,7 +80,7 @@ Result<std::shared_ptr<const v1::Response>> decode_response(BytesView bytes) {
   if (const auto where = first_bad_orientation(*message))
     return failure(ErrorKind::bad_data, *where + " is not a quaternion of norm 1");
   if (message->has_event() && message->event().what_case() == v1::Event::WHAT_NOT_SET)
-    return failure(ErrorKind::bad_data, "an event of an unknown kind");
+    return failure(ErrorKind::bad_data, "the event is of an unknown kind");
   return message;
 }
 

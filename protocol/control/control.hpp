@@ -24,12 +24,12 @@ class Response;
 
 namespace sonar::control {
 
-/// One datagram: a PoseUpdate. Refused with one sentence when malformed (see checked()).
+/// Reads a datagram with a PoseUpdate. A malformed one is refused with one sentence (see checked()).
 Result<PoseSample> decode_pose_datagram(BytesView datagram);
-/// One message of the stream, without its length. A message that is not protobuf has id 0.
+/// Reads a message of the stream, without its length. The refusal of a message that is not protobuf has id 0.
 tl::expected<Request, RefusedRequest> decode_request(BytesView message);
-/// Whether a message of the stream is a pose without an id, which gets no answer. Looks at its outline only: much cheaper than
-/// decode_request().
+/// Whether a message of the stream is a pose without an id, which gets no answer. It does not decode the pose, so it takes much
+/// less time than decode_request().
 bool is_unasked_pose(BytesView message);
 /// The bytes of a response. Bytes of its texts that are no UTF-8 become '?'.
 Bytes encode_response(v1::Response response);
@@ -41,14 +41,14 @@ Bytes encode_request(const Request& request);
 /// or an event is of an unknown kind.
 Result<std::shared_ptr<const v1::Response>> decode_response(BytesView message);
 
-// ---- the same in protobuf's JSON mapping, for HTTP and for people
+// ---- requests and messages in protobuf's JSON mapping, for HTTP and for users
 
 /// Reads a request from JSON. `op` is the name of a member of Request.op ("sonar", "set_object"), `json` its message. `name`: the
 /// sonar or object that the message is about, if it is given elsewhere, as in a path. Text that is not JSON, an unknown key, a
 /// wrong type, and whatever decode_request() refuses are refused with one sentence.
 Result<Request> request_from_json(std::string_view op, std::string_view json, std::string_view name = {});
-/// One line, no newline; names as in control.proto, numbers that are 0 and empty lists too. 64-bit numbers are strings, as
-/// protobuf's mapping has it.
+/// A message as one line of JSON, without its newline. Names are those of control.proto; numbers that are 0 and empty lists are
+/// written too. 64-bit numbers are strings, as protobuf's mapping demands.
 std::string json_of(const google::protobuf::Message& message);
 std::string json_of(StatusCode code, const std::string& text);  // {"code":"REFUSED","text":"..."}
 

@@ -21,10 +21,10 @@ std::string in_quotes(const std::string& name) { return '"' + name.substr(0, 64)
 /// The name in the form in which protobuf compares names: "range_m" and "rangeM" are the same field.
 std::string as_protobuf_reads(const std::string& name) {
   std::string read;
-  bool behind_line = false;
+  bool after_underscore = false;
   for (const char c : name) {
-    if (c != '_') read += behind_line && c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
-    behind_line = c == '_';
+    if (c != '_') read += after_underscore && c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+    after_underscore = c == '_';
   }
   return read;
 }
