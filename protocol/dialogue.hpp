@@ -26,31 +26,33 @@ struct Endpoint {
   bool operator==(const Endpoint&) const = default;
 };
 
-/// Where the device sends the datagrams of its pings from now on. Requested in a conversation: the list is that connection's,
-/// beside those of others, and ends with it. Requested by a datagram or over HTTP: the device's own list, which replaces
-/// Port::group.
+/// The receivers of the datagrams of pings from now on. If a client requests it in a conversation, the list belongs to its
+/// connection, beside those of others, and ends with it. If it is requested by a datagram or over HTTP, it is the device's own
+/// list, which replaces Port::group.
 struct SetReceivers {
   std::vector<Endpoint> to;  // address 0.0.0.0 = that of the host which requests it
   std::size_t stream = 0;    // index of the vendor's port of kind udp_stream, counted from 0
 };
-/// The client replaced the device's settings, perhaps by the same ones: some drivers repeat them at ping rate.
+/// The client replaces the device's settings, perhaps by the same ones: some drivers repeat them for every ping.
 struct ChangeSettings {
   PingSettings settings;
   std::shared_ptr<const VendorSettings> vendor_settings;
   std::string summary;                         // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
   std::optional<SetReceivers> receivers = {};  // the device's own list, where it is one of the settings
 };
-/// Settings override, from the control protocol or of a fault. Unset fields keep their value; all values must be finite.
+/// Settings that the control interface or a fault changes, in terms that all makes share. Unset fields keep their value; all
+/// values must be finite.
 struct SettingsOverride {
   std::optional<double> range_m, rate_hz, gain_percent;  // rate 0 = standby; gain: per cent of what a client can set
   std::optional<std::uint32_t> mode, beams;              // mode: index into SonarModel::modes
   std::optional<std::uint32_t> sample_bits = {};
   std::optional<bool> row_gains = {};
 };
-struct RequestPing {   // one ping now (network trigger, BlueView)
-  bool joins = false;  // a ping that is already under way satisfies the request, too
-  /// Of a mechanical scan: the ping is fired with the sonar turned so far to port about its own z axis, and framed with `with` in
-  /// place of the device's settings. Both hold until the next request.
+/// The client requests one ping now.
+struct RequestPing {
+  bool joins = false;  // a ping that is already being made serves the request too
+  /// For a mechanical scan: the ping is fired with the sonar turned to port by `head_rad` about its own z axis, and framed with
+  /// the settings `with` in place of the device's. Both hold until the next request.
   double head_rad = 0;
   std::shared_ptr<const VendorSettings> with = nullptr;
 };
@@ -62,7 +64,8 @@ struct StoredAddress {
 struct StoreAddress {
   StoredAddress address;
 };
-struct Notice {  // worth one (rate-limited) log line, e.g. junk skipped or a request refused
+/// A line for the log, whose rate is limited: bytes were skipped, a request was refused.
+struct Notice {
   std::string text;
 };
 struct Close {
@@ -74,19 +77,20 @@ struct Reaction {
   std::vector<Bytes> replies;  // whole messages, in order
 };
 
-/// How one client gets a ping of the device: a message for each prefix, the prefix and then the bytes that all clients share.
+/// The messages with which one client gets a ping: one for each prefix, which is the prefix and then the bytes that all clients
+/// share.
 struct Delivery {
   std::vector<Bytes> prefixes;
-  std::vector<Event> events;  // what it wants next
+  std::vector<Event> events;  // events that follow from the delivery, such as the request of the next ping
 };
 
 class Dialogue {
  public:
   virtual ~Dialogue() = default;
-  /// Accepts the stream in pieces of any size, and any garbage. It never throws and never grows without bound.
+  /// Reads the stream in pieces of any size, with any content. It never throws and never keeps bytes without bound.
   virtual Reaction on_bytes(BytesView received, Time now) = 0;
-  /// Keep-alives and subscriptions. Called at or after next_tick(). `ping_pending`: a client has asked the device for one ping,
-  /// which has not been started.
+  /// Makes what the time demands, such as keep-alives and pings of a subscription. Called at or after next_tick().
+  /// `ping_pending`: a client has requested one ping of the device, and it has not been started.
   virtual Reaction on_tick(Time now, bool ping_pending) = 0;
   virtual Time next_tick() const = 0;
   /// Time of the next ping that on_tick() will request by itself. Stepped time advances to it, but not for keep-alives alone.
@@ -97,11 +101,11 @@ class Dialogue {
   /// Whether known hosts send nothing while they get pings. Then, with longest_silence() and datagrams, an answer of the host's
   /// computer counts as a message of the host.
   virtual bool hosts_fall_silent() const { return false; }
-  /// A ping was put into this client's outbox: keep-alives only fill silence.
+  /// Called when a ping was put into this client's outbox, so that a keep-alive can wait.
   virtual void on_ping_queued(Time now) = 0;
-  /// A ping is ready, made with `made_with` (null: the initial settings); its framed size is `shared_bytes`. Most clients take
-  /// every ping as it is; where hosts request single pings, only those that requested one get it. Calls on_ping_queued itself
-  /// when anything is delivered.
+  /// Called when a ping is ready that was made under the settings `made_with` (null: the initial ones); its framed size is
+  /// `shared_bytes`. In most protocols every client gets every ping; where hosts request single pings, only those that requested
+  /// one get it. It calls on_ping_queued() itself if something is delivered.
   virtual Delivery on_ping(const VendorSettings* made_with, std::size_t shared_bytes, Time now) {
     static_cast<void>(made_with), static_cast<void>(shared_bytes);
     on_ping_queued(now);

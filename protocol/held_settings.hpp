@@ -1,4 +1,4 @@
-// The settings of a make as a device holds them, and as pings carry them to their frames.
+// Holds the settings of a make in the device, and in a ping request until the ping is framed.
 #pragma once
 
 #include "core/sonar/ping.hpp"
@@ -6,8 +6,8 @@
 
 namespace sonar::protocol {
 
-/// Whether a client would see no difference. A make whose settings have parts that differ from ping to ping has its own, in its
-/// namespace.
+/// Whether a client would see no difference between two settings. A make whose settings have parts that differ from ping to ping
+/// defines this function in its own namespace.
 template <class Settings>
 bool same_settings(const Settings& a, const Settings& b) {
   return a == b;
@@ -30,7 +30,7 @@ auto settings_in(const VendorSettings* held) {
   return of != nullptr ? of->settings : decltype(of->settings){};
 }
 
-/// The settings that hold after `reaction`, whose changes are not in force yet; `now` without one.
+/// The settings after the changes of `reaction`, which the daemon has not made yet; without a change the settings `now`.
 inline const VendorSettings* settings_after(const Reaction& reaction, const VendorSettings* now) {
   for (const Event& event : reaction.events)
     if (const auto* change = std::get_if<ChangeSettings>(&event)) now = change->vendor_settings.get();

@@ -1,6 +1,6 @@
-// The driver's end of a make's protocol: what a driver sends, and how the bytes of a sonar become pings. It is the counterpart of
-// Dialogue and as pure: no sockets, no clock, no log. The caller opens the ports, reports what arrives and carries out the
-// HostActions.
+// The driver's side of a make's protocol: it makes the messages of a driver, and pings from the bytes of a sonar. It is the
+// counterpart of Dialogue and as pure: no sockets, no clock, no log. The caller opens the ports, passes on the bytes that arrive,
+// and carries out the HostActions.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@
 
 namespace sonar::protocol {
 
-/// The settings that a user wants. Unset values: as the sonar has them, or as a usual driver sends them.
+/// The settings that a user wants. Unset values stay as the sonar has them, or are those that a usual driver sends.
 struct Wanted {
   bool as_it_is = false;                         // send no settings; request pings only from makes that need a request for each
   bool stamped = false;                          // prefer messages that state when a ping was fired
@@ -36,18 +36,18 @@ struct PingFacts {
   double row_m = 0, range_m = 0;  // range_m: far end of the last row
   double frequency_hz = 0;
   std::size_t message_size = 0;  // bytes, of all its messages
-  std::string note = {};         // more for the line of a ping
+  std::string note = {};         // text at the end of a ping's line, such as its distance
 };
 /// A ping as a host decoded it.
 struct HostPing {
   PingFacts facts;
   std::function<Result<PolarImage>()> picture;  // for a mechanical scan: the sector as scanned so far
-  /// A picture of many pings, one scan line each: how many it has, and how many make it whole.
+  /// Number of scan lines in a picture of many pings, one line each, and the number that makes it whole.
   std::size_t lines = 1, whole_lines = 1;
   std::vector<std::string> errors = {};           // errors of identities and sequence
   std::vector<std::string> echo_mismatches = {};  // settings that do not have the requested value yet
   std::optional<double> fired_s = {};             // by the clock of the device
-  /// What people look at; unset: a fan of `picture`.
+  /// Makes the drawing for users. Unset: a fan of `picture` is drawn.
   std::function<SonarPicture()> drawing = {};
   bool is_whole() const { return lines >= whole_lines; }
 };
@@ -59,8 +59,9 @@ struct HostSend {
   std::size_t port = 0;
   Bytes bytes;
 };
-/// In order. ResourceRequest: to port 0, of kind http; the reply goes to on_reply. Error: the host gives up; its
-/// text says what the sonar does ("refuses a request: ..."), that of usage is a sentence.
+/// Actions that the caller carries out in order. ResourceRequest: to port 0, of kind http; the reply goes to on_reply(). Error:
+/// the host gives up. Its text begins with the verb of the sonar ("refuses a request: ..."); with ErrorKind::usage it is a whole
+/// sentence.
 using HostAction = std::variant<HostSend, ResourceRequest, HostPing, Notice, Error>;
 using HostActions = std::vector<HostAction>;
 
@@ -79,21 +80,22 @@ struct HostPort {
 class Host {
  public:
   virtual ~Host() = default;
-  /// The ports are open. `own`: their numbers at this end.
+  /// Called when the ports are open. `own`: their local numbers.
   virtual HostActions on_open(std::span<const std::uint16_t> own, Time now) = 0;
-  /// A piece of a stream, of any size, or a datagram. Any garbage; never throws, never grows without bound.
+  /// Reads a piece of a stream, of any size, or a datagram, with any content. It never throws and never keeps bytes without
+  /// bound.
   virtual HostActions on_bytes(std::size_t port, BytesView received, Time now) = 0;
   virtual HostActions on_reply(const ResourceReply& reply, Time now) {
     static_cast<void>(reply), static_cast<void>(now);
     return {};
   }
-  /// Keep-alives. Called at or after next_tick().
+  /// Makes keep-alives and repeats requests. Called at or after next_tick().
   virtual HostActions on_tick(Time now) {
     static_cast<void>(now);
     return {};
   }
   virtual std::optional<Time> next_tick() const { return std::nullopt; }
-  /// The caller wants a ping. For protocols in which each ping is requested; called whenever the caller waits for one.
+  /// Called whenever the caller waits for a ping. Protocols in which each ping is requested then make a request.
   virtual HostActions on_demand(Time now) {
     static_cast<void>(now);
     return {};
@@ -101,26 +103,26 @@ class Host {
   /// Called before the ports are closed.
   virtual HostActions on_leave() { return {}; }
 
-  /// The sonar has answered and its settings are requested.
+  /// Whether the sonar has answered and its settings have been requested.
   virtual bool is_open() const { return true; }
-  /// "an ARIS", "a BlueView P900-90, serial 7001"
+  /// A text such as "an ARIS" or "a BlueView P900-90, serial 7001".
   virtual std::string about() const = 0;
-  /// Counts on a wire whose messages are numbered and differ from other bytes.
+  /// Counts of a protocol whose messages differ from other bytes and whose pings are numbered.
   struct Counts {
     std::uint64_t messages = 0, dummies = 0, junk_bytes = 0, missing_pings = 0;
   };
   virtual std::optional<Counts> counts() const { return std::nullopt; }
-  /// Pings echo the settings that were sent: HostPing::echo_mismatches is judged.
+  /// Whether pings echo the settings that were sent, so that HostPing::echo_mismatches is to be judged.
   virtual bool expects_echo() const { return false; }
 };
 
-/// The content of a beacon for hosts.
+/// The content of a beacon that hosts need.
 struct Announcement {
   Ipv4 address{}, client{};  // address where hosts connect; who is connected, 0.0.0.0: no one
   std::uint32_t device_id = 0;
   std::vector<std::string> complaints;  // deviations that hosts reject
 };
-/// How hosts find such sonars: by a datagram to all.
+/// The datagram to all addresses by which hosts find sonars, and its answer.
 struct Search {
   struct Answer {
     std::uint16_t port = 0;
@@ -131,7 +133,7 @@ struct Search {
   std::optional<Answer> (*answer)(BytesView datagram) = nullptr;  // nullopt: it is none
 };
 
-/// A make of sonar, both ends. Adding one = one folder + one row of makes.cpp.
+/// A make of sonar: the device's side and the driver's side. A new make is one folder and one row of makes.cpp.
 struct Make {
   const Vendor* device = nullptr;
   std::string_view title;    // "an ARIS"
@@ -157,8 +159,8 @@ struct Make {
   PictureKind picture = PictureKind::fan;
 
   std::string_view name() const { return device->name(); }
-  bool is_by_udp() const { return ports.front().kind == HostPort::Kind::udp; }  // what hosts send it
-  /// The unit of a rate of pings: a ping of some natures is one line of the picture.
+  bool is_by_udp() const { return ports.front().kind == HostPort::Kind::udp; }  // hosts send by UDP
+  /// The unit of a rate of pings. In some kinds of pictures a ping is one line.
   std::string_view rate_unit() const {
     return picture == PictureKind::sweep || picture == PictureKind::waterfall ? "lines/s" : "Hz";
   }
@@ -170,10 +172,11 @@ std::vector<Make> product_makes();
 std::span<const Make> makes();
 /// Null: no make has this name.
 const Make* find_make(std::string_view name);
-/// The make of a product; of an unknown one the first.
+/// The make of a product; for an unknown product the first make.
 const Make& make_of_profile(std::string_view profile);
 
-/// usage: a wanted setting that is not among `known`: "range", "rate", "gain", "mode", ... as sonarctl's options.
+/// Checks that all wanted settings are among `known`: "range", "rate", "gain", "mode", ... as sonarctl's options. usage: one is
+/// not.
 Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::initializer_list<std::string_view> known);
 
 }  // namespace sonar::protocol

@@ -48,7 +48,7 @@ enum class FieldName {
 namespace means {
 using enum FieldName;
 }
-/// The same words, in that order.
+/// The names of FieldName for users, in the order of the enum.
 inline constexpr std::array<std::string_view, 34> field_names{
     "magic",     "source_id",   "destination_id",    "message_type", "version",       "payload_size",
     "ping_id",   "ping_status", "frequency",         "temperature",  "pressure",      "heading",

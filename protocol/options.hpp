@@ -21,7 +21,7 @@ struct Option {
   double lowest = 0, highest = 0;  // limits of a number, inclusive; 0, 0 = any number above 0
   std::string_view word = {};      // word that may stand for a number, beside the default
 };
-/// "number above 0", "number from 5 to 170".
+/// A text such as "number above 0" or "number from 5 to 170".
 inline std::string numbers_of(const Option& option) {
   if (option.highest <= 0) return "number above 0";
   char text[64];
@@ -44,7 +44,7 @@ inline std::optional<double> given_number(const OptionValues& values, std::strin
   return is_number ? std::optional(value) : std::nullopt;
 }
 
-/// 0 for a word.
+/// The option's number, or 0 if it is a word.
 inline double number_option(const OptionValues& values, std::string_view name) { return given_number(values, name).value_or(0); }
 
 }  // namespace sonar::protocol

@@ -47,7 +47,8 @@ struct DeviceState {
   StoredAddress stored_address;
 };
 
-/// How pings reach a host: in its TCP connection, as datagrams (frame() returns null), or by either, as the host connects.
+/// The transport of pings to a host: its TCP connection, datagrams (frame() returns null), or either, depending on how it
+/// connects.
 enum class PingsBy { stream, datagrams, either };
 
 /// The distance that a range finder, such as an altimeter, measures with one ping.
@@ -62,7 +63,7 @@ class Vendor {
   virtual std::string_view name() const = 0;
   virtual std::span<const std::shared_ptr<const SonarModel>> models() const = 0;
   virtual std::span<const Port> ports() const = 0;
-  /// The first of that kind, or null.
+  /// The first port of that kind, or null.
   const Port* port(Port::Kind kind) const {
     for (const Port& port : ports())
       if (port.kind == kind) return &port;
@@ -70,7 +71,7 @@ class Vendor {
   }
   virtual std::span<const Option> options() const { return {}; }
   virtual int default_max_clients() const = 0;
-  /// The model that a device with these (complete) options emulates; asked once, when its configuration is read.
+  /// The model that a device with these (complete) options emulates. Called once, when its configuration is read.
   virtual Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
                                                           const OptionValues& options) const {
     static_cast<void>(options);
@@ -87,7 +88,7 @@ class Vendor {
     static_cast<void>(device);
     return false;
   }
-  /// The settings to which the device itself changes once it has that ping, such as an automatic range. nullopt: they stay.
+  /// The settings to which the device changes by itself after a ping, such as an automatic range. nullopt: they stay.
   virtual std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const {
     static_cast<void>(ping), static_cast<void>(device);
     return std::nullopt;
@@ -99,7 +100,7 @@ class Vendor {
     static_cast<void>(ping);
     return std::nullopt;
   }
-  /// The ping of that number, from 1, of a mechanical scan, as a usual host requests it. Other sonars: nothing.
+  /// Ping `number`, counted from 1, of a mechanical scan as a usual host requests it. nullopt: the sonar does not scan.
   struct ScanStep {
     RequestPing aim;
     PingSettings settings;
@@ -108,7 +109,7 @@ class Vendor {
     static_cast<void>(number), static_cast<void>(device);
     return std::nullopt;
   }
-  /// Empty when the vendor has no beacon.
+  /// The beacon's datagram. Empty: the vendor has no beacon.
   virtual Bytes beacon(const DeviceState& device, Time now) const {
     static_cast<void>(device), static_cast<void>(now);
     return {};
@@ -132,8 +133,8 @@ class Vendor {
   /// A new dialogue at a port of kind tcp_stream or udp_dialogue. The state must outlive it.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
   virtual PingsBy pings_by() const { return PingsBy::stream; }
-  /// Once per ping, shared by all connections; with the settings the ping was made with (PingRequest::vendor_settings). Null: its
-  /// pings are datagrams only.
+  /// Encodes a ping for all connections, under the settings of the ping (PingRequest::vendor_settings). Called once per ping.
+  /// Null: its pings are datagrams only.
   virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const {
     static_cast<void>(ping), static_cast<void>(device);
     return nullptr;
@@ -144,8 +145,8 @@ class Vendor {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};
   }
-  /// Where a message has this field. If `message` is empty: its place in the vendor's layout with the most fields. nullopt: the
-  /// message has no such field or is too short.
+  /// The place of a field in a message; if `message` is empty, in the vendor's layout with the most fields. nullopt: the message
+  /// has no such field or is too short.
   virtual std::optional<Field> field(Part part, FieldName name, BytesView message) const {
     static_cast<void>(part), static_cast<void>(name), static_cast<void>(message);
     return {};
@@ -159,8 +160,8 @@ class Vendor {
   }
   /// Corrects the checksums of a ping whose fields were changed; it has the size of `before`.
   virtual void reseal(BytesView before, Bytes& message) const { static_cast<void>(before), static_cast<void>(message); }
-  /// {offset, size} of a region. nullopt: the vendor has no such region, or the ping is too short. Of an empty `ping`: {0, 0}
-  /// when the vendor has such a region.
+  /// {offset, size} of a region of a ping. nullopt: the vendor has no such region, or the ping is too short. For an empty `ping`
+  /// it is {0, 0} if the vendor has such a region.
   virtual std::optional<std::pair<std::size_t, std::size_t>> region(Region region, BytesView ping) const {
     static_cast<void>(region), static_cast<void>(ping);
     return {};
@@ -179,7 +180,8 @@ class PushingVendor : public Vendor {
   std::array<Port, 1> ports_;
 };
 
-/// Fills in defaults. Unknown names and values are errors that suggest the nearest valid one.
+/// Checks options and adds the defaults of those that are not given. Unknown names and values are errors that suggest the nearest
+/// valid one.
 Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& given);
 
 /// The devices of makes() (protocol/host.hpp), in that order.
@@ -191,9 +193,9 @@ struct Profile {
 };
 Result<Profile> find_profile(std::string_view profile);
 
-/// The addresses of a sonar at `ip`, port by port; `status_to`: where its status messages go.
+/// The addresses of a sonar at `ip`, port by port. `status_to`: the receivers of its status messages.
 std::vector<DriverAddress> driver_addresses(const Vendor& vendor, Ipv4 ip, std::span<const Endpoint> status_to);
-/// "tcp        127.0.0.2:52100            waits for the driver"
+/// A line such as "tcp        127.0.0.2:52100            waits for the driver".
 std::string line_of(std::string_view protocol, std::string_view at, bool sonar_speaks_first);
 
 }  // namespace sonar::protocol

@@ -1,5 +1,5 @@
-// Messages are described once, by a function fields(visit, message); the visitors here write, read, count and name them.
-// Floor of every vendor folder: no packed structs, no casts of buffers, no byte ever read beyond the span.
+// A message is described once, by a function fields(visit, message). The visitors here write, read, count and name its fields, so
+// no protocol has packed structs or casts of buffers, and no byte beyond the span is ever read.
 #pragma once
 
 #include <array>
@@ -235,7 +235,7 @@ class Namer : public Visitor<Namer> {
   std::string prefix_;
 };
 
-/// Where a message has a field; little-endian. `bytes`: neither an integer nor a floating-point number.
+/// The place of a field in a message, and its type; little-endian. `bytes`: neither an integer nor a floating-point number.
 struct Field {
   enum class Type { integer, number, bytes } type{};
   std::size_t offset = 0, size = 0;
@@ -275,7 +275,7 @@ class Locator : public Visitor<Locator<Meaning>> {
   std::size_t offset_ = 0;
 };
 
-/// Bytes a message takes on the wire; a constant.
+/// Size in bytes of a message on the wire; a constant.
 template <class M>
 constexpr std::size_t wire_size() {
   Counter counter;
@@ -284,8 +284,8 @@ constexpr std::size_t wire_size() {
   return counter.bytes;
 }
 
-/// The place of the field of that meaning (Locator) in bytes in which the message begins at `at`; nothing if no field has it, or
-/// `bytes`, if they are not empty, end before the field does.
+/// Finds the field of a meaning (Locator) in bytes in which the message begins at `at`. nullopt: no field has the meaning, or
+/// `bytes` are not empty and end before the field does.
 template <class M, class Meaning>
 constexpr std::optional<Field> locate(Meaning meaning, BytesView bytes = {}, std::size_t at = 0) {
   Locator<Meaning> locator(meaning);
