@@ -34,6 +34,7 @@ Result<std::optional<std::vector<std::byte>>> DelimitedParser::next() {
   return std::optional(std::move(message));
 }
 
+// protobuf's varint: 7 bits a byte, the lowest first; the top bit says that another byte follows.
 std::vector<std::byte> delimited(std::span<const std::byte> message) {
   std::vector<std::byte> out;
   out.reserve(message.size() + longest_length_field);

@@ -159,6 +159,7 @@ bool LineParser::begin() {
   return begun_ = true;
 }
 
+// Blank lines are skipped. A line without its end waits for more bytes, up to longest_line.
 std::optional<LineParser::Line> LineParser::next() {
   if (!begin()) return std::nullopt;
   while (true) {

@@ -332,6 +332,7 @@ bool looks_elsewhere(const v1::DaemonStatus& status) {
                       [](const v1::FaultStatus& fault) { return fault.state() == "active"; });
 }
 
+// Findings of one level keep the order in which they are made: faults, clock, sonars, poses.
 std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere) {
   std::vector<Finding> findings;
   check_faults(now, findings);

@@ -33,6 +33,7 @@ class Frame {
   wire::Writer writer_{bytes_};
 };
 
+/// A call and its answer differ in their opcode only. The payload has no length: it goes to the end of the message.
 Bytes service_frame(std::uint8_t opcode, const ServiceCall& call) {
   return Frame(opcode).add(call.service).add(call.call).counted(call.encoding).text(call.payload).take();
 }

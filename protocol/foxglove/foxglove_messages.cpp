@@ -90,6 +90,7 @@ void change_stamps(pb::Message& message, const Stamp& stamp) {
 
 }  // namespace
 
+// Recorded messages are replayed with the times of the playback, so all their stamps move.
 Bytes with_stamps(const Channel& of, BytesView message, const Stamp& stamp) {
   const auto* const type = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(of.schema.name);
   if (of.encoding == "cdr") return with_stamp(message, stamp);
@@ -264,6 +265,7 @@ Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> point
   return bytes_of(message);
 }
 
+// With `number` = 0 two geometries can be compared: viewers get one only when it changes.
 Bytes geometry(const Ping& ping, std::uint32_t number) {
   const PingSettings& s = ping.request.settings;
   v1::PingGeometry message;

@@ -185,6 +185,7 @@ std::string parameter_values(std::span<const Parameter> parameters, const std::o
   return dump(json);
 }
 
+// Viewers demand schemas of request and response; ours accept any object, because the daemon checks the content.
 std::string advertise_services(std::span<const Service> services) {
   Json list = Json::array();
   for (const Service& s : services) {

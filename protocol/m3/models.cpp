@@ -14,6 +14,7 @@ constexpr double elements = 64;       // PKT
 // unknown: levels. Full scale so that the strongest echoes of the demo scene have the level of those of PKT, about.
 constexpr float source_level_db = 210, full_scale_upa = 1.5e8f;
 
+/// The mode "Imaging 3" of PKT; other modes are not emulated.
 SonarModel make_model() {
   FrequencyMode mode;
   mode.name = "Imaging 3";

@@ -64,6 +64,7 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
                        settings.far_m, static_cast<double>(settings.rate_hz), static_cast<double>(settings.c_db))};
 }
 
+// Only range, rate and gain can be set: the maker's program sets them, its drivers cannot.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   const auto refused = [](std::string text) { return failure(ErrorKind::usage, std::move(text)); };
   Settings s = settings_from(device.settings.get());

@@ -73,6 +73,7 @@ Bytes packed(BytesView bins, bool upper_first) {
   return bytes;
 }
 
+// The upper half comes first here: the frame does not say which half is nearer (option first_4bit_bin).
 Bytes unpacked(BytesView bytes) {
   Bytes bins;
   for (const std::byte both : bytes) bins.insert(bins.end(), {both >> 4, both & std::byte{15}});

@@ -57,6 +57,7 @@ std::optional<std::chrono::milliseconds> Conversation::longest_silence() const {
   return by_datagrams_ && s > 0 ? std::optional(std::chrono::milliseconds(static_cast<int>(1000 * s))) : std::nullopt;
 }
 
+/// Answers what every device of the family answers, and passes other requests to the product.
 void Conversation::on_frame(const Frame& frame, Time now, protocol::Reaction& reaction) {
   if (is_of_device(frame.header.id)) return;  // answering it would let two devices answer each other without end
   if (!frame.sum_is_right) return refuse(frame, "wrong checksum", reaction);

@@ -162,6 +162,7 @@ class Ping360Host final : public PingHost {
   bool is_open() const override { return is_open_; }
 
  private:
+  /// Any frame shows that the sonar is there.
   void on_frame(const Frame&, HostActions& actions) override {
     if (!std::exchange(is_open_, true)) ask(actions);
   }

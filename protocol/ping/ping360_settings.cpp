@@ -22,6 +22,7 @@ constexpr double fastest_hz = 1000;                            // no limit: host
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
+/// The reason for the first value outside its limits, else an empty text.
 std::string out_of_range(std::initializer_list<std::tuple<const char*, int, int, int>> values) {
   for (const auto& [name, value, low, high] : values)
     if (value < low || value > high) {
@@ -179,6 +180,7 @@ std::chrono::nanoseconds transfer(const Transducer& t, const protocol::OptionVal
 
 Time Head::arrives() const { return since + std::abs(to - from) * turn_of_a_grad; }
 
+// Whole grads: the head stops at grads only, and messages have no finer angle.
 std::uint16_t Head::angle_at(Time at) const {
   const int way = std::abs(to - from);
   const auto gone = static_cast<int>(std::clamp<std::int64_t>((at - since) / turn_of_a_grad, 0, way));

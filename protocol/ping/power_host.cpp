@@ -66,6 +66,7 @@ class PowerHost final : public PingHost {
   std::string about() const override { return std::string(title_); }
 
  private:
+  /// The request was refused: the sonar is perhaps the other product. Its request is sent once; a second refusal is an error.
   bool on_nack(Id refused, HostActions& actions) override {
     if (!asks() || refused != refusable_ || title_ == other_.title) return false;
     title_ = other_.title;

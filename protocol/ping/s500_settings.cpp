@@ -171,6 +171,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 
 double gain_percent(const Parameters& p) { return 100.0 / most_gain() * p.reach.gain; }
 
+// The echo is kept for the mean of the distances in any case; range and gain follow it only where they are automatic.
 Settings after(const Ping& ping, const Settings& now) {
   const Echo echo = find_echo(ping);
   Settings next = now;

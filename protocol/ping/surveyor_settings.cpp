@@ -149,6 +149,7 @@ WaterStats water_stats(const protocol::DeviceState& device) {
           static_cast<float>(absolute_pressure_bar(device.water, device.depth_m))};
 }
 
+// Both messages have the same points: 3012 as angle and time, 3011 as y and z.
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) {
   const Settings s = settings_from(ping.request.vendor_settings.get());
   const PingParameters& p = s.parameters;

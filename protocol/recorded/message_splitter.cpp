@@ -46,6 +46,7 @@ void MessageSplitter::lose(std::size_t count) {
   lost_bytes_ += count;
 }
 
+// Bytes are missing behind those that wait, so the message that has begun is lost, and the next bytes may lie within another one.
 void MessageSplitter::break_off() {
   if (waiting_bytes() > 0) ++losses_;
   lose(waiting_bytes());

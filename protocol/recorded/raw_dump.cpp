@@ -54,6 +54,7 @@ class RawReader final : public RecordingReader {
   bool ended_ = false;
 };
 
+/// Writes the bytes of the device as they are. Times and the client's messages are lost.
 class RawWriter final : public RecordingWriter {
  public:
   RawWriter(std::unique_ptr<Sink> sink, Carrier by) : sink_(std::move(sink)), by_(by) {}

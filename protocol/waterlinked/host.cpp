@@ -30,6 +30,7 @@ double centre_hz_of(const Shot& shot) {
 
 }  // namespace
 
+// The sizes come from the network, so they are checked before memory is reserved for a picture.
 std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const StrengthMessage* strengths) {
   const Shot& shot = ranges.shot;
   const std::size_t width = shot.width, height = shot.height;
@@ -56,6 +57,7 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
   for (std::size_t column = 0; column < width; ++column) {
     image.azimuth_rad.push_back(wide * (0.5 - static_cast<double>(column) / static_cast<double>(width - 1)));
     for (std::size_t row = 0; row < height; ++row) {
+      // Row 0 of the message is the lowest; row 0 of the drawing is the highest.
       const std::size_t pixel = row * width + column;
       if (ranges.pixels[pixel] == 0) continue;
       const double range_m = scale_m * ranges.pixels[pixel];

@@ -37,6 +37,7 @@ Outcome malformed(const std::string& why) { return {400, {{"error", why}}}; }
 
 // ---- resources that GET reads
 
+/// A time as "2026-01-31T23:58:15.123Z".
 std::string rfc_3339(Time at) {
   const auto day = std::chrono::floor<std::chrono::days>(at);
   const std::chrono::year_month_day date(day);
@@ -156,6 +157,7 @@ Outcome set_ntp(Call& call, const Json& posted) {
   return {};
 }
 
+/// The sonar does not ask a time server: the result follows from option `clock`.
 Outcome force_sync(Call& call, const Json& posted) {
   if (!posted.is_object() || !posted.value("timeout_seconds", Json(0)).is_number())
     return malformed("not {\"timeout_seconds\": number}");
@@ -234,6 +236,7 @@ ResourceReply reply_of(unsigned status, const Json& body) {
   return {status, status == 204 ? "" : body.dump(-1, ' ', false, Json::error_handler_t::replace)};
 }
 
+/// The reply to a POST. Settings that are the same as before make no event, so that repeated requests do not restart anything.
 ResourceReply changed(const Call& call, const Outcome& outcome) {
   ResourceReply reply = reply_of(outcome.status, outcome.body);
   const Settings before = settings_from(call.device.settings.get(), call.device);
@@ -248,6 +251,7 @@ ResourceReply answer(const protocol::ResourceRequest& request, const DeviceState
   const bool inside = request.path.starts_with(base);
   const auto path = std::find_if(paths.begin(), paths.end(),
                                  [&](const Path& p) { return inside && request.path.substr(base.size()) == p.name; });
+  // Releases compare as texts, because all have the form 1.x.y with one digit each.
   if (path == paths.end() || text_option(device.options, option_name::release) < path->since)
     return reply_of(404, {{"error", "unknown path"}});
   Call call{device, settings_from(device.settings.get(), device), now};

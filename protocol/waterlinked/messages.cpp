@@ -72,6 +72,7 @@ Bytes packet_of(const StrengthMessage& message) {
   return packed(m);
 }
 
+// Vectors of all samples lie one after the other in one list of floats.
 Bytes packet_of(const ImuMessage& message) {
   pb::ImuBatch m;
   m.set_batch_sequence_id(message.sequence);

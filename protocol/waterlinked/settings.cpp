@@ -13,6 +13,7 @@ constexpr float first_gain_db = 30;           // gain of the first pictures, fro
 
 }  // namespace
 
+// The values of the model of the image (protocol/waterlinked/README.md); models.hpp has their evidence.
 HeldSettings::HeldSettings(const Settings& s) : settings(s) {
   beam_height_rad = rad_from_deg(mode_rows()[s.mode].beam_deg);
   range_unit_m = pixel_scale_m;
@@ -77,6 +78,7 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
   return {s, std::make_shared<HeldSettings>(settings), text, receivers_of(settings)};
 }
 
+// The address was checked when it was posted (http.cpp).
 protocol::SetReceivers receivers_of(const Settings& settings) {
   if (settings.udp == multicast) return {{multicast_group}};
   if (settings.udp == unicast) return {{{*text::parse_ipv4(settings.unicast_ip), settings.unicast_port}}};

@@ -61,6 +61,7 @@ class McapRecordingReader final : public RecordingReader {
 
 }  // namespace
 
+// All channels are defined here, but a channel is written into the file only with its first message.
 McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make)
     : writer_(std::move(sink)), sonar_(std::move(sonar)), make_(&make) {
   device_ = vendor_channel("device", "device", "tcp");

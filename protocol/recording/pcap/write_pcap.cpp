@@ -121,6 +121,7 @@ class PcapWriter final : public RecordingWriter {
     return written;
   }
 
+  /// Ends the connection with FIN from both sides, so that Wireshark shows it as closed.
   Result<void> close() override {
     Bytes packets;
     begin(packets);
