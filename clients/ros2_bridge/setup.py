@@ -1,4 +1,4 @@
-"""For colcon; see README.md."""
+"""Installs the package with colcon; see README.md."""
 from setuptools import setup
 
 setup(

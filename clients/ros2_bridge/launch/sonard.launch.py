@@ -1,4 +1,4 @@
-"""sonard, then the bridge, an autopilot and a driver once sonard is ready; when sonard ends, all end.
+"""Starts sonard and, when it is ready, the bridge, an autopilot and a driver. When sonard ends, all of them end.
 
 ros2 launch sonard_bridge sonard.launch.py config:=dive.yaml odometry:=/odom driver:="ros2 launch oculus_ros2 default.launch.py"
 """

@@ -1,1 +1,1 @@
-"""Poses of a ROS 2 system to sonard. `conversions` needs no ROS, `node` is the node."""
+"""Connects a ROS 2 system to sonard. Only `node` needs ROS."""

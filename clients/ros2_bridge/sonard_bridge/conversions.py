@@ -1,8 +1,8 @@
-"""Between ROS and sonard, without ROS: frames, the pose as a line of JSON, the daemon's status, and beams as a laser scan.
+"""Converts between ROS and sonard: frames, poses to lines of JSON, the daemon's status, beams to laser scans. Needs no ROS.
 
-sonard's world is ENU and its body FLU, as ROS has both by REP 103: poses pass as they are, but ROS writes quaternions x, y, z, w
-and sonard w, x, y, z. oculus_sonar_driver's images (marine_acoustic_msgs) are in a frame of their own: z ahead in the middle of
-the fan, y to port, so x down.
+sonard and ROS (REP 103) use the same frames: the world is ENU, the body is FLU. Only the order of a quaternion differs: x, y, z, w
+in ROS, w, x, y, z in sonard. The images of oculus_sonar_driver (marine_acoustic_msgs) have their own frame: z points ahead, in the
+middle of the fan, y points to port, and x points down.
 """
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ NORM_ALLOWED = 1e-3
 
 
 class Unusable(ValueError):
-    """Why a message cannot be sent on; one sentence."""
+    """A message cannot be converted. The text is one sentence with the reason."""
 
 
 def wxyz(xyzw: Sequence[float]) -> Quaternion:
-    """sonard's order from ROS's, of length 1; Unusable where it is none: an all-zero one is ROS's "not set"."""
+    """Converts a quaternion from ROS's order to sonard's and normalises it. Raises Unusable if its length is not nearly 1: ROS
+    leaves a quaternion that is not set at zero."""
     norm = math.sqrt(sum(v * v for v in xyzw))
     if len(xyzw) != 4 or not math.isfinite(norm) or abs(norm - 1) > NORM_ALLOWED:
         raise Unusable(f"orientation {tuple(xyzw)} has length {norm:g}, not 1")
@@ -30,36 +31,37 @@ def wxyz(xyzw: Sequence[float]) -> Quaternion:
 
 
 def xyzw(q: Sequence[float]) -> Quaternion:
-    """ROS's order from sonard's."""
+    """Converts a quaternion from sonard's order to ROS's."""
     return q[1], q[2], q[3], q[0]
 
 
 def rotate(q: Quaternion, v: Sequence[float]) -> Vector3:
-    """A vector of the body in the axes that q is told in."""
+    """Rotates a vector from body axes to the world axes that q refers to."""
     w, x, y, z = q
     tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
     return v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx
 
 
 def enu_from_ned(v: Sequence[float]) -> Vector3:
-    """And NED from ENU: it is its own inverse."""
+    """Converts a vector from NED to ENU, and from ENU to NED: the function is its own inverse."""
     return v[1], v[0], -v[2]
 
 
 def flu_from_frd(v: Sequence[float]) -> Vector3:
-    """And FRD from FLU."""
+    """Converts a vector from FRD to FLU, and from FLU to FRD."""
     return v[0], -v[1], -v[2]
 
 
 def enu_flu_from_ned_frd(q: Quaternion) -> Quaternion:
-    """Body to world, of a sender that keeps to aircraft's axes; and back: its own inverse, except for the sign of all four."""
+    """Converts an orientation (body to world) from the axes NED and FRD to ENU and FLU. Applied twice, it returns -q, which is the
+    same orientation."""
     w, x, y, z = q
     s = math.sqrt(0.5)
     return s * (w + z), s * (x + y), s * (x - y), s * (w - z)
 
 
 def flu_from_image(v: Sequence[float]) -> Vector3:
-    """From the frame of oculus_sonar_driver's images to sonard's sonar frame (x ahead, y to port, z up)."""
+    """Converts a vector from the image frame of oculus_sonar_driver to sonard's sonar frame (x ahead, y to port, z up)."""
     return v[2], v[1], -v[0]
 
 
@@ -67,13 +69,13 @@ def image_from_flu(v: Sequence[float]) -> Vector3:
     return -v[2], v[1], v[0]
 
 
-# The image frame in the sonar's: a static transform from the sonar's FLU frame to its image frame has this rotation, x, y, z, w.
+# Rotation x, y, z, w of a static transform whose parent is the sonar's FLU frame and whose child is its image frame.
 IMAGE_IN_FLU_XYZW = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 
 
 def json_line(position: Sequence[float], orientation: Quaternion, stamp_s: Optional[float] = None, vehicle: str = "",
               velocity_in_body: Optional[Sequence[float]] = None) -> bytes:
-    """A pose as sonard takes it by UDP. ROS's twists are in the axes of the body, sonard's in those of the world."""
+    """Makes the line that sonard receives by UDP. The velocity is in body axes, as in ROS; the line has it in world axes."""
     if len(position) != 3 or not all(map(math.isfinite, position)):
         raise Unusable(f"position {tuple(position)} is not three finite numbers")
     line: Dict[str, Any] = {"frame": "ENU_FLU", "position": list(position), "quaternion": list(orientation)}
@@ -89,12 +91,13 @@ def json_line(position: Sequence[float], orientation: Quaternion, stamp_s: Optio
 
 
 def stamp_s(seconds: int, nanoseconds: int) -> Optional[float]:
-    """None for an unset stamp: then the moment of receipt counts."""
+    """Returns None for a stamp that is not set; sonard then uses the time of receipt."""
     return seconds + 1e-9 * nanoseconds if seconds or nanoseconds else None
 
 
 def vehicle_in(status: Dict[str, Any], name: str) -> "Optional[Tuple[Vector3, Quaternion]]":
-    """Position and orientation w, x, y, z of a vehicle, or of the only one, in a status of the daemon."""
+    """Finds a vehicle by its name in a status of the daemon; an empty name finds the only vehicle. Returns its position and its
+    orientation w, x, y, z."""
     vehicles = [v for v in status.get("vehicles", []) if not name or v.get("name") == name]
     if len(vehicles) != 1 or "orientation" not in vehicles[0]:
         return None
@@ -104,13 +107,13 @@ def vehicle_in(status: Dict[str, Any], name: str) -> "Optional[Tuple[Vector3, Qu
 
 
 def stamp_ns(status: Dict[str, Any]) -> int:
-    """The daemon's time of a status; 0 where it states none."""
+    """Returns the daemon's time in a status, or 0 if the status has none."""
     stated = status.get("now_ns", 0)
     return int(stated) if isinstance(stated, int) or (isinstance(stated, str) and stated.isdigit()) else 0
 
 
 def endpoint(text: str, port: int) -> Tuple[str, int]:
-    """host or host:port"""
+    """Splits "host" or "host:port"; `port` is the default."""
     host, colon, number = text.partition(":")
     if not host or (colon and not (number.isascii() and number.isdigit() and 0 < int(number) < 65536)):
         raise ValueError(f"{text!r} is not host:port")
@@ -118,20 +121,22 @@ def endpoint(text: str, port: int) -> Tuple[str, int]:
 
 
 def name_in_topic(sonar: str) -> str:
-    """A sonar's name as part of a topic: letters, digits and underscores, no digit first."""
+    """Makes a valid part of a topic from a sonar's name: letters, digits and underscores, the first of them not a digit."""
     name = "".join(c if c.isascii() and c.isalnum() else "_" for c in sonar)
     return "_" + name if name[:1].isdigit() else name
 
 
 class Scan(NamedTuple):
-    """Ranges at even angles, positive to port, from starboard to port, as sensor_msgs/LaserScan has them. inf: nothing is hit."""
+    """Ranges at equally spaced angles from starboard to port, as in sensor_msgs/LaserScan. Angles to port are positive. A range of
+    inf means that the beam hits nothing."""
     first_rad: float
     step_rad: float
     range_m: List[float]
 
 
 def scan_of(azimuth_rad: Sequence[float], range_m: Sequence[float]) -> Scan:
-    """Each angle takes what the nearest beam hits. Beams fall from port to starboard; a range of 0 is no hit."""
+    """Gives each angle of the scan the range of the nearest beam. The beams are ordered from port to starboard; their range is 0
+    where they hit nothing."""
     if not 2 <= len(azimuth_rad) == len(range_m):
         raise Unusable(f"{len(range_m)} ranges of {len(azimuth_rad)} beams are not a scan")
     beams = sorted(zip(azimuth_rad, range_m))

@@ -1,4 +1,4 @@
-"""What both launch files have in common: an argument for each parameter, and the node."""
+"""Shared by both launch files: a launch argument for each parameter, and the node."""
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -18,7 +18,7 @@ def arguments():
 
 
 def bridge():
-    """Texts stay text: YAML would make numbers and truth values of names such as 1 and on."""
+    """Passes text parameters as text. Otherwise YAML would convert names such as 1 and on to numbers and booleans."""
     given = {p.name: ParameterValue(LaunchConfiguration(p.name), value_type=str) if isinstance(p.default, str)
              else LaunchConfiguration(p.name) for p in PARAMETERS}
     return Node(package="sonard_bridge", executable="bridge", name="sonard_bridge", namespace=LaunchConfiguration("namespace"),

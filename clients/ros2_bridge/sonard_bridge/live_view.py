@@ -1,5 +1,5 @@
-"""A viewer of sonard's live view (docs/live-view.md) in a thread of its own, without ROS: a WebSocket, what the bridge needs of
-the Foxglove protocol, and protobuf fields by their numbers in protocol/foxglove/schemas."""
+"""A client of sonard's live view (docs/live-view.md) that runs in its own thread and needs no ROS. It has a WebSocket, the part of
+the Foxglove protocol that the bridge uses, and a decoder of protobuf by the field numbers in protocol/foxglove/schemas."""
 from __future__ import annotations
 
 import base64
@@ -15,15 +15,15 @@ from .conversions import Quaternion, Vector3
 from .polling import WANTS_TOKEN
 
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
-LONGEST = 64 << 20   # bytes of a message
-SILENCE_S = 30.0     # sonard says something every second
+LONGEST = 64 << 20   # limit for a message [bytes]
+SILENCE_S = 30.0     # after such a silence the connection is lost: sonard sends a message every second
 RETRY_S = 1.0
 
 
 # ---- messages
 
 def fields(data: bytes) -> Iterator[Tuple[int, Any]]:
-    """(number, value) of a protobuf message: bytes, or an integer of varints."""
+    """Yields number and value of each field of a protobuf message. The value of a varint is an integer, that of others is bytes."""
     def varint() -> int:
         nonlocal at
         value = shift = 0
@@ -52,7 +52,7 @@ def fields(data: bytes) -> Iterator[Tuple[int, Any]]:
 
 
 def last_of(data: bytes) -> Dict[int, Any]:
-    """Of each field the last value, as protobuf has it."""
+    """Returns the last value of each field, which is the valid one in protobuf."""
     return dict(fields(data))
 
 
@@ -79,7 +79,7 @@ class Transform(NamedTuple):
 
 
 def transforms(payload: bytes) -> List[Transform]:
-    """foxglove.FrameTransforms"""
+    """Decodes a foxglove.FrameTransforms."""
     all_ = []
     for _, one in fields(payload):
         found = last_of(one)
@@ -98,12 +98,12 @@ class Cloud(NamedTuple):
     data: bytes
 
 
-# foxglove.PackedElementField's numeric types as sensor_msgs/PointField has them.
+# The numbers of types in foxglove.PackedElementField, and those of the same types in sensor_msgs/PointField.
 POINT_FIELD = {1: 2, 2: 1, 3: 4, 4: 3, 5: 6, 6: 5, 7: 7, 8: 8}
 
 
 def cloud(payload: bytes) -> Cloud:
-    """foxglove.PointCloud"""
+    """Decodes a foxglove.PointCloud."""
     columns = []
     for number, value in fields(payload):
         if number == 5:
@@ -126,7 +126,7 @@ class Truth(NamedTuple):
 
 
 def truth(payload: bytes) -> Truth:
-    """sonar.v1.PingTruth"""
+    """Decodes a sonar.v1.PingTruth."""
     found = last_of(payload)
     nearest, furthest = (struct.unpack("<d", found.get(n, bytes(8)))[0] for n in (5, 6))
     return Truth(_ns(found.get(1, b"")), _floats(found.get(3, b"")), _floats(found.get(4, b"")), nearest, furthest)
@@ -176,7 +176,7 @@ class Connection:
         self.send(TEXT, json.dumps(word).encode())
 
     def _cut(self) -> Optional[Tuple[int, bytes]]:
-        """The first frame of the buffer, once it is whole."""
+        """Removes the first frame from the buffer and returns it; None if it is not complete yet."""
         size = self.buffer[1] & 127 if len(self.buffer) >= 2 else 0
         at = 4 if size == 126 else 10 if size == 127 else 2
         if len(self.buffer) < at:
@@ -192,7 +192,8 @@ class Connection:
         return frame
 
     def receive(self) -> Optional[Tuple[int, bytes]]:
-        """Opcode and payload of the next message; None: there is none for now."""
+        """Returns opcode and payload of the next message, or None if none arrives within the time-out of the socket. Replies to
+        pings of the WebSocket."""
         while True:
             frame = self._cut()
             if frame is None:
@@ -209,8 +210,9 @@ class Connection:
 
 
 class LiveView(threading.Thread):
-    """Looks for as long as it is not stopped. `wants`: whether a topic is subscribed to. `on_message`: topic, time of the daemon,
-    payload; the topic is empty where the daemon says the time alone."""
+    """Receives messages until stop() and connects again after an error. `wants(topic)` says whether to subscribe to a topic.
+    `on_message(topic, ns, payload)` gets each message with the daemon's time. The topic is empty if the message has only the
+    time."""
 
     def __init__(self, at: Tuple[str, int], token: str, wants: Callable[[str], bool],
                  on_message: Callable[[str, int, bytes], None], on_trouble: Callable[[str], None],
@@ -232,7 +234,7 @@ class LiveView(threading.Thread):
                     self._look(connection)
                 finally:
                     connection.stream.close()
-            except Exception as error:  # whatever it is, the thread goes on
+            except Exception as error:  # no error may end the thread
                 if not self.over.is_set():
                     self.on_trouble(str(error) if isinstance(error, (OSError, ValueError)) else
                                     f"the live view cannot be read: {error!r}")

@@ -1,5 +1,5 @@
-"""The node: one source of poses in, to sonard by UDP; and, if wished, what sonard knows as topics. The executor's thread sends
-poses and waits for nothing; what is requested of sonard arrives in threads of its own."""
+"""The node. It sends the poses of one ROS source to sonard by UDP and can publish sonard's data as topics. The executor's thread
+sends the poses and never blocks; other threads receive the data from sonard."""
 from __future__ import annotations
 
 import array
@@ -28,7 +28,7 @@ from .conversions import Unusable, json_line, name_in_topic, scan_of, stamp_ns, 
 from .parameters import PARAMETERS, BadParameter, checked
 from .polling import StatusPoll
 
-WAKE_S = 0.5  # how long the end may be unnoticed
+WAKE_S = 0.5  # period of a timer that makes the executor notice the end of the context
 SAME = 1e-6  # tolerance for a mount: metres, and parts of a quaternion
 
 
@@ -42,7 +42,7 @@ def is_same(a: live_view.Transform, b: live_view.Transform) -> bool:
 
 
 class Bridge(Node):
-    """One of the parameters odometry, pose, and the pair tf_parent and tf_child says where poses come from."""
+    """Reads poses from one source: the topic in the parameter odometry or pose, or the transform from tf_parent to tf_child."""
 
     def __init__(self) -> None:
         super().__init__("sonard_bridge")
@@ -52,7 +52,7 @@ class Bridge(Node):
         self.settings = wanted = checked(given)
         self.vehicle, self.use_stamps = wanted["vehicle"], wanted["use_stamps"]
         self.helpers = []  # threads
-        self.warned: Dict[str, float] = {}  # when, by kind
+        self.warned: Dict[str, float] = {}  # time of the latest warning of each kind
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setblocking(False)
         try:
@@ -85,21 +85,22 @@ class Bridge(Node):
     def close(self) -> None:
         for helper in self.helpers:
             helper.stop()
-        deadline = time.monotonic() + 2  # for all together; the program's end ends those that wait for an answer
+        deadline = time.monotonic() + 2  # for all threads together; a thread that still waits for a reply ends with the program
         for helper in self.helpers:
             if helper.is_alive():
                 helper.join(max(0.0, deadline - time.monotonic()))
         self.socket.close()
 
     def warn(self, text: str) -> None:
-        """One in 5 s of those that begin alike, up to the first colon."""
+        """Logs a warning, at most one in 5 s of a kind. The text up to the first colon is the kind."""
         kind, now = text.partition(":")[0], time.monotonic()
         if self.context.ok() and now - self.warned.get(kind, -math.inf) >= 5:
             self.warned[kind] = now
             self.get_logger().warning(text)
 
     def while_running(self, call):
-        """For a helper's thread: it goes on after an error, which is reported unless the context ends."""
+        """Wraps a callback of another thread: an error is logged and does not end the thread. Nothing is logged while the context
+        ends."""
         def guarded(*arguments):
             try:
                 call(*arguments)
@@ -135,14 +136,14 @@ class Bridge(Node):
             self.warn(f"no transform yet: {error}")
             return
         stamp = found.header.stamp.sec, found.header.stamp.nanosec
-        if stamp == (0, 0):  # static transforms alone have no time: one of now, so that the vehicle does not become stale
+        if stamp == (0, 0):  # only static transforms; with the present time the pose does not become stale
             set_stamp(found.header.stamp, self.get_clock().now().nanoseconds)
-        elif stamp == self.last_tf:  # the newest one, once
+        elif stamp == self.last_tf:  # already sent
             return
         self.last_tf = stamp
         self.send(found.header, found.transform.translation, found.transform.rotation)
 
-    # ---- what sonard knows, as topics
+    # ---- sonard's data as topics
 
     def on_status(self, status) -> None:
         found = vehicle_in(status, self.vehicle)
@@ -163,7 +164,7 @@ class Bridge(Node):
         self.of_sonars = {}  # publishers, by topic
         self.last_clock_ns = -1
         if wanted["tf_static"]:
-            # Late listeners get the last message. The StaticTransformBroadcaster of Jazzy ignores changes of a known frame.
+            # Subscribers that come later get the last message. The StaticTransformBroadcaster of Jazzy ignores changes of a known frame.
             latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             self.static = self.create_publisher(TFMessage, "/tf_static", latched)
         if wanted["clock"]:
@@ -176,8 +177,8 @@ class Bridge(Node):
         self.helpers.append(self.view)
 
     def on_view(self, topic: str, ns: int, payload: bytes) -> None:
-        """In the view's thread."""
-        if self.settings["clock"] and (topic == "" or ns > self.last_clock_ns):  # stamps of pings are older than the time
+        """Runs in the thread of LiveView."""
+        if self.settings["clock"] and (topic == "" or ns > self.last_clock_ns):  # the stamp of a ping may be older than the latest time
             self.on_time(ns)
         if topic == "/tf" and self.settings["tf_static"]:
             self.on_mounts(live_view.transforms(payload))
@@ -235,7 +236,7 @@ class Bridge(Node):
         try:
             scan = scan_of(truth.azimuth_rad, truth.range_m)
         except Unusable:
-            return  # a sonar with one beam
+            return  # a sonar with one beam makes no scan
         message = LaserScan()
         set_stamp(message.header.stamp, truth.stamp_ns)
         message.header.frame_id = topic.split("/")[1]
@@ -251,8 +252,8 @@ def main() -> int:
     node = None
     try:
         node = Bridge()
-        # At a signal rclpy wakes its executor and then ends the context. An executor that is quicker waits again, for the next
-        # message or for ever. A clock that no simulation stops wakes it.
+        # At a signal rclpy wakes its executor before it ends the context. The executor may then wait again, for ever if no message
+        # comes. This timer wakes it; its clock is steady, because a simulation can stop ROS time.
         node.create_timer(WAKE_S, lambda: None, clock=RosClock(clock_type=ClockType.STEADY_TIME))
         rclpy.spin(node)
     except BadParameter as error:
@@ -263,7 +264,7 @@ def main() -> int:
     except Exception:
         if rclpy.ok():
             raise
-        # The signal came while rclpy made the node or its next wait, which then fail in various ways.
+        # The signal came while rclpy created the node or prepared to wait; both then fail with different exceptions.
     finally:
         if node is not None:
             node.close()

@@ -1,4 +1,4 @@
-"""The parameters of the node: one table for the node, the launch files and the tests. Without ROS."""
+"""The parameters of the node: one table for the node, the launch files and the tests. Needs no ROS."""
 from __future__ import annotations
 
 import math
@@ -12,7 +12,7 @@ Value = Union[str, bool, float]
 
 
 class BadParameter(ValueError):
-    """A sentence that names the parameter and says what it takes."""
+    """A parameter has a wrong value. The text names the parameter and the values it accepts."""
 
     def __init__(self, name: str, why: str) -> None:
         super().__init__(f"parameter {name}: {why}")
@@ -48,7 +48,8 @@ PARAMETERS: Tuple[Parameter, ...] = (
 
 
 def value_of(parameter: Parameter, given: Any) -> Value:
-    """As the parameter's type. Numbers may come as text or without a fraction: YAML decides, not the user."""
+    """Converts a value to the parameter's type. Accepts text and integers for numbers, because YAML chooses the type from the
+    spelling."""
     kind = type(parameter.default)
     if kind is float and not isinstance(given, bool):
         try:
@@ -66,7 +67,7 @@ def value_of(parameter: Parameter, given: Any) -> Value:
 
 
 def checked(given: Dict[str, Any]) -> Dict[str, Any]:
-    """All values, by name, of their types and within their bounds; `given` names all parameters."""
+    """Returns the values by name, converted and checked against their bounds. `given` has a value for every parameter."""
     values = {p.name: value_of(p, given[p.name]) for p in PARAMETERS}
     sources = [name for name in ("odometry", "pose", "tf_child") if values[name]]
     if bool(values["tf_parent"]) != bool(values["tf_child"]):

@@ -1,4 +1,4 @@
-"""Requests sonard's status over HTTP in a thread of its own: however slow the answer, poses do not wait for it. Without ROS."""
+"""Requests sonard's status over HTTP in its own thread, so that a slow reply does not delay poses. Needs no ROS."""
 from __future__ import annotations
 
 import http.client
@@ -8,7 +8,7 @@ import urllib.error
 import urllib.request
 from typing import Any, Callable, Dict, Tuple
 
-LIMIT_S = 1.0  # limit for a request; then the next one is made
+LIMIT_S = 1.0  # a request that takes longer is abandoned
 WANTS_TOKEN = "sonard wants a token: set the parameter token_file to the file that its control.token_file names"
 
 
@@ -19,7 +19,7 @@ class StatusPoll(threading.Thread):
         self.request = urllib.request.Request(f"http://{at[0]}:{at[1]}/api/v1/status")
         if token:
             self.request.add_header("Authorization", "Bearer " + token)
-        self.opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # sonard is near, whatever http_proxy says
+        self.opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # ignores http_proxy
         self.period_s, self.on_status, self.on_trouble = 1 / rate_hz, on_status, on_trouble
         self.over = threading.Event()
 
@@ -35,7 +35,7 @@ class StatusPoll(threading.Thread):
                 self.on_trouble(WANTS_TOKEN if error.code == 401 else f"no status of sonard: {error}")
             except (OSError, ValueError, http.client.HTTPException) as error:
                 self.on_trouble(f"no status of sonard: {error}")
-            except Exception as error:  # whatever it is, the thread goes on
+            except Exception as error:  # no error may end the thread
                 self.on_trouble(f"no status of sonard: {error!r}")
 
     def stop(self) -> None:

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes the shell completions of sonard and sonarctl from what their --help says.
+"""Writes the shell completions of sonard and sonarctl from the output of their --help.
 
-usage: make_completion.py BUILD_DIR [--check]      --check: writes nothing, exits 1 when a file is not what it should be
+usage: make_completion.py BUILD_DIR [--check]      --check: writes nothing, exits 1 if a file is out of date
 
-Run it after a command or an option was added; a test runs it with --check.
+Run it after you add a command or an option. A test runs it with --check.
 """
 import difflib
 import pathlib
@@ -13,11 +13,11 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 OPTION = re.compile(r"^  (?:(-\w),)?(--[\w-]+)(?:,--[\w-]+)*((?:[ :=(]\S.*|\s{2,}.*)?)$")
-CHOICES = re.compile(r"\{([^}]+)\}|TEXT:([\w.-]+(?:\|[\w.-]+)*)|INT:([\w.-]+(?:\|[\w.-]+)+)")  # of CLI11's own check, and of ours
+CHOICES = re.compile(r"\{([^}]+)\}|TEXT:([\w.-]+(?:\|[\w.-]+)*)|INT:([\w.-]+(?:\|[\w.-]+)+)")  # as CLI11 prints them, and as our commands do
 COMMAND = re.compile(r"^  ([a-z][\w-]*)\s{2,}\S")
 FILE_WORDS = {"--png", "--record", "--token-file", "--out", "--poses", "--json-file", "--pcap", "--mcap", "--raw", "--from", "--credentials"}
-FILES = ["a file"]  # in place of choices: of the kinds of files that makes of sonar have
-SCENE_COMMANDS = {"load", "run", "check", "render", "dataset", "replay", "info", "import", "submit", "collect"}  # they take files, not addresses
+FILES = ["a file"]  # stands for choices if the value is a file of a make's own kind
+SCENE_COMMANDS = {"load", "run", "check", "render", "dataset", "replay", "info", "import", "submit", "collect"}  # their argument is a file
 
 
 def help_of(program, words):
@@ -25,7 +25,8 @@ def help_of(program, words):
 
 
 def read_help(text):
-    """Sub-commands, and options with the choices of their values (empty = a value of any kind, None = no value)."""
+    """Returns the sub-commands, and the options with the choices for their values. An empty list allows any value; an option with
+    None has no value."""
     commands, options, section = [], {}, ""
     for line in text.splitlines():
         if re.match(r"^\S.*:$", line):
@@ -48,7 +49,7 @@ def read_help(text):
 
 
 def walk(program, words=()):
-    """{("pose", "circle"): (commands, options)} of everything below."""
+    """Returns {("pose", "circle"): (commands, options)} for a command and all its sub-commands."""
     commands, options = read_help(help_of(program, words))
     tree = {words: (commands, options)}
     for command in commands:
@@ -57,7 +58,7 @@ def walk(program, words=()):
 
 
 def sonard_tree(program):
-    """sonard lists its commands in a sentence, not in a section."""
+    """Like walk(). sonard lists its commands in a sentence and not in a section of --help."""
     tree = walk(program)
     if len(tree) == 1:
         commands = ["run", "check", "render", "dataset", "worker", "farm", "replay"]
@@ -68,7 +69,8 @@ def sonard_tree(program):
 
 
 def values(tree, of_words, files, anything):
-    """Case labels by what is offered after an option that takes a value: {"compadd ...": ['" run:--clock"', ...]}."""
+    """Returns the branches of a shell `case` that complete the value of an option. Options with the same completion share one
+    branch."""
     actions = {}
     for words, (_, options) in tree.items():
         path = " ".join(("", *words))
@@ -82,7 +84,7 @@ def values(tree, of_words, files, anything):
 
 
 def words_of(name, tree):
-    """Path of a command, what may follow it, and whether file names may."""
+    """Yields the path of each command, the words that may follow it, and whether a file name may follow it."""
     for words, (commands, options) in tree.items():
         takes_files = name == "sonard" if not words else words[-1] in SCENE_COMMANDS
         yield " ".join(("", *words)), " ".join([*commands, *options]), takes_files
@@ -107,7 +109,7 @@ def bash(name, tree):
 
 
 def zsh(name, tree):
-    """The same words by way of zsh's own functions."""
+    """The completion of bash(), with the functions of zsh."""
     lines = [f"#compdef {name}", f"# zsh completion of {name}. Made by clients/sonarctl/completion/make_completion.py: do not edit.",
              f"_{name}() {{", '  local current=${words[CURRENT]} previous=${words[CURRENT-1]} at="" word',
              '  for word in ${words[2,CURRENT-1]}; do', '    case "$at $word" in', f'      {paths_below(tree)}) at="$at $word" ;;',
