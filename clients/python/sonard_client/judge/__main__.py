@@ -35,7 +35,7 @@ ROS_MODULES = {"ros1": "rospy", "ros2": "rclpy"}  # modules that the taps import
 
 
 class NotJudged(RuntimeError):
-    """The run stops: the driver does not work without a fault, or sonard cannot be started."""
+    """Ends the run, because the driver does not work without a fault or sonard cannot be started."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -73,7 +73,7 @@ def _merge_parser() -> argparse.ArgumentParser:
 
 
 def driver_name(words: Sequence[str]) -> str:
-    """The program of a command line; behind an interpreter or launcher its script."""
+    """Returns the name of the program in a command line. For an interpreter or a launcher it is the name of the script."""
     launchers = {"env", "sh", "bash", "python", "python3", "roslaunch", "rosrun", "ros2", "nice", "timeout"}
     names = [pathlib.Path(word).name for word in words if not word.startswith("-") and "{" not in word]
     return next((name for name in names if name not in launchers), names[0] if names else "driver")
@@ -109,20 +109,20 @@ def _check(options: argparse.Namespace) -> None:
 
 
 class TimeLeft:
-    """How long the cases that are left will take: as long as those before, by what each is expected to take."""
+    """Estimates the time for the remaining cases: their expected time, scaled by how long the finished ones really took."""
 
     def __init__(self, cases: Sequence[Case], jobs: int) -> None:
         self._waiting = {case.number: case for case in cases}
         self._jobs = jobs
-        self._expected_s = self._took_s = 0.0  # of the cases that are done
+        self._expected_s = self._took_s = 0.0  # sums over the finished cases
 
     @staticmethod
     def expected_s(case: Case) -> float:
-        """Start, fault, recovery and end, on an idle computer."""
+        """Returns the time for start, fault, recovery and end on an idle computer."""
         return 6 + case.until().get("seconds", 1) + case.tail_s
 
     def after(self, case: Case, took_s: float, repeat: int = 1) -> str:
-        """Words for the time that is left once that case is done: "", ", 40 s left", ", 5 min left"."""
+        """Counts a finished case. Returns the remaining time as text: "", ", 40 s left", ", 5 min left"."""
         if self._waiting.pop(case.number, None) is not None:
             self._expected_s += self.expected_s(case) * repeat
             self._took_s += took_s
@@ -134,7 +134,7 @@ class TimeLeft:
 
 
 class Judge:
-    """One run over the chosen cases."""
+    """Runs the chosen cases and makes their report."""
 
     def __init__(self, options: argparse.Namespace, out: pathlib.Path) -> None:
         self.options, self.out = options, out
@@ -156,7 +156,7 @@ class Judge:
         self._stopping = False
         self._left = TimeLeft([], options.jobs)
         self._print, self._done, self._slots = threading.Lock(), 0, list(range(options.jobs, 0, -1))
-        # Several judges on one computer: their loopback addresses and ports must differ.
+        # Judges that run at the same time on one computer need different loopback addresses and ports.
         self._first_offset = 1 + os.getpid() % 9 * 10
 
     def _text(self, *arguments: str) -> str:
@@ -207,7 +207,7 @@ class Judge:
                 self._slots.append(slot)
 
     def stop(self) -> None:
-        """Ends the running cases; those that wait do not begin."""
+        """Ends the running cases and starts no more."""
         self._stopping = True
         for runner in list(self._running):
             runner.terminate()
@@ -227,7 +227,7 @@ class Judge:
         self.kinds = {kind["code"]: kind for kind in result["kinds"].get("kinds", ())}
 
     def not_run(self, case: Case) -> str:
-        """Why a case cannot run here; empty if it can."""
+        """Returns why a case cannot run here, or an empty text."""
         if case.kind == "N00":
             return ""
         if case.needs_lab:

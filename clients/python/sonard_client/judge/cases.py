@@ -1,14 +1,15 @@
-"""The cases: one row each. A row is data; how a case runs is in run_case.py, what it must show in verdicts.py.
+"""The table of cases. run_case.py runs them; verdicts.py judges them.
 
-row(NUMBER, WITH, FOR, SENTENCE): the kind's code is in the number. FOR: "2 s", "3 pings", "once", "5 times". Further:
+row(NUMBER, given, DURATION, SENTENCE, ...). NUMBER begins with the code of the kind of fault. DURATION is "2 s", "3 pings", "once"
+or "5 times".
 at      when the fault begins: "ping 6" (the default), "every 5 pings", "start" (before the driver connects)
 limit   seconds after the fault's end within which the driver must be back
-must    limits of this case beside surviving, being true and coming back: {"rss_mib": 64}
-given   parameters as `sonarctl fault kinds` shows them; "byte": a place in the ping, which becomes a fraction of its size
+must    limits of this case in addition to those of all cases (verdicts.judge): {"rss_mib": 64}
+given   parameters that `sonarctl fault kinds` lists; "byte" is an offset in the ping, which becomes a fraction of its size
 should  limits that replace those of verdicts.SHOULD; None removes one
-notice  the driver should notice: an outage longer than 2 s
-info    real devices differ or are unknown: shown, not counted
-measured  a row of the table of measured drivers
+notice  the driver should notice the fault (by its log, a state or a new connection), because the outage is longer than 2 s
+info    the result is shown but not counted, because real devices differ or are unknown
+measured  the case is in the table of measured drivers
 """
 from __future__ import annotations
 
@@ -86,7 +87,7 @@ class Case:
         return "MUST" + (", also of " + ", ".join(sorted(self.must)) if self.must else "") + "; SHOULD"
 
     def until(self) -> Dict[str, float]:
-        """The duration as a fault record has it."""
+        """The duration as a field of a fault record."""
         count, _, unit = self.duration.replace("once", "1 times").partition(" ")
         return {{"s": "seconds", "pings": "pings", "times": "count"}[unit]: float(count) if unit == "s" else int(count)}
 
@@ -98,16 +99,16 @@ class Case:
 
     @property
     def times(self) -> int:
-        """How often it begins."""
+        """How often the fault begins."""
         return int(self.until().get("count", 1)) if self.at.startswith("every") else 1
 
     @property
     def tail_s(self) -> float:
-        """For how long it acts after the journal says that it ended: a pause belongs to the ping in which it began."""
+        """How long the fault acts after its end in the journal: a pause is counted for the ping in which it begins."""
         return float(self.given["seconds"]) if self.kind == "S06" else 0.0
 
     def record(self) -> Dict[str, Any]:
-        """The fault record that sonard takes."""
+        """The fault record for sonard."""
         return {"name": "case", "do": self.kind, "with": dict(self.given), "at": self.begin(), "for": self.until()}
 
 
@@ -115,10 +116,10 @@ def row(number: str, given: Dict[str, Any], duration: str, sentence: str, **more
     return Case(number, number.partition(".")[0], sentence, {k: str(v) for k, v in given.items()}, duration, **more)
 
 
-_FREE = {"lost": None}                        # pings are lost by the fault itself
-_LONG = {"recover_s": 5.0, "lost": None}      # a reboot takes its time
-_CHANGED = {"lost": None, "rss_mib": 64.0}    # other sizes of pings need other buffers
-_LEAN = {"rss_mib": 256.0}                    # MUST: nothing is allocated by a length field
+_FREE = {"lost": None}                        # the fault itself loses pings
+_LONG = {"recover_s": 5.0, "lost": None}      # a reboot takes a few seconds
+_CHANGED = {"lost": None, "rss_mib": 64.0}    # pings of another size need new buffers
+_LEAN = {"rss_mib": 256.0}                    # as `must`: a driver must not allocate what a length field says
 
 CASES: List[Case] = [
     row("N00.1", {}, "2 s", "Nothing is wrong.", measured=True),
@@ -322,15 +323,15 @@ CASES: List[Case] = [
     row("G07.1", {}, "3 s", "The multicast group loses the driver."),
 ]
 
-HEAD_BYTES = (*range(1, 17), *range(20, 128, 6))  # inside the header; the fields after it
+HEAD_BYTES = (*range(1, 17), *range(20, 128, 6))  # the header; the fields after it
 TORTURES = (("L03", "The connection ends (FIN) at byte {} of a ping.", {}),
             ("L04", "The connection is reset at byte {} of a ping.", {}),
             ("S06", "The stream pauses for 0.3 s at byte {} of a ping.", {"seconds": "0.3"}))
 
 
 def torture(seed: int, shallow: Optional[int] = None) -> List[Case]:
-    """The same fault at every fallible point of a ping: each byte of the header, the fields, bearings and image. `shallow`:
-    only so many of them, chosen by the seed."""
+    """Makes cases that cut, reset or pause the stream at each byte of the header and in the fields, bearings and image. `shallow`
+    limits their number; the seed selects them."""
     fractions = [f"{tenth / 10:g}" for tenth in range(1, 10)]
     found = []
     for kind, sentence, given in TORTURES:
@@ -345,7 +346,7 @@ def torture(seed: int, shallow: Optional[int] = None) -> List[Case]:
 
 
 def select(wanted: Sequence[str], cases: Sequence[Case] = ()) -> List[Case]:
-    """The cases that a user names by number, code, family letter or name; all without names. Raises ValueError."""
+    """Returns the cases with the wanted numbers, codes, family letters or names; all if `wanted` is empty. Raises ValueError."""
     cases = cases or CASES
     if not wanted:
         return list(cases)
@@ -363,7 +364,7 @@ def select(wanted: Sequence[str], cases: Sequence[Case] = ()) -> List[Case]:
 
 
 def listing(cases: Sequence[Case]) -> str:
-    """A line for each case: number, name, expectation, sentence."""
+    """Returns a line for each case: number, name, expectation, sentence."""
     lines = []
     family = ""
     for case in cases:

@@ -1,4 +1,4 @@
-"""The driver under test: started as its user starts it, watched through /proc, its output read as log and as tap."""
+"""Runs the driver under test as its user would. Its processes are observed through /proc; its output is the log and the tap."""
 from __future__ import annotations
 
 import json
@@ -17,7 +17,7 @@ _PAGE, _TICK = os.sysconf("SC_PAGE_SIZE"), os.sysconf("SC_CLK_TCK")
 
 
 class Published(NamedTuple):
-    """A line of the tap: a ping as the driver gives it to its user."""
+    """A line of the tap for a ping that the driver published."""
     mono: float
     number: Optional[int]
     crc: int
@@ -26,13 +26,13 @@ class Published(NamedTuple):
 
 
 class State(NamedTuple):
-    """A line of the tap that reports on the link: "lost", "ok", ..."""
+    """A line of the tap for the state of the link: "lost", "ok", ..."""
     mono: float
     state: str
 
 
 class Sample(NamedTuple):
-    """The driver's processes at one moment."""
+    """What the driver's processes use at one moment, all together."""
     mono: float
     resident_mib: float
     descriptors: int
@@ -40,7 +40,7 @@ class Sample(NamedTuple):
 
 
 def tap_line(line: bytes, mono: float) -> "Published | State | None":
-    """Reads {"id": 812, "crc32": "0a1b2c3d"}, also with rows and beams, or {"state": "lost"}; None for any other line."""
+    """Parses {"id": 812, "crc32": "0a1b2c3d"}, optionally with rows and beams, or {"state": "lost"}; None for other lines."""
     if not line.startswith(b"{"):
         return None
     try:
@@ -59,7 +59,7 @@ def tap_line(line: bytes, mono: float) -> "Published | State | None":
 
 
 def expand(command: str, ip: str, port: int, device_id: int) -> List[str]:
-    """The words of the command line, with {ip}, {port} and {id} filled in. Other braces stay."""
+    """Splits a command line into words and replaces {ip}, {port} and {id} in them."""
     words = shlex.split(command)
     for name, value in (("{ip}", ip), ("{port}", str(port)), ("{id}", str(device_id))):
         words = [word.replace(name, value) for word in words]
@@ -67,7 +67,7 @@ def expand(command: str, ip: str, port: int, device_id: int) -> List[str]:
 
 
 class Driver:
-    """start(), poll(), stop(). tap: whether lines of standard output can be pings."""
+    """The driver from start() to stop(). tap: whether its standard output has lines of a tap."""
 
     def __init__(self, words: Sequence[str], prefix: Sequence[str], log: pathlib.Path, tap: bool) -> None:
         self._words, self._prefix, self._log_path, self._tap = list(words), list(prefix), log, tap
@@ -82,7 +82,7 @@ class Driver:
         self.line_times: List[float] = []    # times of the first lines after each start
         self.samples: List[Sample] = []
         self.peak_mib = 0.0
-        self.exited: Optional[Tuple[float, int]] = None  # when and with what
+        self.exited: Optional[Tuple[float, int]] = None  # time and exit code
 
     def start(self) -> None:
         environment = {key: value for key, value in os.environ.items() if not key.startswith("SONARD_LAB")}
@@ -100,7 +100,7 @@ class Driver:
         return self._process.pid if self._process else 0
 
     def poll(self) -> Optional[int]:
-        """The exit code if the driver has ended, negative for a signal. Takes a sample of its processes otherwise."""
+        """Returns the exit code if the driver has ended (negative after a signal). Otherwise adds a Sample and returns None."""
         assert self._process is not None
         code = self._process.poll()
         if code is None:
@@ -110,7 +110,7 @@ class Driver:
         return code
 
     def stop(self) -> None:
-        """SIGTERM as a user would, SIGKILL after 2 s; both to all its processes."""
+        """Ends all processes of the driver with SIGTERM and, after 2 s, SIGKILL."""
         if self._process is None:
             return
         for sign, wait_s in ((signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0)):
@@ -131,7 +131,7 @@ class Driver:
             return next((t for t in self.line_times if t > mono), None)
 
     def lines_per_s(self, since: float, window_s: float = 5.0) -> float:
-        """The highest number of log lines a second in any window since then."""
+        """Returns the highest rate of log lines in any window after `since`."""
         with self._lock:
             counts = sorted((tenth, count) for tenth, count in self.lines.items() if tenth >= int(since * 10))
         best, first, total = 0, 0, 0
@@ -195,7 +195,7 @@ class Driver:
 
 
 def family_of(pid: int) -> List[int]:
-    """A process and its descendants."""
+    """Returns the numbers of a process and all its descendants."""
     found = [pid]
     for one in found:
         try:

@@ -8,8 +8,8 @@ from .cases import FAMILIES
 Json = Dict[str, Any]
 _HEAD = """# Drivers under faults
 
-What `sonarctl judge` measured. A case that does not hold says how this version of a driver answers a fault on purpose, not how good
-the driver is at sea; a later version may differ. How to read the verdicts: docs/judge.md, "Verdicts".
+`sonarctl judge` measured these results. A failed case shows how this version of a driver reacts to one injected fault; it does not say
+how good the driver is at sea, and another version may differ. docs/judge.md, "Verdicts", explains the words.
 """
 
 
@@ -34,7 +34,7 @@ def _cell(row: "Json | None") -> str:
 
 
 def page(columns: Sequence[Json]) -> str:
-    """Drivers, their figures by family, and each case that one of them does not hold."""
+    """Returns the page: the drivers, their counts by family, and the cases in which at least one driver fails."""
     names = [column["name"] for column in columns]
     drivers = _table(["driver", "version", "tap", "MUST", "SHOULD", "date"], [
         [c["name"], c["version"] or "not given", c["tap"], f"{c['counts']['must']} of {c['counts']['of']}",
@@ -50,5 +50,5 @@ def page(columns: Sequence[Json]) -> str:
             rows.append([f"{number} {case['sentence']}", *map(_cell, cells)])
     first = columns[0]
     return (f"{_HEAD}\n{drivers}\nProfile {first['profile']}, {first['sonard']}, seed {first['seed']}; {first['machine']}.\n\n{families}"
-            "\n## Cases that a driver does not hold\n\nA MUST that does not hold is **bold**.\n\n"
+            "\n## Cases that a driver fails\n\nA failed MUST is **bold**.\n\n"
             + _table(["case", *names], rows))

@@ -1,4 +1,4 @@
-"""The result of a case: the content of case.json, with its time line."""
+"""Makes the result of a case, which is written to case.json, with its time line."""
 from __future__ import annotations
 
 import itertools
@@ -11,7 +11,7 @@ from .wire import Connection, hex_around
 
 
 def result_of(scene: Scene, case: Case, seen: Observation, verdict: Verdict) -> Dict[str, Any]:
-    """The content of case.json. Figures that depend on the wall clock are apart, so that runs can be compared."""
+    """Returns the content of case.json. `wall_clock` has the values that depend on time; the others are equal in equal runs."""
     comment = f"sonard judge, case {case.number} {case.name}: {case.sentence}"
     capture_packets = scene.capture.write_pcapng(scene.folder / "case.pcapng", comment) if scene.capture else 0
     connections: List[Connection] = scene.capture.connections if scene.capture else []
@@ -69,7 +69,7 @@ def timeline(scene: Scene, seen: Observation, connections: List[Connection]) -> 
 
 
 def in_brief(records: Sequence[Dict[str, Any]]) -> List[Tuple[Dict[str, Any], str]]:
-    """Records of the journal; of those that only repeat for ping after ping the first, with what follows it."""
+    """Shortens the journal. Consecutive records that differ only in the ping become the first one and a text about the others."""
     def alike(record: Dict[str, Any]) -> Tuple[Any, ...]:
         return tuple(str(record.get(key)) for key in ("event", "fault", "kind", "sonar", "client"))
     found: List[Tuple[Dict[str, Any], str]] = []
@@ -80,7 +80,7 @@ def in_brief(records: Sequence[Dict[str, Any]]) -> List[Tuple[Dict[str, Any], st
 
 
 def _hex(scene: Scene, connections: List[Connection]) -> List[str]:
-    """The bytes around the first one that the fault touched."""
+    """Returns lines of hex around the first byte that the fault changed."""
     for record in scene.journal.records:
         offset = int(record.get("offset", -1))
         connection = next((c for c in connections if c.peer == record.get("client")), None)

@@ -1,4 +1,4 @@
-"""The pages of a report: one matrix of cases by drivers, one page a case. Everything is in the file: no network, no fonts."""
+"""Makes the HTML pages of a report: a matrix of cases and drivers, and a page for each case. The pages load no other files."""
 from __future__ import annotations
 
 import html
@@ -106,7 +106,7 @@ def _page(title: str, body: str, script: str = "") -> str:
 
 
 def verdict_words(row: Json) -> List[str]:
-    """The two verdicts with their figures, of the run that is shown."""
+    """Returns the texts of the two verdicts of the run that the report shows."""
     if row["result"] == "NOT RUN":
         return ["", ""]
     run = row["runs"][row.get("shown", 0)]["wall_clock"]
@@ -157,7 +157,7 @@ def _causes(column: Json, causes: Callable[[Sequence[Json]], List[Json]]) -> str
 
 
 def matrix(columns: Sequence[Json], summary: Callable[[Json], str], causes: Callable[[Sequence[Json]], List[Json]]) -> str:
-    """The table of cases by drivers."""
+    """Returns the page with the table of cases and drivers."""
     numbers: Dict[str, Json] = {}
     for column in columns:
         for row in column["cases"]:
@@ -274,7 +274,7 @@ def _run_part(row: Json, number: int, folder: pathlib.Path) -> str:
 
 
 def case_page(column: Json, row: Json, folder: pathlib.Path, reasons: Sequence[str]) -> str:
-    """The page of one case."""
+    """Returns the page of one case."""
     up = "../" * (row["folder"].count("/") + 1)
     parts = "".join(_run_part(row, n, folder) for n in range(len(row["runs"])))
     why = "".join(f"<li>{_e(reason)}</li>" for reason in reasons)

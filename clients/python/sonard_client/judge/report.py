@@ -1,4 +1,4 @@
-"""The judge's report: index.json, junit.xml, the summary; reports merged into one. The pages are in pages.py."""
+"""Writes, reads and merges the judge's reports: index.json, junit.xml and the summary. pages.py makes the HTML pages."""
 from __future__ import annotations
 
 import json
@@ -18,7 +18,7 @@ _LONG = ("timeline", "journal", "hex", "connections", "text")  # only in case.js
 
 
 def brief(run: Json) -> Json:
-    """A run as the index has it."""
+    """Returns a run without the long parts, for the index."""
     kept = {key: value for key, value in run.items() if key not in _LONG}
     if "wall_clock" in kept:
         kept["wall_clock"] = {key: value for key, value in kept["wall_clock"].items() if key not in _LONG}
@@ -26,7 +26,7 @@ def brief(run: Json) -> Json:
 
 
 def combine(case: Json, runs: Sequence[Json], strict: bool, tapped: bool) -> Json:
-    """One row of a report from the runs of a case. Runs that disagree make it FLAKY: they are never averaged."""
+    """Makes one row of a report from the runs of a case. If the runs disagree, the row is FLAKY."""
     row = dict(case, runs=[brief(run) for run in runs])
     ran = [run for run in runs if run.get("ran")]
     if not ran or len(ran) < len(runs):
@@ -54,19 +54,19 @@ def counts(rows: Sequence[Json]) -> Json:
 
 
 def summary(column: Json) -> str:
-    """my_driver: 92 of 107 MUST, 71 of 96 SHOULD, 2 flaky"""
+    """Returns a line such as "my_driver: 92 of 107 MUST, 71 of 96 SHOULD, 2 flaky"."""
     n = column["counts"]
     text = f"{column['name']}: {n['must']} of {n['of']} MUST, {n['should']} of {n['of']} SHOULD, {n['flaky']} flaky"
     return text + (f", {n['not_run']} not run" if n["not_run"] else "") + ("" if column["tap"] != "none" else " (wire only)")
 
 
 def passed(column: Json) -> bool:
-    """Whether every case that counts holds."""
+    """Returns whether every counted case holds."""
     return all(r["result"] in ("PASS", "PASS (wire)", "INFO", "NOT RUN") for r in column["cases"])
 
 
 def reasons(row: Json, strict: bool = True) -> List[str]:
-    """Why a case is not perfect, one sentence each."""
+    """Returns the checks of a case that do not hold, one sentence each."""
     if row["result"] == "NOT RUN":
         return [row["why"]]
     found = []
@@ -81,14 +81,14 @@ def reasons(row: Json, strict: bool = True) -> List[str]:
 
 
 def causes(rows: Sequence[Json]) -> List[Json]:
-    """The verdicts that do not hold, each with the cases that fail alike: those with a MUST first, then the largest. One bug of a driver is
-    one cause, not a red line a case."""
+    """Groups the cases that fail in the same way, because one bug of a driver can fail many cases. Groups with a MUST come first,
+    then large groups."""
     found: Dict[str, Json] = {}
     for row in rows:
         if row["result"] in ("NOT RUN", "INFO"):
             continue
         why = reasons(row, strict=False) or reasons(row)
-        # Figures differ from case to case: 0.6 s, 124 pings.
+        # Numbers are replaced, because they differ between the cases of a group.
         alike = "; ".join(sorted({re.sub(r"\d+(\.\d+)?", "n", text) for text in why}))
         if alike:
             cause = found.setdefault(alike, {"why": "; ".join(why), "must": why[0].startswith("MUST"), "cases": []})
@@ -97,7 +97,7 @@ def causes(rows: Sequence[Json]) -> List[Json]:
 
 
 def causes_text(column: Json, most: int = 8) -> str:
-    """For a terminal; empty if everything holds."""
+    """Returns the groups as text for a terminal; empty if every case holds."""
     lines = []
     for cause in causes(column["cases"]):
         numbers = cause["cases"][:most] + (["..."] if len(cause["cases"]) > most else [])
@@ -129,7 +129,7 @@ def junit(columns: Sequence[Json], strict: bool) -> bytes:
 
 
 def write(out: pathlib.Path, columns: Sequence[Json], strict: bool) -> None:
-    """Writes index.json, junit.xml, index.html and the page of each case into a folder that has the cases' files."""
+    """Writes index.json, junit.xml, index.html and the page of each case into the folder of a run."""
     index = {"schema": SCHEMA, "version": VERSION, "strict": strict, "drivers": list(columns)}
     (out / "index.json").write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
     (out / "junit.xml").write_bytes(junit(columns, strict))
@@ -142,7 +142,7 @@ def write(out: pathlib.Path, columns: Sequence[Json], strict: bool) -> None:
 
 
 def read(folder: pathlib.Path) -> Json:
-    """The index of a report. Raises ValueError if it is not one."""
+    """Reads the index of a report. Raises ValueError if the folder has none that this program can read."""
     try:
         index = dict(json.loads((folder / "index.json").read_text(encoding="utf-8")))
     except (OSError, ValueError) as why:
@@ -155,7 +155,7 @@ def read(folder: pathlib.Path) -> Json:
 
 
 def merge(folders: Sequence[pathlib.Path], out: pathlib.Path) -> List[Json]:
-    """One matrix of several reports. Drivers of the same name get a number."""
+    """Merges reports into one with a column for each driver. Drivers of the same name get a number."""
     columns: List[Json] = []
     strict = True
     for folder in folders:
@@ -181,7 +181,7 @@ def merge(folders: Sequence[pathlib.Path], out: pathlib.Path) -> List[Json]:
 
 
 def without_wall_clock(item: Any) -> Any:
-    """An index without what depends on the clock: equal for equal seeds."""
+    """Returns an index without the values that depend on time. It is equal for equal seeds."""
     if isinstance(item, dict):
         return {key: without_wall_clock(value) for key, value in item.items() if key != "wall_clock"}
     return [without_wall_clock(one) for one in item] if isinstance(item, list) else item

@@ -2,7 +2,7 @@
 
     python3 -m sonard_client.judge.ros_tap ros1|ros2 TOPIC -- COMMAND...
 
-Any message type with a number (ping_id, ping_number or header.seq) and samples (ping_data, image.data or data) will do.
+The type of the message must have a number (ping_id, ping_number or header.seq) and samples (ping_data, image.data or data).
 """
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import time
 import zlib
 from typing import Any
 
-GAIN_BYTES = 4  # before the samples of a row
+GAIN_BYTES = 4  # size of the gain before the samples of a row
 
 
 def _field(message: Any, *paths: str) -> Any:
@@ -32,8 +32,9 @@ def _field(message: Any, *paths: str) -> Any:
 
 
 def line_of(message: Any) -> str:
-    """The tap line of a message. Of a message with n_ranges rows of step bytes each, these are the samples, less the gain before
-    each row if has_gains: ping_data of one driver's Ping begins with the whole head of the message on the wire."""
+    """Returns the line of the tap for a message. If the message has `step` and `n_ranges`, its last n_ranges * step bytes are the
+    samples, because ping_data of one driver's Ping begins with the header from the wire. With `has_gains` the gain before each
+    row is removed."""
     samples = _field(message, "ping_data", "image.data", "data")
     data = bytes(samples if samples is not None else b"")
     step, rows = getattr(message, "step", 0), getattr(message, "n_ranges", 0)
@@ -56,7 +57,7 @@ def _subscribe_ros1(topic: str) -> None:
             kind, name, _ = rostopic.get_topic_class(topic, blocking=False)
             if kind is not None:
                 break
-        except Exception:  # the master is not up yet
+        except Exception:  # the ROS master does not run yet
             pass
         time.sleep(0.2)
     rospy.init_node("sonard_judge", anonymous=True, disable_signals=True)
@@ -73,7 +74,7 @@ def _subscribe_ros2(topic: str) -> None:
         time.sleep(0.1)
     package, _, kind = publishers[0].topic_type.split("/")  # "sensor_msgs/msg/Image"
     message = getattr(importlib.import_module(package + ".msg"), kind)
-    quality = QoSProfile(depth=100, reliability=publishers[0].qos_profile.reliability)  # as its publisher offers it
+    quality = QoSProfile(depth=100, reliability=publishers[0].qos_profile.reliability)  # must match the publisher
     node.create_subscription(message, topic, _print, quality)
     rclpy.spin(node)
 
@@ -87,9 +88,9 @@ def main() -> int:
 
 
 def ended_as(code: int) -> int:
-    """Ends by the driver's signal, if that ended it: as an exit code the judge could not tell it."""
+    """If a signal ended the driver, ends this process by the same signal, so that the judge sees it."""
     if code < 0:
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # its core is the driver's
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no second core file
         if -code not in (signal.SIGKILL, signal.SIGSTOP):
             signal.signal(-code, signal.SIG_DFL)
         os.kill(os.getpid(), -code)

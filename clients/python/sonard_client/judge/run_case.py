@@ -1,6 +1,6 @@
-"""Runs one case: a fresh sonard, a fresh driver, one fault. Started by the judge inside a namespace of the case's own.
+"""Runs one case with a new sonard, a new driver and one fault. The judge starts this program in a network namespace of its own.
 
-    python3 -m sonard_client.judge.run_case FOLDER      FOLDER/spec.json says what; the result is FOLDER/case.json
+    python3 -m sonard_client.judge.run_case FOLDER      reads FOLDER/spec.json, writes FOLDER/case.json
 """
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from .truth import TruthReader, reader_for
 from .verdicts import BACK_PINGS, Observation, back_at, judge
 from .wire import Capture, DatagramFlow, Seen
 
-NOMINAL_PINGS, NOMINAL_S = 20, 20.0  # a driver that works at all
+NOMINAL_PINGS, NOMINAL_S = 20, 20.0  # a working driver takes so many pings in this time without a fault
 _SETTLE_S = 0.52
-_STILL_S = 20.0          # so long nothing happens, and the fault's begin is waited for no more
+_STILL_S = 20.0          # after such a time without any activity the judge stops waiting for the fault
 _DEVICE_ID = 7001
 
 
@@ -34,7 +34,7 @@ def case_from(spec: Dict[str, Any]) -> Case:
 
 
 def fault_record(case: Case, ping_bytes: int) -> Dict[str, Any]:
-    """The fault as sonard takes it. A place given as a byte becomes a fraction of the message."""
+    """Returns the fault record for sonard. A position in bytes becomes a fraction of the message, which sonard expects."""
     record = case.record()
     given = record["with"]
     if "byte" in given:
@@ -43,7 +43,7 @@ def fault_record(case: Case, ping_bytes: int) -> Dict[str, Any]:
 
 
 def config_of(spec: Dict[str, Any], case: Optional[Case], address: str, journal: pathlib.Path) -> str:
-    # The sonar drops a client that does not answer for 3 s, as devices do: the driver cannot rely on the old connection.
+    # The sonar closes a connection whose client has not acknowledged data for 3 s, as devices do. A driver must connect again.
     more: Dict[str, Any] = {"world": {"scene": "tank-rod.yaml", "seed": spec["seed"]}, "limits": {"dead_peer_s": 3}}
     if spec["fault_engine"]:
         by_sonard = case is not None and case.kind != "N00" and not case.needs_lab
@@ -74,7 +74,7 @@ def _with_sonard(spec: Dict[str, Any], folder: pathlib.Path, laboratory: Optiona
                 if not sonard.ended():
                     raise
                 result = {}
-            # Whatever the driver did then, it had no sonar.
+            # Without a sonar the driver cannot be judged.
             how, log = sonard.ended(), sonard.log()
             if how:
                 result = {"ran": False, "why": f"sonard ended during the case, {how}: {_last_line(log)}", "text": log[-4000:]}
@@ -91,7 +91,7 @@ def _last_line(text: str) -> str:
 
 
 def port_of(sonar: Dict[str, Any]) -> int:
-    """Where a driver connects, as the sonar's status names it."""
+    """Returns the port in the sonar's status to which a driver connects."""
     for_drivers = [a["address"] for a in sonar.get("addresses", ()) if not a.get("sonar_speaks_first")]
     return int([*for_drivers, sonar["listens"]][0].rpartition(":")[2])
 
@@ -157,7 +157,7 @@ def _kinds(control: Control) -> Dict[str, Any]:
 
 
 def explanation(scene: Scene) -> str:
-    """The reason why a driver takes no pings, for its developer."""
+    """Explains to the developer of a driver why it takes no pings."""
     lines = []
     connections = scene.capture.connections if scene.capture else []
     taken = len(scene.capture.delivered()) if scene.capture and scene.reads_pings else len(scene.status.ping_times)
@@ -226,7 +226,7 @@ def _apply(scene: Scene, case: Case) -> None:
 
 
 def _fault(scene: Scene, case: Case, by_lab: bool, at_start: bool) -> Tuple[Optional[float], float]:
-    """Waits for the fault's begin and end and returns both."""
+    """Waits until the fault has begun and ended. Returns both times; the first is None if it did not begin."""
     seconds = case.until().get("seconds", 0.0)
     if case.kind == "N00" or by_lab:
         count = 0 if at_start else int(case.begin().get("ping", 6))
@@ -253,13 +253,13 @@ def _fault(scene: Scene, case: Case, by_lab: bool, at_start: bool) -> Tuple[Opti
         scene.capture.mark()
     scene.wait(lambda: scene.journal.ended(case.times) is not None, seconds + _STILL_S + case.limit)
     ended_at = scene.journal.ended(case.times)
-    if ended_at is None:  # as after a crash, when the sonar has no client to finish the fault with
+    if ended_at is None:  # after a crash no client is left on which the fault could end
         ended_at = max(scene.journal.last() or began, began + seconds)
     return began, ended_at + case.tail_s
 
 
 def _restart(scene: Scene) -> bool:
-    """Does what an operator does: starts the driver again."""
+    """Starts the driver again, as an operator would. Returns whether pings come."""
     scene.say("the judge restarts the driver, as an operator would")
     scene.driver.stop()
     scene.status.end_faults()  # ends the faults that wait for more pings
@@ -273,14 +273,14 @@ def _observe(scene: Scene, case: Case, began: float, ended: float, watched_until
     scene.driver.poll()
     published = list(scene.driver.published)
     if scene.capture:
-        scene.capture.catch_up()  # a ping that was published before its packets were read is not false
+        scene.capture.catch_up()  # otherwise a ping whose packets are not read yet would be judged false
     exited = scene.driver.exited
     connections: List[Tuple[float, Optional[float], str]] = list(scene.status.connections)
     if scene.capture:
         connections = [(c.opened, c.ended, c.ended_by) for c in scene.capture.connections]
     touched = [int(r["ping"]) for r in scene.journal.records if int(r.get("ping", 0) or 0) > 0 and r.get("event") == "injected"]
     delivered: List[Seen] = scene.capture.delivered() if scene.capture else []
-    if scene.capture and case.needs_lab:  # no one knows which datagrams arrived while the laboratory dropped packets
+    if scene.capture and case.needs_lab:  # the capture may see datagrams that the laboratory drops
         flows = {c.number for c in scene.capture.connections if isinstance(c, DatagramFlow)}
         delivered = [s for s in delivered if s.connection not in flows or not began <= s.mono <= ended]
     return Observation(
@@ -296,7 +296,7 @@ def _observe(scene: Scene, case: Case, began: float, ended: float, watched_until
 
 def main() -> int:
     folder = pathlib.Path(sys.argv[1])
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the driver and sonard must not be left behind
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # SIGTERM must end the driver and sonard too
     try:
         result = run(folder)
     except KeyboardInterrupt:

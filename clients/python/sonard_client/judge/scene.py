@@ -1,4 +1,4 @@
-"""A running case: sonard, the driver, and the three eyes on them."""
+"""A running case: sonard, the driver, and what observes them (the capture of packets, the tap, the journal of faults)."""
 from __future__ import annotations
 
 import contextlib
@@ -19,11 +19,11 @@ from .verdicts import sort_published
 from .wire import Capture
 
 _STEP_S = 0.05
-_MOST_MIB = 6144.0  # a driver that takes more memory is stopped, for the computer's sake
+_MOST_MIB = 6144.0  # a driver that takes more memory is stopped before the computer runs out of it
 
 
 class StatusWire(threading.Thread):
-    """Without the right to read packets: sonard's own account of its clients, five times a second."""
+    """Replaces the capture if packets may not be read: requests sonard's counts of its clients five times a second."""
 
     def __init__(self, control: Control) -> None:
         super().__init__(daemon=True)
@@ -62,7 +62,7 @@ class StatusWire(threading.Thread):
 
 
 class Journal:
-    """The records that sonard appends to a file."""
+    """Reads the journal of faults, a file to which sonard appends records."""
 
     def __init__(self, path: pathlib.Path) -> None:
         self._path, self._at, self._rest = path, 0, b""
@@ -87,7 +87,7 @@ class Journal:
         return next((mono(r) for r in self.records if r.get("event") in ("began", "injected")), None)
 
     def ended(self, times: int) -> Optional[float]:
-        """When it had ended so often."""
+        """Returns when the fault ended for the `times`-th time, or None."""
         found = [mono(r) for r in self.records if r.get("event") == "ended"]
         return found[times - 1] if len(found) >= times else None
 
@@ -101,7 +101,7 @@ def mono(record: Dict[str, Any]) -> float:
 
 @dataclasses.dataclass
 class Scene:
-    """Everything of a running case."""
+    """The programs, observers and files of a running case. Times are monotonic seconds."""
     spec: Dict[str, Any]
     folder: pathlib.Path
     address: str
@@ -120,7 +120,7 @@ class Scene:
 
     @property
     def reads_pings(self) -> bool:
-        """Whether the truth can be read from the wire: there is a capture, and a reader of the make's protocol."""
+        """Whether pings can be read from the wire, which needs a capture and a reader for the protocol of the make."""
         return self.capture is not None and reader_for(self.spec["profile"]) is not None
 
     def say(self, what: str) -> None:
@@ -132,7 +132,7 @@ class Scene:
         return sort_published(list(self.driver.published), self.capture.seen())[0]
 
     def ping_times(self) -> List[float]:
-        """When the driver took pings: as published, without a tap as acknowledged."""
+        """Returns when the driver took pings: when it published them, or without a tap when it acknowledged them."""
         if self.tapped:
             return [p.mono for p in self.good()]
         if self.capture is not None and self.reads_pings:
@@ -140,15 +140,16 @@ class Scene:
         return list(self.status.ping_times)
 
     def moves(self) -> Tuple[int, ...]:
-        """Counts that grow as long as anything happens between sonar and driver."""
+        """Returns counts of which one grows as long as there is any activity between sonar and driver."""
         wire = self.capture
         return (len(self.status.ping_times), len(self.driver.published), len(self.driver.line_times),
                 len(wire.seen()) if wire else 0, len(wire.connections) if wire else len(self.status.connections),
                 sum(len(c.fires) for c in wire.connections) if wire else 0)
 
     def wait(self, until: Callable[[], bool], timeout_s: float, moves: Optional[Callable[[], object]] = None) -> bool:
-        """Waits for a condition; ends early when the driver or sonard ends, or the driver takes too much memory. With `moves` the time counts anew, up
-        to six times it, whenever their value changes: a busy computer is slow, and a driver that does nothing is stuck."""
+        """Waits for a condition and returns whether it holds. Returns early if the driver or sonard ends or the driver takes too
+        much memory. Each change of moves() restarts the time-out, up to six times `timeout_s` in all, so that a slow computer
+        is not taken for a driver that does nothing."""
         began = time.monotonic()
         deadline, before = began + timeout_s, moves() if moves else None
         while True:

@@ -1,7 +1,7 @@
-"""The pings that a stream really contains, whatever faults are in it: what a driver may publish.
+"""Finds the pings in a stream with faults. A driver may publish these pings and no others.
 
-An Oculus' ping counts when the samples it announces are there: image, dimensions and one of the lengths agree, and no header of another
-message lies inside. So a driver may use any of the length fields, as long as what it publishes is what the sonar measured.
+A ping of an Oculus counts if all samples that it announces are there: image, dimensions and one of the length fields agree, and the
+header of another message does not follow too early. A driver may therefore use any of the length fields.
 """
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Reader(Protocol):
 
 
 def sample_crcs(image: bytes, rows: int, row_bytes: int, has_gains: bool) -> FrozenSet[int]:
-    """CRC-32 of an image as it is sent; with row gains also of the samples alone."""
+    """Returns the CRC-32 of an image as sent and, if it has row gains, also the CRC-32 of the samples without the gains."""
     found = {zlib.crc32(image)}
     if has_gains:
         crc, stride = 0, row_bytes + 4
@@ -44,7 +44,7 @@ def sample_crcs(image: bytes, rows: int, row_bytes: int, has_gains: bool) -> Fro
 
 
 class TruthReader:
-    """Finds pings at any offset of a stream. feed() returns those that became complete."""
+    """Finds the pings of an Oculus at any offset of a stream."""
 
     def __init__(self) -> None:
         self._data = bytearray()
@@ -60,7 +60,7 @@ class TruthReader:
                 at = len(self._data) - (self._data[-1:] == layouts.MAGIC[:1])
                 break
             step = self._ping_at(at, found)
-            if step == 0:  # incomplete: look again with more data
+            if step == 0:  # incomplete: wait for more data
                 break
             at += step
         del self._data[:at]
@@ -68,14 +68,14 @@ class TruthReader:
         return found
 
     def _ping_at(self, at: int, found: List[TruePing]) -> int:
-        """The bytes to go on by; 0 if more data are needed."""
+        """Returns how many bytes to advance, or 0 if more data are needed. Appends a ping that begins at `at`."""
         data = self._data
         if len(data) - at < layouts.HEADER_BYTES:
             return 0
         header = layouts.read_header(bytes(data[at:at + layouts.HEADER_BYTES]))
         if header.type != layouts.PING:
             return 1
-        version = min(header.version, 2)  # later versions: as the last known one
+        version = min(header.version, 2)  # reads later versions as the last known one
         head = layouts.ping_head_bytes(version)
         if len(data) - at < head:
             return 0
@@ -86,7 +86,7 @@ class TruthReader:
         image_bytes = f.rows * (row_bytes + (4 if has_gains else 0))
         end = f.image_offset + image_bytes
         declared = {f.message_bytes, header.payload_bytes + layouts.HEADER_BYTES}
-        row_short = end - row_bytes - (4 if has_gains else 0)  # all lengths say one row fewer: may be accepted or refused
+        row_short = end - row_bytes - (4 if has_gains else 0)  # if both lengths lack one row, a driver may accept or refuse the ping
         if end not in declared and declared == {row_short}:
             end, image_bytes = row_short, row_short - f.image_offset
         elif end not in declared:
@@ -95,11 +95,11 @@ class TruthReader:
                 f.image_offset < head + 2 * f.beams:
             return 1
         if len(data) - at < end:
-            # A message that can never be complete must not hide those behind it.
+            # If another message begins inside, this one will never be complete; go on with the other.
             other = data.find(front[:6], at + 1)
             return other - at if 0 <= other < at + end else 0
         message = bytes(data[at:at + end])
-        other = message.find(front[:6], 1)  # magic and source of another message: this one lacks bytes
+        other = message.find(front[:6], 1)  # the start of another message: bytes of this one are missing
         if other > 0:
             return other
         image = message[f.image_offset:]
@@ -109,15 +109,15 @@ class TruthReader:
         return end
 
 
-# Messages of the ping protocol that have what a driver publishes: its number, and where in it a number of the ping stands.
+# Messages of the ping protocol that hold samples, with the offset of the ping's number in the payload.
 _PROFILE, _MONO_PROFILE, _DEVICE_DATA, _AUTO_DEVICE_DATA, _ATOF = 1300, 2198, 2300, 2301, 3012
 _NUMBER_AT: Dict[int, Optional[int]] = {_PROFILE: 8, _MONO_PROFILE: None, _DEVICE_DATA: None, _AUTO_DEVICE_DATA: None, _ATOF: 20}
-_FRAME = struct.Struct("<2sHHBB")  # "BR", length of the payload, message, source, destination; behind the payload a sum of 16 bits
+_FRAME = struct.Struct("<2sHHBB")  # "BR", payload length, message, source, destination; after the payload a 16-bit sum
 
 
 class PingProtocolReader:
-    """Finds undamaged messages of the ping protocol, at any offset. The samples are the payload of such a message. Where it has no
-    number, pings count down from -1: no driver prints such a number, and no two are one ping."""
+    """Finds undamaged messages of the ping protocol at any offset. Their payload counts as the samples. Pings without a number get
+    -1, -2, ..., so that they differ from each other and from every number that a driver can print."""
 
     def __init__(self) -> None:
         self._data = bytearray()
@@ -126,7 +126,7 @@ class PingProtocolReader:
     def feed(self, received: bytes) -> List[TruePing]:
         self._data += received
         found: List[TruePing] = []
-        at, waiting = 0, -1  # waiting: the first message that is not complete; one behind it shows that it is none
+        at, waiting = 0, -1  # waiting: the first incomplete message; a complete one after it shows that it was none
         while (begin := self._data.find(b"BR", at)) >= 0:
             end = self._end(begin)
             if end > 0:
@@ -140,7 +140,7 @@ class PingProtocolReader:
         return found
 
     def _end(self, begin: int) -> int:
-        """Where an undamaged message ends; 0 if this is none, -1 while bytes of it are missing."""
+        """Returns the end of an undamaged message, 0 if no message begins here, or -1 while bytes are missing."""
         if len(self._data) - begin < _FRAME.size:
             return -1
         end = begin + _FRAME.size + int.from_bytes(self._data[begin + 2:begin + 4], "little") + 2
@@ -163,7 +163,7 @@ class PingProtocolReader:
 
 
 def reader_for(profile: str) -> Optional[Callable[[], Reader]]:
-    """What finds the pings of such a product; None where none is written: its data are not judged."""
+    """Returns the reader for a product, or None if there is none; then the driver's data are not judged."""
     if profile.startswith("oculus"):
         return TruthReader
     return PingProtocolReader if profile.startswith(("ping", "omniscan", "surveyor")) else None

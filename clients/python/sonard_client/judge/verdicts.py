@@ -1,4 +1,4 @@
-"""From what was observed to the two verdicts of a case. Pure functions: no clock, no processes."""
+"""Derives the two verdicts of a case from its observations. The functions are pure: no clock, no processes."""
 from __future__ import annotations
 
 import collections
@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 from .driver import Published, Sample
 from .wire import Seen
 
-BACK_PINGS = 3          # consecutive pings that make a driver "back"
+BACK_PINGS = 3          # a driver is back after so many consecutive pings
 SHOULD = {"notice_s": 2.0, "recover_s": 3.0, "lost": 1.0, "rss_mib": 32.0, "log_lines_s": 10.0}
 WORDS = {"notice_s": "notices within {:g} s", "recover_s": "is back within {:g} s of the fault's end",
          "lost": "loses at most {:g} more ping", "rss_mib": "takes at most {:g} MiB more memory",
@@ -17,25 +17,25 @@ WORDS = {"notice_s": "notices within {:g} s", "recover_s": "is back within {:g} 
 
 @dataclasses.dataclass
 class Observation:
-    """The three eyes' observations in one run of a case. Times are monotonic seconds."""
+    """What the capture, the tap and the journal observed in one run of a case. Times are monotonic seconds."""
     began: float
     ended: float                  # end of the fault
     watched_until: float
     tapped: bool                  # whether there is a tap
     published: Sequence[Published] = ()
     true_pings: Sequence[Seen] = ()      # on the wire
-    delivered: Sequence[Seen] = ()       # those of them that the driver's computer acknowledged
-    wire_times: Sequence[float] = ()     # instead of delivered, where the packets cannot be read
+    delivered: Sequence[Seen] = ()       # the pings whose bytes the driver's computer acknowledged
+    wire_times: Sequence[float] = ()     # replaces `delivered` if the packets cannot be read
     touched: Sequence[int] = ()          # numbers of the pings that the fault touched
     connections: Sequence[Tuple[float, Optional[float], str]] = ()  # opened, ended, by whom
     log_times: Sequence[float] = ()
     state_times: Sequence[float] = ()
     log_lines_s: float = 0.0
     samples: Sequence[Sample] = ()
-    exit_code: Optional[int] = None      # None: alive to the end
+    exit_code: Optional[int] = None      # None: the driver was still running
     exit_time: Optional[float] = None
-    restarted_well: Optional[bool] = None  # the judge started it again: did pings come?
-    packets_lost: int = 0                # by the capture
+    restarted_well: Optional[bool] = None  # whether pings came after the judge started the driver again
+    packets_lost: int = 0                # packets that the capture missed
     truth_known: bool = True             # whether the packets could be read
 
 
@@ -58,7 +58,7 @@ class Verdict:
         return all(check["holds"] for check in self.should)
 
     def classes(self) -> Tuple[str, str, bool, bool]:
-        """The part by which runs of a case are compared: no figures, which vary from run to run."""
+        """The part of a verdict that must be equal in all runs of a case. Figures are left out, because they vary."""
         return self.data, self.recovery, self.must_holds, self.should_holds
 
     def words(self) -> Tuple[str, str]:
@@ -74,12 +74,12 @@ def _matches(shown: Published, seen: Seen) -> bool:
 
 def sort_published(published: Sequence[Published], true_pings: Sequence[Seen]
                    ) -> Tuple[List[Published], List[Published], List[Published]]:
-    """(good, stale, false): stale is a ping published before, false one that the sonar never sent."""
+    """Sorts published pings into (good, stale, false). A stale ping was published before; the sonar never sent a false one."""
     by_crc: Dict[int, List[Seen]] = {}
     for seen in true_pings:
         for crc in seen.ping.crcs:
             by_crc.setdefault(crc, []).append(seen)
-    # After a reboot the same numbers and images come again, on another connection: they are new there.
+    # After a reboot the sonar sends the same numbers and images again, on another connection. They count as new pings.
     connections: Dict[Tuple[int, int], "set[int]"] = {}
     for seen in true_pings:
         for crc in seen.ping.crcs:
@@ -93,7 +93,7 @@ def sort_published(published: Sequence[Published], true_pings: Sequence[Seen]
         if not matching:
             false.append(shown)
             continue
-        # Without a number equal images are indistinguishable: the first not yet published is meant.
+        # Equal images without a number cannot be told apart; the first one that is not yet published is assumed.
         keys = [(seen.ping.number, shown.crc) for seen in matching]
         fresh = next((key for key in keys if before[key] < len(connections[key])), None)
         if fresh is None:
@@ -105,7 +105,7 @@ def sort_published(published: Sequence[Published], true_pings: Sequence[Seen]
 
 
 def back_at(times: Sequence[float], after: float, pings: int = BACK_PINGS, within_s: float = 3.0) -> Optional[float]:
-    """The first of `pings` events after a moment that lie within `within_s`."""
+    """Returns the time of the first of `pings` events that follow `after` and lie within `within_s` of each other, or None."""
     later = [t for t in times if t >= after]
     for first, last in zip(later, later[pings - 1:]):
         if last - first <= within_s:
@@ -119,8 +119,8 @@ def longest_gap(times: Sequence[float], since: float, until: float) -> float:
 
 
 def judge(seen: Observation, must: Mapping[str, float], should: Mapping[str, Optional[float]], wants_notice: bool) -> Verdict:
-    """must: further limits of this case beside surviving, being true and coming back. should: limits that replace SHOULD's;
-    None removes one."""
+    """Makes the verdict. must: limits of this case in addition to those of all cases (the driver survives, publishes nothing false,
+    comes back). should: limits that replace those of SHOULD; None removes one."""
     verdict = Verdict()
     good, stale, false = sort_published(seen.published, seen.true_pings) if seen.tapped and seen.truth_known else (
         list(seen.published), [], [])
@@ -143,7 +143,7 @@ def judge(seen: Observation, must: Mapping[str, float], should: Mapping[str, Opt
     for name, wanted in limits.items():
         if wanted is None or name in must or (name == "notice_s" and not wants_notice) or (name == "lost" and not seen.tapped):
             continue
-        if name == "rss_mib" and name not in measured:  # it ended before a second look
+        if name == "rss_mib" and name not in measured:  # the driver ended before its memory was measured twice
             continue
         _check(verdict.should, name, wanted, measured.get(name))
     return verdict
@@ -222,7 +222,7 @@ def _figures(seen: Observation, lost: int, back: Optional[Verdict]) -> Dict[str,
 
 
 def colour(verdict: Verdict) -> str:
-    """The worse of the two verdicts: good, fair, bad, worst."""
+    """Returns the worse of the two verdicts as good, fair, bad or worst."""
     if verdict.recovery == "CRASH" or verdict.data == "FALSE":
         return "worst"
     if verdict.recovery in ("NEVER", "OPERATOR") or verdict.data == "STALE" or not verdict.must_holds:

@@ -1,4 +1,4 @@
-"""The wire: every packet between sonar and driver, read from the network interface; the connections and pings in it."""
+"""Reads every packet between sonar and driver from the network interface, and finds the connections and pings in them."""
 from __future__ import annotations
 
 import collections
@@ -40,7 +40,7 @@ class Connection:
         self.fires: List[float] = []  # when settings or requests were sent
         self.zero_windows = 0
         self.sent = 0                 # bytes of the device, without repetitions
-        self.acked = 0                # number of them that were acknowledged
+        self.acked = 0                # number of these bytes that the driver acknowledged
         self.pings: List[Seen] = []
         self.stream = bytearray()
         self._first: Optional[int] = None  # sequence number of the device's first byte
@@ -100,8 +100,8 @@ class Connection:
 
 
 class DatagramFlow(Connection):
-    """Datagrams between the sonar and one port of the driver. It begins with the driver's first one; nothing says that it ends.
-    What was on the wire counts as delivered: UDP has no acknowledgement."""
+    """Datagrams between the sonar and one port of the driver. The flow begins with the first datagram of the driver and has no end.
+    Every datagram on the wire counts as delivered, because UDP has no acknowledgements."""
 
     def __init__(self, number: int, peer: str, mono: float, reader: Callable[[], Reader]) -> None:
         super().__init__(number, peer, mono, reader)
@@ -113,20 +113,20 @@ class DatagramFlow(Connection):
 
 
 class Capture(threading.Thread):
-    """Reads an interface from start() to stop(). Needs CAP_NET_RAW, as a namespace of one's own gives.
+    """Captures packets from start() to stop(). Needs CAP_NET_RAW, which a process has in its own network namespace.
 
-    interface: "lo" or the end of the cable. device: the sonar's address. reader: what finds the pings of its make."""
+    interface: "lo" or one end of the veth pair. device: the sonar's address. reader: finds the pings of its make in the bytes."""
 
     def __init__(self, interface: str, device: str, port: int = layouts.DATA_PORT,
                  reader: Callable[[], Reader] = TruthReader) -> None:
         super().__init__(daemon=True)
         self._reader = reader
         self._flows: Dict[Tuple[bytes, int], DatagramFlow] = {}
-        self._fragments: Dict[Tuple[bytes, bytes, bytes], Dict[int, bytes]] = {}  # of datagrams that are not complete
+        self._fragments: Dict[Tuple[bytes, bytes, bytes], Dict[int, bytes]] = {}  # of incomplete datagrams: fragments by offset
         self._lo, self._device, self._port = interface == "lo", ipaddress.IPv4Address(device).packed, port
         self.connections: List[Connection] = []
         self.lost_packets = 0
-        self._idle_at = 0.0  # when nothing waited to be read
+        self._idle_at = 0.0  # the latest time when no packet was waiting
         self._open: Dict[Tuple[bytes, int], Connection] = {}
         self._stopping = threading.Event()
         self._lock = threading.Lock()
@@ -154,7 +154,7 @@ class Capture(threading.Thread):
                 if error.errno in (errno.ENETDOWN, errno.EINTR):
                     continue
                 return
-            if self._lo and source[2] == _OUTGOING:  # loopback shows every packet twice
+            if self._lo and source[2] == _OUTGOING:  # loopback delivers every packet twice
                 continue
             with self._lock:
                 self._packet(time.monotonic(), time.time_ns(), packet)
@@ -167,7 +167,7 @@ class Capture(threading.Thread):
         self._socket.close()
 
     def catch_up(self, timeout_s: float = 5.0) -> None:
-        """Waits until everything that was on the wire by now has been read."""
+        """Waits until all packets that were sent before this call are read."""
         now = time.monotonic()
         while self._idle_at <= now and time.monotonic() < now + timeout_s:
             time.sleep(0.01)
@@ -180,7 +180,7 @@ class Capture(threading.Thread):
             pass
 
     def mark(self) -> None:
-        """The fault begins: what came before is kept, and a limited amount of what follows."""
+        """Marks the begin of the fault. The packets kept until now stay; after them only a limited number of bytes is kept."""
         with self._lock:
             self._marked = True
 
@@ -189,7 +189,7 @@ class Capture(threading.Thread):
             return [seen for connection in self.connections for seen in connection.pings]
 
     def delivered(self) -> List[Seen]:
-        """The pings that the driver's computer acknowledged whole."""
+        """Returns the pings of which the driver's computer acknowledged every byte."""
         with self._lock:
             return [seen for connection in self.connections for seen in connection.pings if seen.ping.end <= connection.acked]
 
@@ -210,19 +210,19 @@ class Capture(threading.Thread):
             if len(datagram) >= 8:
                 self._udp(mono, source, destination, datagram)
         elif protocol == 6 and len(packet) >= at + 20:
-            if end == ip:  # more than a length field holds: one large segment of the network card
+            if end == ip:  # length 0: a segment too large for the field, from offloading
                 end = len(packet)
             if self._tcp(mono, source, destination, packet, at, end):
                 self._keep(utc_ns, packet)
 
     def _whole_datagram(self, packet: bytes, ip: int, at: int, end: int) -> bytes:
-        """With its header; empty while fragments are missing."""
+        """Returns a datagram with its UDP header, or empty bytes while fragments are missing."""
         place = struct.unpack_from(">H", packet, ip + 6)[0]
         offset, more = (place & 0x1FFF) * 8, bool(place & 0x2000)
         if offset == 0 and not more:
             return packet[at:end]
         key = (packet[ip + 12:ip + 16], packet[ip + 16:ip + 20], packet[ip + 4:ip + 6])
-        if len(self._fragments) > _MOST_FRAGMENTED:  # some never become complete
+        if len(self._fragments) > _MOST_FRAGMENTED:  # drops also those that can never be completed
             self._fragments.clear()
         parts = self._fragments.setdefault(key, {})
         parts[offset] = packet[at:end]
@@ -303,7 +303,7 @@ def _option(code: int, value: bytes) -> bytes:
 
 
 def pcapng(packets: "List[Tuple[int, bytes]]", comment: str) -> bytes:
-    """A capture file of Ethernet packets with times in ns since 1970."""
+    """Returns a pcapng file of Ethernet packets whose times are ns since 1970."""
     end = _option(0, b"")
     parts = [_block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1) + _option(1, comment.encode()) + end),
              _block(1, struct.pack("<HHI", 1, 0, 0) + _option(9, b"\x09") + end)]
@@ -314,7 +314,7 @@ def pcapng(packets: "List[Tuple[int, bytes]]", comment: str) -> bytes:
 
 
 def hex_around(stream: bytes, offset: int, before: int = 32, after: int = 64) -> List[str]:
-    """Lines of 16 bytes; the line of the offset is marked."""
+    """Returns lines of 16 bytes in hex; `>` marks the line that contains the offset."""
     first = max(0, offset - before) // 16 * 16
     lines = []
     for at in range(first, min(len(stream), offset + after), 16):
