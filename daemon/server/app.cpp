@@ -87,6 +87,7 @@ void App::log_new_notes() {
   for (const Note& note : plausibility_.use(config_, *changes_.scene())) log_.warning(text_of(note));
 }
 
+/// Control opens last, so that no request comes to a daemon whose sonars cannot be opened.
 Result<void> App::open() {
   if (options_.handle_signals) {  // before a program can read that sonard is ready
     signals_.add(SIGINT);
@@ -126,6 +127,7 @@ std::string App::status_line() const {
   return line;
 }
 
+/// SIGHUP reloads. The first SIGINT or SIGTERM stops gracefully, the second one ends the process.
 void App::wait_for_signal() {
   signals_.async_wait([this](const error_code& ec, int signal) {
     if (ec) return;
@@ -145,6 +147,7 @@ void App::request_stop() {
   asio::post(io_, [this] { stop("asked to stop"); });
 }
 
+/// Servers are closed first, so that no request arrives while sonars finish their clients.
 void App::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
   log_.info("stopping: " + why);
@@ -171,6 +174,7 @@ void App::stop(const std::string& why) {
   on_change();
 }
 
+/// Many changes in one turn of the event loop cause one look().
 void App::on_change() {
   if (std::exchange(look_posted_, true)) return;
   asio::post(io_, [this] {
@@ -203,6 +207,7 @@ Reload::Steps App::reload_steps() {
           .end = [this] { notify_.ready(status_line()); }};
 }
 
+/// Runs in one turn of the event loop, so that no request sees half of the new configuration.
 void App::take_over(Config next) {
   const std::vector<std::string> keys = keep_restart_keys(config_, next);
   const bool other_water = !(config_.water == next.water);

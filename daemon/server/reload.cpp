@@ -7,6 +7,7 @@
 
 namespace sonar {
 
+/// At most one reload in each `pause`. A request within it waits for its end, and further requests join that one.
 void Reload::request() {
   if (waits_) return;
   const auto now = std::chrono::steady_clock::now();
@@ -27,6 +28,8 @@ void Reload::stop() {
   timer_.cancel();
 }
 
+/// The file is read on the scene thread, as a change of the scene, so that the new configuration and its scene come into use
+/// together.
 void Reload::begin() {
   if (!steps_.read_config || !steps_.load_scene) return log_.info("reload: there is no configuration file; nothing changed");
   if (changes_.is_full()) return log_.warning("reload: too many changes of the scene wait already; nothing changed");

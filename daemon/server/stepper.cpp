@@ -9,6 +9,7 @@ bool is_first(std::optional<Time> t, std::optional<Time> of) { return t && (!of 
 
 }  // namespace
 
+/// The earliest ping, request and dialogue tick of all sonars. Of equal times the first sonar of the configuration counts.
 Stepper::Due Stepper::next_due() {
   Due due;
   for (Device& d : fleet_.devices()) {
@@ -19,6 +20,8 @@ Stepper::Due Stepper::next_due() {
   return due;
 }
 
+/// Advances time by at most one event, and only when all clients have received what was sent. Returns whether the daemon may
+/// end, because enough pings were served.
 bool Stepper::step(const std::function<bool()>& enough_served) {
   skip();
   const std::list<Device>& devices = fleet_.devices();
@@ -43,6 +46,7 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   return false;
 }
 
+/// The sonars act on the new time at once: dialogues, faults and pings that are held back.
 void Stepper::advance(Time to) {
   clock_.advance_to(to);
   for (Device& d : fleet_.devices()) d.tick_sessions();

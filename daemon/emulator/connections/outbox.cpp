@@ -6,6 +6,7 @@
 
 namespace sonar {
 
+/// The bound protects against a client that sends requests and does not read the replies.
 bool Outbox::push_reply(Bytes reply) {
   if (replies_.size() >= most_replies || reply_bytes_ + reply.size() > most_reply_bytes) return false;
   reply_bytes_ += reply.size();
@@ -23,6 +24,7 @@ std::size_t Outbox::Message::size() const {
 void Outbox::push(Message ping, bool limited) {
   const std::size_t size = ping.size();
   ++pings_offered_;
+  // An empty queue accepts any ping, so that one that exceeds most_ping_bytes can still be sent.
   const auto full = [&] {
     return limited && !pings_.empty() &&
            (pings_.size() >= static_cast<std::size_t>(rules_.depth) || ping_bytes_ + size > most_ping_bytes);
@@ -31,6 +33,7 @@ void Outbox::push(Message ping, bool limited) {
     count_drop(DropReason::slow);
     return;
   }
+  // The oldest pings make room, so that a slow client gets the newest picture.
   while (full()) {
     ping_bytes_ -= pings_.front().size();
     pings_.pop_front();
@@ -43,6 +46,7 @@ void Outbox::push(Message ping, bool limited) {
 Outbox::Message Outbox::take() {
   if (writing_ || (replies_.empty() && pings_.empty())) return {};
   writing_ = true;
+  // Replies come first: they are small, and they are never dropped.
   writing_ping_ = replies_.empty();
   if (writing_ping_) {
     Message ping = std::move(pings_.front());
@@ -76,6 +80,7 @@ void Outbox::drop_waiting_pings(DropReason why) {
 
 void Outbox::end(DropReason why) {
   drop_waiting_pings(why);
+  // The message being written is incomplete at the client, so its ping counts as dropped.
   if (std::exchange(writing_, false) && writing_ping_) count_drop(why);
   replies_.clear();
   reply_bytes_ = 0;

@@ -27,6 +27,7 @@ void Pacer::configure(const PingSettings& settings, Time now) {
   // A new grid begins when the last echo has arrived and the shorter of both periods is over.
   const Time quiet_until = has_fired_ ? std::max(home_at_, last_tick_ + std::min(period_, period)) : now;
   running_ = period.count() > 0;
+  // A trigger that waits stays valid only if pings were triggered before and still are.
   if (!(running_ && triggered_ && settings.triggered)) forget_trigger();
   triggered_ = settings.triggered;
   if (running_) {
@@ -64,6 +65,7 @@ void Pacer::trigger(Time now, bool joins) {
   }
   ++ticks_;
   trigger_waits_ = true;
+  // A trigger fires at once if a period has passed since the last ping, else when it has passed.
   trigger_at_ = has_fired_ ? std::max({now, start_, last_tick_ + period_}) : std::max(now, start_);
 }
 
@@ -73,6 +75,7 @@ std::optional<Time> Pacer::next_tick() const {
   return start_ + index_ * period_;
 }
 
+/// Remembers when the sound of this ping is back: configure() begins no new grid before then.
 void Pacer::note_ping(Time at) {
   last_tick_ = at;
   home_at_ = at + travel_;
@@ -101,6 +104,7 @@ bool Pacer::fire(Time now, bool busy) {
     ++skipped_.busy;
     return false;
   }
+  // The ping is stamped with its place on the grid, however late the call comes.
   note_ping(start_ + reached * period_);
   return true;
 }

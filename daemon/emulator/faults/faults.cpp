@@ -45,6 +45,7 @@ Faults::Entry* Faults::active(Effect effect) {
 
 // ---- triggers
 
+/// Whether the trigger of a fault that is not active is met by this ping. Triggers by time and by events are not decided here.
 bool Faults::fires(const Entry& e, std::uint32_t ping) const {
   const FaultRecord::At& at = e.fault.at;
   if (at.ping) return e.begun == 0 && ping >= *at.ping;
@@ -71,6 +72,7 @@ void Faults::begin(Entry& e, Time now) {
   begin_effect(e, now);
 }
 
+/// A fault with a bounded number of occurrences is over after the last of them; others wait for their trigger again.
 void Faults::end(Entry& e, Time now) {
   if (!e.active) return;
   e.active = false;
@@ -80,6 +82,8 @@ void Faults::end(Entry& e, Time now) {
   if (e.fault.span.count != 0 && e.begun >= e.fault.span.count) e.over = true;
 }
 
+/// Only faults that change the device or its connections act here, by orders. Faults of messages and samples act when those
+/// pass.
 void Faults::begin_effect(Entry& e, Time now) {
   switch (e.fault.kind->effect) {
     case Effect::close_ports:
@@ -166,6 +170,7 @@ void Faults::end_effect(Entry& e) {
 
 // ---- time
 
+/// For each fault in this order: it begins, takes a step, applies late requests, ends clients, ends, expires.
 void Faults::on_tick(Time now) {
   for (Entry& e : entries_) {
     const auto& at = e.fault.at;
@@ -187,6 +192,7 @@ void Faults::on_tick(Time now) {
   }
 }
 
+/// Mirrors on_tick(): the earliest time at which one of its conditions becomes true.
 std::optional<Time> Faults::next_tick() const {
   Time next = Time::max();
   for (const Entry& e : entries_) {
@@ -206,6 +212,7 @@ void Faults::on(Occasion occasion, Time now) {
     if (e.fault.on == occasion && (e.fault.span.count == 0 || e.begun < e.fault.span.count)) begin(e, now);
 }
 
+/// A step is a change inside a fault: of a power cycle the opening of the ports, of a flapping link each up and down.
 void Faults::step(Entry& e, Time now) {
   if (e.fault.kind->effect == Effect::power_cycle) {  // TCP before the first status message
     orders_.emplace_back(SetListening{true});
@@ -221,6 +228,7 @@ void Faults::step(Entry& e, Time now) {
 
 // ---- pings
 
+/// Decides once for each ping which faults it meets, and remembers that, so that all clients and all stages agree.
 void Faults::begin_ping(std::uint32_t number, Time now) {
   if (entries_.empty()) return;
   on_tick(now);
@@ -257,6 +265,7 @@ double Faults::rate_factor() const {
 
 bool Faults::leaves_group() const { return any(Effect::leave_group); }
 
+/// The first fault that holds the ping decides; holds do not add up.
 Faults::Hold Faults::hold(const Connection& to, std::uint32_t ping, Time now) {
   for (Entry& e : entries_) {
     if (!met(e, ping) || !chosen(e.fault, to)) continue;

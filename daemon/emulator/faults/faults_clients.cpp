@@ -25,6 +25,7 @@ bool Faults::chosen(const Fault& fault, const Connection& client) const {
   });
 }
 
+/// The first active fault of this kind decides.
 Faults::Admission Faults::admission() const {
   for (const Entry& e : entries_) {
     if (!e.active) continue;
@@ -35,6 +36,7 @@ Faults::Admission Faults::admission() const {
   return Admission::as_configured;
 }
 
+/// A client that connects while a fault is active is treated as those before it.
 void Faults::on_served(const Connection& client, Time now) {
   if (entries_.empty()) return;
   on(Occasion::connect, now);
@@ -84,6 +86,7 @@ Faults::RequestVerdict Faults::on_request(protocol::ChangeSettings& change, cons
   return RequestVerdict::apply;
 }
 
+/// Ends a client at its first bytes, whatever they are, if the fault is configured so.
 Faults::RequestVerdict Faults::on_bytes(const std::string& who, Time now) {
   for (Entry& e : entries_) {
     if (!e.active || e.fault.kind->effect != Effect::end_on_request || e.fault.word("command") != "any") continue;

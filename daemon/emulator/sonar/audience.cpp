@@ -24,6 +24,7 @@ Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protoco
                             Actions& actions) {
   using Verdict = Connections::Verdict;
   using Admission = Faults::Admission;
+  // First the rules for slots decide, then a fault of the clients may replace their verdict.
   Verdict verdict = stopping_ ? Verdict::refuse : connections_.verdict(role);
   const Admission admission = role == Role::client && !stopping_ ? by_fault : Admission::as_configured;
   if (admission == Admission::wait) verdict = Verdict::wait;

@@ -121,6 +121,7 @@ void Delivery::deliver(Connection& to, Outbox::Message ping, Time now, Actions& 
   }
   if (held.size() >= most_held || held_bytes(to) + ping.size() > most_held_bytes)
     return to.outbox.drop_offered(DropReason::fault);
+  // A ping that waits for a later event (collect, after_next) has no time of release: Time::max().
   // Pings keep their order: no ping leaves before the previous one.
   const Time earliest = held.empty() ? now : held.back().until;
   const Time until = hold.kind == Kind::until ? std::max(hold.until, earliest) : hold.kind == Kind::pass ? earliest : Time::max();

@@ -89,6 +89,7 @@ bool PingSource::wants_pings() const {
 void PingSource::update_pacer(Time now) {
   PingSettings paced = settings_;
   if (runs_itself()) paced.triggered = false;  // no client asks for pings
+  // A fault with factor 0 stops the pings, as rate 0 (standby) does.
   if (const double factor = faults_.rate_factor(); factor != 1) paced.rate_hz *= static_cast<float>(factor);
   if (wants_pings())
     pacer_.configure(paced, now);
@@ -195,7 +196,9 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
     if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period()),
                                            sonar_.around.config.sonars.size() > 1))
       sonar_.report(Report::Topic::state, LogLevel::warning, *slow, {}, actions);
+  // The gain of the next ping follows this one, also if no client gets it.
   if (outcome.ping) gain_assist_.look_at(*outcome.ping);
+  // A ping that was made for clients that have left, or that is noise only, must not change the device.
   if (outcome.ping && !audience_.stopping() && !busy_unwanted_ && !outcome.ping->request.blank)
     if (const auto change = sonar_.vendor.after_ping(*outcome.ping, sonar_.state)) change_settings(*change, {}, now, actions);
   if (outcome.ping) note_water(outcome.ping->request, now, actions);
@@ -208,13 +211,14 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
   } else if (!audience_.stopping() && (audience_.has_audience() || runs_itself_) && !busy_unwanted_) {
     return true;
   } else {
-    ++figures.unwanted;
+    ++figures.unwanted;  // its clients left while it was computed
   }
   return false;
 }
 
 /// This ping was requested like any other, and the engine computed only noise, because the sonar is above the sea surface.
 void PingSource::note_water(const PingRequest& computed, Time now, Actions& actions) {
+  // `busy_blank_` pings were requested as noise only, so they say nothing about the water.
   const bool was_in_air = std::exchange(in_air_, computed.blank && !busy_blank_);
   if (!in_air_) return;
   ++sonar_.figures.out_of_water;

@@ -40,6 +40,7 @@ void Sonar::move(const SonarConfig& config, Time now) {
   move_mount(config.mount, now);
 }
 
+/// The figures of connections that have ended are in `data_`; those of the present ones are added here.
 DeviceFigures Sonar::figures() const {
   DeviceFigures f = data_.figures;
   f.ticks = source_.pacer().ticks();
@@ -54,6 +55,7 @@ DeviceFigures Sonar::figures() const {
 
 // ---- time
 
+/// While poses are stale and the rule for them forbids pings, no request is due: stepped time does not wait for it.
 std::optional<Time> Sonar::next_request() const {
   const auto next = audience_.earliest(&Connection::next_request);
   return next && source_.waits_for_pose(*next) ? std::nullopt : next;
@@ -306,6 +308,7 @@ bool Sonar::end_faults(const std::string& name, Time now, Actions& actions) {
   return found;
 }
 
+/// Faults leave orders for ports, clients and settings. They are applied after each call that may leave some.
 void Sonar::apply_fault_orders(Time now, Actions& actions) {
   for (const FaultOrder& order : faults_.take_orders()) apply(order, now, actions);
 }

@@ -56,6 +56,7 @@ void Viewer::on_binary(wire::BytesView frame, Moment now) {
   host_.call(*this, *call);
 }
 
+/// A bucket of messages: a viewer that sends more than 100 a second is closed.
 bool Viewer::has_room_for_message(Moment now) {
   if (allowance_at_) allowance_ = std::min(burst, allowance_ + messages_per_s * sonar::seconds(now - *allowance_at_));
   allowance_at_ = now;
@@ -142,12 +143,14 @@ void Viewer::say_ignored(const std::string& what) {
 void Viewer::say(std::string word) { add_word({true, bytes_of(word), {}}); }
 void Viewer::say_frame(wire::Bytes frame) { add_word({false, std::move(frame), {}}); }
 
+/// Words are never dropped. A viewer that is too slow for them is closed, and may connect again.
 void Viewer::add_word(ViewMessage word) {
   word_bytes_ += word.head.size();
   words_.push_back(std::move(word));
   if (words_.size() > most_words || word_bytes_ > most_word_bytes) close_ = CloseCode::try_again_later;
 }
 
+/// The status is removed after `lasts`; next() does so. Beyond 64 such statuses a further one stays.
 void Viewer::say_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts) {
   if (passing_.size() >= most_passing && !passing_.contains(id)) return say_status(foxglove::StatusLevel::error, text);
   say_status(foxglove::StatusLevel::error, text, id);
@@ -162,6 +165,7 @@ void Viewer::forget(std::uint32_t channel) {
   std::erase_if(slots_, [channel](const auto& slot) { return slot.second.channel == channel; });
 }
 
+/// Events queue up to a bound, and the oldest is dropped. Of other kinds one payload waits.
 void Viewer::offer(std::uint32_t channel, const ViewPayloadPointer& payload, Moment now) {
   for (auto& [id, slot] : slots_) {
     if (slot.channel != channel) continue;
@@ -231,6 +235,7 @@ Viewer::Slot* Viewer::next_slot(bool last_values, Moment now, std::uint32_t& sub
   return best;
 }
 
+/// The order: removed statuses, words, the time, last values, then pictures and events.
 std::optional<ViewMessage> Viewer::next(Moment now) {
   if (slow_since_ && now - *slow_since_ >= slow_is_said_for) {
     slow_since_.reset();
@@ -263,6 +268,7 @@ std::optional<ViewMessage> Viewer::next(Moment now) {
   return message;
 }
 
+/// Must consider everything that next() may return later; otherwise it would wait for another message.
 std::optional<Viewer::Moment> Viewer::next_due(Moment now) const {
   std::optional<Moment> due;
   const auto consider = [&due](Moment at) { due = due ? std::min(*due, at) : at; };

@@ -35,6 +35,7 @@ World::World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyS
 void World::use_vehicles(std::vector<BodyStart> vehicles, Time now) { vehicles_ = taken_over(vehicles_, vehicles, now); }
 void World::use_objects(std::vector<BodyStart> objects, Time now) { objects_ = taken_over(objects_, objects, now); }
 
+/// Bodies of a known name keep their poses. A new body begins with a full allowance, and a changed trajectory begins now.
 std::vector<World::Track> World::taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const {
   std::vector<Track> tracks;
   for (BodyStart& b : bodies) {
@@ -69,6 +70,7 @@ World::Track* World::find(PoseSample::Of of, const std::string& name, std::strin
   return nullptr;
 }
 
+/// Whether a pose belongs to the history of the body: the same sender and kind of time stamp, and no long silence.
 bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) const {
   const bool known = !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain;
   if (!known) return false;
@@ -96,6 +98,7 @@ bool World::over_rate(Track& track, Time now) const {
   return false;
 }
 
+/// Checked before anything is changed, so that a refused pose leaves no trace.
 std::string World::why_bad_time(const PoseSample& sample, Time at, Time now) const {
   if (has_shared_clock(sample) && (at > now + future_allowed || at < now - rules_.stale_after - future_allowed))
     return "WALL time stamp is " + std::to_string(seconds(at - now)) +
@@ -122,6 +125,8 @@ bool World::is_next(Track& track, const PoseSample& sample, Time at, PoseOutcome
   return true;
 }
 
+/// The order matters: name, time stamp, continuity, clock offset, then the pose is kept. A pose that is refused, or late,
+/// changes nothing but a counter.
 PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time now) {
   PoseOutcome out;
   Track* const found = find(sample.of, sample.name, out.refusal);
@@ -168,6 +173,7 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   return out;
 }
 
+/// Also ends the state "stale". The body is hidden or shown as the pose says.
 void World::keep(Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) {
   track.source = sender.source;
   track.sender_id = sender.id;
@@ -215,6 +221,8 @@ std::vector<World::Stale> World::newly_stale(Time now) {
   return sentences;
 }
 
+/// The first of these that applies: hidden far above the scene, received poses, a trajectory, the orbit of the demo, the
+/// initial pose.
 Pose World::pose_at(const Track& track, Time t) const {
   if (track.hidden) return {{0, 0, hidden_height_m}, {}};
   if (!track.history.empty()) return track.history.at(t - track.offset, rules_.extrapolate_max);

@@ -64,6 +64,7 @@ Admission::~Admission() {
   if (reserve_ >= 0) ::close(reserve_);
 }
 
+/// Logs the first of a series of refusals. A series ends after a minute without one.
 void Admission::say(Steady::time_point& last, const char* what) {
   const auto now = Steady::now();
   if (last == Steady::time_point{} || now - last > spell) log_.warning(what, {{"connected", *count_}});
@@ -78,11 +79,13 @@ bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
   return false;
 }
 
+/// The descriptors just below the spare ones are for drivers. A socket whose number is one of them takes a place from drivers.
 bool Admission::is_drivers(const tcp::socket& socket) const {
   const std::uint64_t for_drivers = std::min(most_kept_for_drivers, most_descriptors() / 8);
   return number_of(socket) >= first_spare(limits_, Purpose::client) - for_drivers;
 }
 
+/// The place counts as long as a copy of it lives, also after this object is gone.
 Admission::Place Admission::enter(const tcp::socket& socket) {
   if (!leaves_spare(socket, Purpose::client)) return {};
   if (*count_ >= static_cast<std::uint64_t>(limits_.clients)) {

@@ -91,6 +91,7 @@ HttpConnection::HttpConnection(ConnectionServices& services, HttpService& servic
   if (!ec && peer.address().is_v4()) peer_ = peer.address().to_v4().to_bytes();
 }
 
+/// Ends all waits; both coroutines then return.
 void HttpConnection::close() {
   if (takeover_ && !over()) takeover_->on_closing();
   error_code ec;
@@ -166,6 +167,8 @@ void HttpConnection::hand_over() {
   wake_writer_.cancel();
 }
 
+/// Call it when an answer is sent. A request that has been received already is answered at once; otherwise the client has the
+/// time of keep-alive.
 void HttpConnection::next_request() {
   busy_ = false;
   request_limit_->within(reader_.begun() ? std::chrono::seconds(greeting_limit) : std::chrono::seconds(keep_alive_limit));
@@ -186,6 +189,8 @@ void HttpConnection::finish_sending() {
 
 // ---- answers
 
+/// read() and write() take turns: read() sets `request_` or `refusal_` and waits while `busy_`; write() answers and lets it go
+/// on.
 asio::awaitable<void> HttpConnection::write() {
   while (!over() && !all_sent_) {
     if (std::exchange(continue_asked_, false)) {
@@ -212,6 +217,7 @@ bool HttpConnection::has_slot(const HttpRequest& request) {
   return !services_.token.matches(bearer_token(request.authorization)) || claim_slot();
 }
 
+/// Three kinds of answers: a stream until the client disconnects, a takeover by another protocol, and a document.
 asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
   if (!has_slot(request)) {
     refusal_ = too_many;

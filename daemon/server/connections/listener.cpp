@@ -40,6 +40,7 @@ void Listener::stop() {
   reopen_timer_.cancel();
 }
 
+/// Closing the socket makes the kernel refuse connections. The accept loop then waits in reopen().
 void Listener::pause() {
   if (at_.port == 0 || stopping_) return;
   paused_ = true;
@@ -47,6 +48,7 @@ void Listener::pause() {
   acceptor_.close(ec);
 }
 
+/// Opens the port at once if it is free; reopen() retries if another program has taken it.
 void Listener::resume(Fault taken) {
   if (!std::exchange(paused_, false) || stopping_) return;
   taken_ = std::move(taken);

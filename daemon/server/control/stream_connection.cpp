@@ -63,6 +63,7 @@ StreamConnection::StreamConnection(ConnectionServices& services, ControlTargets&
   socket_.set_option(asio::socket_base::receive_buffer_size(receive_buffer), ec);
 }
 
+/// May be called more than once. The coroutines return when their waits are cancelled.
 void StreamConnection::close() {
   error_code ec;
   socket_.close(ec);
@@ -75,6 +76,8 @@ void StreamConnection::close() {
 
 // ---- requests
 
+/// Requests are read in turns of bounded size. A pose beyond the rate is kept in `newest_pose_` until the rate allows it,
+/// another request comes, or a newer pose replaces it.
 asio::awaitable<void> StreamConnection::read() {
   std::vector<std::byte> buffer(work_of_a_turn);
   std::size_t received = 0;
@@ -112,6 +115,7 @@ asio::awaitable<void> StreamConnection::read() {
       }
       if (const auto pose = std::exchange(newest_pose_, std::nullopt)) accept(*pose, work);
       ending_ = !accept(**message, work);
+      // A client that does not read its answers is not read further, so the answers that wait are bounded.
       while (!over() && answers_.size() + in_progress_ >= most_open_requests) co_await wake_reader_.async_wait(into(ec));
     }
     if (!greeted_ && received > longest_before_hello) ending_ = true;
@@ -177,6 +181,8 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
   return accept_greeted(*request);
 }
 
+/// The Hello decides everything: version, token, and then a slot among the authenticated clients. After it the time limit for
+/// greetings ends.
 bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
   if (hello.protocol_version != control::protocol_version) {
     answer(greeting(id, StatusCode::refused, "protocol_version must be " + std::to_string(control::protocol_version)));
@@ -198,12 +204,14 @@ bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
   return true;
 }
 
+/// The answer is still written before the connection is closed.
 bool StreamConnection::refuse_and_end(std::uint64_t id, StatusCode code, const std::string& why) {
   log_refusal(services_, why, sender_.id);
   answer(response_of(id, code, why));
   return false;
 }
 
+/// True, because no request of a client that was greeted ends the connection.
 bool StreamConnection::accept_greeted(const control::Request& request) {
   std::visit(
       [&](const auto& op) {
@@ -235,6 +243,7 @@ void StreamConnection::perform(std::uint64_t id, const control::Operation& opera
   });
 }
 
+/// A subscription holds a listener only while it selects a kind of event.
 void StreamConnection::subscribe(const control::Subscribe& wanted) {
   events_.subscribe(wanted);
   if (!events_.subscribes_any()) {
@@ -254,6 +263,7 @@ void StreamConnection::answer(const v1::Response& response) {
   wake_writer_.cancel();
 }
 
+/// Answers come before events. At the end it waits for requests in progress, so that each gets its answer.
 asio::awaitable<void> StreamConnection::write() {
   while (!over()) {
     if (!answers_.empty()) {

@@ -25,6 +25,7 @@ SceneChanges::SceneChanges(asio::io_context& io, Simulator& simulator, ScenePoin
 
 SceneChanges::~SceneChanges() { thread_.join(); }
 
+/// A build that is under way goes on; finish() then drops its result.
 void SceneChanges::stop() {
   stopped_ = true;
   waiting_.clear();
@@ -35,6 +36,7 @@ std::chrono::steady_clock::duration SceneChanges::building_for() const {
   return building_ ? std::chrono::steady_clock::now() - building_since_ : std::chrono::steady_clock::duration{};
 }
 
+/// Changes are done in the order in which they were submitted.
 void SceneChanges::submit(Change change) {
   if (stopped_) return;
   if (!change.make && !busy()) return change.done({});
@@ -53,6 +55,7 @@ void SceneChanges::begin() {
   });
 }
 
+/// A bucket of engines: `most_at_once` may be built in a row, then one in each `between_engines`, while drivers are served.
 std::chrono::steady_clock::duration SceneChanges::pause_before_engine() {
   const auto now = std::chrono::steady_clock::now();
   if (!drivers_wait_ || !drivers_wait_()) return {};
@@ -61,6 +64,7 @@ std::chrono::steady_clock::duration SceneChanges::pause_before_engine() {
   return std::max(due - now, std::chrono::steady_clock::duration{});
 }
 
+/// The first waiting change, and those behind it that may share its engine, up to the first that may not.
 std::vector<SceneChanges::Make> SceneChanges::next_makes() const {
   std::vector<Make> makes;
   for (const Change& change : waiting_) {
@@ -96,6 +100,8 @@ auto caught(const Work& work) -> decltype(work()) {
 
 }  // namespace
 
+/// Runs on the scene thread. Each change starts from the scene that the one before it made; a change that fails leaves that
+/// scene as it is.
 SceneChanges::Built SceneChanges::build(const std::vector<Make>& makes, const ScenePointer& now) const {
   Built built{now, nullptr, {}};
   for (const Make& make : makes) {
@@ -114,6 +120,8 @@ SceneChanges::Built SceneChanges::build(const std::vector<Make>& makes, const Sc
   return {now, nullptr, {tl::make_unexpected(engine.error())}};
 }
 
+/// Runs on the I/O thread. The order matters: first the simulator gets the engine, then the world gets the bodies of the scene,
+/// and only then are the changes reported as done.
 void SceneChanges::finish(Built built) {
   building_ = false;
   if (stopped_) return;

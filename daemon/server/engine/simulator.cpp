@@ -31,6 +31,7 @@ Simulator::~Simulator() {
   thread_.join();
 }
 
+/// The work guard in the job keeps the loop of the I/O thread running until the answer has been delivered there.
 void Simulator::submit(PingRequest request, Done done) {
   if (unanswered_++ == 0) begun_ = Steady::now();
   asio::post(queue_, [this, job = Job{std::move(request), std::move(done), {}, {}, asio::make_work_guard(io_)}]() mutable {
@@ -38,6 +39,7 @@ void Simulator::submit(PingRequest request, Done done) {
   });
 }
 
+/// The change of the engine waits in the same queue as pings: those submitted before it are computed by the engine before.
 void Simulator::use(std::unique_ptr<PingEngine> engine, Retired retired) {
   description_ = engine->description();
   asio::post(queue_, [this, job = Job{{}, {}, std::move(engine), std::move(retired), asio::make_work_guard(io_)}]() mutable {
@@ -57,6 +59,7 @@ void Simulator::arrive(Job job) {
   if (!working_) work_off();
 }
 
+/// `working_` prevents a second loop: queue_.poll() below, and run_other(), may call arrive() while this one runs.
 void Simulator::work_off() {
   working_ = true;
   while (!waiting_.empty()) {
@@ -135,6 +138,7 @@ void Simulator::simulate(std::vector<Job> jobs) {
   }
 }
 
+/// The outcomes are in the order of the jobs.
 std::vector<Simulator::Outcome> Simulator::run(const std::vector<Job>& jobs) {
   if (jobs.size() == 1) return {run(jobs[0].request)};
   std::vector<Outcome> outcomes(jobs.size());
@@ -150,6 +154,7 @@ std::vector<Simulator::Outcome> Simulator::run(const std::vector<Job>& jobs) {
   return outcomes;
 }
 
+/// Only the ping is refused if its request is invalid or memory is short. Any other exception means that the engine has failed.
 Simulator::Outcome Simulator::run(const PingRequest& request) {
   Outcome outcome;
   try {

@@ -104,6 +104,7 @@ void PoseServer::stop() {
 
 // ---- what arrives
 
+/// Passes a line on as a pose. Lines that are too long, or no JSON object, count against the connection.
 PoseServer::LineKind PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
   if (line.too_long) {
     intake_.refuse("line is longer than 4096 bytes", sender);
@@ -151,6 +152,8 @@ asio::awaitable<void> PoseServer::receive(Port& port) {
 
 // ---- JSON lines by TCP
 
+/// The order of the checks: is the address allowed, are there descriptors to spare, is a slot free or can one be taken from a
+/// sender that does not use it well.
 void PoseServer::admit(tcp::socket socket) {
   error_code ec;
   const auto peer = socket.remote_endpoint(ec);
@@ -180,6 +183,8 @@ void PoseServer::admit(tcp::socket socket) {
       });
 }
 
+/// Each turn reads at most work_of_a_turn bytes and then lets others proceed. A sender that has left with more than its limits
+/// allow has only its last pose applied.
 asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
   Connection& c = *connection;
   std::array<std::byte, work_of_a_turn> buffer;

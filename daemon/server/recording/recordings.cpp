@@ -23,6 +23,8 @@ std::string why_without_labels(RecordingFile::Kind kind, const RecordedSonar& so
 
 }  // namespace
 
+/// A recording is opening until its file has been created, then running until end(), then ending until its file is closed. The
+/// I/O thread alone reads and writes it, except for `work`, which belongs to the writer thread.
 struct Recordings::Recording {
   enum class State { opening, running, ending, ended } state = State::opening;
   std::string name;  // file name in the folder
@@ -121,6 +123,7 @@ void Recordings::find_earlier() {
   }
 }
 
+/// Checks a request and adds the recording in state `opening`. No file is touched on this thread.
 Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& asked, const RecordedSonar& sonar) {
   if (config_.recording.folder.empty())
     return failure(ErrorKind::usage,
@@ -143,6 +146,7 @@ Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& ask
   return recording;
 }
 
+/// Makes room in the list of the recordings that the status shows.
 void Recordings::remove_oldest() {
   while (recordings_.size() >= most_remembered) {
     const auto ended = [](const Pointer& r) { return r->state == Recording::State::ended; };
@@ -150,6 +154,7 @@ void Recordings::remove_oldest() {
   }
 }
 
+/// `done` is called once, when the last of the recordings has been closed, with the first error.
 void Recordings::stop(const control::StopRecording& asked, Done done) {
   std::vector<Pointer> meant;
   for (const Pointer& r : recordings_)
@@ -174,6 +179,7 @@ void Recordings::stop(const control::StopRecording& asked, Done done) {
   }
 }
 
+/// A recording that is still opening cannot end yet: start() ends it when its file is open.
 void Recordings::end_of(const std::string& sonar, const std::string& why) {
   for (const Pointer& r : recordings_) {
     if (r->status.sonar() != sonar) continue;
@@ -230,6 +236,8 @@ void Recordings::take_fault(const std::string& sonar, Time at, const std::string
       write(r, json.size(), [at, json](RecordingFile& file) { return file.write_fault(at, json); });
 }
 
+/// The bound is for all recordings together. If it is exceeded, the recording with the most data in memory ends, which may be
+/// another one.
 bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
   const auto is_running = [](const Pointer& r) { return r->state == Recording::State::running; };
   std::size_t waiting = 0;
@@ -261,6 +269,7 @@ void Recordings::write(const Pointer& recording, std::size_t size, Job job) {
 
 // ---- the end
 
+/// The first failure counts: it is logged and becomes the result. Later ones of the same recording are ignored.
 void Recordings::fail(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running && !(recording->state == Recording::State::ending && !recording->failed))
     return;
@@ -281,6 +290,7 @@ void Recordings::end(const Pointer& recording, const std::string& why) {
       [this, recording](const Outcome& outcome) { ended(recording, outcome); });
 }
 
+/// The file is closed. Those who asked for the end get the result now.
 void Recordings::ended(const Pointer& recording, const Outcome& outcome) {
   if (!outcome.result) fail(recording, outcome.result.error().text);
   recording->state = Recording::State::ended;

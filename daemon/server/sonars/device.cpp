@@ -36,6 +36,7 @@ Result<void> Device::open() {
   return open_observers();
 }
 
+/// Each kind of port has its own listener or socket. Streams and dialogues share a datagram socket if their numbers are equal.
 Result<void> Device::open(const protocol::Port& port) {
   using Kind = protocol::Port::Kind;
   const Ipv4 ip = config().bind_ip;

@@ -68,6 +68,7 @@ std::uint32_t Fleet::free_index(std::size_t wanted, const std::vector<Opening>& 
   return index;
 }
 
+/// Stops a device and keeps it until its connections and handlers are done (sweep).
 void Fleet::retire(std::list<Device>::iterator device) {
   device->stop("the configuration changed");
   retired_.emplace_back();
@@ -102,6 +103,7 @@ bool Fleet::add(const SonarConfig& sonar, std::uint32_t index, Change& change) {
   return false;
 }
 
+/// A sonar at 0.0.0.0 holds every address.
 bool Fleet::is_held(Ipv4 ip) const {
   return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) {
     const Ipv4 held = d.config().bind_ip;
@@ -142,6 +144,8 @@ void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Co
   device->use_place(is);
 }
 
+/// Changes the sonars to those of the new configuration. A sonar that cannot be opened is an error in the result and does not
+/// stop the others.
 Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   Change change;
   Outcomes outcomes;
@@ -181,6 +185,8 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
 
 // ---- pings and clients, passed on to the simulator, recordings and events
 
+/// The request says what recordings and viewers want beside the samples. The scene's names are remembered for the ping, because
+/// another scene may be in use when it is done.
 void Fleet::compute(const Device& of, PingRequest request, Simulator::Done done) {
   const std::string& name = of.config().name;
   request.switches.keep_truth = recordings_.wants_truth(name) || (tap_wants_truth_ && tap_wants_truth_(name));

@@ -22,6 +22,7 @@ std::string reason(const error_code& ec) {
   return ec == asio::error::timed_out ? "connection timed out: the peer stopped reading and answering" : ec.message();
 }
 
+/// Small messages are sent at once, and little waits in the kernel: pings that wait in the outbox can still be replaced.
 void prepare(tcp::socket& socket, const LimitConfig& limits) {
   error_code ec;  // a refused option costs smoothness, not correctness
   socket.set_option(tcp::no_delay(true), ec);
@@ -51,6 +52,8 @@ Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
   prepare(socket_, setup_.limits);
 }
 
+/// Three coroutines share the session: read() receives, write() sends, watch() ends the session of a client that hangs. Each
+/// holds a pointer to the session, which lives until the last one returns.
 void Session::start() {
   spawn(&Session::read);
   spawn(&Session::write);
@@ -106,6 +109,7 @@ void Session::read_from_client(bool on) {
 
 void Session::wake() { wake_writer_.cancel(); }
 
+/// False: the session is over. A ping with prefixes is sent once for each of them.
 asio::awaitable<bool> Session::write_whole(const Outbox::Message& message) {
   if (message.shape) {
     assert(message.prefixes.empty());
@@ -138,6 +142,8 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
   co_return true;
 }
 
+/// Writes a message in parts, with a pause before each place that a fault or the port names. Before a reset it waits until the
+/// client has the bytes.
 asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Outbox::Shape& shape) {
   for (std::size_t done = 0; const Outbox::Shape::Pause& pause : shape.pauses) {
     // Places of pauses count from the start of the message; `bytes` is what is left of it.
@@ -168,11 +174,13 @@ void Session::end_pauses() {
   pause_.cancel();
 }
 
+/// Bytes that the kernel holds because the client has not acknowledged them. 0 if the kernel does not report them.
 int Session::unconfirmed_bytes() {
   int bytes = 0;
   return ::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) == 0 ? bytes : 0;
 }
 
+/// How long the message being written has made no progress.
 std::chrono::steady_clock::duration Session::stands_for() const {
   return writing_ ? std::max(Steady::duration{}, Steady::now() - progress_at_) : Steady::duration{};
 }
@@ -188,6 +196,7 @@ asio::awaitable<bool> Session::deliver() {
   co_return !over_;
 }
 
+/// A fault ends the connection after the message that it shaped. The time limit is then that of faults.
 void Session::end_by(Outbox::Shape::End end) {
   if (end == Outbox::Shape::End::reset) return reset("a fault reset the connection");
   finish("a fault ended the stream");
@@ -205,6 +214,7 @@ void Session::send_fin() {
   wake_watch_.cancel();
 }
 
+/// Takes one message after the other from the outbox. Sends FIN when finish() was called and the outbox is empty.
 asio::awaitable<void> Session::write() {
   const auto self = shared_from_this();
   while (!over_) {
@@ -226,6 +236,7 @@ asio::awaitable<void> Session::write() {
   }
 }
 
+/// The time of the next check: after a second, or earlier if a deadline comes first.
 Session::Steady::time_point Session::watch_until() const {
   auto until = Steady::now() + idle_watch;
   if (finishing_) until = std::min(until, finish_by_);
@@ -234,6 +245,7 @@ Session::Steady::time_point Session::watch_until() const {
   return until;
 }
 
+/// True when the client has confirmed all bytes after our FIN, and has had time to send its own.
 bool Session::has_all(Steady::time_point now) {
   return sent_fin_ && !fin_by_fault_ && now >= fin_at_ + fin_limit && unconfirmed_bytes() <= 0;
 }
@@ -264,6 +276,8 @@ bool Session::is_silent(Steady::time_point now) const {
   return longest && reading_ && now - received_at_ > *longest && socket_.available(ec) == 0;
 }
 
+/// Begins an orderly end: the message being written is completed, FIN is sent, and the client may still close first. All four
+/// waits are ended, so that each coroutine looks at `finishing_`.
 void Session::finish(std::string why) {
   if (over_ || finishing_) return;
   finishing_ = true;
@@ -276,6 +290,7 @@ void Session::finish(std::string why) {
   pause_.cancel();
 }
 
+/// Ends at once with RST: closing a socket with linger 0 discards what was not sent.
 void Session::reset(std::string why) {
   if (over_) return;
   error_code ec;
@@ -294,6 +309,7 @@ void Session::end_if_closed() {
   over_after(ec);
 }
 
+/// A peer that closes while we finish has done what was wanted, so the reason stays that of finish().
 void Session::over_after(const error_code& ec) {
   const bool left = ec == asio::error::eof || ec == asio::error::connection_reset || ec == asio::error::broken_pipe;
   if (finishing_)
@@ -302,6 +318,7 @@ void Session::over_after(const error_code& ec) {
     over(reason(ec), left);
 }
 
+/// Every end of a session comes here; only the first call has an effect. The coroutines return when their waits are cancelled.
 void Session::over(std::string why, bool by_client) {
   if (std::exchange(over_, true)) return;
   error_code ec;
