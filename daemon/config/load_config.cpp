@@ -103,6 +103,7 @@ void read_addresses(Map& map, SonarConfig& sonar) {
   derive_addresses(sonar);
 }
 
+/// Reading continues after an error, which the document keeps; a value may then be a default.
 SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
   SonarConfig sonar;
   const Node name = map.required("name");
@@ -284,6 +285,7 @@ Result<Config> parse_config(std::string_view yaml, const std::string& name, cons
   return read(*document, name, directory);
 }
 
+/// The demo also accepts faults, shows previews, and may record into a folder that it makes.
 Result<Config> demo_config() {
   auto config = parse_config(demo_yaml(), "demo", {});
   if (!config) return config;

@@ -16,6 +16,7 @@ void count_instances(const json& part, Instances& instances) {
     for (const json& a : image["annotations"]) ++instances[a["class"].get<std::string>()];
 }
 
+/// Reads the notes twice, once for each array, so that one shard at a time is in memory.
 Result<void> write_coco(const DatasetJob& job, const std::filesystem::path& set, const CocoFile& coco) {
   auto file = DurableFile::open(coco.file);
   if (!file) return tl::make_unexpected(file.error());

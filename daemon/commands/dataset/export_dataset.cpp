@@ -50,6 +50,7 @@ class Export {
         folder_(set / std::string(export_form_names[static_cast<std::size_t>(form)])),
         unfinished_(folder_.string() + ".unfinished") {}
 
+  // An unfinished export of an earlier run is removed. The folder gets its name when it is complete.
   Result<Exported> run() {
     std::error_code ec;
     if (std::filesystem::exists(folder_, ec))

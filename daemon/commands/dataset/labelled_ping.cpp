@@ -65,6 +65,7 @@ Result<Raster> draw(const Ping& ping, int width_px) {
 
 }  // namespace
 
+/// A new scene is put into the existing engine, which keeps the trees and cells of meshes that both scenes share (shapes_).
 Result<DrawnPing> PingMaker::compute(std::uint64_t number, Ping& ping) {
   auto drawn = draw_ping(job_, number, known_);
   if (!drawn) return drawn;

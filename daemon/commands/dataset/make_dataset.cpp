@@ -39,6 +39,7 @@ class Folder final : public DatasetFolder {
   Folder(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress)
       : job_(job), o_(options), on_progress_(std::move(on_progress)), pool_(options.threads) {}
 
+  // First finds the shards that are missing, so that progress knows how many pings are to be made.
   Result<DatasetProgress> make_all() {
     std::vector<std::uint64_t> missing;
     for (std::uint64_t shard = o_.part; shard < job_.shards(); shard += o_.parts) {
@@ -124,6 +125,7 @@ class Folder final : public DatasetFolder {
                                             ": it was changed or damaged; remove both, and run the same command again");
   }
 
+  // Pings of a batch are computed side by side and written in order, so the bytes do not depend on the number of threads.
   Result<void> make(std::uint64_t shard) override {
     differs_ = false;
     json part{{"images", json::array()}, {"pixels", json::object()}};

@@ -41,6 +41,7 @@ bool is_name(std::string_view name) {
          std::all_of(name.begin(), name.end(), letter);
 }
 
+/// Exactly one kind is allowed, so all keys are read before they are counted.
 Variation read_one(const std::string& name, const text::Node& node) {
   Variation v;
   v.name = name;
@@ -76,6 +77,7 @@ Variation read_one(const std::string& name, const text::Node& node) {
   return v;
 }
 
+/// The number is written with nine digits, and formulas read it back from this text: file and formulas agree.
 std::string word_of(const Variation& v, Seed seed, std::uint64_t ping, std::uint32_t attempt) {
   const auto [u, w] = uniforms(seed, ping, attempt, v.name);
   switch (v.kind) {

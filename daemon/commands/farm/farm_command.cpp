@@ -34,6 +34,7 @@ Result<std::unique_ptr<dataset::DatasetFolder>> open_folder(const dataset::Datas
   return dataset::open_dataset(job, options, [](const dataset::DatasetProgress&) {});
 }
 
+/// The order makes a repeated submission safe: files, record, consumer, then the missing shards; the mark "stopped" goes last.
 Result<int> submit(const FarmCommand& c) {
   auto job = dataset::load_job(c.job);
   if (!job) return tl::make_unexpected(job.error());
@@ -188,6 +189,7 @@ Result<FarmJob> described_in(const path& folder) {
   return record;
 }
 
+/// Works on the folder alone, without the queue: every shard is compared with its digest.
 Result<int> collect(const FarmCommand& c) {
   const path out = c.out;
   const auto record = described_in(out);

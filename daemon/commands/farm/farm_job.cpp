@@ -134,6 +134,7 @@ Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& inst
   return record;
 }
 
+/// A record comes from the network: the id must be the digest of its contents, and its names must stay inside the folder.
 Result<FarmJob> parse_farm_job(const std::string& id, const std::string& text) {
   FarmJob record;
   try {
@@ -159,6 +160,7 @@ Result<FarmJob> parse_farm_job(const std::string& id, const std::string& text) {
                                           "; submit the job again");
 }
 
+/// Files go into the shared folder, and into the queue if all together are small: workers then need no shared folder.
 Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const path& files, Queue& queue) {
   std::uint64_t bytes = 0;
   std::error_code ec;
@@ -183,6 +185,7 @@ Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const p
   return {};
 }
 
+/// Files that are there with the right digest are kept. The digest is checked before a file is written.
 Result<path> receive_files(const FarmJob& record, const path& files, Queue& queue) {
   for (const FarmFile& f : record.files) {
     if (is_there(files / f.name, f.digest)) continue;

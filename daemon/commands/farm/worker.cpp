@@ -50,6 +50,8 @@ class Worker {
       if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '.') c = '_';  // keys of the queue allow no others
   }
 
+  // Takes jobs until a signal comes or, with until_empty, no job has work. An error of the server is temporary; other errors
+  // end the worker.
   Result<int> run() {
     while (!stopping) {
       const auto job = next_job();
@@ -163,6 +165,7 @@ class Worker {
     }
   }
 
+  // A shard that failed goes back to the queue for another try; after the last try it is recorded as dead.
   Result<void> refuse(const FarmJob& record, Task& task, const Error& why) {
     const bool is_last = task.delivery() >= most_tries;
     say(dataset::shard_name(task.shard()) + ": " + why.text + (is_last ? "; it is dead" : ""));
@@ -174,11 +177,14 @@ class Worker {
 
   /// An error means that this worker cannot do any work.
   Result<void> work(const FarmJob& record, Task& task) {
+    // The last refusal removes a shard from the queue. A further delivery means that its workers ended without a refusal, so it
+    // would end this one too.
     if (task.delivery() > most_tries)
       return refuse(
           record, task,
           {ErrorKind::bug, "its workers ended " + std::to_string(most_tries) +
                                " times without an error: killed or out of memory; see their logs, submit the job again"});
+    // The shard is made on another thread, so that this one can report progress to the queue.
     auto made = std::async(std::launch::async, [this, shard = task.shard()]() -> Result<bool> {
       const auto is_there = folder_->holds(shard);
       if (!is_there || *is_there) return is_there;
@@ -208,6 +214,7 @@ class Worker {
       return {};
     }
     const Error& why = is_there.error();
+    // Two workers made different bytes of one shard. More shards of this job must not be trusted, so the job stops everywhere.
     if (folder_->differs()) {
       say("ALARM: " + why.text + "; the job is stopped");
       if (const auto put = queue_.put(job_table, record.id + ".stopped", why.text); !put) say(put.error().text);
@@ -238,6 +245,7 @@ class Worker {
     std::_Exit(0);
   }
 
+  // Reports to `sonarctl farm status` what this worker does. The entry expires by itself if the worker is killed.
   void beat(const FarmJob& record, const std::string& shard) {
     const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
     queue_.put(beat_table, name_,

@@ -213,6 +213,8 @@ std::string unknown_command(std::string_view word) {
 
 }  // namespace
 
+/// Without a command, the options are those of `run`. Unknown words are reported before CLI11 parses the line, because it would
+/// take them for a configuration file.
 Command parse_command_line(int argc, char** argv) {
   if (argc > 1 && std::string_view(argv[1]) == "bench")
     return complain("the benchmark is a program of its own, sonard_bench, which is built with the tests (docs/benchmarks.md)");
@@ -289,6 +291,7 @@ Command parse_command_line(int argc, char** argv) {
   return run;
 }
 
+/// The order matters: the product comes first, because other options change its sonar; the check for conflicts comes last.
 Result<void> override_config(Config& config, const RunCommand& command) {
   if (!command.profile.empty())
     if (const auto r = use_product(config, command.profile); !r) return failure(r.error().kind, "--profile: " + r.error().text);

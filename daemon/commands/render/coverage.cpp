@@ -97,6 +97,7 @@ RenderJob with_bed_only(RenderJob job) {
   return job;
 }
 
+/// Compares in power, bin by bin, only where the closed form holds in the whole footprint.
 Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
   const Pose& sonar = ping.request.sonar_in_world;
   const auto bed = bed_below(*job.scene, sonar.position_m);

@@ -55,6 +55,7 @@ protocol::Bytes ReplayDevice::status_at(Ipv4 ip, Ipv4 mask, Ipv4 client) const {
   return wire::bytes_of(here);
 }
 
+/// Looks for the device id in the stream and for a status datagram, until both are found or the front of the recording is over.
 Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, const std::string& file, std::uint16_t part_number) {
   ReplayDevice device;
   std::optional<std::uint16_t> id;
@@ -93,6 +94,7 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   }
   if (!id)
     return failure(ErrorKind::bad_data, file + " holds no message of a sonar" + (damage ? ": " + damage->text : std::string()));
+  // Without a recorded status, values that drivers check are made up: id, part number, and an address of the hardware.
   if (!device.recorded_status) {
     device.status.device_id = *id;
     device.status.part_number = device.status.header.part_number = part_number;

@@ -104,6 +104,7 @@ asio::awaitable<void> ReplayServer::watch_signals() {
   if (!ec && !over_) std::_Exit(EXIT_FAILURE);  // asked twice
 }
 
+/// Ends after the present message. A client that does not take it within the limit is reset.
 void ReplayServer::stop() {
   if (stopping_ || over_) return;
   stopping_ = true;
@@ -134,6 +135,8 @@ void ReplayServer::end() {
   if (options_.on_end) options_.on_end();
 }
 
+/// Serves one client; others are refused while it is connected. Two coroutines share a client: serve() writes, listen_to()
+/// reads.
 asio::awaitable<void> ReplayServer::accept() {
   while (!over_ && !stopping_) {
     error_code ec;
@@ -173,6 +176,7 @@ asio::awaitable<void> ReplayServer::accept() {
   }
 }
 
+/// Plays the recording once, or again and again with `loop`, and then closes the connection or ends the replay.
 asio::awaitable<void> ReplayServer::serve(ClientPointer client) {
   std::optional<std::chrono::nanoseconds> interval;
   if (!reader_.knows_times()) interval = nanoseconds_from(1 / options_.rate_hz);
@@ -199,6 +203,8 @@ asio::awaitable<void> ReplayServer::serve(ClientPointer client) {
   if (stopping_ || played == Played::to_the_end) end();
 }
 
+/// Sends the device's messages in order. Before each it sends waiting replies, waits until the host wants pings, and waits for
+/// the time at which the message is due.
 asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, ReplayPace& pace) {
   bool any = false;
   const auto carrier = device_.by_datagrams() ? recording::Carrier::datagram : recording::Carrier::stream;
@@ -244,6 +250,7 @@ bool ReplayServer::number_datagram(const Client& client, protocol::Bytes& datagr
          device_.vendor->change_integer(protocol::Part::ping, protocol::FieldName::ping_id, number, datagram);
 }
 
+/// The list of receivers is copied, because a request of the host may change it while a send waits.
 asio::awaitable<void> ReplayServer::send_datagram(ClientPointer client, const protocol::Bytes& datagram) {
   const std::vector<udp::endpoint> receivers = client->receivers;
   for (const udp::endpoint& to : receivers) {
@@ -273,6 +280,8 @@ void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
   client.wake.cancel();
 }
 
+/// Carries out what a request of the host means for the replay: whether and where frames are sent. All other settings have no
+/// effect.
 void ReplayServer::apply(Client& client, const protocol::Event& event) {
   const auto send_to = [&client](const protocol::SetReceivers& set) {
     client.receivers.clear();

@@ -63,6 +63,7 @@ class Check {
   }
 
  private:
+  // The first error counts; checks go on after it, with values that do no harm.
   void wrong(std::string text) {
     if (error_.empty()) error_ = std::move(text);
   }
@@ -73,6 +74,7 @@ class Check {
     return nullptr;
   }
 
+  // A trouble becomes one fault for each of its kinds, with the parameters of its severity.
   std::vector<Fault> of_trouble(const Trouble& trouble) {
     auto with = record_.with;
     std::size_t severity = 2;
@@ -168,6 +170,7 @@ class Check {
     fault.on = static_cast<Occasion>(it - occasion_names.begin());
   }
 
+  // The forms: all, newest, oldest, an ordinal, an address, or a prefix.
   void read_client(const FaultKind& kind, Fault& fault) {
     const std::string& text = record_.client;
     using Kind = ClientChoice::Kind;
@@ -195,6 +198,7 @@ class Check {
     fault.client = {Kind::prefix, 0, *address, static_cast<int>(*bits)};
   }
 
+  // Decides how long the fault acts each time (a time or pings) and how often (count).
   void read_span(const FaultKind& kind, double default_s, Fault& fault) {
     const FaultRecord::For& lasts = record_.lasts;
     if (manual_ && lasts.seconds.value_or(0) > static_cast<double>(longest_manual_fault.count()))

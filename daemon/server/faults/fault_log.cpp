@@ -48,6 +48,7 @@ void FaultLog::write_pending() {
       });
 }
 
+/// One line in the log when losing begins, and one when it ends, however many entries are lost.
 void FaultLog::lose(std::uint64_t entries, const std::string& why) {
   lost_ += entries;
   why_lost_ = why;
@@ -64,6 +65,7 @@ std::vector<Note> FaultLog::notes() const {
                " entries: sonarctl fault journal --json"}};
 }
 
+/// One entry goes to all places: counters, file, recording, events, and the list of the latest.
 void FaultLog::write(const FaultEntry& entry) {
   using std::chrono::steady_clock, std::chrono::system_clock;
   auto message = std::make_shared<v1::FaultEntry>();

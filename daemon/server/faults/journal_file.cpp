@@ -31,6 +31,7 @@ Result<std::shared_ptr<JournalFile>> JournalFile::open(const std::filesystem::pa
   return std::shared_ptr<JournalFile>(new JournalFile(*descriptor));
 }
 
+/// Opens without O_CREAT. If the file is missing, it checks whether it could be created.
 Result<void> JournalFile::check(const std::filesystem::path& file) {
   const auto descriptor = open_for_appending(file, 0);
   if (descriptor) {
@@ -46,6 +47,7 @@ Result<void> JournalFile::check(const std::filesystem::path& file) {
 
 JournalFile::~JournalFile() { ::close(descriptor_); }
 
+/// The caller learns how many lines are in the file, and counts the rest as lost.
 JournalFile::Written JournalFile::append(std::string_view lines) {
   Written written;
   while (!lines.empty()) {
@@ -72,6 +74,7 @@ std::string JournalFile::write_line(std::string_view line) {
   const std::string why = errno == EAGAIN ? "its reader is too slow" : std::strerror(errno);
   struct stat status {};
   const auto part = static_cast<off_t>(done);
+  // A part of a line is removed from a regular file; from a FIFO it cannot be. Then the next line begins with a newline.
   const bool taken_back = done == 0 || (::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode) && status.st_size >= part &&
                                         ::ftruncate(descriptor_, status.st_size - part) == 0);
   cut_ = !taken_back;

@@ -56,6 +56,7 @@ std::optional<HttpAnswer> wrong_handshake(const HttpRequest& request) {
   return std::nullopt;
 }
 
+/// A ticket is good for one connection. Beside it the token is accepted or, without a token, the key of this run.
 bool shows_secret(const HttpRequest& request, const std::vector<std::pair<std::string, std::string>>& query, const ViewDoor& door,
                   ViewSecrets::Steady::time_point now) {
   if (const std::string ticket = value_of(query, "ticket"); !ticket.empty() && door.secrets.take_ticket(ticket, now)) return true;
@@ -84,6 +85,8 @@ bool ViewSecrets::take_ticket(std::string_view shown, Steady::time_point now) {
   return true;
 }
 
+/// The order: handshake, protocol, query, secret, origin. A client that shows a secret may come from any page. Without a secret
+/// it is refused if a token is configured; otherwise the origin decides.
 std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
                                                 const std::vector<std::pair<std::string, std::string>>& query,
                                                 const ViewDoor& door, ViewSecrets::Steady::time_point now) {

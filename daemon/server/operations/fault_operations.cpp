@@ -127,6 +127,7 @@ OperationResult FaultOperations::add(const control::FaultRecord& record, bool ma
   return {};
 }
 
+/// An empty name ends all faults and always succeeds.
 OperationResult FaultOperations::end(const control::EndFaults& asked, const Sender& sender) {
   bool found = asked.name.empty();
   for (Device& device : fleet_.devices()) found = device.end_faults(asked.name) || found;
@@ -149,6 +150,7 @@ OperationResult FaultOperations::report(const control::GetFaults& asked) const {
   return result;
 }
 
+/// The new failure is checked before the previous one is ended. Only a conflict with another fault is noticed later.
 mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
   using enum mavlink::MavResult;
   if (unit != mavlink::distance_sensor) return unsupported;
@@ -182,6 +184,7 @@ mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureT
   return accepted;
 }
 
+/// A record that a sonar refuses is logged; the others of the plan begin nevertheless.
 void FaultOperations::begin_plan(const Device* only) {
   for (const control::FaultRecord& record : config_.faults.plan)
     if (only != nullptr && !record.sonar.empty() && record.sonar != only->config().name)

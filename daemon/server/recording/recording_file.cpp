@@ -82,6 +82,7 @@ bool RecordingFile::is_recording(std::string_view name) {
                                  }));
 }
 
+/// Names are restricted to plain file names, because clients of control choose them.
 Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vendor) {
   const auto refuse = [&](const std::string& why) {
     return failure(ErrorKind::usage, "\"" + std::string(name.substr(0, longest_name)) + "\": " + why);
@@ -124,6 +125,7 @@ RecordingFile::RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, c
   }
 }
 
+/// The order in the file: a status message if one is due, the ping as a stream, its datagrams, and in MCAP the truth.
 Result<void> RecordingFile::write(const RecordedPing& ping) {
   const bool keeps_status = kind_ == &mcap || kind_ == &pcap;
   if (keeps_status && !ping.status.empty() && (!status_at_ || ping.at - *status_at_ >= status_period)) {

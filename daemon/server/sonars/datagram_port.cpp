@@ -62,6 +62,7 @@ void DatagramPort::receive_broadcasts(const SonarConfig& sonar) {
   }
 }
 
+/// A port without functions for answers and errors only sends.
 void DatagramPort::start() {
   if (!answer_ && !closed_) return;
   if (closed_) {
@@ -71,6 +72,7 @@ void DatagramPort::start() {
   for (Socket& socket : sockets_) receive(socket);
 }
 
+/// Reads the error queue of the socket: with IP_RECVERR, an ICMP answer names the host that it came from.
 void DatagramPort::take_errors() {
   while (closed_ && !stopping_) {
     sockaddr_in host{};
@@ -95,6 +97,7 @@ void DatagramPort::stop() {
   for (Socket& socket : sockets_) socket.socket.close(ec);
 }
 
+/// Receives one datagram and calls itself again, until the socket is closed.
 void DatagramPort::receive(Socket& at) {
   at.socket.async_receive_from(asio::buffer(at.datagram), at.from, [this, &at](const error_code& ec, std::size_t size) {
     if (stopping_ || ec == asio::error::operation_aborted) return;

@@ -44,6 +44,7 @@ asio::awaitable<void> DatagramStream::send() {
   }
 }
 
+/// An empty datagram has no effect on a host, but a closed port answers it with ICMP.
 void DatagramStream::send_nothing_to(const Endpoint& to) {
   error_code ignored;
   socket_.send_to(asio::const_buffer(), {address_of(to.ip), to.port}, 0, ignored);

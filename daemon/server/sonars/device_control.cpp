@@ -54,6 +54,7 @@ void fill(v1::ClientStatus& out, const Connection& c, Session* session) {
 
 }  // namespace
 
+/// The status that control, the live view and the doctor show.
 v1::SonarStatus Device::status(Time now) const {
   const protocol::DeviceState& state = sonar_.state();
   const PingSettings& settings = sonar_.settings();
@@ -137,6 +138,7 @@ RecordedSonar Device::recorded() const {
   return sonar;
 }
 
+/// Settings are checked first: if the product refuses them, neither transmission nor mount changes.
 Result<void> Device::ask(const control::SetSonar& asked, const std::string& who) {
   const Time now = network_.clock.now();
   const protocol::SettingsOverride wanted{asked.range_m, asked.rate_hz, asked.gain_percent, asked.mode, asked.beams};

@@ -191,6 +191,7 @@ void RecordingViews::Seen::draw(Work& work, const RecordingPlayer::Shown& shown)
   work.made[fan_channel] = fan_payload(sonar_name, at, *picture, work.painter);
 }
 
+/// Runs on the I/O thread after each slice of work. While `busy_`, only the work thread uses `work_`.
 void RecordingViews::Seen::take() {
   busy_ = false;
   const auto connection = connection_.lock();

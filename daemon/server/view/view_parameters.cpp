@@ -123,6 +123,8 @@ Result<control::Operation> set_trajectory(control::PoseSample::Of of, const std:
   return no_such_parameter();
 }
 
+/// A trouble is a parameter whose value is the time in seconds for which it acts; 0 ends it. GetFaults stands for "nothing to
+/// do".
 Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSource& of) {
   if (wanted.name == "/faults/armed") return refused("cannot be set: start sonard with --faults");
   if (!of.config.faults.armed) return refused("start sonard with --faults");
@@ -160,6 +162,7 @@ std::optional<double> number_of(const Value& value) {
   return std::nullopt;
 }
 
+/// All parameters with their present values, in the order in which viewers list them.
 std::vector<Parameter> parameters_of(const ParameterSource& of) {
   const Time now = of.clock.now();
   std::vector<Parameter> all;

@@ -8,6 +8,7 @@ constexpr std::chrono::seconds rest_after_failure{30};  // pause of previews tha
 
 }  // namespace
 
+/// A viewer switches the preview of a sonar on or off. Empty, or why not.
 std::string ViewFeed::set_preview(Viewer& viewer, Device& device, bool on) {
   const std::string& name = device.config().name;
   Preview& preview = device.preview();

@@ -53,6 +53,7 @@ std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer& viewer, cons
   return all;
 }
 
+/// Parameters of the live view itself, not of control. nullopt: it is none of these; else empty, or why it was not set.
 std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Parameter& wanted) {
   for (SonarView& sonar : sonars_) {
     if (wanted.name != sonar.points.threshold) continue;
@@ -105,6 +106,7 @@ void ViewFeed::push_parameters() {
   });
 }
 
+/// The answer may come later, and the viewer may have left by then; so only a weak pointer is kept.
 void ViewFeed::call(Viewer& viewer, const foxglove::ServiceCall& call) {
   if (call.service == 0 || call.service > service_table.size()) return viewer.fail(call, "there is no such service");
   auto request = control::request_from_json(service_table[call.service - 1].op, call.payload);
