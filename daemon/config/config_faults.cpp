@@ -74,6 +74,7 @@ std::string why_not(const std::vector<Fault>& faults, const std::vector<SonarCon
 
 }  // namespace
 
+/// Each record is checked as a request would be, and all together: no two faults may have one name or write the same part.
 FaultConfig read_faults(const Node& node, const std::vector<SonarConfig>& sonars, const std::filesystem::path& directory) {
   FaultConfig config;
   if (!node.present()) return config;

@@ -38,6 +38,7 @@ void read_control_listener(const Node& node, bool has_token, PoseListener& liste
     node.fail("can be reached from other computers: that needs control.token_file, the file of a secret that clients must show");
 }
 
+/// The forms: the origin as a text, or a map with `origin` and `steer`.
 ViewOrigin read_view_origin(const Node& node) {
   ViewOrigin allowed;
   Node origin = node;
@@ -56,6 +57,7 @@ ViewOrigin read_view_origin(const Node& node) {
 
 }  // namespace
 
+/// token_file is read first, because a listener that other computers reach needs it.
 ControlConfig read_control(const Node& node, const std::filesystem::path& directory) {
   ControlConfig control;
   if (!node.present()) return control;

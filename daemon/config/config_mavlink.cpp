@@ -28,6 +28,7 @@ void read_link(const Node& node, bool has_ranges, MavlinkConfig& link) {
   if (link.dials && link.at.ip == Ipv4{}) node.fail("udpout needs the address of the other end");
 }
 
+/// A link belongs to one vehicle; its name may be left out if there is only one.
 std::string read_vehicle(Map& map, const std::vector<VehicleConfig>& vehicles) {
   if (vehicles.empty()) return {};  // reported elsewhere
   const Node node = vehicles.size() > 1 ? map.required("vehicle") : map.optional("vehicle");
@@ -57,6 +58,7 @@ std::optional<Geodetic> read_origin(const Node& node) {
                   place.optional("alt").number_or(0, Range::between(-12000, 10000))};
 }
 
+/// The forms: `off`, one endpoint as a text, or a list of links.
 std::vector<MavlinkConfig> read_mavlink(const Node& node, bool has_ranges, const Config& config) {
   const std::vector<VehicleConfig>& vehicles = config.vehicles;
   std::vector<MavlinkConfig> links;

@@ -38,6 +38,7 @@ TrajectoryKeys::TrajectoryKeys(text::Map& map)
       rate_hz(map.optional("rate_hz")),
       body(map.optional("body")) {}
 
+/// A file that was read before with the same options is used again.
 TrajectoryFiles::Named TrajectoryFiles::read(const Node& file, const motion::ReadOptions& options) {
   const std::string name = file.text(1024);
   if (name.empty()) return {};  // reported
@@ -84,6 +85,7 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
   return plan;
 }
 
+/// A text with a dot or slash is the name of a file; any other must be one of the words.
 Plan TrajectoryFiles::read_words(const Node& node, const std::string& body, bool* orbits) {
   const std::string word = node.text(1024);
   if (word.empty() || !is_word(word)) return plan_of(node, read(node, {}), {}, body);
@@ -93,6 +95,7 @@ Plan TrajectoryFiles::read_words(const Node& node, const std::string& body, bool
   return {};
 }
 
+/// All keys are read before a missing file ends the function, so that errors in the others are reported too.
 Plan TrajectoryFiles::read_plan(const Node& node, const std::string& body, bool* orbits) {
   if (!node.present()) return {};
   if (!node.is_map()) return read_words(node, body, orbits);

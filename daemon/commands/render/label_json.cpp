@@ -70,6 +70,7 @@ json polar_polygon(const Outline& outline) {
   return polygon;
 }
 
+/// Edges along an arc are divided, because a straight line would cut the arc.
 json cartesian_polygon(const Outline& outline, const Cartesian& cartesian) {
   json polygon = json::array();
   for (std::size_t i = 0; i < outline.size(); ++i) {

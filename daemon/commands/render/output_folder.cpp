@@ -107,6 +107,7 @@ Result<void> make_way(const OutputOptions& o, const std::string& digest) {
 
 }  // namespace
 
+/// The lock comes first: two runs must not both find the folder free.
 Result<OutputFolder> OutputFolder::claim(const RenderInput& input, const OutputOptions& options, std::string digest) {
   std::error_code ec;
   std::filesystem::create_directories(options.folder, ec);
@@ -151,6 +152,7 @@ std::vector<path> OutputFolder::files_of(std::uint64_t number) const {
   return files;
 }
 
+/// The sidecar is written last, so a ping is complete if its sidecar names these inputs.
 bool OutputFolder::holds(std::uint64_t number) const {
   std::error_code ec;
   for (const path& file : files_of(number))

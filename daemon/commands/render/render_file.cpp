@@ -47,6 +47,7 @@ PingSettings plain_settings(const Water& water, double depth_m, const FrequencyM
   return s;
 }
 
+/// A file of poses replaces `at` and `orbit`.
 void read_path(const Node& node, const std::filesystem::path& folder, RenderJob& job) {
   if (!node.present()) return;
   Map keys = node.map();
@@ -115,6 +116,7 @@ Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::
   return *std::move(scene);
 }
 
+/// The scene is read last, because its errors are of another kind.
 Result<RenderJob> read_job(const std::string& text, const std::string& name, const std::filesystem::path& folder,
                            const Values& values, ShapeCache* known) {
   const auto document = text::parse_yaml(text, name, {.error_kind = ErrorKind::config});
@@ -230,6 +232,7 @@ Result<RenderInput> parse_render_file(std::string_view text, const std::string& 
   return input;
 }
 
+/// A key tells the kind of file: `world` a configuration, `objects` a scene, `dataset` a job; else it is a render file.
 Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar) {
   const auto text = text_of_file(file);
   if (!text) return tl::make_unexpected(text.error());

@@ -188,6 +188,7 @@ PingRequest request_of(const RenderJob& job, const World& world, std::uint64_t n
 
 }  // namespace
 
+/// With poses and no rate there is a ping for each line; otherwise pings have a constant rate, within the time of the poses.
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& o) {
   const std::vector<Time> lines = pose_times(job);
   const std::uint64_t before = o.first - 1;
@@ -219,6 +220,7 @@ Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions
   return times;
 }
 
+/// Counts pings in air over all jobs before any is rendered, because poses in the wrong frame are a common mistake.
 std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
   std::size_t all = 0, in_air = 0, above = 0;
   for (const RenderJob& job : input.jobs) {
@@ -249,6 +251,7 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
       above, all, cure);
 }
 
+/// Times of all jobs are computed first, so that an impossible request is refused before the folder is touched.
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, Parallel& pool,
                               const std::function<void(const Progress&)>& on_progress) {
   if (o.first > 1 && input.jobs.size() > 1)

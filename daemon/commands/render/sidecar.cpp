@@ -156,6 +156,7 @@ void add_way(Sha256& hash, const std::shared_ptr<const motion::Trajectory>& way,
   hash.add(std::as_bytes(std::span(p.angular_velocities_radps)));
 }
 
+/// Meshes count by content, not by the name of their file.
 void add_scene(Sha256& hash, const Scene& scene) {
   for (const Object& o : scene.objects) {
     add(hash, {o.name, o.label, o.visible, json_of(o.in_world)});
@@ -213,6 +214,7 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
           {"truth", truth_of(ping, *job.scene)}};
 }
 
+/// Everything that can change a byte of the pings must be added here: pings with an equal digest are not rendered again.
 std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictures) {
   Sha256 hash;
   add(hash, {version, input.text, rate_hz});

@@ -159,6 +159,7 @@ int read_mode(const Node& node, const SonarModel& model, int fallback) {
   return static_cast<int>(node.choice_index(std::move(names)));
 }
 
+/// The order matters: mode before range, range before rows, because the default of each key depends on those before it.
 void read_ping(Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& s) {
   const PingSettings before = s;
   const bool own_grid = rows_of == RowsOf::no_device, range_image = rows_of == RowsOf::range_image;

@@ -89,6 +89,7 @@ std::size_t at_fraction(const Fault& fault, const Bytes& bytes) {
   return static_cast<std::size_t>(std::llround(fault.number("fraction") * static_cast<double>(bytes.size())));
 }
 
+/// The inserted message has a valid header of this make, with another type and random contents.
 Touch insert_message(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const auto header = c.vendor.region(Region::header, bytes);
   const auto type = c.vendor.field(Part::ping, FieldName::message_type, bytes);
@@ -105,6 +106,7 @@ Touch insert_message(const Fault& fault, const MessageContext& c, Bytes& bytes) 
   return {};
 }
 
+/// The last row is missing; with `declared` all length fields say so, too.
 Touch cut_row(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const auto image = c.vendor.field(Part::ping, FieldName::image_size, bytes);
   const auto rows = c.vendor.field(Part::ping, FieldName::rows, bytes);
@@ -170,6 +172,7 @@ Touch slice(MessageEdit& m, std::size_t every, double pause_s) {
   return {true, std::min(every, m.bytes.size())};
 }
 
+/// The pieces last about 20 ms each at the rate of the link.
 Touch thin(const Fault& fault, MessageEdit& m) {
   const double bytes_per_s = fault.number("mbit-per-s") * 125000;
   const auto piece = std::clamp<std::size_t>(static_cast<std::size_t>(bytes_per_s * 0.02), 64, 65536);
@@ -183,6 +186,7 @@ Touch end_inside(const Fault& fault, MessageEdit& m) {
   return {true, m.bytes.size()};
 }
 
+/// The end of the image is that of the previous message, as if the device sent a buffer before it was filled.
 Touch splice(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const auto image = c.vendor.region(Region::image, bytes);
   if (!image || c.before == nullptr || c.before->size() != bytes.size()) return {false};
@@ -220,6 +224,7 @@ void write_address(Bytes& bytes, const std::optional<Field>& field, const text::
   for (std::size_t i = 0; i < 4; ++i) bytes[field->offset + i] = static_cast<std::byte>(address[i]);
 }
 
+/// A second device differs in what drivers tell devices apart by: id, hardware address, and network address if wanted.
 Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
   const auto of = [&](FieldName name) { return vendor.field(Part::beacon, name, bytes); };
   const std::string& address = fault.word("address");
@@ -334,6 +339,7 @@ Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m)
   return touch;
 }
 
+/// Changes the first datagram, removes all, or adds one.
 void alter_beacons(const Fault& fault, const Vendor& vendor, const FaultDraws& draws, std::vector<Bytes>& datagrams) {
   if (datagrams.empty()) return;
   Bytes& bytes = datagrams.front();

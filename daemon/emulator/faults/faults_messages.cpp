@@ -34,6 +34,7 @@ Time before_wrap(const std::string& unit, Time powered_up_at) {
 
 }  // namespace
 
+/// A ping is copied only if a fault acts on it. Faults act in the order of their stages.
 std::shared_ptr<const Ping> Faults::altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state,
                                             Time now) {
   const auto number = static_cast<std::uint32_t>(ping->request.number);
@@ -76,6 +77,7 @@ bool Faults::withholds(std::uint32_t ping, Time now) const {
   });
 }
 
+/// False: the message is not sent. First faults that silence the sonar, then those that change bytes, pace or end.
 bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
   if (entries_.empty() || to.role == Role::observer) return true;
   for (Entry& e : entries_) {
@@ -171,6 +173,7 @@ bool Faults::alters_datagrams(const Connection& stream, std::uint32_t ping) cons
   });
 }
 
+/// Faults of bytes come first, then those that lose, repeat or reorder datagrams.
 void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
   if (frames_datagrams(stream)) alter_bytes_of_datagrams(datagrams, stream, ping, now);
   for (Entry& e : entries_) {
@@ -205,6 +208,7 @@ void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& st
   }
 }
 
+/// Several faults act on the same status message, one after the other.
 void Faults::alter_beacons(std::vector<Bytes>& beacons, Time now) {
   if (entries_.empty() || beacons.empty()) return;
   on(Occasion::status, now);

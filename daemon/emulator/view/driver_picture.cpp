@@ -50,6 +50,7 @@ DriverPicture::DriverPicture(const protocol::Make& make) : make_(make) {
   if (make.picture == PictureKind::sweep || make.picture == PictureKind::waterfall) host_ = host_of(make);
 }
 
+/// Pictures that add up many pings need every ping, so a host reads it now. Others are decoded when the drawing is called.
 DriverPicture::Drawing DriverPicture::after(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state) {
   if (make_.picture == PictureKind::fan) return [ping] { return SonarPicture{.image = polar_image_of(*ping)}; };
   if (host_) return read_by(*host_, make_, *ping, state);

@@ -151,6 +151,7 @@ ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPic
 
 ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture) { return view_payload(at, foxglove::picture(picture)); }
 
+/// Only the brightest samples are kept, in no particular order: a viewer draws them as points.
 ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold) {
   if (const RangeImageSettings* const range_image = range_image_of(ping.request))
     return view_payload(ping.request.fired_at,

@@ -11,6 +11,7 @@ constexpr std::chrono::milliseconds slack{1};  // a change of speed or a pause r
 
 PlaybackWatch::PlaybackWatch(const motion::Playback& of, Time now) : playback_(of), looked_at_(now), said_(state(now)) {}
 
+/// A position that playing since the last look cannot explain is a seek.
 std::optional<foxglove::PlaybackState> PlaybackWatch::look(const motion::Playback* of, Time now) {
   const double before = playback_.rules().speed.factor();
   if (of != nullptr)

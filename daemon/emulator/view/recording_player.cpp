@@ -16,6 +16,7 @@ std::optional<RecordingPlayer::Shown> RecordingPlayer::read() {
   return Shown{last_, std::move(found->ping)};
 }
 
+/// Reads to the end once; afterwards the recording is at its start.
 bool RecordingPlayer::measure() {
   if (const auto ping = read()) {
     length_ = ping->at;
@@ -28,6 +29,7 @@ bool RecordingPlayer::measure() {
   return false;
 }
 
+/// Recordings can only be read forwards: for an earlier time it begins at the start again.
 bool RecordingPlayer::approach(Ns at) {
   if (shown_ && at < shown_->at) {
     pings_.rewind();

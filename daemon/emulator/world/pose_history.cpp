@@ -27,6 +27,7 @@ PoseHistory::Motion PoseHistory::between(const Sample& before, const Sample& aft
           per_s * rotation_between(before.pose.orientation, after.pose.orientation)};
 }
 
+/// Velocities that the sender states replace the difference of the last two poses.
 PoseHistory::Motion PoseHistory::newest_motion() const {
   const Sample& last = samples_.back();
   Motion motion;
@@ -48,6 +49,7 @@ PoseHistory::Samples::const_iterator PoseHistory::not_before(Time t) const {
   return std::lower_bound(samples_.begin(), samples_.end(), t, [](const Sample& s, Time x) { return s.at < x; });
 }
 
+/// Zero where at() holds a pose, so that pose and motion agree.
 PoseHistory::Motion PoseHistory::motion_at(Time t, std::chrono::nanoseconds extrapolate_max) const {
   if (t - samples_.back().at > extrapolate_max || t < samples_.front().at) return {};
   const auto after = not_before(t);

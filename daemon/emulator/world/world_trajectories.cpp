@@ -13,6 +13,7 @@ motion::Moment World::played(const Track& track, Time t) {
   return moment;
 }
 
+/// Everything is checked before anything changes.
 std::string World::steer(const control::SetTrajectory& asked, Time now) {
   std::string refusal;
   Track* const track = find(asked.of, asked.name, refusal);

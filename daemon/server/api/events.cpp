@@ -6,6 +6,7 @@
 
 namespace sonar {
 
+/// A listener is removed when its token is gone; no call is needed.
 Events::Token Events::listen(Listener listener) {
   remove_expired();
   auto kept = std::make_shared<Listener>(std::move(listener));
@@ -50,6 +51,7 @@ void Events::publish_scene(const std::string& scene, const std::string& text) {
   publish(event);
 }
 
+/// The count of dropped events travels with the next event that finds room.
 bool EventQueue::offer(const v1::Event& event) {
   if (!subscribes_to(event)) return false;
   if (waiting_.size() == deepest) {

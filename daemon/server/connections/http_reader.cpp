@@ -88,6 +88,8 @@ void HttpReader::feed(std::span<const std::byte> received) {
 
 bool HttpReader::begun() const { return !buffer_.empty() || parser_->beast.got_some(); }
 
+/// Feeds Beast until a request is complete or bytes are missing. A new parser begins each request, because limits and state
+/// belong to one.
 tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
   auto& beast = parser_->beast;
   while (!buffer_.empty() && !beast.is_done()) {

@@ -25,6 +25,7 @@ tl::unexpected<Error> unusable(const std::filesystem::path& file, const std::str
 
 }  // namespace
 
+/// A token that is too short, or has blanks inside, is refused: it would be guessed, or cut in a header.
 Result<Token> Token::read(const std::filesystem::path& file, std::string& warning) {
   const auto read = read_regular(file, 2 * longest);
   if (!read) return unusable(file, "cannot be read; make one: (umask 077; openssl rand -hex 24 > " + file.string() + ")");

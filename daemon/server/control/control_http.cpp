@@ -13,6 +13,7 @@ using control::StatusCode;
 
 }  // namespace
 
+/// Each branch is a kind of action that the router chose; help is the rest.
 asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, HttpConnection& from) {
   RoutedRequest routed = route_request(request, {services_.token, from.reached().ip, config_.hosts});
   if (!routed.pose_refusal.empty()) targets_.poses.refuse(routed.pose_refusal, from.sender());
@@ -30,6 +31,7 @@ asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, Htt
   co_return help;
 }
 
+/// The checks are in this order: is there a live view, may this client open it, is there such a recording, is a slot free.
 HttpOutcome ControlHttp::open_socket(const HttpRequest& request, const SocketAction& asked, HttpConnection& from) {
   if (view_ == nullptr) return answer_of(404, StatusCode::unsupported, "there is no live view");
   auto opened = open_view(request, asked.query, {services_.token, view_->secrets(), from.reached().ip, config_},

@@ -58,6 +58,7 @@ HttpAnswer answer_of(unsigned status, StatusCode code, const std::string& text) 
 
 bool wants_socket(const HttpRequest& request) { return request.method == "GET" && header_names(request.upgrade, "websocket"); }
 
+/// The order of the rules is a matter of safety: host, WebSocket, origin, page, token, route, method, body.
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy) {
   if (auto answer = reject_host(request, policy)) return {*std::move(answer)};
   const auto target = parse_target(request.target);

@@ -137,6 +137,7 @@ std::string Monitoring::metrics() const {
   return metrics_text(f);
 }
 
+/// The first of these: the simulation hangs, a scene takes too long, a sonar does not listen.
 std::string Monitoring::problem() const {
   const auto under_way = of_.simulator.under_way_for();
   if (under_way > longest_ping) return "the simulation has been at one ping for " + whole_seconds(under_way);

@@ -22,6 +22,7 @@ void SceneOperations::log_change(const std::string& what, const Sender& sender) 
   events_.publish_scene(config_.scene.name(), what);
 }
 
+/// The edit gets the scene that the changes before it have made, and shares its engine with other edits that wait.
 void SceneOperations::edit(Edit edit, const std::string& what, const Sender& sender, Operations::Done done) {
   if (changes_.is_full()) return done(too_many_changes());
   changes_.submit({[edit = std::move(edit)](const ScenePointer& now) { return edit(*now); },
@@ -41,6 +42,7 @@ void SceneOperations::remove(const control::RemoveObject& asked, const Sender& s
        std::move(done));
 }
 
+/// The name is looked up at once, so that a wrong one is refused without waiting for other changes.
 void SceneOperations::load(const control::LoadScene& asked, const Sender& sender, Operations::Done done) {
   if (!load_scene_) return done(failed("this program cannot load scenes"));
   if (changes_.is_full()) return done(too_many_changes());

@@ -21,6 +21,7 @@ void TimeOperations::take(const control::PoseSample& sample, const Sender& sende
   time_.wait([done = std::move(done)](Time) { done({}); });
 }
 
+/// The answer comes when the step is over, with the pings made since the answer before.
 void TimeOperations::step(const control::Step& asked, Operations::Done done) {
   if (std::string why = time_.step(asked.dt_s); !why.empty()) return done(refused(std::move(why)));
   time_.wait([this, done = std::move(done)](Time then) {

@@ -19,6 +19,7 @@ Result<void> Beacon::open(const SonarConfig& sonar, const protocol::Port& port) 
   return {};
 }
 
+/// If an exception ends send(), it begins again after a period, or at once by send_now().
 void Beacon::start() {
   if (period_.count() == 0) return;
   asio::co_spawn(

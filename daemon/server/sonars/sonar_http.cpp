@@ -16,6 +16,7 @@ SonarHttp::SonarHttp(asio::io_context& io, const LimitConfig& limits, Admission&
         return std::make_shared<HttpConnection>(services_, *this, std::move(socket), sender);
       }) {}
 
+/// Passes the request to the vendor after the checks that protect it from web pages of other sites.
 asio::awaitable<HttpOutcome> SonarHttp::answer(const HttpRequest& request, HttpConnection& from) {
   // Programs send no Origin, and as Host the address at which they reached it (docs/control.md, "Access").
   const std::vector<std::string> names = names_();

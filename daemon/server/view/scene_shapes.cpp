@@ -69,6 +69,7 @@ Mesh bounding_box(const Mesh& mesh) {
 
 }  // namespace
 
+/// Runs on the thread of the view. An object with too many triangles is shown as its bounding box.
 std::vector<SceneShapes::Made> SceneShapes::make(const Job& job) {
   std::vector<Made> all;
   for (const std::size_t index : job.objects) {
@@ -88,6 +89,8 @@ std::vector<SceneShapes::Made> SceneShapes::make(const Job& job) {
   return all;
 }
 
+/// Compares the scene with what viewers show: new and changed objects go into the job, hidden and removed ones are deleted at
+/// once. While a job is under way nothing is compared.
 std::vector<ViewPayload::Piece> SceneShapes::update(const std::shared_ptr<const Scene>& scene, const World& world, Time now,
                                                     Job& job) {
   if (under_way_) return {};
@@ -116,6 +119,7 @@ std::vector<ViewPayload::Piece> SceneShapes::update(const std::shared_ptr<const 
   return pieces;
 }
 
+/// Objects that were removed while their mesh was made are left out.
 std::vector<ViewPayload::Piece> SceneShapes::take(std::vector<Made> made) {
   under_way_ = false;
   std::vector<ViewPayload::Piece> pieces;

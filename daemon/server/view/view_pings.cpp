@@ -12,6 +12,7 @@
 
 namespace sonar {
 
+/// Only payloads that a viewer subscribes to are made; the slow ones are made on the view's thread.
 void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   SonarView* const sonar = find(of.config().name);
   if (sonar == nullptr) return;
@@ -42,6 +43,7 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   if (of_.clock.stepped()) arm();
 }
 
+/// Called for each ping and at each tick, because a payload may become due, or wanted, between pings.
 void ViewFeed::begin_slow_ones(SonarView& sonar) {
   if (sonar.last == nullptr) return;
   const Time at = sonar.last->request.fired_at;
@@ -72,6 +74,7 @@ void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload
   });
   const auto is_there = [&slow](const auto& one) { return slow.made.contains(one.first); };
   if (made.empty() || (slow.of == at && std::all_of(made.begin(), made.end(), is_there))) return;
+  // From here the thread owns copies only; the result is dropped if the sonar has another make by then.
   slow.under_way = true;
   slow.begun_at = now;
   asio::post(thread_, [this, name = sonar.name, of = sonar.make, which, at, make = std::move(make), made]() mutable {

@@ -47,6 +47,7 @@ void ViewFeed::watch_playback(const Viewer* but) {
   }
 }
 
+/// The request becomes an operation of control, and its refusal a status for the viewer.
 bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) {
   auto watch = watches_.find(viewer.playback());
   if (watch == watches_.end()) return false;
