@@ -5,17 +5,19 @@
 namespace sonar::bvt {
 namespace {
 
-/// Rows row - above ... row + below, columns col - left ... col + right.
+/// The pixels over which the mean for (row, col) is taken: rows row - above to row + below, columns col - left to col + right.
 struct Window {
   int above, below, left, right;
 };
 
+/// A sliding window: a row is added to `sums` when the window reaches it, and subtracted when the window has left it. `sums` has
+/// zeros on both sides, so that the inner loop needs no tests.
 void mean_over(const Window& window, int height, int columns, std::vector<std::uint16_t>& pixels) {
   const auto width = static_cast<std::size_t>(columns);
   const auto margin = static_cast<std::size_t>(window.left + window.right);
   std::vector<std::uint16_t> out(pixels.size());
-  std::vector<std::uint32_t> sums(width + margin, 0);  // sums over the rows in the window, with zeros on both sides
-  std::vector<float> inside(width, 0);                 // how many columns of the window lie inside
+  std::vector<std::uint32_t> sums(width + margin, 0);  // of each column: sum over the rows of the window
+  std::vector<float> inside(width, 0);                 // of each column: number of window columns in the image
   for (int col = 0; col < columns; ++col)
     inside[static_cast<std::size_t>(col)] =
         static_cast<float>(std::min(col, window.left) + 1 + std::min(columns - 1 - col, window.right));

@@ -1,5 +1,5 @@
-// Tables of the samples that make each pixel of an XY image. They are computed once for a geometry and used for every ping with
-// it. The slow part of imaging (angles, square roots) is done here.
+// A table that tells for each pixel of an XY image which samples it is interpolated from. It is computed once for a geometry,
+// with all angles and square roots, and used for every ping of that geometry.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace sonar::bvt {
 
-/// Samples of a ping as imaging reads them: beam after beam, at least 2 x 2.
+/// The samples of a ping, beam after beam; at least 2 beams and 2 bins.
 struct PolarGrid {
   const std::uint16_t* samples = nullptr;
   int beams = 0, bins = 0;
@@ -17,7 +17,7 @@ class PolarLookup {
  public:
   struct Key {
     int height = 0, width = 0;
-    int origin_row = 0, origin_col = 0;  // the sonar
+    int origin_row = 0, origin_col = 0;  // position of the sonar
     double pixel_m = 0;
     double start_m = 0, stop_m = 0, bin_m = 0;
     double fov_min_deg = 0, fov_max_deg = 0;
@@ -33,14 +33,14 @@ class PolarLookup {
   /// May throw std::bad_alloc.
   explicit PolarLookup(const Key& key);
   const Key& key() const { return key_; }
-  /// Writes the pixels inside the sector by bilinear interpolation in bearing and range; leaves the others as they are.
-  /// `grid` has the key's beams and bins, `pixels` its height x width.
+  /// Writes the pixels inside the sector by bilinear interpolation in bearing and range; does not change the others.
+  /// `grid` must have the beams and bins of the key, `pixels` its height x width.
   void apply(const PolarGrid& grid, std::uint16_t* pixels) const;
 
  private:
   struct Entry {
-    std::uint32_t sample;                    // the one of the four to the left and nearest
-    std::uint16_t along_range, along_beams;  // weight of the further ones, 0 to 32768
+    std::uint32_t sample;                    // of the four samples: the left one of the two nearer ones
+    std::uint16_t along_range, along_beams;  // weights of the neighbours, 0 to 32768
   };
   struct Span {
     std::uint32_t pixel, count;
@@ -48,7 +48,7 @@ class PolarLookup {
 
   Key key_;
   std::vector<Span> spans_;     // runs of pixels inside the sector
-  std::vector<Entry> entries_;  // for all of them, in order
+  std::vector<Entry> entries_;  // of the pixels of all spans, in order
 };
 
 }  // namespace sonar::bvt

@@ -10,11 +10,11 @@
 namespace sonar::bvt {
 namespace {
 
-/// Index of the selected sample, or n for none. Of equally strong samples the nearest is selected.
+/// Returns the index of the selected sample, or n if there is none. Of equally strong samples it selects the nearest.
 std::size_t chosen_bin(const std::uint16_t* samples, std::size_t first, std::size_t n, std::uint16_t lowest,
                        RangeListSettings::Policy policy) {
   if (first >= n) return n;
-  // The compiler vectorises this loop. Most beams have no sample as strong as `lowest` and need no other.
+  // The compiler vectorises this loop. It is enough for most beams, which have no sample of `lowest` or more.
   std::uint16_t strongest = 0;
   for (std::size_t k = first; k < n; ++k) strongest = std::max(strongest, samples[k]);
   if (strongest < lowest) return n;
@@ -51,7 +51,7 @@ Code make_range_list(const PolarPing& ping, const RangeListSettings& settings, R
   if (!ping.has_signal()) return no_ping_signal;
   const double scale = range_scale(ping, settings.sound_speed_override_mps);
   const auto beams = static_cast<std::size_t>(ping.beams), bins = static_cast<std::size_t>(ping.bins);
-  // The smallest sample that counts: it is above `threshold`, and the noise threshold does not set it to 0.
+  // The smallest sample that can be selected: above `threshold`, and not set to 0 by the noise threshold.
   const int lowest = std::max(settings.threshold + 1, static_cast<int>(lowest_significant(settings.noise_threshold)));
   const double skipped = (static_cast<double>(settings.start_range_m) / scale - static_cast<double>(ping.start_m)) /
                              static_cast<double>(ping.bin_m) -

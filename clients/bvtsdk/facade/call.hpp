@@ -1,5 +1,5 @@
-// The steps that all C functions of the facades share around their own line of work: find the object of the handle, lock it,
-// always write every out-parameter, and let no exception out.
+// The steps that all C functions of the facades share: they find the object of the handle, lock it, write every out-parameter
+// even on failure, and catch every exception.
 #pragma once
 
 #include <cstring>
@@ -33,7 +33,7 @@ int on(const void* handle, F work) noexcept {
   });
 }
 
-/// Getter of the 4.x interface: sets *out to work(object), or to 0 if it fails.
+/// A getter of the 4.x interface: sets *out to work(object), or to 0 for a bad handle.
 template <class T, class V, class F>
 int get(const void* handle, V* out, F work) noexcept {
   if (!out) return invalid_ptr;
@@ -44,7 +44,7 @@ int get(const void* handle, V* out, F work) noexcept {
   });
 }
 
-/// Getter that can fail: returns the code of work(object, value). On failure *out is 0.
+/// A getter that can fail: returns the code of work(object, value). On failure *out is 0.
 template <class T, class V, class F>
 int try_get(const void* handle, V* out, F work) noexcept {
   if (!out) return invalid_ptr;
@@ -55,7 +55,7 @@ int try_get(const void* handle, V* out, F work) noexcept {
   return code;
 }
 
-/// Getter of the 3.x interface, which has no error code: returns `otherwise` for a bad handle.
+/// A getter of the 3.x interface, which has no error codes: returns work(object), or `otherwise` for a bad handle.
 template <class T, class V, class F>
 V value(const void* handle, V otherwise, F work) noexcept {
   V result = otherwise;
@@ -74,7 +74,7 @@ int give(std::shared_ptr<Object> object, H* out) {
   return handle ? success : memory_alloc;
 }
 
-/// Creates an N, lets work(object, fresh) fill it, and puts a handle of it into *out; *out is null if that fails.
+/// Creates an N, fills it by work(object, fresh), and writes its handle to *out; *out is null on failure.
 template <class T, class N, class H, class F>
 int make(const void* handle, H* out, F work) noexcept {
   if (!out) return invalid_ptr;

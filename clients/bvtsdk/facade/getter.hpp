@@ -1,13 +1,13 @@
-// One getter, both interfaces: 3.x returns the value (0 for a bad handle), 4.x a code and the value through a pointer.
-// The facade's sources are compiled once for each, with BVT_ABI 3 or 4 and that interface's header.
+// Macros that define a getter for both interfaces. In 3.x a getter returns the value, or 0 for a bad handle; in 4.x it returns a
+// code and writes the value through a pointer. The sources are compiled once with BVT_ABI 3 and once with BVT_ABI 4.
 #pragma once
 
 #include <bvt_sdk.h>
 
 #include "clients/bvtsdk/facade/call.hpp"
 
-// BVT_GETTER(int, Head, GetPingCount, Head, o.ping_count()) defines BVTHead_GetPingCount; `o` is the object, an Object.
-// BVT_GETTER_AT also takes one argument list more, as (int row, int col).
+// BVT_GETTER(int, Head, GetPingCount, Head, o.ping_count()) defines BVTHead_GetPingCount; `o` is the object of the handle.
+// BVT_GETTER_AT has one more argument, the parameters of the getter: (int row, int col).
 #define BVT_UNPACK(...) __VA_ARGS__
 #if BVT_ABI == 3
 #define BVT_GETTER(Type, Class, Function, Kind, expression)                                               \

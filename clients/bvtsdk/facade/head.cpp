@@ -1,4 +1,4 @@
-// The functions BVTHead_* of both interfaces, 3.x and 4.x (BVT_ABI). What each function does: clients/bvtsdk/README.md.
+// The functions BVTHead_* of both interfaces, 3.x and 4.x (BVT_ABI). clients/bvtsdk/README.md describes each function.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"
@@ -63,7 +63,7 @@ RetVal BVTHead_PutPing(BVTHead self, BVTPing ping) {
   return on<Head>(self, [&](Head& o) -> int { return on<PingObject>(ping, [&](PingObject& p) { return o.put_ping(p); }); });
 }
 
-// Image settings for later pings of this head; not sent to the sonar.
+// These set how images of later pings are made; the sonar does not get them.
 RetVal BVTHead_SetImageRes(BVTHead self, int resolution) {
   return on<Head>(self, [&](Head& o) -> int {
     if (resolution < 0 || resolution > 4) return invalid_resolution;

@@ -1,4 +1,4 @@
-// BVTMagImage_*, BVTColorImage_* and BVTColorMapper_*. What each function does: clients/bvtsdk/README.md.
+// The functions BVTMagImage_*, BVTColorImage_* and BVTColorMapper_*. clients/bvtsdk/README.md describes each function.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;
@@ -44,7 +44,7 @@ auto* row_of(Image& image, int row) {
 BVT_IMAGE(MagImage, MagImageObject, MagPixel)
 BVT_IMAGE(ColorImage, ColourImageObject, ColourPixel)
 
-// A row or pixel outside the image: null or 0, and index_out_of_bounds where the function returns a code.
+// For a row or pixel outside the image these return null or 0, and the code index_out_of_bounds if they return a code.
 #if BVT_ABI == 3
 #define BVT_PIXELS(Class, Kind, Pixel)                                                                                           \
   Pixel* BVT##Class##_GetRow(BVT##Class self, int row) {                                                                         \

@@ -1,4 +1,5 @@
-// BVTImageGenerator_*, 4.x only: how pings become images and range profiles. What each function does: clients/bvtsdk/README.md.
+// The functions BVTImageGenerator_* of 4.x, which make images and range profiles. clients/bvtsdk/README.md describes each
+// function.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"
@@ -9,7 +10,7 @@ using Generator = sonar::bvt::ImageGeneratorObject;
 
 namespace {
 
-/// Makes N with work(generator, ping, new N); bad_head before SetHead.
+/// Creates an N and fills it by work(generator, ping, N). Returns bad_head if SetHead was not called.
 template <class N, class H, class F>
 RetVal from_ping(BVTImageGenerator self, BVTPing ping, H* out, F work) {
   return make<Generator, N>(self, out, [&](Generator& o, N& fresh) -> int {

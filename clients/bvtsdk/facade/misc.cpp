@@ -1,4 +1,4 @@
-// Discovery, error texts, version and log. What each function does: clients/bvtsdk/README.md.
+// The functions for discovery, error texts, version and log. clients/bvtsdk/README.md describes each function.
 #include "clients/bvtsdk/core/errors.hpp"
 #include "clients/bvtsdk/facade/getter.hpp"
 
@@ -34,7 +34,7 @@ int BVTSDK_MinorVersion() { return BVT_ABI == 3 ? 6 : 4; }
 int BVTSDK_BuildNumber() { return 0; }
 
 #if BVT_ABI == 4
-void BVTSDK_Init() {}  // nothing needs it; hosts call it
+void BVTSDK_Init() {}  // programs call it, and there is nothing to initialise
 void BVTSDK_Shutdown() {}
 #endif
 

@@ -1,4 +1,5 @@
-// BVTNavData_*: where the vehicle is; both interfaces, 3.x without the time. What each function does: clients/bvtsdk/README.md.
+// The functions BVTNavData_* (navigation data) of both interfaces; 3.x has no time. clients/bvtsdk/README.md describes each
+// function.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

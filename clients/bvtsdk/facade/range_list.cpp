@@ -1,4 +1,4 @@
-// BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x): one range per bearing. What each function does: clients/bvtsdk/README.md.
+// The functions BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x). clients/bvtsdk/README.md describes each function.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;

@@ -1,4 +1,4 @@
-// BVTSonar_*: both interfaces. What each function does: clients/bvtsdk/README.md.
+// The functions BVTSonar_* of both interfaces. clients/bvtsdk/README.md describes each function.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;

@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-constexpr std::size_t most_objects = 20000, most_bodies = 256;  // as a scene file may have
+constexpr std::size_t most_objects = 20000, most_bodies = 256;  // the limits of scene files
 constexpr std::size_t longest_name = 64;
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
@@ -29,7 +29,7 @@ bool is_printable(std::string_view name) {
   return std::all_of(name.begin(), name.end(), [](char c) { return std::isprint(static_cast<unsigned char>(c)) != 0; });
 }
 
-/// Empty when an object may have this name.
+/// Returns why an object cannot have this name; empty if it can.
 std::string complaint_about(const Scene& scene, const std::string& name) {
   if (name.empty() || name.size() > longest_name || !is_printable(name))
     return "an object needs a name of 1 to 64 printable characters";
@@ -38,13 +38,14 @@ std::string complaint_about(const Scene& scene, const std::string& name) {
   return {};
 }
 
-/// A copy of the mesh in which every triangle has this material.
+/// Copies a mesh and gives every triangle this material.
 std::shared_ptr<const Mesh> mesh_of(const Mesh& mesh, std::size_t material) {
   auto copy = std::make_shared<Mesh>(mesh);
   std::fill(copy->material.begin(), copy->material.end(), static_cast<std::uint16_t>(material));
   return copy;
 }
 
+/// Returns the index for a new object: that of a removed object, else a new one at the end.
 std::size_t free_place(Scene& scene) {
   const auto left =
       std::find_if(scene.objects.begin(), scene.objects.end(), [](const Object& o) { return o.name.empty() && !o.visible; });
@@ -69,7 +70,7 @@ void remove_body_if_empty(Scene& scene, int body) {
   move_up(scene.point_targets);
 }
 
-/// Meshes are compared by content: a reloaded scene has read its files again.
+/// Compares meshes by content, because a reload reads the files again into new meshes.
 bool is_same(const Object& a, const Object& b) {
   Object other = b;
   if (*a.mesh == *b.mesh) other.mesh = a.mesh;

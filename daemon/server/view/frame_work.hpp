@@ -1,5 +1,6 @@
-// Counts the WebSocket frames of a viewer, which cost time in addition to their bytes. The library reads empty fragments and
-// control frames (RFC 6455, 5.2) without reporting them. Looks at the heads of frames only, at any split of the stream.
+// Counts the WebSocket frames that a viewer sends, because each frame costs time in addition to its bytes. The library does not
+// report empty fragments and control frames (RFC 6455, 5.2). FrameWork parses only the headers of frames; bytes may come in
+// pieces.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +13,7 @@ namespace sonar {
 
 class FrameWork {
  public:
-  /// The work of all that begins in these bytes, which follow those before.
+  /// Returns the work of the next bytes of the stream: their number, and a fixed amount for each frame that begins in them.
   std::size_t of(std::span<const std::byte> received) {
     std::size_t work = received.size();
     for (std::size_t i = 0; i < received.size();) {
@@ -28,7 +29,7 @@ class FrameWork {
   }
 
  private:
-  /// One byte of a head.
+  /// Parses one byte of a frame header; returns the work of the frame with its first byte, else 0.
   std::size_t take(std::uint8_t byte) {
     std::size_t work = 0;
     if (at_ == 0) {
@@ -47,7 +48,7 @@ class FrameWork {
     return work;
   }
 
-  std::size_t at_ = 0, length_bytes_ = 0, mask_bytes_ = 0;  // in the head
+  std::size_t at_ = 0, length_bytes_ = 0, mask_bytes_ = 0;  // position in the header; sizes of its parts
   std::uint64_t length_ = 0, payload_left_ = 0;
 };
 
