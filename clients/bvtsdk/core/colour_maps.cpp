@@ -17,10 +17,10 @@ double ramp(double t) { return std::clamp(t, 0.0, 1.0); }
 
 Rgb hot(double t) { return {ramp(t * 8 / 3), ramp((t - 0.375) * 8 / 3), ramp((t - 0.75) * 4)}; }
 
-/// The formulas of the palettes' usual definitions; t from 0, the weakest, to 1.
+/// Computes a colour by the usual formula of the palette; t is 0 for the weakest echo and 1 for the strongest.
 Rgb colour_at(std::string_view name, double t) {
   if (name == "jet") return {ramp(1.5 - std::abs(4 * t - 3)), ramp(1.5 - std::abs(4 * t - 2)), ramp(1.5 - std::abs(4 * t - 1))};
-  if (name == "bone") {  // grey with an eighth of hot turned round
+  if (name == "bone") {  // grey, with an eighth of the map `hot` in reverse order of colours
     const Rgb h = hot(t);
     return {(7 * t + h.blue) / 8, (7 * t + h.green) / 8, (7 * t + h.red) / 8};
   }
@@ -39,7 +39,8 @@ std::uint32_t pixel_of(const Colour& c, PixelOrder order) {
   return pixel;
 }
 
-/// The least magnitude that 99.5 % of the pixels do not exceed; those outside the sector, and silence, are 0 and left out.
+/// Returns the smallest magnitude that 99.5 % of the pixels do not exceed. Pixels of 0 (outside the sector, or no echo) do not
+/// count.
 int high_percentile(const MagImage& image) {
   std::vector<std::uint32_t> histogram(65536, 0);
   for (const std::uint16_t v : image.pixels) ++histogram[v];

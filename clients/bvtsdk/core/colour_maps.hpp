@@ -48,11 +48,11 @@ class ColourMapper {
 
   /// Returns bad_parameter if 0 <= bottom < top <= 65535 does not hold, and always in auto mode (verified: the SDK refuses it).
   Code set_thresholds(int top, int bottom);
-  /// bad_parameter unless 0 < gamma <= 100.
+  /// Returns bad_parameter unless 0 < gamma <= 100.
   Code set_gamma(float gamma);
   /// Automatic top: the 99.5th percentile of the pixels that are not 0, at least lowest_auto_top (our assumption).
   void set_auto_mode(bool on);
-  int top() const { return top_; }  // in auto mode the top that the last image had
+  int top() const { return top_; }  // in auto mode: the top of the last image
   int bottom() const { return bottom_; }
   float gamma() const { return gamma_; }
   bool auto_mode() const { return auto_mode_; }
@@ -70,7 +70,7 @@ class ColourMapper {
   int top_ = 65535, bottom_ = 0;
   float gamma_ = 1;
   bool auto_mode_ = false;
-  std::vector<std::uint32_t> table_;  // a pixel for each magnitude; empty = to be built
+  std::vector<std::uint32_t> table_;  // a pixel for each magnitude; empty = not built yet
 };
 
 /// Writes a P5 file of 16 bits, big-endian. Returns file_create if it cannot be created, and file_write if writing fails.

@@ -31,11 +31,11 @@ struct SonarDescription {
   std::uint16_t version = 1;
   std::string model, name, serial, firmware;
   float temperature_c = 0;
-  std::uint32_t capabilities = 0;  // bit 0: head numbers are strict; bit 1: its time may stand
+  std::uint32_t capabilities = 0;  // bit 0: head numbers are strict; bit 1: its time may stop
   std::vector<HeadDescription> heads;
 
   bool strict_heads() const { return (capabilities & 1) != 0; }
-  /// True of a simulator whose time may stop: silence is then not a fault.
+  /// True for a simulator whose time may stop; silence is then no fault.
   bool may_be_silent() const { return (capabilities & 2) != 0; }
   /// The head with this number; a sonar with one head and non-strict numbers accepts 0 and 1.
   const HeadDescription* head(int number) const;

@@ -12,12 +12,12 @@ namespace sonar::bvt {
 
 class DiscoveryAgent {
  public:
-  /// Clears the results and asks again: by broadcast on every network, this machine's own among them, and every address in
-  /// the environment variable BVE_DISCOVERY (separated by commas or spaces). failed without a socket.
+  /// Clears the results and sends the question again: by broadcast on every network and on loopback, and to every address in the
+  /// environment variable BVE_DISCOVERY (separated by commas or spaces). Returns failed if there is no socket.
   Code start();
-  /// Takes the last answers.
+  /// Reads the answers that have arrived, and closes the socket.
   void stop();
-  /// IPv4 addresses in the order they answered; asks once more when the last time was over a second ago.
+  /// Returns the IPv4 addresses in the order of their answers. Sends the question again if the last one was over a second ago.
   const std::vector<std::string>& sonars();
 
  private:

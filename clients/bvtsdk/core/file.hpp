@@ -1,4 +1,4 @@
-// A C stream that closes itself.
+// A pointer to a C stream that closes the stream when it is destroyed.
 #pragma once
 
 #include <cstdio>

@@ -1,5 +1,5 @@
-// Handles that a host holds instead of pointers. A handle is a small number cast to the pointer type, so that truncation to 32
-// bits (Python's ctypes by default) loses nothing, and stale or foreign handles are detected.
+// Handles that programs get instead of pointers. A handle is a number below 2^31 cast to the pointer type, so that truncation to
+// 32 bits (by Python's ctypes) does no harm. Stale and foreign handles are detected.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,18 @@
 
 namespace sonar::bvt {
 
-/// Whatever a handle may stand for. `mutex` is held by the facades while a call works on the object.
+/// Base of all objects that have handles. The facades hold `mutex` while a call works on the object.
 struct Object {
   virtual ~Object() = default;
   std::mutex mutex;
 };
 
-/// 20 bits of index and 11 of generation: up to 1 048 575 objects at once, all numbers below 2^31.
+/// The table of handles. A handle has 20 bits of index and 11 bits of generation: up to 1 048 575 objects at a time.
 class Handles {
  public:
-  /// Null when the table is full.
+  /// Adds an object and returns its handle; null if the table is full.
   void* add(std::shared_ptr<Object> object);
-  /// Null when the handle is null, stale, foreign, or stands for something else.
+  /// Returns the object of a handle; null if the handle is null, stale, foreign, or of another type.
   template <class T>
   std::shared_ptr<T> find(const void* handle) {
     return std::dynamic_pointer_cast<T>(find_any(handle));
@@ -44,11 +44,11 @@ class Handles {
 
   std::mutex mutex_;
   std::vector<Place> places_;
-  std::deque<std::uint32_t> free_;  // first freed, first used again, so that stale handles are noticed for long
+  std::deque<std::uint32_t> free_;  // the longest free index is used first, so that stale handles are detected for long
   std::size_t live_ = 0;
 };
 
-/// The one table of this library. Never destroyed: hosts destroy handles from destructors of their globals.
+/// The only table of this library. Never destroyed, because programs destroy handles in destructors of global objects.
 Handles& handles();
 
 }  // namespace sonar::bvt

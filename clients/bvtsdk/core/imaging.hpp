@@ -1,6 +1,6 @@
-// Forms images from polar pings. As with the real SDK, the library does this, not the sonar. It computes the geometry first, then
-// the pixels. Marks in this folder: verified = seen in public client code; inferred = concluded from it; chosen = our choice, as
-// nothing is known.
+// Forms images from polar pings. As in the real SDK, the library does this, not the sonar. It computes the geometry first, then
+// the pixels. Words in this folder: verified = seen in public client code; inferred = concluded from it; chosen = our choice,
+// because nothing is known.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ enum class ImageType { xy = 0, r_theta = 1 };
 /// XY no more than make a million pixels, because a client keeps whole images on its stack. Off: as automatic.
 enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 
-/// How near an XY image begins: with the nearest corners of the sector, or with the sonar itself.
+/// Where an XY image begins: at the nearest corners of the sector, or at the sonar.
 enum class XyBottom { sector, sonar };
 /// BVE_XY=sector or sonar; default sector.
 XyBottom xy_bottom_from_environment();
@@ -30,10 +30,11 @@ XyBottom xy_bottom_from_environment();
 struct ImageSettings {
   ImageRes resolution = ImageRes::automatic;
   XyBottom xy_bottom = xy_bottom_from_environment();
-  /// Requested by the user; 0 = not. A size wins over a range resolution, that over `resolution` (chosen).
+  /// Requests of the program; 0 = none. A size has priority over a range resolution, which has priority over `resolution`
+  /// (chosen).
   float range_resolution_m = 0;                   // metres per row; at most a million pixels are made for it
   int requested_height = 0, requested_width = 0;  // XY keeps the height and adjusts the width (verified); a width alone sets both
-  int r_theta_width = 0;                          // columns; wins over requested_width
+  int r_theta_width = 0;                          // columns; has priority over requested_width
   int filter_flags = no_filter;
   float noise_threshold = 0;         // fraction of full scale below which samples become 0
   float clipping_threshold = 0;      // fraction of full scale above which samples are cut to it; 0 = off
@@ -62,14 +63,14 @@ struct MagImage : ImageGeometry {
   std::vector<std::uint16_t> pixels;  // 65535 = full scale (verified)
 };
 
-/// Size and scale of the image a ping would give. no_ping_signal for a ping without samples, bad_parameter for negative
-/// sizes or resolutions, invalid_image_size for more than 32 million pixels.
+/// Computes size and scale of the image of a ping. Returns no_ping_signal for a ping without samples, bad_parameter for negative
+/// sizes or resolutions, and invalid_image_size for more than 32 million pixels.
 Code plan_image(const PolarPing& ping, ImageType type, const ImageSettings& settings, ImageGeometry& geometry);
 
-/// Makes images; remembers the lookup tables of the last few XY geometries. One Imager may serve several threads.
+/// Makes images and keeps the lookup tables of the last few XY geometries. Several threads may use one Imager.
 class Imager {
  public:
-  /// Codes of plan_image, or memory_alloc. On failure `image` is empty.
+  /// Returns the codes of plan_image, or memory_alloc. On failure `image` is empty.
   Code make(const PolarPing& ping, ImageType type, const ImageSettings& settings, MagImage& image);
 
  private:

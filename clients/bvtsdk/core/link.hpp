@@ -20,31 +20,31 @@ namespace sonar::bvt {
 
 /// Time limits. Tests shorten them.
 struct Patience {
-  std::chrono::milliseconds connect{5000};    // name, connection and greeting, each
-  std::chrono::milliseconds request{5000};    // a reply that needs no ping
-  std::chrono::milliseconds silence{2000};    // without own messages, then a keep-alive is sent
-  std::chrono::milliseconds lifeless{10000};  // nothing at all from the sonar: it is gone
+  std::chrono::milliseconds connect{5000};    // for each of name lookup, connection and greeting
+  std::chrono::milliseconds request{5000};    // for a reply that needs no ping
+  std::chrono::milliseconds silence{2000};    // a keep-alive is sent after such a time without a message of ours
+  std::chrono::milliseconds lifeless{10000};  // the link is lost after such a time without a byte from the sonar
 };
 
 class Link {
  public:
-  /// `endpoint` is "host" or "host:port"; the port is else that of the environment variable BVE_PORT, else 14750.
-  /// bad_parameter, lookup_host, connection_timed_out (refused, unreachable, or silent), bad_packet_type (something else lives
-  /// there), bad_packet_version. A failure is logged with its reason.
+  /// `endpoint` is "host" or "host:port"; the default port is that of the environment variable BVE_PORT, else 14750. Returns
+  /// bad_parameter, lookup_host, connection_timed_out (refused, unreachable, or silent), bad_packet_type (another service
+  /// replies) or bad_packet_version. A failure is logged with its reason.
   static Code open(const std::string& endpoint, int abi, std::unique_ptr<Link>& link, SonarDescription& sonar,
                    const Patience& patience = {});
-  /// Closes, and waits for the reader to end.
+  /// Closes the link, and waits until the reader thread has ended.
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  /// Sends a request and waits for its reply. The sonar's code when it refuses, socket_read_timeout without a reply in time;
-  /// once the link is lost, always the cause (socket_closed, socket_read_timeout, ...).
+  /// Sends a request and waits for its reply. Returns the sonar's code if it refuses, socket_read_timeout without a reply in
+  /// time, and the cause (socket_closed, socket_read_timeout, ...) if the link is lost.
   int ask(FrameType request, const Bytes& payload, Bytes& answer, std::chrono::milliseconds patience);
   int ask(FrameType request, const Bytes& payload, Bytes& answer) { return ask(request, payload, answer, patience_.request); }
 
   bool connected() const { return lost_ == success; }
-  /// Waiting calls return socket_closed. From any thread.
+  /// Closes the connection; waiting calls return socket_closed. May be called from any thread.
   void close() { lose(socket_closed); }
 
  private:
@@ -66,7 +66,7 @@ class Link {
   const Patience patience_;
   Descriptor socket_;
   std::atomic<Code> lost_{success};
-  std::atomic<bool> may_be_silent_{false};  // the sonar's time may stand; that it is gone, TCP tells
+  std::atomic<bool> may_be_silent_{false};  // the sonar's time may stop, so silence is not a fault; TCP reports a lost sonar
 
   std::mutex waiting_mutex_;
   std::condition_variable answered_;
@@ -76,10 +76,10 @@ class Link {
   std::mutex send_mutex_;
   Deadline last_sent_;
 
-  // Used by the reader alone.
+  // Used by the reader thread only.
   Deadline last_received_;
   Bytes received_;
-  std::thread reader_;  // last: it uses all of the above
+  std::thread reader_;  // the last member, because it uses all others
 };
 
 }  // namespace sonar::bvt

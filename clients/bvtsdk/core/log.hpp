@@ -10,10 +10,10 @@ enum class LogLevel { none = -1, critical = 0, warning = 1, status = 2 };
 
 void log(LogLevel level, const std::string& line);
 
-/// Messages above this level are dropped; warning at first.
+/// Sets the level; messages above it are dropped. The initial level is warning.
 void set_log_level(LogLevel level);
-/// "stdout", "stderr" (at first), "null" or the name of a file, which is appended to. False when it cannot be opened; the log
-/// then stays where it was.
+/// Sets where the log goes: "stdout", "stderr" (the initial value), "null" or the name of a file, to which lines are appended.
+/// Returns false if the file cannot be opened; then nothing changes.
 bool set_log_target(const std::string& name);
 
 }  // namespace sonar::bvt

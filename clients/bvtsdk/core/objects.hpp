@@ -48,7 +48,7 @@ struct PingObject : Object {
   HeadDescription settings;  // settings of the head when this ping was made
   HeadImaging imaging;
   std::shared_ptr<Imager> imager;  // shared with the head, so that its tables are used again
-  void* range_data = nullptr;      // 3.x: belongs to the ping and dies with it
+  void* range_data = nullptr;      // 3.x: belongs to the ping and is destroyed with it
   ~PingObject() override {
     if (range_data) handles().remove<RangeListObject>(range_data);
   }

@@ -28,7 +28,7 @@ void numbers_of(Nav& nav, const Visit& visit) {
 }
 constexpr std::uint16_t known_fields = 2 * nav_text - 1;
 
-/// The error in the fields of fixed size; empty when they are valid.
+/// Returns the error in the fields of fixed size; empty if they are valid.
 std::string complaint(const PolarPing& p) {
   if (!std::isfinite(p.time_s)) return "its time is not a number";
   if (!(p.start_m >= 0 && p.stop_m > p.start_m && p.stop_m <= 1e6f)) return "its ranges are not 0 <= start < stop <= 1000 km";
@@ -63,7 +63,7 @@ Bytes bytes_of(const std::vector<std::uint16_t>& samples, Packing packing) {
   return out;
 }
 
-/// Exactly `size` bytes or nothing: a longer stream is refused.
+/// Inflates exactly `size` bytes; fails if the stream is shorter or longer.
 Bytes inflated(BytesView body, std::size_t size) {
   if (size > deflate_at_best * body.size + 64) return {};
   Bytes out(size);

@@ -1,5 +1,5 @@
-// One ping as delivered by the link: polar samples, their geometry, and navigation data. Images, range lists and
-// recordings are all made from this.
+// One ping as the link delivers it: polar samples, their geometry, and navigation data. Images, range lists and recordings are
+// made from it.
 #pragma once
 
 #include <cstdint>
@@ -70,8 +70,8 @@ struct PolarPing {
 /// than the payload can hold, and never more than 64 MiB.
 std::optional<PolarPing> decode_ping(BytesView payload, std::string* why = nullptr);
 
-/// How the samples lie in PING_DATA: as they are; as a zlib stream; as a zlib stream of all their high bytes, then all their low
-/// ones. Noise and speckle leave most high bytes 0: the last is 15 to 23 % smaller than the second, and no slower.
+/// The three encodings of samples in PING_DATA: plain; a zlib stream; a zlib stream of all high bytes followed by all low bytes.
+/// Most high bytes are 0, so the third is 15 to 23 % smaller than the second, and not slower.
 enum class Packing : std::uint8_t { plain = 0, deflate = 1, planes = 2 };
 
 /// Encodes a ping as the payload of PING_DATA.

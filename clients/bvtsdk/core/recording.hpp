@@ -24,7 +24,7 @@ struct EventMark {
   std::string key, text;
 };
 
-/// Where a frame lies.
+/// The position of a frame in the file.
 struct FramePlace {
   FrameType type{};
   std::int32_t head = 0;  // pings only
@@ -35,14 +35,14 @@ struct FramePlace {
 /// Not for several threads at once.
 class RecordingWriter {
  public:
-  /// Makes or overwrites the file. `hello`: payload of HELLO_OK, opaque here. file_create, file_write.
+  /// Creates or overwrites the file. `hello`: payload of HELLO_OK. Returns file_create or file_write on failure.
   Code create(const std::string& path, BytesView hello);
-  /// Whole frames reach the file at once, so that it can be read while it grows. file_not_open, file_write.
-  /// `head` replaces the ping's. `hello`: payload of HELLO_OK with the settings the ping was made with.
+  /// Every call writes whole frames to the file, so that it can be read while it grows. Returns file_not_open or file_write on
+  /// failure. `head` replaces the head of the ping. `hello`: payload of HELLO_OK with the settings of the ping.
   Code put_ping(std::int32_t head, const PolarPing& ping, BytesView hello);
   Code put_nav(const NavData& nav, double time_s);
   Code put_event(const EventMark& mark);
-  /// Appends the index and closes. The destructor closes too.
+  /// Appends the index and closes the file. The destructor does the same.
   Code close();
   ~RecordingWriter();
   RecordingWriter() = default;
@@ -66,26 +66,26 @@ class RecordingWriter {
 /// Not for several threads at once.
 class RecordingReader {
  public:
-  /// file_open; file_header_bad for any other file, including the vendor's .son; file_too_new. `why` is
-  /// a line for the log.
+  /// Returns file_open, file_too_new, or file_header_bad for a file of another kind, such as the vendor's .son. `why` is a line
+  /// for the log.
   Code open(const std::string& path, std::string* why = nullptr);
   Code open(File file, std::string* why = nullptr);
 
   const Bytes& hello() const { return hello_; }  // payload of the first HELLO_OK
-  /// Payload of the description valid at ping n of a head; by default the first one.
+  /// Payload of the description that is valid at ping n of a head; the first one if none was written before it.
   Bytes hello_of_ping(std::int32_t head, int n);
   std::uint64_t size_bytes() const { return size_; }
-  /// False when the last writer never closed the file, or its end is damaged.
+  /// False if the writer did not close the file, or if its end is damaged.
   bool has_index() const { return has_index_; }
 
   /// Frames in order of arrival.
   int ping_count(std::int32_t head) const { return static_cast<int>(places(FrameType::ping_data, head).size()); }
   int nav_count() const { return static_cast<int>(places(FrameType::nav_data).size()); }
   int event_count() const { return static_cast<int>(places(FrameType::event_mark).size()); }
-  /// ping_number_too_small, ping_number_too_large; file_read and bad_ping for one that is damaged, and `why` is a line for the
-  /// log.
+  /// Returns ping_number_too_small or ping_number_too_large, and file_read or bad_ping for a damaged ping; `why` is then a line
+  /// for the log.
   Code read_ping(std::int32_t head, int n, PolarPing& ping, std::string* why = nullptr);
-  /// index_out_of_bounds, file_read. `time_s`: when it was recorded.
+  /// Returns index_out_of_bounds or file_read on failure. `time_s`: time of the recording.
   Code read_nav(int n, NavData& nav, double& time_s);
   Code read_event(int n, EventMark& mark);
 

@@ -10,9 +10,9 @@
 
 namespace sonar::bvt {
 
-/// Ranges are multiplied by it: override / the ping's sound speed, 1 without an override (0).
+/// The factor for ranges: override / the ping's sound speed, or 1 without an override (0).
 double range_scale(const PolarPing& ping, int sound_speed_override_mps);
-/// The least sample that is not set to 0 by a noise threshold in fractions of full scale.
+/// The smallest sample that a noise threshold, a fraction of full scale, does not set to 0.
 std::uint16_t lowest_significant(float noise_threshold);
 
 class SampleGrid {

@@ -28,17 +28,17 @@ class Descriptor {
 /// Splits "host" or "host:port". False when the host is empty or the port is not a number from 1 to 65535.
 bool split_endpoint(const std::string& endpoint, std::string& host, std::string& port);
 
-/// Connects to the first address of the host that takes it. lookup_host when the name is unknown, connection_timed_out when
-/// the connection is refused, or not accepted by the deadline; `why` is then the system's error text. The socket is non-blocking.
+/// Connects to the first address of the host that accepts. Returns lookup_host if the name is unknown, or connection_timed_out if
+/// the connection is refused or not accepted by the deadline; `why` is the system's error text. The socket is non-blocking.
 Code connect_to(const std::string& host, const std::string& port, Deadline deadline, Descriptor& out, std::string& why);
 
-/// success, timeout (no event by the deadline), or failed. `events` as for poll().
+/// Waits for an event of the socket; `events` as for poll(). Returns success, timeout (no event by the deadline) or failed.
 Code wait_for(int fd, short events, Deadline deadline);
 
-/// success, socket_write_timeout, socket_closed (the peer is gone) or socket_write.
+/// Writes all bytes. Returns success, socket_write_timeout, socket_closed (by the peer) or socket_write.
 Code send_all(int fd, const Bytes& bytes, Deadline deadline);
 
-/// Appends what has arrived, at most `most` bytes. success (perhaps with nothing), socket_closed or socket_read.
+/// Appends received bytes, at most `most`. Returns success (perhaps without a byte), socket_closed or socket_read.
 Code receive_some(int fd, Bytes& out, std::size_t most);
 
 }  // namespace sonar::bvt

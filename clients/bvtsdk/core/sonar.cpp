@@ -10,7 +10,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A sonar answers a ping request within this and the time that sound and ping interval take.
+// Limit for the answer to a ping request, in addition to the travel time of sound and the ping interval.
 constexpr milliseconds ping_patience{20000};
 constexpr std::size_t longest_mark_key = 80, longest_mark_text = 512;
 
@@ -35,7 +35,8 @@ int Head::set_range(float start_m, float stop_m) {
 int Head::set_start(float start_m) {
   const int code = set(Key::start_range, start_m, now.start_m);
   RangeLimits limits{now.start_m, now.stop_m};
-  if (code == success && source_->get(now.id, limits) == success) now.stop_m = limits.stop_m;  // it may have been moved too
+  if (code == success && source_->get(now.id, limits) == success)
+    now.stop_m = limits.stop_m;  // the sonar may have changed it too
   return code;
 }
 

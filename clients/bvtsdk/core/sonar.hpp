@@ -14,8 +14,8 @@ class Head : public Object {
  public:
   Head(std::shared_ptr<Source> source, const HeadDescription& description);
 
-  /// The settings that were last applied here; after a ping was read from a recording, those that it was made with. Changes that
-  /// other programs make at the same sonar are not seen.
+  /// The settings that this program last applied, or those of the ping last read from a recording. Changes by other programs are
+  /// not included.
   HeadDescription now;
   HeadImaging imaging;
   int transmit = 1, ping_interval_ms = 0, dynamic_power = 0, mount = 0;  // mount has no effect: it is stored and returned

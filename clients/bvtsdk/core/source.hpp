@@ -31,7 +31,7 @@ class Source {
 
   virtual bool is_file() const { return true; }
   virtual bool connected() const { return false; }
-  /// `value` receives the applied value, which may be the nearest valid one. Recordings accept any.
+  /// `value` receives the applied value, which may be the nearest valid one. Recordings accept every value.
   virtual int set(int /*head*/, Key, std::int32_t& /*value*/) { return success; }
   virtual int set(int /*head*/, Key, float& /*value*/) { return success; }
   virtual int set(int /*head*/, RangeLimits&) { return success; }
@@ -55,11 +55,11 @@ class Source {
   const SonarDescription sonar_;
 };
 
-/// Codes as Link::open.
+/// Returns the codes of Link::open.
 Code open_live(const std::string& endpoint, int abi, std::shared_ptr<Source>& source);
-/// Codes as RecordingReader::open.
+/// Returns the codes of RecordingReader::open.
 Code open_recording(const std::string& path, std::shared_ptr<Source>& source);
-/// Codes as RecordingWriter::create. The recording describes itself as that sonar.
+/// Returns the codes of RecordingWriter::create. The recording has the description of that sonar.
 Code create_recording(const std::string& path, const SonarDescription& sonar, std::shared_ptr<Source>& source);
 
 }  // namespace sonar::bvt
