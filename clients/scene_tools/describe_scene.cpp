@@ -21,7 +21,7 @@ struct Outline {
   };
   std::vector<Kind> objects;           // in the order of Scene::objects
   std::vector<std::string> materials;  // the scene's own
-  std::set<std::string> started_from;  // named by a `like`
+  std::set<std::string> started_from;  // materials that a `like` names
 };
 
 Outline outline_of(const text::Document& document) {

@@ -25,7 +25,7 @@ struct DescribedMaterial {
   std::string name, law;
   double strength_db = 0;  // at normal incidence and the trend's reference frequency
   double roughness_m = 0, reflection = 0;
-  std::size_t objects = 0, triangles = 0;  // 0: defined, or only started from, and not used
+  std::size_t objects = 0, triangles = 0;  // 0: not used, or only as a base of other materials
 };
 
 struct SceneDescription {
@@ -42,7 +42,7 @@ struct SceneDescription {
   std::vector<std::string> notes;  // the loader's
 };
 
-/// Errors as of the daemon. `file` may also name a built-in scene.
+/// Returns the errors of the daemon. `file` may also name a built-in scene.
 Result<SceneDescription> describe_scene(const std::filesystem::path& file);
 
 /// Remarks on a valid scene for its author.

@@ -27,7 +27,7 @@ std::optional<FuelAddress> fuel_address(std::string_view address) {
   std::erase_if(parts, [](const std::string& part) { return part.empty() || part == "/"; });
   const auto is_api = [](const std::string& part) { return part.find_first_not_of("0123456789.") == std::string::npos; };
   if (parts.size() > 1 && is_api(parts[1])) parts.erase(parts.begin() + 1);
-  if (parts.size() > 3 && parts[2] == "fuel" && parts[3] == "models") parts.erase(parts.begin() + 2);  // as web pages name it
+  if (parts.size() > 3 && parts[2] == "fuel" && parts[3] == "models") parts.erase(parts.begin() + 2);  // the form of web pages
   if (parts.size() < 4 || lower(parts[2]) != "models") return std::nullopt;
   FuelAddress out{parts[0], parts[1], parts[3], "", {}};
   std::size_t next = 4;
@@ -56,7 +56,7 @@ std::string fetch_command(std::string_view uri) {
   uri = uri.substr(0, uri.find("/files/"));
   if (uri.size() > 200 || uri.find_first_not_of(safe) != std::string_view::npos) return {};
   if (!fuel_address(uri.substr(uri.find("://") + 3))) return {};
-  std::string url(uri);  // the command does not take the addresses of web pages
+  std::string url(uri);  // the command does not accept the form of web pages
   for (const std::string_view page : {"://app.gazebosim.org/", "://app.ignitionrobotics.org/"})
     if (const std::size_t at = url.find(page), models = url.find("/fuel/models/"); at != url.npos && models != url.npos)
       url.replace(models, 13, "/models/").replace(0, at + page.size(), "https://fuel.gazebosim.org/1.0/");

@@ -32,7 +32,7 @@ std::string suggestion(const std::string& name, const std::set<std::string>& kno
   return text::suggestion(name, views, label);
 }
 
-/// Words of a name in small letters: "Gazebo/WoodFloor_2" has gazebo, wood and floor.
+/// Splits a name into words in small letters: "Gazebo/WoodFloor_2" into gazebo, wood and floor.
 std::vector<std::string> words_of(std::string_view name) {
   std::vector<std::string> words;
   bool open = false;
@@ -57,7 +57,7 @@ constexpr auto meanings = std::to_array<std::pair<std::string_view, std::string_
      {"bricks", "concrete"},    {"iron", "steel"},      {"rust", "steel"},    {"rusty", "steel"},     {"stainless", "steel"},
      {"aluminum", "aluminium"}, {"wooden", "wood"},     {"timber", "wood"},   {"plank", "wood"},      {"tyre", "rubber"},
      {"tire", "rubber"},        {"neoprene", "rubber"}, {"pvc", "plastic"},   {"acrylic", "plastic"}, {"iceberg", "ice"}});
-/// Words for ground of whatever material.
+/// Words for ground of any material.
 constexpr auto ground_words = std::to_array<std::string_view>(
     {"heightmap", "seabed", "seafloor", "bathymetry", "terrain", "seamount", "ground", "riverbed", "lakebed", "sediment"});
 
@@ -83,7 +83,7 @@ class MaterialChooser {
     return chooser;
   }
 
-  /// By the names that the files give: of the appearance, the shape, the model, and of the file or the library that it is from.
+  /// Chooses a material by names in the files: of the appearance, the shape, the model, and the file or library of the model.
   std::string choose(const PlacedShape& shape, const ImportedModel& model) const {
     for (const auto& [path, name] : for_model_)
       if (model.path == path || model.path.starts_with(path + "/")) return name;

@@ -18,7 +18,7 @@ struct ImportOptions {
   std::vector<std::string> materials;  // NAME for everything, MODEL=NAME for one model and what is in it
   std::vector<std::string> moving;     // models by path
   Vec3d offset_m = {};
-  bool check = true;  // try every mesh, and load the scene in the end as the daemon does
+  bool check = true;  // load every mesh, and finally the scene, as the daemon does
   bool overwrite = false;
 };
 
@@ -27,8 +27,8 @@ struct Imported {
   std::vector<std::string> left_out;
 };
 
-/// Errors: file:line: what. Writes nothing unless everything was converted; a scene that does not load stays on disk for
-/// inspection.
+/// Errors begin with file:line. Writes nothing if a part cannot be converted. A scene that is written but cannot be loaded stays
+/// on disk, so that the user can inspect it.
 Result<Imported> import_scene(const ImportOptions& options);
 
 }  // namespace sonar::scene_tools

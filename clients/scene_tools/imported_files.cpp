@@ -27,7 +27,7 @@ MeshFile mesh_at(const fs::path& file) {
   return request;
 }
 
-/// The mesh scaled differently per axis, as an OBJ about its own origin.
+/// Returns an OBJ text of the mesh, scaled about its origin by a factor for each axis.
 std::string stretched_obj(const CentredMesh& centred, Vec3d scale) {
   std::string out = "# stretched by sonarctl scene import\n";
   for (const Vec3& v : centred.mesh.vertices) {
@@ -129,7 +129,7 @@ bool FileResolver::resolve_heightmap(PlacedShape& placed, const fs::path& file) 
   return true;
 }
 
-/// Relative to the scene, so that both can be moved together; absolute where they share only the root.
+/// Returns a path relative to the scene, so that both can be moved together. It is absolute if they have only the root in common.
 std::string FileResolver::path_to_write(const fs::path& file) const {
   std::error_code error;
   const fs::path target = fs::weakly_canonical(fs::absolute(file, error), error);

@@ -15,9 +15,9 @@ namespace sonar::scene_tools {
 class FileResolver {
  public:
   FileResolver(const Library& library, std::filesystem::path scene, bool skip_missing, bool try_files, Findings& findings);
-  /// Sets the scene entry of a shape from a file. False: omitted and listed, or missing.
+  /// Sets the entry of the scene for a shape from a file. Returns false if the file is missing, or omitted and listed.
   bool resolve(PlacedShape& placed);
-  /// Fails when files were not found and are not to be skipped: each is named once.
+  /// Fails if files were not found and must not be skipped; the error names each file once.
   void report_missing();
   /// Writes the meshes that had to be converted into a folder beside the scene.
   Result<void> write_converted();
@@ -39,7 +39,7 @@ class FileResolver {
     std::string what, fetch;  // fetch: a command; may be empty
   };
   std::vector<Missing> missing_;
-  std::map<std::filesystem::path, std::string> tried_;      // why a mesh cannot be used; empty: it can
+  std::map<std::filesystem::path, std::string> tried_;      // why a mesh cannot be used; empty if it can
   std::map<std::string, std::string> known_conversions_;    // by file and scale: the path to write
   std::map<std::filesystem::path, std::string> converted_;  // file to write, its text
 };

@@ -27,7 +27,7 @@ struct PlacedShape {
   Pose in_world;
   std::size_t model = 0;              // index into ImportedWorld::models
   std::string link = {}, label = {};  // names of the visual or collision
-  std::string material = {};          // in: name of its appearance in the file; out: a material of the scene
+  std::string material = {};  // before import_scene: name of the appearance in the file; after it: a material of the scene
   Place at = {};
 };
 
@@ -60,8 +60,8 @@ struct ReadOptions {
 
 inline constexpr std::size_t max_shapes = 20'000;
 
-/// The world of an SDF, world or URDF text, identified by its root element; `path` begins the errors. Bounded in depth, models
-/// and shapes, for any text and its includes.
+/// Reads the world of an SDF, world or URDF text, which its root element identifies. Errors begin with `path`. Depth, models and
+/// shapes are bounded for any text and its includes.
 Result<ImportedWorld> read_world(std::string_view text, const std::filesystem::path& path, const Library& library,
                                  const ReadOptions& options, Findings& findings);
 

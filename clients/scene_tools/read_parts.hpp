@@ -7,11 +7,12 @@
 
 namespace sonar::scene_tools {
 
-/// The one shape inside <geometry>; sizes are in child elements (SDF) or attributes (URDF). Empty when a scene cannot hold it,
-/// which is then listed, or for another element. `offset` receives the pose of the shape in its own frame.
+/// Reads the shape inside <geometry>, whose sizes are in child elements (SDF) or attributes (URDF). Returns nothing for other
+/// elements, and for shapes that a scene cannot hold, which are then listed. `offset` receives the pose of the shape in its
+/// frame.
 std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, Pose& offset);
 
-/// Adds a shape; an error beyond max_shapes.
+/// Adds a shape; more than max_shapes are an error.
 void add_shape(ImportedWorld& world, PlacedShape shape, Findings& findings);
 
 /// "sensor "camera"": name of an element in the list of omissions.

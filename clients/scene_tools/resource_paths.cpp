@@ -60,7 +60,7 @@ fs::path child_of(const fs::path& folder, const std::string& name) {
   return {};
 }
 
-/// The SDF that a model's folder holds: the newest that model.config names.
+/// Returns the SDF in the folder of a model: the newest one that model.config names.
 fs::path model_in(const fs::path& folder) {
   const fs::path config = folder / "model.config";
   if (!is_file(config)) return is_file(folder / "model.sdf") ? folder / "model.sdf" : fs::path();

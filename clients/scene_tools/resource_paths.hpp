@@ -10,13 +10,14 @@
 
 namespace sonar::scene_tools {
 
-/// Folders to look in, best first: `given`, then those of GZ_SIM_RESOURCE_PATH, GAZEBO_MODEL_PATH, IGN_GAZEBO_RESOURCE_PATH and,
-/// for packages, ROS_PACKAGE_PATH; last ~/.gazebo/models.
+/// Folders to search, in this order: `given`, then those of GZ_SIM_RESOURCE_PATH, GAZEBO_MODEL_PATH, IGN_GAZEBO_RESOURCE_PATH
+/// and, for packages, ROS_PACKAGE_PATH; last ~/.gazebo/models.
 std::vector<std::filesystem::path> resource_folders(const std::vector<std::filesystem::path>& given);
 
-/// The file that `uri` names in `from_file`, else an empty path. For a folder, the SDF in it that model.config names, or
-/// model.sdf, or that of its newest version. Of a Fuel address first in GZ_FUEL_CACHE_PATH, IGN_FUEL_CACHE_PATH, ~/.gz/fuel and
-/// ~/.ignition/fuel. Beside the folders: next to `from_file`, and up to eight folders above it.
+/// Finds the file that `uri` names in `from_file`; returns an empty path if there is none. It searches the folders, and those of
+/// `from_file` and up to eight levels above it. A Fuel address is searched in GZ_FUEL_CACHE_PATH, IGN_FUEL_CACHE_PATH, ~/.gz/fuel
+/// and
+/// ~/.ignition/fuel first. For a folder it returns the SDF that model.config names, or model.sdf, of the newest version.
 std::filesystem::path find_resource(std::string_view uri, const std::filesystem::path& from_file,
                                     const std::vector<std::filesystem::path>& folders);
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double far_m = 1000, tiny_m = 0.005, wide_m = 5;
 constexpr double tiny_ground_m = 1, steepest_ground = 10;  // width of the ground; its height over its width
-constexpr double flat_ground = 0.1, huge_ground_m = 5000;  // the same of ground as a mesh, which may be long
+constexpr double flat_ground = 0.1, huge_ground_m = 5000;  // the same limits for ground that is a mesh, which may be long
 constexpr double at_surface_m = 0.001;                     // a height that is rounded to 0
 constexpr std::size_t many_triangles = 2'000'000;
 
@@ -30,7 +30,8 @@ std::vector<std::string> names_where(const SceneDescription& scene, const Wanted
   return names;
 }
 
-/// A bottom: ground by its name, an object wide in both directions, or a tank that contains all others.
+/// Returns whether an object is a bottom: ground by its kind, an object wide in both directions, or a tank that contains all
+/// others.
 bool is_ground(const DescribedObject& o, const SceneDescription& scene) {
   const Vec3d all = scene.in_world.size_m();
   const Vec3d size = o.in_world.size_m();

@@ -197,7 +197,7 @@ void SdfTree::add_include(SdfModel& parent, const Element& include, int include_
 
 namespace {
 
-/// The pose of a frame, resolved once; a repeated request means that poses refer to each other in a circle.
+/// Computes the pose of a frame once. If the same frame is requested meanwhile, poses refer to each other in a circle.
 template <class Place_it>
 Pose once(SdfFrame& frame, const Place& asked_by, Findings& findings, int depth, const Place_it& place_it) {
   if (frame.in_model) return *frame.in_model;

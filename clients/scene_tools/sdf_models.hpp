@@ -13,18 +13,18 @@ namespace sonar::scene_tools {
 
 struct SdfModel;
 
-/// Something that poses may be relative to: a link, a joint, a frame or a nested model.
+/// A frame to which poses may be relative: a link, a joint, a frame or a nested model.
 struct SdfFrame {
   Element pose, element;
-  std::string base;              // what the pose is relative to by default; empty: the model
-  SdfModel* nested = nullptr;    // a model, whose own `placing` then says where
-  std::optional<Pose> in_model;  // once known
+  std::string base;              // frame to which the pose is relative by default; empty = the model
+  SdfModel* nested = nullptr;    // nested model; its `placing` has the pose
+  std::optional<Pose> in_model;  // set when it has been computed
   bool being_asked = false;
 };
 
 struct SdfModel {
   std::string name, path;  // crane, ship/crane; both empty for the world
-  std::string source;      // name of the model that an include names, which may say more than the name given here
+  std::string source;      // name of the included model, which may tell more than the name in this file
   Element element;         // <model> or <world>
   SdfModel* parent = nullptr;
   bool is_world = false, is_static = false, merged = false;
@@ -34,7 +34,7 @@ struct SdfModel {
   std::vector<std::unique_ptr<SdfModel>> nested;
 };
 
-/// Pose as written, and what it says it is relative to.
+/// A pose as the file has it, and the frame to which it is relative.
 struct SdfPose {
   Pose pose;
   std::string relative_to;

@@ -1,4 +1,4 @@
-// An imported world as the text of a scene of ours, with comments that say where things came from and what was left out.
+// Writes an imported world as the text of a scene, with comments on the origin of each part and on omitted parts.
 #pragma once
 
 #include <string>
@@ -9,19 +9,19 @@
 namespace sonar::scene_tools {
 
 struct WriteOptions {
-  std::vector<std::string> moving;  // models by path; what hangs on them moves with them
-  Vec3d offset_m = {};              // added to every place
-  std::string command;              // how this was made, for the first comment
+  std::vector<std::string> moving;  // models by path; models attached to them move with them
+  Vec3d offset_m = {};              // added to every position
+  std::string command;              // the command that made the scene, for the first comment
 };
 
-/// Paths of `moving` that no model has.
+/// Returns the paths in `moving` that no model has.
 std::vector<std::string> unknown_models(const ImportedWorld& world, const std::vector<std::string>& moving);
 
-/// YAML as docs/scenes.md describes it. Every shape needs a material, meshes and heightmaps the path to write. Names are unique,
-/// and as short as that allows.
+/// Returns YAML in the format of docs/scenes.md. Every shape needs a material; meshes and heightmaps need the path to write.
+/// Names become unique and as short as possible.
 std::string scene_text(const ImportedWorld& world, const std::vector<std::string>& left_out, const WriteOptions& options);
 
-/// Roll, pitch, yaw in degrees (intrinsic Z-Y-X), exact also where the nose points straight up or down.
+/// Returns roll, pitch and yaw in degrees (intrinsic Z-Y-X), exact also if the nose points straight up or down.
 Vec3d rpy_deg_from(const Quatd& orientation);
 
 }  // namespace sonar::scene_tools

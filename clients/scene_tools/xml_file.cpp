@@ -22,7 +22,7 @@ std::string_view trimmed(const char* text) {
 
 constexpr int deepest = 100;  // the limit of tinyxml2 before version 10; later versions allow 500
 
-/// The first element that lies deeper than `deepest`; null when none does. `count` elements were seen.
+/// Returns the first element below the depth `deepest`, or null. `count` receives the number of elements.
 const tinyxml2::XMLElement* count_elements(const tinyxml2::XMLElement* first, int depth, std::size_t& count) {
   for (const tinyxml2::XMLElement* e = first; e != nullptr; e = e->NextSiblingElement()) {
     if (depth > deepest) return e;
@@ -32,7 +32,7 @@ const tinyxml2::XMLElement* count_elements(const tinyxml2::XMLElement* first, in
   return nullptr;
 }
 
-/// Bytes of the UTF-8 character that `text` begins with; 0 if it is not valid.
+/// Returns the size of the UTF-8 character with which `text` begins; 0 if it is invalid.
 std::size_t character_length(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char lead = byte(0);

@@ -1,5 +1,5 @@
-// An XML file as the importers see it: elements that know their position, and one list of complaints. Only this file uses
-// tinyxml2; it bounds all sizes, so that the readers can accept any text.
+// XML files for the importers: elements with their positions in the file, and a list of errors and omissions. Only this file uses
+// tinyxml2; it limits all sizes, so that the readers can accept any text.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +32,7 @@ struct Place {
   std::string short_text() const;  // world.sdf:12, crate/model.sdf:12
 };
 
-/// A cursor on one element, or on the absence of one: everything about an absent one is empty.
+/// An element, or an absent one, all of whose properties are empty.
 class Element {
  public:
   Element() = default;
@@ -62,20 +62,20 @@ struct XmlFile {
 
 inline constexpr std::size_t max_xml_bytes = std::size_t{16} << 20;
 
-/// Errors: file:line: what. Refused: more than max_xml_bytes, no root element, elements more than 100 deep.
+/// Errors begin with file:line. Files of more than max_xml_bytes, without a root element, or deeper than 100 elements are errors.
 Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const std::filesystem::path& path,
                                                  std::string short_name);
 
-/// Errors and omissions of readers: they continue after an error with zeros, the first error counts; unread parts are listed.
+/// Collects errors and omissions of the readers. After an error they continue with zeros; only the first error is reported.
 class Findings {
  public:
   void fail(const Place& at, const std::string& what);
-  void leave_out(const Place& at, const std::string& what);  // each place and sentence once
-  /// "light": counted; the names of models, which may be empty, are listed with the count.
+  void leave_out(const Place& at, const std::string& what);  // lists each place and sentence once
+  /// Counts an omitted element, such as a "light". The names of models, if any, are listed with the count.
   void leave_out_of_no_echo(const std::string& kind, std::string_view name = {});
   bool failed() const { return error_.has_value(); }
   const std::optional<Error>& error() const { return error_; }
-  /// First, in one line, how many of what has no echo.
+  /// Returns the list. Its first line has the counts of elements without an echo.
   std::vector<std::string> left_out() const;
 
  private:
@@ -90,11 +90,11 @@ class Findings {
   std::unordered_set<std::string> seen_;
 };
 
-/// Numbers between blanks. Fails unless there are exactly `count`, finite and within 1e9 either way.
+/// Parses numbers between blanks. Fails unless there are exactly `count` numbers, all within -1e9 to 1e9.
 std::vector<double> read_numbers(std::string_view text, std::size_t count, const Place& at, std::string_view what,
                                  Findings& findings);
 
-/// Free text from a file, fit for a name or a comment: one line, valid UTF-8, at most `most` bytes.
+/// Makes text from a file usable as a name or comment: one line, valid UTF-8, at most `most` bytes.
 std::string plain(std::string_view text, std::size_t most = 64);
 
 }  // namespace sonar::scene_tools
