@@ -14,13 +14,13 @@ class Validator;
 
 namespace sonar::clients {
 
-/// HOST, HOST:PORT or :PORT.
+/// Checks an option whose value is HOST, HOST:PORT or :PORT.
 CLI::Validator address();
 CLI::Validator colour_map();
 
-/// --frame: enu or ned, in lower or upper case.
+/// Adds --frame: enu or ned, in lower or upper case.
 void add_frame_option(CLI::App& command, control::Frame& frame, const std::string& help);
-/// --control and --token-file.
+/// Adds --control and --token-file.
 void add_control_options(CLI::App& command, std::string& address, std::filesystem::path& token_file);
 
 struct DeviceArguments {
@@ -28,7 +28,7 @@ struct DeviceArguments {
   std::uint16_t port = 0;  // 0 = the default
   bool discover = false;
   double patience_s = 2;
-  /// ADDRESS, --port, --discover and --wait.
+  /// Adds ADDRESS, --port, --discover and --wait.
   void add_to(CLI::App& command, const std::string& port_help);
 };
 

@@ -29,12 +29,12 @@ Run add_load(CLI::App& app);
 Run add_object(CLI::App& app);
 Run add_recording(CLI::App& app);
 Run add_fault(CLI::App& app);
-/// `words`: all after "sonarctl". The parser does not read them: another program's command line is among them.
+/// `words`: all words after "sonarctl". They contain the command line of another program, so the parser does not read them.
 Run add_judge(CLI::App& app, const std::vector<std::string>& words);
 Run add_farm(CLI::App& app, const std::vector<std::string>& words);
 Run add_lab(CLI::App& app, const std::vector<std::string>& words);
 
-/// Runs the command that the arguments name; the exit code of the program.
+/// Runs the command that the arguments name. Returns the exit code of the program.
 int run(int argc, char** argv);
 
 }  // namespace sonar::clients

@@ -20,7 +20,7 @@ namespace sonar::clients {
 /// Source of pings: a device or a recording.
 struct SourceOptions {
   Endpoint device{"127.0.0.2", 0};  // port 0: that of the make
-  const Make* make = nullptr;       // null: any that answers at the host of `device`
+  const Make* make = nullptr;       // null: the first make that answers at the host of `device`
   bool discover = false;            // take the device from its status broadcast
   std::filesystem::path recording;  // instead of a device
   std::string sonar;                // selects one of several in a recording
@@ -31,7 +31,7 @@ struct SourceOptions {
   double picture_limit_s = 30;  // longest wait for a picture of many pings, from the first ping on; a Ping360 scans 180 degrees
   bool observe = false;         // occupy no client slot, request nothing
   bool keeps_messages = false;  // fill PingStream::Item::messages
-  std::string control;  // HOST:PORT of sonard's control stream, which gives the address for observers; empty = the usual one
+  std::string control;  // HOST:PORT of sonard's control stream, which reports the address for observers; empty = the default
   std::filesystem::path token_file;
 };
 
@@ -40,7 +40,7 @@ struct ListenOptions {
   double seconds = 0;       // 0 = no limit
   std::uint64_t pings = 0;  // 0 = no limit
   bool json = false, quiet = false;
-  double started_at_unix_s = 0;  // also report the time from then to the first ping
+  double started_at_unix_s = 0;  // if set, also report the time from then to the first ping
   std::filesystem::path png;     // draw the last ping
   std::filesystem::path record;  // raw bytes
   FanStyle style;
@@ -70,13 +70,13 @@ Result<void> stats(const StatsOptions& options);
 
 struct PoseOptions {
   enum class Path { once, circle, line } path = Path::once;
-  std::string to;                                             // HOST:PORT; empty = 127.0.0.1 and the protocol's port
-  bool json = false;                                          // JSON lines instead of protobuf
-  bool confirm = false;                                       // over the TCP control stream, each pose answered by the daemon
-  std::filesystem::path token_file;                           // for a control stream that requires one
-  control::Frame frame = control::Frame::enu_flu;             // frame of the positions and angles below, and of what is sent
-  std::string vehicle, object;                                // at most one; empty = the only vehicle. Objects use TCP
-  double rate_hz = 20, seconds = 0;                           // 0 = one turn, or one line
+  std::string to;                                  // HOST:PORT; empty = 127.0.0.1 and the protocol's port
+  bool json = false;                               // JSON lines instead of protobuf
+  bool confirm = false;                            // sends over the TCP control stream, where the daemon answers each pose
+  std::filesystem::path token_file;                // for a control stream that requires one
+  control::Frame frame = control::Frame::enu_flu;  // frame of the positions and angles below, and of what is sent
+  std::string vehicle, object;                     // at most one; empty = the only vehicle. Objects use TCP
+  double rate_hz = 20, seconds = 0;                // 0 = one turn, or one line
   std::vector<double> position_m{0, 0, 0}, rpy_deg{0, 0, 0};  // once
   std::vector<double> centre_m{0, 0, 0};                      // circle
   double radius_m = 5, period_s = 60;

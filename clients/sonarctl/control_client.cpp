@@ -15,7 +15,7 @@ std::chrono::milliseconds left_until(Clock::time_point deadline) {
   return std::max(std::chrono::milliseconds(0), std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()));
 }
 
-/// Without surrounding blanks, as the daemon reads it.
+/// Reads the token without surrounding blanks, as the daemon does.
 Result<std::string> token_from(const std::filesystem::path& file) {
   if (file.empty()) return std::string();
   constexpr const char* blanks = " \t\r\n";
@@ -49,7 +49,7 @@ Result<void> judge(const v1::Status& answer) {
   }
 }
 
-/// The event is kept as long as the Response that carries it.
+/// The event lives as long as the Response that contains it.
 std::shared_ptr<const v1::Event> event_of(const ControlClient::Response& response) { return {response, &response->event()}; }
 
 }  // namespace
@@ -83,7 +83,7 @@ Result<ControlClient::Response> ControlClient::request(Operation operation, std:
   for (;;) {
     const Result<Response> answer = next_message(deadline, false);
     if (!answer) return tl::unexpected(answer.error());
-    if (!*answer && last_id_ == 1)  // the greeting
+    if (!*answer && last_id_ == 1)  // the answer to Hello
       return tl::unexpected(no_control_stream("no greeting within " + std::to_string(patience.count() / 1000) + " s"));
     if (!*answer)
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " did not answer within " +
@@ -127,7 +127,7 @@ Error ControlClient::no_control_stream(const std::string& why) const {
                                    " unless configured otherwise; sonard's banner names it: --control HOST:PORT"};
 }
 
-/// Null at the end of the time or, with `until_signal`, after a signal.
+/// Returns null when the time is over or, with `until_signal`, after a signal.
 Result<ControlClient::Response> ControlClient::next_message(Clock::time_point deadline, bool until_signal) {
   for (;;) {
     auto message = parser_.next();

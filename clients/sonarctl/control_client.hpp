@@ -38,10 +38,10 @@ class ControlClient {
   /// wrong. `token_required` is set when sonard requires a token and no token file is given.
   static Result<ControlClient> open(const ControlOptions& options, bool* token_required = nullptr);
 
-  /// The answer to one request; a refusal is an error with sonard's text. Events that arrive meanwhile are kept.
+  /// Sends a request and returns its answer; a refusal is an error with sonard's text. Events that arrive meanwhile are kept.
   Result<Response> request(Operation operation, std::chrono::milliseconds patience = usual_patience);
   Result<std::shared_ptr<const v1::DaemonStatus>> status(std::chrono::milliseconds patience = usual_patience);
-  /// The next subscribed event; null when `patience` has passed or the process has received a signal.
+  /// Returns the next subscribed event; null when `patience` has passed or the process has received a signal.
   Result<std::shared_ptr<const v1::Event>> next_event(std::chrono::milliseconds patience);
 
   const Endpoint& at() const { return at_; }

@@ -1,4 +1,4 @@
-// One request over HTTP, for the client side. Used by doctor and by waterlinked_stream.
+// Sends one request over HTTP, for doctor and ping_stream.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@ struct HttpReply {
   unsigned status = 0;
   std::string body;
 };
-/// A body is sent as JSON. unavailable: no connection; bad_data: what answers within `patience` is not HTTP.
+/// A body is sent as JSON. Errors: unavailable if there is no connection; bad_data if the answer within `patience` is not HTTP.
 Result<HttpReply> http_ask(const Endpoint& at, const std::string& method, const std::string& path, const std::string& body,
                            std::chrono::milliseconds patience);
 

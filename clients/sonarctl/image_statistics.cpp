@@ -16,7 +16,7 @@ std::vector<double> values_in(const PolarImage& image, const Window& w) {
   return values;
 }
 
-/// "a:b", "a:", ":b" or "" into [begin, end); false for other text or a window that does not fit.
+/// Parses "a:b", "a:", ":b" or "" to [begin, end). Returns false for other text or a window that does not fit.
 bool parse_interval(const std::string& text, std::size_t limit, std::size_t& begin, std::size_t& end) {
   begin = 0, end = limit;
   if (text.empty()) return true;

@@ -16,11 +16,11 @@ struct Window {
   std::size_t row_begin = 0, row_end = 0, beam_begin = 0, beam_end = 0;
 };
 Window whole(const PolarImage& image);
-/// "400:650" or "400:650,100:200" (rows, beams); a missing end is that of the image. usage: empty or outside.
+/// Parses "400:650" or "400:650,100:200" (rows, beams); a missing end is that of the image. Errors: usage if empty or outside.
 Result<Window> parse_window(const std::string& text, const PolarImage& image);
 
 double mean(const PolarImage& image, const Window& window);
-/// Pearson correlation of each sample with the one `rows` and `beams` further on, over the window. 0 when nothing varies.
+/// Pearson correlation of each sample of the window with the sample `rows` and `beams` further on; 0 if all are equal.
 double correlation(const PolarImage& image, const Window& window, std::size_t rows, std::size_t beams);
 /// Share of the window's samples at or above a code.
 double share_at_least(const PolarImage& image, const Window& window, float code);

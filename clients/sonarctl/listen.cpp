@@ -27,8 +27,8 @@ class Listener {
     use(std::move(opened.stream));
   }
 
-  /// Runs until the requested time or number of pings. An error when the device stops earlier and, in a run without a limit, does
-  /// not come back.
+  /// Runs until the requested time or number of pings. It is an error if the device stops earlier or, in a run without a limit,
+  /// does not come back.
   Result<void> run() {
     for (;;) {
       const Result<void> ran = run_once();
@@ -38,7 +38,7 @@ class Listener {
       const Endpoint device = stream_->device();
       before_ = counts();
       outage_.begins();
-      stream_.reset();  // its ports are wanted again
+      stream_.reset();  // frees its ports for the next connection
       auto again =
           open_again(options_.source, device, outage_, ran.error(), [](const std::string& line) { print_notices({line}); });
       if (!again) return interrupted != 0 ? Result<void>{} : tl::unexpected(again.error());
@@ -47,7 +47,7 @@ class Listener {
   }
 
   PingSummary summary() const { return log_.summary(counts()); }
-  /// True when settings were sent that pings echo.
+  /// True if settings were sent that pings echo.
   bool asked() const { return asked_; }
   const std::optional<HostPing>& last_ping() const { return last_ping_; }
   std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }

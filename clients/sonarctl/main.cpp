@@ -7,8 +7,8 @@
 int main(int argc, char** argv) {
   struct sigaction on_interrupt {};
   on_interrupt.sa_handler = [](int) { sonar::clients::interrupted = 1; };
-  on_interrupt.sa_flags =
-      static_cast<int>(SA_RESETHAND);  // a second one ends commands that do not check `interrupted`, such as a check of a scene
+  on_interrupt.sa_flags = static_cast<int>(
+      SA_RESETHAND);  // a second Ctrl-C ends commands that do not check `interrupted`, such as a check of a scene
   sigaction(SIGINT, &on_interrupt, nullptr);
   sigaction(SIGTERM, &on_interrupt, nullptr);
   std::signal(SIGPIPE, SIG_IGN);

@@ -48,7 +48,7 @@ bool is_connected_to_itself(const Socket& socket) {
   return ours.sin_port == theirs.sin_port && ours.sin_addr.s_addr == theirs.sin_addr.s_addr;
 }
 
-/// 0, or the errno of one attempt that takes at most `patience`.
+/// Tries to connect once, for at most `patience`. Returns 0 or the errno.
 int try_connect(const Socket& socket, const addrinfo& address, std::chrono::milliseconds patience) {
   const int flags = ::fcntl(socket.fd(), F_GETFL);
   ::fcntl(socket.fd(), F_SETFL, flags | O_NONBLOCK);

@@ -20,7 +20,7 @@ struct Endpoint {
   std::uint16_t port = 0;
 };
 std::string text_from(const Endpoint& endpoint);  // "127.0.0.2:52100"
-/// "host", "host:port" or ":port"; missing parts come from `fallback`.
+/// Parses "host", "host:port" or ":port"; missing parts are taken from `fallback`.
 Result<Endpoint> parse_endpoint(const std::string& text, const Endpoint& fallback);
 
 /// Owns a file descriptor.
@@ -41,14 +41,14 @@ class Socket {
 
 /// Retries until `patience` is over, so that a daemon that is still starting is reached.
 Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patience);
-/// The same for several addresses, tried in turn: the socket of the first that accepts, and its index.
+/// Tries several addresses in turn. Returns the socket of the first that accepts, and its index.
 struct Connected {
   Socket socket;
   std::size_t which = 0;
 };
 Result<Connected> connect_first(const std::vector<Endpoint>& places, std::chrono::milliseconds patience);
 Result<Socket> connect_udp(const Endpoint& to);
-/// Bound with address reuse: other listeners on this machine still receive broadcasts.
+/// Binds with address reuse, so that other listeners on this computer still receive broadcasts.
 Result<Socket> listen_udp(const Endpoint& at);
 inline Result<Socket> listen_udp(std::uint16_t port) { return listen_udp(Endpoint{"0.0.0.0", port}); }
 
@@ -59,7 +59,7 @@ struct Read {
   std::string error;  // reason when the connection was not closed regularly
 };
 Read read_some(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience);
-/// One datagram, and who sent it.
+/// A datagram and its sender.
 struct Datagram {
   Wait what = Wait::timed_out;
   std::size_t size = 0;
@@ -67,7 +67,7 @@ struct Datagram {
   std::string error;
 };
 Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience);
-/// Reads nothing. False when a byte is available, or nothing happens within `patience`.
+/// Waits for the end of a connection without reading. Returns false if a byte is available, or nothing happens within `patience`.
 bool ends_without_a_byte(const Socket& socket, std::chrono::milliseconds patience);
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);
 

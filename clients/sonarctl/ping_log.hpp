@@ -20,7 +20,8 @@ using protocol::HostPing;
 struct PingSummary {
   std::uint64_t pings = 0, bytes = 0, identity_errors = 0;
   std::optional<protocol::Host::Counts> of_wire;   // nullopt: messages are neither numbered nor judged
-  std::optional<std::uint64_t> echo_satisfied_at;  // number of the ping, from 1; nullopt = never, or nothing was requested
+  std::optional<std::uint64_t> echo_satisfied_at;  // number of the first ping with the requested settings, from 1; nullopt =
+                                                   // none, or nothing was requested
   std::uint64_t echo_lost = 0;                     // pings after that one whose echo differed
   double rate_hz = 0;
   double interval_p50_ms = 0, interval_p99_ms = 0, interval_max_ms = 0;
@@ -37,10 +38,10 @@ class PingLog {
   std::vector<Seconds> arrivals_;
 };
 
-/// Value below which `share` (0..1) of the values lie; 0 for none. Sorts a copy.
+/// Returns the value below which `share` (0..1) of the values lie; 0 if there are none.
 double percentile(std::vector<double> values, double share);
 
-/// Faults of the stream for a driver; empty = none.
+/// Describes the faults of the stream that a driver would notice; empty = none.
 std::vector<std::string> complaints(const PingSummary& summary, bool asked);
 
 std::string line_from(const HostPing& ping);  // one line per ping

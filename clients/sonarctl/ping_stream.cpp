@@ -23,20 +23,20 @@ using Clock = std::chrono::steady_clock;
 using Kind = protocol::HostPort::Kind;
 
 constexpr auto probe_patience = 300ms;         // for each make, while the make is not known
-constexpr auto answer_patience = 3000ms;       // minimum for a sonar that is there: it may be computing
+constexpr auto answer_patience = 3000ms;       // minimum once a sonar has answered, because it may be computing
 constexpr auto connect_patience = 2000ms;      // for streams, before other kinds of ports are tried
 constexpr auto longest_pause = 160ms;          // between attempts
 constexpr int receive_buffer_bytes = 4 << 20;  // a few pings
 constexpr const char* is_sonard_there = ". Is sonard running there? Its banner names the address of each sonar";
 
-/// The time that a host is given.
+/// The time in the form that hosts expect.
 Time now() { return Time(std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch())); }
 
 milliseconds left_until(Clock::time_point deadline) {
   return std::max(0ms, std::chrono::ceil<milliseconds>(deadline - Clock::now()));
 }
 
-/// The address of either end; the socket API requires the casts.
+/// Returns the address of one end of a socket; the socket API requires the casts.
 sockaddr_in own_address(const Socket& socket) {
   sockaddr_in at{};
   socklen_t size = sizeof at;
@@ -83,7 +83,7 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
     if (Result<void> opened = stream.start(std::move(connected), within); !opened) return tl::unexpected(opened.error());
     return stream;
   };
-  // A sonar that does not have the settings is asked without them. Its refusal counts only if such a sonar answers.
+  // A make that does not have the settings is tried without them. The refusal of the settings is reported only if it answers.
   const auto searched = [&](const Candidate& at, milliseconds within) -> Result<PingStream> {
     auto host = at.first->host(wanted);
     if (host) return started(at, std::move(host), std::nullopt, within);
@@ -95,7 +95,7 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
   Error failed;
   auto pause = 20ms;
   for (bool is_last = false;;
-       is_last = Clock::now() >= deadline) {  // the streams once more after the others, which may take long
+       is_last = Clock::now() >= deadline) {  // tries the streams once more, because the other kinds may have taken long
     if (!streams.empty()) {
       std::vector<Endpoint> places;
       for (const auto& [one, at] : streams) places.push_back(at);

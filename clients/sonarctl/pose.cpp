@@ -70,7 +70,7 @@ PoseSample sample_of(const PoseOptions& options, const Moment& moment, std::uint
   return sample;
 }
 
-/// ArduPilot's keys; its frame is the default and not repeated.
+/// Uses the keys of ArduPilot's JSON; its frame is the default, so the line does not name it.
 std::string json_line(const PoseSample& sample) {
   const bool ned = sample.sent_in == Frame::ned_frd;
   const Pose pose = ned ? enu_flu_from_ned_frd(sample.pose) : sample.pose;  // the conversion is its own inverse
@@ -91,7 +91,7 @@ std::vector<std::byte> bytes_of(const std::string& text) {
   return bytes;
 }
 
-/// On a connected UDP socket a missing listener shows as a refusal after the first datagram.
+/// Sends over a connected UDP socket, which reports after the first datagram if no program listens.
 Result<void> send_datagram(const Socket& socket, const Endpoint& to, const std::vector<std::byte>& datagram) {
   const tl::unexpected<Error> no_listener = failure(
       ErrorKind::unavailable, "no program listens on udp " + text_from(to) + ": is sonard running with poses there? (--to)");

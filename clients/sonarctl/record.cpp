@@ -26,7 +26,7 @@ constexpr int most_status_at_once = 32;
 
 Time unix_now() { return Time(std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())); }
 
-/// The sonard that serves the device: name of the sonar and a subscription to its pings.
+/// The sonard that serves the device, with the name of the sonar and a subscription to its pings.
 struct Steering {
   ControlClient client;
   std::string sonar;
@@ -202,7 +202,7 @@ Result<void> record_device(const RecordOptions& options) {
   return ran ? closed : ran;
 }
 
-/// Ten a second, as raw dumps have no times.
+/// Makes times of ten messages a second, because raw dumps have no times.
 Time made_up_time(std::uint64_t number) { return Time(number * 100ms); }
 
 Result<void> convert(const RecordOptions& options) {

@@ -77,7 +77,7 @@ Result<void> RecordFiles::write_ping(Time at, const HostPing& ping) {
   // The session makes images of messages with samples. For a scan, each of its lines would write the whole picture.
   if (mcap_ == nullptr || make_->codec.samples != nullptr || make_->scans) return {};
   const Result<PolarImage> image = ping.picture();
-  return image ? mcap_->write_image(at, samples_of(*image, ping.facts.bits)) : Result<void>{};  // some pings are no picture
+  return image ? mcap_->write_image(at, samples_of(*image, ping.facts.bits)) : Result<void>{};  // some pings make no picture
 }
 
 Result<void> RecordFiles::write_pose(Time at, Time of, const Pose& sonar_in_world) {

@@ -12,17 +12,17 @@ namespace sonar::clients {
 
 class RecordFiles {
  public:
-  /// Creates all files that the options name. io; usage: a kind of file that another make has.
+  /// Creates all files that the options name. Errors: io; usage for a kind of file of another make.
   static Result<RecordFiles> create(const RecordOptions& options, const Make& make,
                                     const recording::PcapConversation& conversation, const std::string& sonar);
 
-  /// Writes to every file; the first failure ends all. io.
+  /// Writes to every file. The first failure ends all of them. Errors: io.
   Result<void> write(const recording::RecordedMessage& message);
   /// Counts the ping whose last message was written; its picture goes to the MCAP file, if any.
   Result<void> write_ping(Time at, const HostPing& ping);
   /// Writes to the MCAP file, if any.
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
-  /// Finishes every file, also after a failure; returns the first error. io.
+  /// Finishes every file, also after a failure. Returns the first error: io.
   Result<void> close();
 
   std::uint64_t pings() const { return pings_; }

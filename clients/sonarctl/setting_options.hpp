@@ -1,5 +1,5 @@
-// Options that say where pings come from and the settings of the sonar, the same for every make. Used by every command that shows
-// or keeps pings.
+// Options for the source of pings and the settings of the sonar. They are the same for every make and for every command that
+// shows or records pings.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -13,11 +13,11 @@ namespace sonar::clients {
 
 struct SettingArguments {
   protocol::SettingsOverride settings;
-  std::map<std::string, std::string> more;  // options that few makes have
+  std::map<std::string, std::string> more;  // options of few makes
 
   /// The command must outlive this.
   void add_to(CLI::App& app);
-  /// The options that were typed.
+  /// Returns the options that the user gave.
   protocol::Wanted wanted() const;
 };
 

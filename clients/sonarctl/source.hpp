@@ -13,7 +13,7 @@ namespace sonar::clients {
 
 std::chrono::milliseconds milliseconds_from(double s);
 
-/// The given address, or that of a status broadcast; `say` prints the result.
+/// Returns the given address, or that of a status broadcast; `say` prints the result.
 Result<Endpoint> find_device(const SourceOptions& source, bool say);
 
 /// Pings of a device: as a client with the requested settings, or as an observer.
@@ -29,7 +29,7 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
 /// find_device() and open_stream().
 Result<OpenedStream> connect(const SourceOptions& source, bool say);
 
-/// When the pings stopped. A connection without pings is no return of the device: by UDP one can always be opened.
+/// The time without pings. A connection without pings does not end it, because by UDP a connection can always be opened.
 class Outage {
  public:
   using Clock = std::chrono::steady_clock;
@@ -37,7 +37,7 @@ class Outage {
   void begins();  // no effect in an outage
   void ends() { since_.reset(); }
   double left_s(const SourceOptions& source) const;  // until source.return_limit_s is over
-  /// When the next attempt may begin: a device that ends each connection at once is not asked more often than once a second.
+  /// When the next attempt may begin. A device that ends each connection at once is tried at most once a second.
   Clock::time_point next_attempt() { return last_attempt_ = std::max(Clock::now(), last_attempt_ + std::chrono::seconds(1)); }
 
  private:
@@ -45,21 +45,21 @@ class Outage {
   Clock::time_point last_attempt_;
 };
 
-/// The stream again after `why` it was lost, within what is left of the outage; both lines go to `say`. The error is `why` when
-/// Ctrl-C is pressed, and says so when the device does not come back.
+/// Connects again after the stream was lost (`why`), within the remaining time of the outage; reports loss and return to `say`.
+/// The error is `why` after Ctrl-C; otherwise it says that the device did not come back.
 Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, Outage& outage, const Error& why,
                                 const std::function<void(const std::string&)>& say);
 
 /// Writes to standard error.
 void print_notices(const std::vector<std::string>& notices);
 
-/// Error: `what` did not arrive within source.silence_limit_s, or no message of the make arrived at all (`received` false).
+/// Makes the error for `what` that did not arrive within source.silence_limit_s. `received`: some message of the make arrived.
 Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
               const std::string& hint);
 
-/// read_ping() of a recording, or the first ping of a device that was made with the requested settings. A picture of many pings
-/// is waited for until it is whole or source.picture_limit_s is over; where single pings make no picture: `of_samples`, not at
-/// all.
+/// Returns read_ping() of a recording, or the first ping of a device with the requested settings. If many pings make a picture,
+/// it waits until the picture is whole or source.picture_limit_s is over. With `of_samples` it does not wait if a single ping
+/// makes no picture.
 Result<HostPing> fetch_ping(const SourceOptions& source, std::optional<std::size_t> number, bool of_samples = false);
 
 }  // namespace sonar::clients

@@ -17,8 +17,8 @@ struct TerminalFacts {
 };
 TerminalFacts terminal_facts();
 
-/// None for files and pipes, with NO_COLOR set (no-color.org), on dumb terminals and where the locale is not UTF-8; else by
-/// COLORTERM, or 256 colours.
+/// Returns no colours for files and pipes, with NO_COLOR (no-color.org), on dumb terminals and without a UTF-8 locale; else those
+/// of COLORTERM, or 256 colours.
 TerminalColours choose_colours(const TerminalFacts& facts);
 
 struct TerminalSize {
@@ -35,7 +35,7 @@ class LiveScreen {
   ~LiveScreen();
   LiveScreen(const LiveScreen&) = delete;
   LiveScreen& operator=(const LiveScreen&) = delete;
-  /// False when the output was closed.
+  /// Returns false if the output was closed.
   bool show(const std::vector<std::string>& lines) const;
 
  private:

@@ -15,7 +15,7 @@ struct Circle {
   double radius_m = 5, period_s = 60, pitch_rad = 0;  // pitch: bow up positive; negative period = clockwise
   bool look_inwards = true;                           // if false: along the path
 };
-/// Anticlockwise seen from above, starting east of the centre.
+/// Moves anticlockwise seen from above, starting east of the centre.
 Moment on_circle(const Circle& circle, double time_s);
 
 struct Line {
@@ -23,7 +23,7 @@ struct Line {
   double speed_mps = 0.5, pitch_rad = 0;
   double duration_s() const { return length(to_m - from_m) / speed_mps; }
 };
-/// Heading along the line; stays at the end.
+/// Moves along the line, heading ahead, and stops at its end.
 Moment on_line(const Line& line, double time_s);
 
 }  // namespace sonar::clients

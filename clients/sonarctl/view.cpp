@@ -28,7 +28,7 @@ Result<Raster> write_picture(const ViewOptions& options, PicturePainter& painter
   return raster;
 }
 
-/// The picture as lines that fit the terminal above `lines_kept` others.
+/// Returns the picture as lines that fit into the terminal above `lines_kept` other lines.
 Result<std::vector<std::string>> lines_of(const ViewOptions& options, const SonarPicture& picture, int lines_kept) {
   const TerminalSize size = terminal_size();
   TerminalStyle style;
@@ -84,7 +84,7 @@ class LiveView {
         ran = draw(screen, has_screen);
         if (!lost_ || interrupted != 0 || options_.pings > 0 || figures_.pings() == 0) break;
         const Endpoint device = stream_->device();
-        stream_.reset();  // its ports are wanted again
+        stream_.reset();  // frees its ports for the next connection
         outage_.begins();
         auto again = open_again(options_.source, device, outage_, ran.error(), [&](const std::string& line) {
           if (has_screen)
@@ -131,7 +131,7 @@ class LiveView {
     return {};
   }
 
-  /// False when the output was closed.
+  /// Returns false if the output was closed.
   Result<bool> show(const HostPing& ping, const LiveScreen& screen) {
     figures_.add(ping, stream_->host().counts(), now_s());
     outage_.ends();

@@ -1,4 +1,4 @@
-// Lines on standard error about what a command waits for: none waits in silence.
+// Prints to standard error what a command waits for.
 #pragma once
 
 #include <chrono>
@@ -9,7 +9,7 @@
 
 namespace sonar::clients {
 
-/// The wait for the first ping. Its line is printed once it lasts longer than a moment.
+/// The wait for the first ping. If it is not very short, it prints a line.
 class FirstPingWait {
  public:
   using Clock = std::chrono::steady_clock;
@@ -17,13 +17,13 @@ class FirstPingWait {
 
   /// `observes`: nothing was requested.
   FirstPingWait(const SourceOptions& source, const PingStream& stream, bool observes, Clock::time_point now = Clock::now());
-  /// `most`, or less if the line may be due before.
+  /// Returns how long to wait: `most`, or less if the line is due before.
   std::chrono::milliseconds patience(std::chrono::milliseconds most, Clock::time_point now = Clock::now()) const;
-  /// To be called after each wait, with whether a ping came.
+  /// Call it after each wait, with whether a ping came.
   void look(bool has_ping, Clock::time_point now = Clock::now());
 
  private:
-  std::string line_;  // empty: it was printed, or is no longer needed
+  std::string line_;  // empty after it was printed, or if it is no longer needed
   Clock::time_point due_;
 };
 
@@ -35,7 +35,7 @@ class PictureProgress {
   explicit PictureProgress(double limit_s) : limit_s_(limit_s) {}
   /// A line to print: with the first ping, then every two seconds. `ping` is not whole.
   std::optional<std::string> line_at(const HostPing& ping, Clock::time_point now);
-  /// The picture is to be taken as it is.
+  /// True if the wait for the whole picture is over.
   bool is_over(Clock::time_point now) const;
 
  private:

@@ -25,7 +25,7 @@ std::vector<std::string> lines_of(const std::string& text, int most) {
   return lines;
 }
 
-/// Short sleeps: Ctrl-C ends the wait.
+/// Sleeps in short pieces, so that Ctrl-C ends the wait.
 void wait_s(double seconds) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(1000 * seconds));
   while (interrupted == 0 && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(std::chrono::milliseconds(20));

@@ -26,7 +26,7 @@ struct EventsOptions {
 };
 Result<void> print_events(const EventsOptions& options);
 
-/// One request and the text to print on success.
+/// A request, and the text to print if it succeeds.
 Result<void> steer(const ControlOptions& control, ControlClient::Operation operation, const std::string& done);
 
 struct StepOptions {
@@ -35,10 +35,10 @@ struct StepOptions {
   std::uint64_t count = 1;
   bool json = false;
 };
-/// Step by step, until interrupted; prints per step the time and the number of pings.
+/// Steps until interrupted; prints the time and the number of pings of each step.
 Result<void> step_time(const StepOptions& options);
 
-/// The path for the daemon: absolute for a file that exists here, since the daemon has another working directory.
+/// Returns the path to send to the daemon: absolute if the file exists here, because the daemon has another working directory.
 std::string scene_path_for(const Endpoint& daemon, const std::string& path);
 Result<void> load_scene(const ControlOptions& control, const std::string& path);
 

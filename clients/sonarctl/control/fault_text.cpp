@@ -38,7 +38,7 @@ std::string text_from(const v1::FaultEntry& e) {
   if (e.offset() >= 0) text += format("  byte %lld", static_cast<long long>(e.offset()));
   if (e.bytes_before() != e.bytes_after())
     text += format("  %" PRIu64 " -> %" PRIu64 " bytes", e.bytes_before(), e.bytes_after());
-  const std::set<std::string> names = [&] {  // a map of protobuf has no order
+  const std::set<std::string> names = [&] {  // sorts them, because a map of protobuf has no order
     std::set<std::string> all;
     for (const auto& [name, value] : e.with()) all.insert(name);
     return all;
@@ -51,7 +51,7 @@ std::string text_from(const v1::FaultEntry& e) {
 std::string fault_list_text(const v1::FaultReport& report) {
   if (!report.armed()) return "faults are not armed: sonard run --faults, or faults: {armed: true}\n";
   if (report.faults().empty()) return "no faults\n";
-  std::vector<const v1::FaultStatus*> faults;  // first those that act, then those that wait, then those that are over
+  std::vector<const v1::FaultStatus*> faults;  // in the order active, waiting, over
   int name_width = 16, asked_width = 16;
   for (const v1::FaultStatus& f : report.faults()) {
     faults.push_back(&f);
@@ -89,7 +89,7 @@ std::string fault_kinds_text(const v1::FaultReport& report) {
 }
 
 std::string fault_support_text(const v1::FaultReport& report) {
-  std::set<std::string> vendors;  // faults that a daemon cannot inject from inside name all of them
+  std::set<std::string> vendors;  // all vendors: faults that a daemon cannot inject name each of them
   for (const v1::FaultKind& k : report.kinds())
     for (const auto& [vendor, why] : k.without_effect()) vendors.insert(vendor);
   std::string text = "| code | name | tier |", rule = "|---|---|---|";

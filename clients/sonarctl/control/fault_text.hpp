@@ -15,17 +15,17 @@ class FaultReport;
 
 namespace sonar::clients {
 
-/// One line without newline.
+/// Returns one line without newline.
 std::string text_from(const v1::FaultEntry& entry);
-/// Several lines, each with its newline.
+/// Returns several lines, each with its newline.
 std::string fault_list_text(const v1::FaultReport& report);
 std::string fault_kinds_text(const v1::FaultReport& report);
-/// The table kind x vendor in Markdown, of a report with kinds.
+/// Returns the table of kinds by vendors in Markdown. The report must have kinds.
 std::string fault_support_text(const v1::FaultReport& report);
 
-/// {"bytes=1", "fill=zero"}. Errors: usage.
+/// Parses {"bytes=1", "fill=zero"}. Errors: usage.
 Result<void> read_parameters(const std::vector<std::string>& given, control::FaultRecord& record);
-/// {"every=50", "phase=3"}. The daemon checks the numbers. Errors: usage.
+/// Parses {"every=50", "phase=3"}; the daemon checks the numbers. Errors: usage.
 Result<void> read_trigger(const std::vector<std::string>& given, control::FaultRecord& record);
 
 }  // namespace sonar::clients

@@ -23,7 +23,7 @@ std::string duration_text(double seconds) {
 
 std::string line(const char* name, const std::string& text) { return format("%-9s ", name) + text + "\n"; }
 
-/// As it is set, and as it is measured.
+/// Returns the rate that is set and the rate that is measured.
 std::string rate_text(const v1::SonarStatus& s) {
   std::string text = s.rate_hz() <= 0 ? "standby" : s.on_request() ? "on request" : format("%g Hz", s.rate_hz());
   const double made_hz = s.figures().made_hz();
@@ -67,7 +67,7 @@ std::string water_text(const v1::Environment& e) {
   return text + (speed > 0 ? format(", sound speed %g m/s", speed) : std::string(", sound speed computed"));
 }
 
-/// The trajectory that a vehicle or an object follows.
+/// Describes the trajectory that a vehicle or an object follows.
 std::string trajectory_text(const auto& body) {
   if (!body.has_trajectory()) return {};
   const v1::TrajectoryStatus& t = body.trajectory();
@@ -116,7 +116,7 @@ std::string text_from(const v1::ObjectStatus& o) {
   return text;
 }
 
-/// The time of the clock; empty for real time.
+/// Returns the time of the clock; empty for real time.
 std::string clock_time(const v1::DaemonStatus& s) {
   return s.clock() == "realtime" ? std::string() : format(" at %.3f s", 1e-9 * static_cast<double>(s.now_ns()));
 }

@@ -13,12 +13,12 @@ class ObjectStatus;
 
 namespace sonar::clients {
 
-/// Several lines, each with its newline.
+/// Returns several lines, each with its newline.
 std::string text_from(const v1::DaemonStatus& status);
-/// One line without newline.
+/// Returns one line without newline.
 std::string text_from(const v1::ObjectStatus& object);
 std::string text_from(const v1::Event& event);
-/// "-6.00 0.00 -3.00 m, heading 90, pitch -15, roll 0 deg": east, north, up; compass; bow up; starboard down.
+/// Returns "-6.00 0.00 -3.00 m, heading 90, pitch -15, roll 0 deg": east, north, up; compass; bow up; starboard down.
 std::string place_text(const Pose& body_in_world);
 
 }  // namespace sonar::clients

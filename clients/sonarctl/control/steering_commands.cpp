@@ -19,7 +19,7 @@ void add_control_options(CLI::App& command, ControlOptions& control) {
   clients::add_control_options(command, control.address, control.token_file);
 }
 
-/// Pose of a body on the command line, converted from the given frame to ENU/FLU.
+/// Reads the pose of a body from the command line and converts it from the given frame to ENU/FLU.
 struct PlaceArguments {
   std::vector<double> xyz_m, rpy_deg{0, 0, 0};
   control::Frame frame = control::Frame::enu_flu;
@@ -49,7 +49,7 @@ CLI::Option* add_optional(CLI::App& command, const std::string& name, std::optio
 
 std::string name_or_its(const std::string& name) { return name.empty() ? "the sonar" : name; }
 
-/// Commands share one ControlOptions; the selected sub-command sets `what`.
+/// The sub-commands share one ControlOptions; the selected one sets `what`.
 struct Steering {
   ControlOptions control;
   std::function<Result<void>()> what;

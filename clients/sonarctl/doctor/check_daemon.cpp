@@ -68,13 +68,13 @@ void check_http(const Facts& facts, std::vector<Finding>& findings) {
   }
 }
 
-/// When one address was given, the other sonars were not examined.
+/// If one address was given, the other sonars were not examined.
 bool was_examined(const Facts& facts, const v1::SonarStatus& sonar) {
   return !facts.address_given || std::any_of(facts.sonars.begin(), facts.sonars.end(),
                                              [&sonar](const SonarFacts& s) { return s.at.host == sonar.advertised(); });
 }
 
-/// Sonars of makes that hosts search for.
+/// Reports the sonars of makes that hosts search for.
 void check_search(const Facts& facts, std::vector<Finding>& findings) {
   for (const FoundSonar& found : facts.found)
     findings.push_back({Level::ok, std::string(found.make->name()), found.about + " answers discovery at tcp " + found.at, ""});

@@ -14,7 +14,7 @@ using sonar::doctor::less_to_compute;
 using text::format;
 
 constexpr double fastest_hz = 40;  // highest rate of an Oculus
-constexpr double soon_s = 1;       // a driver asks for pings within
+constexpr double soon_s = 1;       // a driver requests pings within this time
 
 std::string joined(const auto& words) {
   std::string text;
@@ -68,7 +68,7 @@ class SonarChecks {
 
   bool answers() const { return sonar_.stream.outcome >= Outcome::closed_without_a_byte || !sonar_.clients.empty(); }
 
-  /// Images go by UDP, and no client connects for them. So only the status of the daemon shows them.
+  /// No client connects for images by UDP, so only the status of the daemon shows them.
   void check_images() {
     const std::string at = "http at " + sonar_.at.host;
     if (!sonar_.reported) return add(Level::warn, "ping", at + ": no daemon tells whether images are sent", "");
@@ -89,7 +89,7 @@ class SonarChecks {
     check_faults();
   }
 
-  /// Without drivers that stay connected only faults can be in the way.
+  /// If no driver stays connected, only faults can be the cause.
   void check_faults() {
     for (const Finding& found : sonar::doctor::judge(*facts_.control.status, nullptr))
       if (found.check == "fault" && found.level != Level::ok && (found.sonar.empty() || found.sonar == sonar_.reported->name()))
@@ -264,7 +264,7 @@ class SonarChecks {
     return {};
   }
 
-  /// Computing time of one ping: median of those just received, else the mean since the start of the daemon; 0 = unknown.
+  /// The computing time of a ping: the median of those just received, else the mean since the daemon started; 0 = unknown.
   double computing_ms() const {
     if (sonar_.stream.computing_ms) return *sonar_.stream.computing_ms;
     return sonar_.reported ? sonar_.reported->figures().simulation_ms() : 0;
@@ -299,7 +299,7 @@ class SonarChecks {
         finding.level = Level::warn;  // the refused client gets a slot when one leaves
       const bool is_cause = finding.check == "fault" && sonar_.stream.outcome != Outcome::pings;
       if (has_connected() && !is_cause && (finding.client.empty() || finding.level != Level::fail))
-        continue;  // this check got pings
+        continue;  // this check received pings
       found.push_back(std::move(finding));
     }
     const bool any_fails = std::any_of(found.begin(), found.end(), [](const Finding& f) { return f.level == Level::fail; });
@@ -320,7 +320,7 @@ class SonarChecks {
     return found == in.sonars().end() ? nullptr : &*found;
   }
 
-  /// The last status without our own connection; clients that left or were refused are those of the first status.
+  /// The latest status without our own connection. Clients that left or were refused are from the first status.
   v1::DaemonStatus without_us() const {
     const v1::DaemonStatus& first = *facts_.control.status;
     v1::DaemonStatus now = facts_.control.latest ? *facts_.control.latest : first;
@@ -338,7 +338,7 @@ class SonarChecks {
     return now;
   }
 
-  /// Time in which a correct driver gets its first ping.
+  /// The time in which a correct driver receives its first ping.
   static double first_ping_within_s(const v1::ClientStatus& client, const v1::SonarStatus& of) {
     if (client.requests() == 0 || of.rate_hz() <= 0) return soon_s;
     return std::max(soon_s, 2 / of.rate_hz() + 2e-3 * of.figures().simulation_ms());

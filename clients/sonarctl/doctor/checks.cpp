@@ -65,7 +65,7 @@ std::vector<Finding> run_checks(const Facts& facts) {
   return findings;
 }
 
-/// Broadcasts, multicasts and streams that a router, a NAT or a bridge does not pass, by the kinds of a make's ports.
+/// Names the broadcasts, multicasts and streams that a router, a NAT or a bridge does not pass, by the kinds of a make's ports.
 void check_networks(const Facts& facts, std::vector<Finding>& findings) {
   using Kind = protocol::Port::Kind;
   for (const SonarFacts& sonar : facts.sonars) {
@@ -95,7 +95,7 @@ void check_networks(const Facts& facts, std::vector<Finding>& findings) {
   }
 }
 
-/// The ports of the examined sonars, whatever their makes.
+/// Returns the ports of the examined sonars of all makes.
 void check_ports(const Facts& facts, std::vector<Finding>& findings) {
   const KernelPorts& ports = facts.kernel_ports;
   if (!ports.known) return;

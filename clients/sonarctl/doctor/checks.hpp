@@ -19,13 +19,13 @@ void check_sonar(const Facts& facts, const SonarFacts& sonar, std::vector<Findin
 void check_daemon(const Facts& facts, std::vector<Finding>& findings);
 void check_ports(const Facts& facts, std::vector<Finding>& findings);
 void check_networks(const Facts& facts, std::vector<Finding>& findings);
-/// "front at tcp 127.0.0.2:52100, side at udp 127.0.0.3:12345"; "no sonar".
+/// Returns "front at tcp 127.0.0.2:52100, side at udp 127.0.0.3:12345", or "no sonar".
 std::string served_by(const v1::DaemonStatus& status);
 
-/// "ok    text" or "warn  text; cure"; lines end with a newline, the last is "5 checks, 0 errors, 1 warning".
-/// `colours`: of the levels, for a terminal.
+/// Returns lines such as "ok    text" or "warn  text; cure"; the last is "5 checks, 0 errors, 1 warning". `colours`: the levels
+/// have colours, for a terminal.
 std::string text_from(const std::vector<Finding>& findings, bool colours = false);
-/// One object: the findings and their number per level.
+/// Returns a JSON object with the findings and their number for each level.
 std::string json_from(const std::vector<Finding>& findings);
 bool any_failed(const std::vector<Finding>& findings);
 

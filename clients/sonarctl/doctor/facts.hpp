@@ -34,7 +34,7 @@ struct ReceivedStatus {
 };
 struct StatusFacts {
   Endpoint on{"0.0.0.0", 52102};
-  std::string error;                     // why listening failed; empty = it did not
+  std::string error;                     // why listening failed; empty = it succeeded
   std::vector<PortHolder> holders;       // programs that have the port, if listening failed
   std::vector<ReceivedStatus> received;  // one for each pair of `from` and `advertised`
   double waited_s = 0;
@@ -43,7 +43,7 @@ struct StatusFacts {
 struct StreamFacts {
   enum class Outcome { not_tried, refused, unreachable, closed_without_a_byte, no_ping, pings } outcome = Outcome::not_tried;
   std::string error;                         // why the connection or the greeting failed
-  bool refuses = false;                      // `error` is what the sonar answered to a request
+  bool refuses = false;                      // `error` is the answer of the sonar to a request
   std::string own;                           // our end of the connection; empty = there was none
   bool asked = false;                        // settings were sent, since no other client was connected
   std::uint64_t junk_bytes = 0, others = 0;  // others: messages that are no pings
@@ -52,7 +52,7 @@ struct StreamFacts {
   std::uint64_t pings = 0, missing = 0, broken = 0;
   std::string first_complaint;  // complaint about the first broken ping
   double asked_hz = 0, rate_hz = 0;
-  // How much later pings arrive than the most prompt one, relative to the time stamps in them.
+  // Delay of the pings relative to the one with the smallest delay, by the time stamps in them.
   std::optional<double> spread_p99_ms;
   // Time from transmission to the last byte received, by the events of the control stream.
   std::optional<double> latency_p50_ms, latency_p99_ms;
@@ -64,9 +64,9 @@ struct SonarFacts {
   std::string name;        // from the control stream; empty = not known
   std::string unresolved;  // why its name has no address
   bool on_this_host = false;
-  bool in_our_network = true;                       // at an address that an interface reaches without a router
+  bool in_our_network = true;                       // an interface reaches its address without a router
   bool out_of_time = false;                         // not examined, for lack of time
-  std::vector<std::string> clients;                 // connected already, before us
+  std::vector<std::string> clients;                 // clients that were connected before us
   std::vector<PortHolder> listeners;                // programs on this computer that listen on its port
   std::shared_ptr<const v1::SonarStatus> reported;  // after the pings; null = the daemon does not know it
   StreamFacts stream;
@@ -74,7 +74,7 @@ struct SonarFacts {
 
 struct ControlFacts {
   Endpoint at;
-  bool given = false;                              // given by the user: then it is an error if nothing answers
+  bool given = false;                              // given by the user; no answer is then an error
   std::string error;                               // why there is no status
   bool token_required = false;                     // there is no status, because the daemon requires a token and got none
   std::shared_ptr<const v1::DaemonStatus> status;  // null = there is none

@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto status_patience = 2500ms;  // status messages come every second
-constexpr auto first_status = 1300ms;     // to learn who is connected
+constexpr auto first_status = 1300ms;     // for the status that says which clients are connected
 const Endpoint usual_http{"127.0.0.1", 8088};
 constexpr auto short_patience = 700ms, own_patience = 200ms;
 constexpr auto search_patience = 400ms, search_patience_here = 100ms;  // for an answer to discovery
@@ -78,7 +78,7 @@ class Gathering {
       control_.emplace(std::move(*client));
   }
 
-  /// Asks at the address that the user gave, else at the one that the daemon reported, else at the default.
+  /// Requests /healthz at the address that the user gave, else at the one that the daemon reported, else at the default.
   void ask_http(Endpoint at) {
     const bool given = !questions_.http.empty();
     const auto& status = facts_.control.status;
@@ -162,7 +162,7 @@ class Gathering {
     facts_.sonars.push_back(std::move(sonar));
   }
 
-  /// Null = the daemon serves none there.
+  /// Returns null if the daemon serves no sonar there.
   static std::shared_ptr<const v1::SonarStatus> reported_by(const SonarFacts& sonar,
                                                             const std::shared_ptr<const v1::DaemonStatus>& status) {
     for (const v1::SonarStatus& s : status->sonars())

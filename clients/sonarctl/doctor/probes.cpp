@@ -36,7 +36,7 @@ struct Datagram {
   std::string from;
   std::vector<std::byte> bytes;
 };
-/// The next datagram that has arrived or arrives before the deadline.
+/// Returns the next datagram that has arrived or arrives before the deadline.
 std::optional<Datagram> receive(const Socket& socket, Steady::time_point deadline) {
   for (;;) {
     pollfd ready{socket.fd(), POLLIN, 0};
@@ -65,7 +65,7 @@ std::string line_of(const std::string& file) {
   return line;
 }
 
-/// Whether an interface has that address, or one of its network.
+/// Returns whether an interface has the address, or one in the same network.
 bool has_interface(const std::string& ipv4, bool same_network) {
   const auto asked = address_of({ipv4, 0});
   ifaddrs* interfaces = nullptr;

@@ -13,15 +13,15 @@ namespace sonar::clients::doctor {
 using Steady = std::chrono::steady_clock;
 std::chrono::milliseconds left_until(Steady::time_point deadline);
 
-/// "127.0.0.2" of a host name. usage: no address.
+/// Resolves a host name to text such as "127.0.0.2". Errors: usage if it has no address.
 Result<std::string> ipv4_of(const std::string& host);
-/// All of 127.0.0.0/8, and the addresses of the interfaces.
+/// Returns whether an address belongs to this computer: 127.0.0.0/8, or an address of an interface.
 bool is_on_this_host(const std::string& ipv4);
-/// At an address that an interface reaches without a router.
+/// Returns whether an interface reaches the address without a router.
 bool is_in_our_network(const std::string& ipv4);
 Machine this_machine();
 
-/// No program listens at this TCP port: its computer says so at once.
+/// Returns whether the computer refuses connections to this TCP port, because no program listens there.
 bool refuses(const Endpoint& at);
 
 /// Receives status messages and sorts them, also those that arrive during other queries.
@@ -54,7 +54,7 @@ class DiscoveryQuestion {
   std::optional<Socket> socket_;
 };
 
-/// GET /healthz.
+/// Requests GET /healthz.
 HttpFacts ask_health(const Endpoint& at, bool given, std::chrono::milliseconds patience);
 
 KernelPorts kernel_ports();

@@ -25,7 +25,7 @@ std::vector<SocketLine> sockets_of(const char* protocol) {
   return all;
 }
 
-/// "socket:[12345]" into 12345.
+/// Parses "socket:[12345]" to 12345.
 std::optional<std::uint64_t> socket_inode(const std::string& link) {
   std::uint64_t inode = 0;
   if (!link.starts_with("socket:[")) return std::nullopt;

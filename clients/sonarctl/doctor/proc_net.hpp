@@ -1,4 +1,4 @@
-// Sockets of this computer by /proc/net, and their programs as far as /proc is readable. Used by doctor to name the program that
+// The sockets of this computer from /proc/net, and their programs as far as /proc is readable. doctor names the program that
 // holds a port.
 #pragma once
 
@@ -17,11 +17,11 @@ using sonar::doctor::listening;
 using sonar::doctor::parse_proc_net;
 using sonar::doctor::SocketLine;
 
-/// All sockets of the computer, IPv4 and IPv6. Empty where there is no /proc.
+/// Returns all sockets of the computer, IPv4 and IPv6; none if there is no /proc.
 std::vector<SocketLine> tcp_sockets();
 std::vector<SocketLine> udp_sockets();
 
-/// Program by socket inode, without those of other users.
+/// Returns the program of each socket inode, without programs of other users.
 struct Program {
   int pid = 0;
   std::string name;

@@ -46,7 +46,7 @@ class Watch {
     conclude(of_wire.missing_pings);
   }
 
-  /// Per ping, by the events of the control stream: delay from transmission to arrival, and computing time.
+  /// From the events of the control stream, for each ping: the delay from transmission to arrival, and the computing time.
   struct DaemonTimes {
     std::vector<double> delays_s, computing_ms;
   };
@@ -104,7 +104,7 @@ class Watch {
   std::vector<double> behind_stamp_s_;
 };
 
-/// The outcome of a failed connection or greeting.
+/// Records the outcome of a failed connection or greeting.
 Outcome outcome_of(const Error& error, const SonarFacts& sonar) {
   using Kind = protocol::HostPort::Kind;
   const Kind first = sonar.make->ports.front().kind;
@@ -129,7 +129,7 @@ void set_latency(SonarFacts& sonar, const std::vector<double>& delays_s, Control
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks) {
   StreamFacts& facts = sonar.stream;
   Wanted wanted;
-  // Beside a client the check changes no settings.
+  // If a client is connected, the check does not change settings.
   wanted.as_it_is = !sonar.clients.empty();
   wanted.stamped = true;
   facts.asked = !wanted.as_it_is || sonar.make->each_ping_requested;
