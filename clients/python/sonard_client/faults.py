@@ -1,4 +1,4 @@
-"""A fault for the time of a block, and what the clients of the sonar did about it (docs/faults.md)."""
+"""A fault that lasts for a `with` block, and the reactions of the sonar's clients to it (docs/faults.md)."""
 from __future__ import annotations
 
 import itertools
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .control import Control, Events
 
 Json = Dict[str, Any]
-_BY_FAULT = "a fault"  # why the daemon ended a connection
+_BY_FAULT = "a fault"  # the reason that the daemon states when a fault ended a connection
 _numbers = itertools.count(1)
 
 
@@ -27,7 +27,7 @@ class Fault:
         self._news = threading.Condition()
 
     def __enter__(self) -> Fault:
-        self._events = self._control.events(clients=True, faults=True)  # before the fault: nothing is missed
+        self._events = self._control.events(clients=True, faults=True)  # subscribed before the fault begins, so that no event is missed
         self._thread.start()
         try:
             self._control.add_fault(self._what, name=self.name, **self._record)
@@ -44,15 +44,15 @@ class Fault:
             self._stop_reading()
 
     def status(self) -> List[Json]:
-        """As sonard lists it: one entry for each sonar and, of a trouble, for each of its kinds."""
+        """The entries of sonard's list: one for each sonar, and for a trouble one for each of its kinds."""
         return [fault for fault in self._control.faults() if self._is_ours(fault["name"])]
 
     def injections(self) -> int:
-        """How often it acted so far."""
+        """How often the fault has acted so far."""
         return sum(fault["injections"] for fault in self.status())
 
     def journal(self) -> List[Json]:
-        """Its entries among the latest 1000 of the daemon."""
+        """The entries of this fault among the latest 1000 of the journal."""
         return [entry for entry in self._control.fault_journal() if self._is_ours(entry["fault"])]
 
     def noticed_within(self, seconds: float) -> bool:

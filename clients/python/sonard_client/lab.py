@@ -28,12 +28,12 @@ from .daemon import Daemon, DaemonFailed
 
 DEVICE, HOST, LINK = "10.77.0.2", "10.77.0.1", "sonar0"
 _HOST_LINK = "host0"
-_PATH = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"  # where ip, nft and tc are, on the path of root only
+_PATH = os.environ.get("PATH", "") + ":/usr/sbin:/sbin"  # ip, nft and tc are often only on the path of root
 _INSIDE = "SONARD_LAB_INSIDE"
 
 
 class LabFailed(RuntimeError):
-    """A program that the laboratory needs is missing, or the kernel refused."""
+    """The laboratory cannot be made: a program is missing, or the kernel refuses."""
 
 
 def program(name: str) -> Optional[str]:
@@ -51,12 +51,12 @@ def _run(*command: str, text: str = "") -> None:
 
 
 def unshare_prefix() -> List[str]:
-    """The command that starts another one in a network namespace of its own, with the right to change it."""
+    """Returns the command that runs another one in its own network namespace, with the right to change the namespace."""
     return [program("unshare") or "unshare", *([] if os.geteuid() == 0 else ["-r"]), "-n", "--"]
 
 
 def missing() -> str:
-    """Why namespaces cannot be used here; empty if they can."""
+    """Returns why namespaces cannot be used here, or an empty text."""
     for name in ("unshare", "nsenter", "ip"):
         if program(name) is None:
             return f"namespaces (the program {name} is not installed)"
@@ -68,9 +68,9 @@ def missing() -> str:
 
 
 class Fault(NamedTuple):
-    """A fault of the network. begin(lab, parameters) applies it, lab.end(code) takes it back."""
+    """A fault of the network. begin(lab, parameters) applies it; lab.end(code) ends it."""
     name: str
-    parameters: Mapping[str, str]  # and defaults
+    parameters: Mapping[str, str]  # with their defaults
     needs: Tuple[str, ...]         # programs
     begin: "Callable[[Lab, Mapping[str, str]], None]"
 
@@ -79,7 +79,7 @@ def _vanish(lab: "Lab", given: Mapping[str, str]) -> None:
     if program("nft"):
         lab.drop(lab.device, "")
         lab.drop(lab.host, "")
-    else:  # without nft: the device's end of the cable is pulled
+    else:  # without nft: the device's end of the veth pair goes down
         _run("ip", "link", "set", LINK, "down")
         lab.undo.append(lambda: _run("ip", "link", "set", LINK, "up"))
 
@@ -131,7 +131,7 @@ CHOICES = {("L09", "answer"): ("none", "unreachable"), ("L17", "side"): ("device
 
 
 def fault_missing(code: str) -> str:
-    """The programs that a fault of the network lacks here."""
+    """Returns the missing programs that a fault of the network needs."""
     return ", ".join(name for name in FAULTS[code].needs if program(name) is None)
 
 
@@ -170,14 +170,14 @@ class Lab:
 
     @property
     def host_pid(self) -> int:
-        """A process in the host's namespace."""
+        """The number of a process in the host's namespace."""
         return self._holder.pid if self._holder else 0
 
     def __enter__(self) -> "Lab":
         _run("ip", "link", "set", "lo", "up")
         _run("ip", "link", "add", LINK, "type", "veth", "peer", "name", _HOST_LINK)
         self._holder = subprocess.Popen([program("unshare") or "unshare", "-n", "--", "cat"], stdin=subprocess.PIPE)
-        # cat holds the namespace, and ends with this process: its input closes then.
+        # cat keeps the namespace alive. It ends with this process, because its input closes then.
         space = f"/proc/{self._holder.pid}/ns/net"
         deadline = time.monotonic() + 5
         while os.readlink(space) == os.readlink("/proc/self/ns/net"):
@@ -198,15 +198,15 @@ class Lab:
             self._holder.wait()
 
     def rule(self, prefix: Sequence[str], hook: str, text: str) -> None:
-        """Adds a rule of nft in one namespace until the fault ends."""
+        """Adds an nft rule in one namespace; the end of the fault removes it."""
         self._tables += 1
-        table, at = f"fault{self._tables}", "-450" if hook == "prerouting" else "0"  # before fragments are put together
+        table, at = f"fault{self._tables}", "-450" if hook == "prerouting" else "0"  # -450: before fragments are reassembled
         chain = f"chain c {{ type filter hook {hook} priority {at}; {text}; }}"
         _run(*prefix, "nft", "-f", "-", text=f"table ip {table} {{ {chain}; }}\n")
         self.undo.append(lambda: _run(*prefix, "nft", "delete", "table", "ip", table))
 
     def drop(self, prefix: Sequence[str], match: str) -> None:
-        """Drops what arrives over the cable in a namespace, silently for the sender."""
+        """Drops packets that arrive over the veth pair in one namespace; the sender gets no error."""
         link = LINK if prefix == self.device else _HOST_LINK
         self.rule(prefix, "prerouting", f"iifname {link} {match} drop")
 
@@ -228,7 +228,7 @@ class Lab:
 
 
 def enter(module: str, arguments: Sequence[str]) -> None:
-    """Replaces this process by the same program inside the device's namespace, unless it is there already."""
+    """Runs the same program inside the device's namespace in place of this process, unless it runs there already."""
     if os.environ.get(_INSIDE) == "1":
         return
     lacking = missing()
@@ -240,7 +240,7 @@ def enter(module: str, arguments: Sequence[str]) -> None:
 
 
 def lab_config(profile: str, address: str = DEVICE, more: Optional[Dict[str, object]] = None) -> str:
-    """A configuration for tests of drivers: a small scene and a model that costs little. JSON, which is YAML too."""
+    """Returns a configuration for tests of drivers: a small scene and a cheap model. It is JSON, which is also YAML."""
     config: Dict[str, object] = {
         "world": {"scene": "tank-rod.yaml", "seed": 1}, "vehicles": [{"name": "rov", "trajectory": "none"}],
         "sonars": [{"name": "front", "profile": profile, "bind_ip": address}], "engine": {"fixed_fan": 1}}
@@ -262,7 +262,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def check() -> List[str]:
-    """A line for each thing that the laboratory can or cannot do here."""
+    """Returns a line for each part of the laboratory that works here or does not."""
     lacking = missing()
     lines = [f"{'no' if lacking else 'ok':<4} {'namespaces' if not lacking else lacking}"]
     for code, fault in FAULTS.items():
@@ -276,7 +276,7 @@ def _say(text: str) -> None:
 
 
 class _Timed:
-    """Applies faults for their seconds, one thread each."""
+    """Applies faults for their time; each has a thread."""
 
     def __init__(self, lab: Lab) -> None:
         self._lab, self._lock, self._stopped = lab, threading.Lock(), threading.Event()

@@ -119,7 +119,7 @@ class Instruments:
             return ""
         self._fixes_by = kind
         self.place = Geodetic(latitude, longitude)
-        now = time_of_day_s(fields[clock]) if len(fields) > clock else None  # old GLL sentences have neither time nor status
+        now = time_of_day_s(fields[clock]) if len(fields) > clock else None  # old GLL sentences have no time and no status
         if now is not None:
             before = self.fix_time_s
             while before is not None and now < before - DAY_S / 2:

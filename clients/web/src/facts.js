@@ -1,4 +1,4 @@
-// The page's knowledge of the daemon: messages come in, panels read. It draws nothing.
+// The state of the daemon as the page knows it: messages change it, panels read it. It draws nothing.
 import { Counter, Counters } from './rates.js';
 
 const log_lines = 500;
@@ -17,12 +17,12 @@ export class Facts {
     this.clear();
   }
 
-  /// After a new session: nothing of the old one holds, but the log stays readable.
+  /// Call it for a new session: it clears everything but the log.
   clear() {
     this.status = null;
     this.findings = null;
     this.faults = [];
-    this.troubles = new Map();  // by name: what is known of each trouble
+    this.troubles = new Map();  // the description of each trouble, by name
     this.frames = new Map();  // child -> {parent, translation, rotation}
     this.ping = null;
     this.geometry = new Map();  // by sonar
@@ -66,24 +66,24 @@ export class Facts {
   get sonarStatus() {
     return this.status?.sonars.find((s) => s.name === this.sonar) ?? null;
   }
-  /// A driver is connected, or a group of receivers gets the pings.
+  /// True if a driver is connected or a group of receivers gets the pings.
   get listened() {
     const sonar = this.sonarStatus;
     return Boolean(sonar && (sonar.clients.length > 0 || sonar.receivers?.length > 0));
   }
-  /// "fan" and others: sonard draws pictures of many pings, or of another shape.
+  /// The kind of picture, such as "fan". sonard draws pictures of many pings and of other shapes.
   get pictureKind() {
     return this.pictures.get(this.sonar)?.kind ?? 'fan';
   }
   get preview() {
     return !this.listened && Boolean(this.sonarStatus?.preview || this.of('preview'));
   }
-  /// The rate that the sonar is to have; 0 when its host asks for each ping.
+  /// The rate that the sonar should have; 0 if its host requests each ping.
   get wantedRate() {
     const sonar = this.sonarStatus;
     return sonar?.on_request ? 0 : sonar?.rate_hz ?? 0;
   }
-  /// A ping of some natures is one line of the picture.
+  /// True if a ping is one line of the picture.
   get linesByPing() {
     return ['sweep', 'waterfall'].includes(this.pictureKind);
   }
@@ -94,14 +94,14 @@ export class Facts {
   get rateUnit() {
     return this.linesByPing ? 'lines/s' : 'Hz';
   }
-  /// Pings are made at less than the rate, by an engine that is busy for a good part of the time. A sonar whose host asks for each
-  /// ping has a rate that none reaches.
+  /// True if the engine is too slow: pings come at a lower rate than wanted, and computing takes at least 30 % of the time. If the
+  /// host requests each ping, no rate is expected.
   get isSlow() {
     const sonar = this.sonarStatus;
     const wanted = this.wantedRate;
     return Boolean(this.realtime && wanted > 0 && this.rate < 0.9 * wanted && this.rate * (sonar.figures?.simulation_ms ?? 0) > 300);
   }
-  /// The vehicle that carries the sonar: by the frames, else the only one.
+  /// The vehicle that carries the sonar, by the frames, or the only vehicle.
   get vehicle() {
     const name = this.frames.get(this.sonar)?.parent;
     const vehicles = this.status?.vehicles ?? [];
@@ -179,7 +179,7 @@ export class Facts {
     if (event) this.count(this.ping, event);
   }
 
-  /// A picture has no number. The event of the same time has one; it comes before or after the picture.
+  /// A picture has no number, but the event of the same time has one. The event comes before or after the picture.
   count(ping, event) {
     ping.number = event.number;
     if (Boolean(event.preview) !== this.wasPreview) this.lastNumber = Infinity;  // previews have numbers of their own
@@ -196,7 +196,7 @@ export class Facts {
     const before = this.vehicle;
     this.status = status;
     if (!this.vehicle?.stale) this.staleSince = undefined;
-    else if (before && !before.stale) this.staleSince = now_s();  // a page that was opened later cannot know it
+    else if (before && !before.stale) this.staleSince = now_s();  // unknown to a page that was opened later
     this.clock = status.clock || this.clock;
     this.setTime(status.now_ns || ns);
     if (!status.sonars.some((s) => s.name === this.sonar)) this.sonar = status.sonars[0]?.name ?? '';

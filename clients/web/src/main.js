@@ -1,4 +1,4 @@
-// The page: one connection, what it tells, and the panes that show it.
+// The page: one connection to the daemon, and the panes that show its data.
 import { $, make, setHidden, setText, setClass } from './dom.js';
 import { Connection } from './socket/connection.js';
 import { Facts } from './facts.js';
@@ -59,7 +59,7 @@ const connection = new Connection({
     if (id?.startsWith('param:')) refusals.show(id, message, id.slice('param:'.length));
   },
 });
-connection.open();  // answers come once all below is there
+connection.open();  // its callbacks run only after this script, so they may use everything below
 const refusals = new Refusals();
 const fan = new Fan(facts, test, () => choose());
 let scene = null;
@@ -75,7 +75,7 @@ const steering = {
   },
   start: (name, seconds) => steering.set(name, Number(seconds), 'float64'),
   clear(fault) {
-    if (!fault.name.startsWith('view.')) {  // begun by another viewer or program: ended by its name
+    if (!fault.name.startsWith('view.')) {  // another viewer or program began it, so it is ended by its name
       for (const one of facts.faults)
         if (one.do === fault.do && one.sonar === fault.sonar && (fault.do || one.name === fault.name))
           steering.call('/sonard/end_faults', { name: one.name });
@@ -147,10 +147,10 @@ function announce() {
   setText($('announce'), text);
 }
 
-/// The scene's meshes and shaders would delay the first picture, with a software renderer by seconds: it begins after that one, or
-/// when none is to be expected.
+/// Starts the scene after the first picture, or when no picture is expected. Its meshes and shaders would delay the first
+/// picture, by seconds with a software renderer.
 function sceneMayBegin() {
-  if (facts.drawnPings > 0) return true;  // it was painted before this frame
+  if (facts.drawnPings > 0) return true;  // the picture was painted before this frame
   if (facts.connection !== 'open' || !facts.status) return false;
   const expected = facts.previews || facts.preview || facts.listened;
   return performance.now() / 1000 - facts.openedAt > (expected ? scene_waits_for_pings_s : scene_waits_s);

@@ -6,7 +6,7 @@ from typing import List, Tuple
 
 
 class Broken(ValueError):
-    """The bytes do not match their type. The text does not name the file."""
+    """The bytes do not match the type of the message. The text does not name the file."""
 
 
 class Reader:

@@ -18,9 +18,9 @@ from .track import ConvertError, Place2, Track, Warn
 from .ulog import read_ulog
 
 FORMATS = ("dataflash", "tlog", "mcap", "rosbag", "db3", "ulog", "nmea")
-RECORDINGS = ("mcap", "rosbag", "db3")  # in metres, their frame not said
+RECORDINGS = ("mcap", "rosbag", "db3")  # their positions are metres in an unknown frame
 _HEAD_BYTES = 4096
-# Common formats that this does not read: the first bytes, what they are, what to do; {} is the file.
+# Common formats that cannot be read: first bytes, name of the format, advice; {} is the file.
 _OTHERS = (
     (b"\x28\xb5\x2f\xfd", "compressed by zstd; unpack it first: zstd -d {}"),
     (b"\x1f\x8b", "compressed by gzip; unpack it first: gunzip -k {}"),
@@ -36,7 +36,7 @@ _OTHERS = (
 
 
 def _described(path: pathlib.Path, head: bytes) -> str:
-    """Says what a file is that this does not read; empty if that is not known."""
+    """Names the format of a file that cannot be read, with advice; empty if the format is unknown."""
     for magic, text in _OTHERS:
         if head.startswith(magic):
             return text.format(path)
@@ -48,7 +48,7 @@ def _described(path: pathlib.Path, head: bytes) -> str:
 
 
 def format_of(path: pathlib.Path) -> str:
-    """Returns one of FORMATS, or raises ConvertError. Of a folder: that of its first recording."""
+    """Returns one of FORMATS, for a folder that of its first recording, or raises ConvertError."""
     path = recording_at(path)
     if path.is_dir():
         path = files_of(path)[0]

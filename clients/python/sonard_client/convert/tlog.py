@@ -183,7 +183,7 @@ class _Vehicle:
                 for name, used in sorted(self.components.items()) if name in self.omitted or len(used) > 1]
 
     def _since_start(self, boot_s: float, received_s: float) -> float:
-        """Time since the first start; after a restart continued by the time of receipt."""
+        """Returns the time since the first start. After a restart the time of receipt continues it."""
         if self._boot is not None and boot_s < self._boot[0] - RESTART_S:
             self._before_s += self._boot[0] - boot_s + max(0.0, received_s - self._boot[1])
             self.restarts += 1
@@ -199,7 +199,7 @@ class _Vehicle:
 
     @property
     def pressure_of_depth(self) -> str:
-        """The message of a sensor that was in the water, where no message has the depth; empty if there is none."""
+        """Returns the message of a sensor that was in the water, if no message has the depth; empty if there is none."""
         if self.depths.get("GLOBAL_POSITION_INT") or (self.is_submarine and self.depths.get("VFR_HUD")):
             return ""
         return next((name for name in PRESSURES if any(hpa > IN_WATER_HPA for _, hpa in self.pressures.get(name, []))), "")

@@ -47,7 +47,7 @@ class Source(NamedTuple):
 
 
 def rising(stream: Stream[Value]) -> Stream[Value]:
-    """Drops items whose time falls; an item of the same time replaces the one before."""
+    """Drops items whose time decreases; an item replaces the one before if both have the same time."""
     kept: Stream[Value] = []
     for item in stream:
         if kept and item[0] == kept[-1][0]:
@@ -155,12 +155,12 @@ def dead_reckon(track: Track, speed_m_s: float) -> None:
 
 
 def depth_source(attitude: str, attitudes: Stream[Quaternion], depths: Stream[float]) -> Source:
-    """The track of a vehicle that knows its depth and no horizontal position, such as a BlueROV2 without DVL."""
+    """Makes the track of a vehicle that has a depth but no horizontal position, such as a BlueROV2 without DVL."""
     return Source(f"{attitude}+depth", attitudes, [(t, (0.0, 0.0, down)) for t, down in depths], held=True)
 
 
 def _stays(positions: Stream[Vector3]) -> bool:
-    """Filters without a horizontal position report one that does not change."""
+    """Returns whether the position never changes, as filters report without a horizontal position."""
     first = positions[0][1]
     return len(positions) > 1 and all(math.hypot(p[0] - first[0], p[1] - first[1]) < 1e-3 for _, p in positions)
 

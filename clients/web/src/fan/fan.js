@@ -1,4 +1,4 @@
-// The fan's pane: draws each ping, its marks, and what lies under the cursor.
+// The pane of the fan: draws each ping, its marks, and the values under the cursor.
 import { $, setClass, setHidden, setText } from '../dom.js';
 import { beamTable, drawnLayout, exactLayout, fittedLayout, polarOf, samplesOf, under } from './layout.js';
 import { bearingText, drawAxes, drawMarks } from './marks.js';
@@ -21,7 +21,7 @@ const kinds = {  // names of the pictures that sonard draws
 const empty_grid = { rows: 500, beams: 2, spacing_m: 0.02, start_m: 0, range_m: 10, azimuth_rad: [Math.PI / 6, -Math.PI / 6] };
 
 export class Fan {
-  /// `onMissing`: called when it turns out that there is no WebGL2.
+  /// `onMissing` is called if the browser has no WebGL2.
   constructor(facts, exact, onMissing) {
     this.facts = facts;
     this.onMissing = onMissing;
@@ -43,15 +43,15 @@ export class Fan {
     this.marks.addEventListener('pointerleave', () => this.point(null));
   }
 
-  /// Begins the browser's graphics, which takes seconds beside other work: called once the first picture was asked for, which is
-  /// computed meanwhile.
+  /// Starts the graphics of the browser, which can take seconds. Call it after the first picture is requested, so that the daemon
+  /// computes the picture meanwhile.
   prepare() {
     if (this.painter !== undefined) return;
     this.painter = makeFanPainter(this.canvas);
     if (!this.painter) this.onMissing();
   }
 
-  /// sonard draws the picture: it is no fan, or there is no WebGL2.
+  /// True if sonard draws the picture, because it is no fan or there is no WebGL2.
   get drawn() {
     return this.painter === null || Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
   }
@@ -85,7 +85,7 @@ export class Fan {
     this.redraw();
   }
 
-  /// A new ping, or null: nothing was received yet.
+  /// Shows a new ping; null if none was received yet.
   show(ping) {
     if (this.frozen || ping === this.ping) return;
     this.ping = ping;

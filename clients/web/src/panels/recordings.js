@@ -12,14 +12,14 @@ function newName(sonar) {
   return `${sonar}-${digits.slice(0, 8)}-${digits.slice(8, 14)}.mcap`;
 }
 
-/// The button was pressed: `call(service, request)`.
+/// Call it when the button is pressed; `call(service, request)` calls the service.
 export function toggleRecording(facts, call) {
   const one = running(facts);
   if (one) call('/sonard/stop_recording', { file: nameOf(one) });
   else call('/sonard/start_recording', { file: newName(facts.sonar), sonar: facts.sonar });
 }
 
-/// Of earlier runs only the size is known.
+/// True if a recording ended without pings. Of recordings from earlier runs, which have no sonar, only the size is known.
 const isEmpty = (r) => !r.running && Boolean(r.sonar) && !r.pings;
 
 function about(r, facts) {

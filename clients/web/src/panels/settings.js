@@ -20,7 +20,7 @@ function numberRow(setting, name, steering) {
   input.onchange = () => (input.value === '' && !setting.zero ? input.dispatchEvent(new Event('blur')) : steering.set(name, Number(input.value)));
   let before = '';
   input.onfocus = () => (before = input.value);
-  // Nothing is returned: false would keep every other key from the field, Tab too.
+  // Returns nothing, because `false` would block all other keys of the field, even Tab.
   input.onkeydown = (event) => {
     if (event.key !== 'Escape') return;
     input.value = before;

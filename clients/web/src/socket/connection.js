@@ -66,7 +66,7 @@ export class Connection {
     this.heard = false;
   }
 
-  /// A browser does not say why a socket was refused, but an ordinary request does.
+  /// Returns whether the socket was refused because the token is missing. Browsers do not report that, so this sends a request.
   async refused() {
     try {
       return (await fetch('/api/v1/status', { headers: this.token ? { Authorization: `Bearer ${this.token}` } : {} })).status === 401;
@@ -189,7 +189,7 @@ export class Connection {
   set(name, value, type) {
     this.send({ op: 'setParameters', parameters: [{ name, value, type }], id: name });
   }
-  /// The answer of a service as text; fails with the daemon's sentence.
+  /// Calls a service and returns its answer as text; throws the daemon's sentence if it fails.
   call(service, request) {
     return new Promise((done, failed) => {
       const id = this.services.get(service);
