@@ -15,8 +15,8 @@ struct FoundConfig {
   std::filesystem::path file;  // empty = none
 };
 
-/// `file` empty: ./sonard.yaml, ~/.config/sonard/sonard.yaml, /etc/sonard/sonard.yaml, in this order; `demo` wins over all files.
-/// Errors: those of load_config().
+/// If `file` is empty: ./sonard.yaml, ~/.config/sonard/sonard.yaml, /etc/sonard/sonard.yaml, in this order. `demo` ignores all
+/// files. Errors: those of load_config().
 Result<FoundConfig> find_config(const std::string& file, bool demo);
 
 }  // namespace sonar

@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// A name that find_scene() finds in the same `directory`; empty when none is near.
+/// Returns a similar name that find_scene() finds in `directory`; empty if there is none.
 std::string nearest_scene(const std::filesystem::path& given, const std::filesystem::path& directory);
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-// Annotations in COCO's form (cocodataset.org, "Data format": object detection), written as they come.
+// Writes annotations in COCO's format (cocodataset.org, "Data format": object detection), without holding all in memory.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace sonar::dataset {
 
-/// Things that were seen, by class.
+/// Number of visible things by class.
 using Instances = std::map<std::string, std::uint64_t>;
 /// Adds those of a shard's notes (parts.hpp).
 void count_instances(const nlohmann::json& part, Instances& instances);

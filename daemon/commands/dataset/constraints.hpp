@@ -1,4 +1,4 @@
-// Conditions of a drawn ping, by geometry alone: no ray is traced, so occlusion is left to the labels.
+// Conditions for a drawn ping. They use only geometry and trace no rays, so occlusion is visible only in the labels.
 #pragma once
 
 #include <cstdint>
@@ -18,11 +18,11 @@ struct Constraints {
   std::uint32_t tries = 100;
 };
 
-/// By name, by the name its instances share, or by label.
+/// Compares the name, the name that instances share, and the label.
 bool is_named(const Object& object, const std::string& name);
-/// All that is_named() knows in a scene.
+/// Returns all names that is_named() accepts in a scene.
 std::set<std::string> names_of(const Scene& scene);
-/// A sentence about a name that the scene does not have; else empty.
+/// Returns a sentence about a name that the scene does not have; empty if all are known.
 std::string why_unknown(const Constraints& constraints, const std::vector<std::string>& targets, const Scene& scene);
 
 /// How often each constraint was not met.

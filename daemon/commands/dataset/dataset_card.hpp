@@ -15,7 +15,7 @@ struct FilesOfSplit {
   std::string split;               // "train"
   std::vector<std::string> paths;  // "shard-*.tar"
 };
-/// The lines between "---" and "---", these included. `files` may be empty.
+/// Returns the YAML head with its "---" lines. `files` may be empty.
 std::string card_head(const DatasetJob& job, const std::vector<FilesOfSplit>& files, bool is_webdataset);
 
 struct Statistics {

@@ -5,7 +5,7 @@
 
 namespace sonar::dataset {
 
-/// The exit code. Errors: what the job, the options or the folder have wrong.
+/// Returns the exit code. Errors: faults of the job, the options or the folder.
 Result<int> run_dataset(const DatasetCommand& command);
 
 }  // namespace sonar::dataset

@@ -61,8 +61,8 @@ struct DrawnPing {
   std::shared_ptr<const Scene> whole_scene;  // before counts and a negative hide some of its objects
 };
 
-/// Draws until the constraints are met. config: they never are, with what they were; what the filled file has wrong. `known`: a
-/// scene that has been read, for the pings that have the same, and the shapes of all.
+/// Draws until the constraints are met. Errors: config if they never are, or if the filled file is wrong. `known`: the last
+/// scene, which is used again if it is the same, and all shapes read so far.
 struct KnownScene {
   std::string key = {};
   std::shared_ptr<const Scene> scene = {};
@@ -70,7 +70,7 @@ struct KnownScene {
 };
 Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const KnownScene& known = {});
 
-/// Everything the ping depends on.
+/// Returns everything on which the ping depends.
 PingRequest request_of(const DrawnPing& ping, std::uint64_t number);
 
 }  // namespace sonar::dataset

@@ -27,7 +27,7 @@ struct Split {
 /// "80,10,10" and "bed_seed,coat". usage: what is wrong with them.
 Result<Split> parse_split(const std::string& shares, const std::string& by);
 
-/// Which split each of the scenes belongs to, by their names; every split with a share has one if there are enough.
+/// Returns the split of each scene, by its name. Every split with a share gets a scene if there are enough.
 std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const std::array<double, 3>& shares);
 
 struct Exported {

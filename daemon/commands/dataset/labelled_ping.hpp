@@ -1,4 +1,4 @@
-// One ping of a data set as the files it has in a shard.
+// Makes the files of one ping of a data set.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,7 @@ struct LabelledPing {
 /// Makes pings one after the other on one thread; keeps the engine while the scene stays the same.
 class PingMaker {
  public:
-  /// `simd`: instead of the job's.
+  /// `simd` replaces that of the job.
   PingMaker(const DatasetJob& job, std::string inputs, std::optional<SimdLevel> simd)
       : job_(job), inputs_(std::move(inputs)), simd_(simd) {}
   Result<LabelledPing> make(std::uint64_t number);

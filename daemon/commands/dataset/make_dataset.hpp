@@ -1,4 +1,4 @@
-// Makes a data set: its shards, as far as they are missing, and when all are there the manifest, the COCO file and the card.
+// Makes a data set: the missing shards and, when no shard is missing, the manifest, the COCO file and the card.
 #pragma once
 
 #include <atomic>
@@ -20,7 +20,7 @@ struct DatasetOptions {
   std::uint64_t part = 0, parts = 1;   // the part has the shards whose number leaves `part` when divided by `parts`
   int threads = 1;                     // pings side by side
   std::optional<SimdLevel> simd = {};  // instead of the job's
-  // When it becomes true, the pings under way are finished, and the shard's are set aside for the next run.
+  // When it becomes true, the pings being made are finished, and those of the incomplete shard are kept for the next run.
   const std::atomic<bool>* stop = nullptr;
 };
 
@@ -42,9 +42,10 @@ class DatasetFolder {
   virtual ~DatasetFolder() = default;
   virtual const std::string& inputs() const = 0;           // digest of all that the bytes depend on
   virtual const std::string& instruction_set() const = 0;  // a name of simd_level_names
-  /// Whether the shard is there, and as it was written. bad_data: it differs from its digest.
+  /// Returns whether the shard exists and is unchanged. Error bad_data: it differs from its digest.
   virtual Result<bool> holds(std::uint64_t shard) = 0;
-  /// A shard of that name that has come meanwhile stays. bad_data: its bytes differ. Others: io; config as draw_ping().
+  /// Makes the shard. One that another process has made meanwhile is kept; if its bytes differ, the error is bad_data. Other
+  /// errors: io; config as draw_ping().
   virtual Result<void> make(std::uint64_t shard) = 0;
   /// Whether the last error is that a shard's bytes differ: another program, or a damaged disk or memory.
   virtual bool differs() const = 0;
@@ -55,7 +56,7 @@ class DatasetFolder {
 /// Makes the folder. `job` outlives it. Errors: io; usage when it holds another job's shards; config as draw_ping().
 Result<std::unique_ptr<DatasetFolder>> open_dataset(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress);
 
-/// Everything of this part that is missing, and the conclusion.
+/// Makes all missing shards of this part, and the manifest if no shard is missing.
 Result<DatasetProgress> make_dataset(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress);
 
 }  // namespace sonar::dataset

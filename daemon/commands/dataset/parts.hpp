@@ -1,4 +1,4 @@
-// The notes beside each shard, shard-NNNNNN.json: what the conclusion of a data set and its exports need of the shard's pings.
+// The notes beside each shard, shard-NNNNNN.json: facts of its pings for the manifest, the COCO file and the exports.
 #pragma once
 
 #include <cstdint>

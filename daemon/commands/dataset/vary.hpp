@@ -29,7 +29,7 @@ struct Draws {
   render::Values numbers;
 };
 
-/// `vary:` of a job; what is wrong with it the document's finish() tells.
+/// Reads `vary:` of a job; the finish() of the document returns its errors.
 std::vector<Variation> read_variations(const text::Node& node);
 
 /// Draws for a ping, from 1; attempts count from 0.

@@ -7,10 +7,10 @@
 
 namespace sonar::farm {
 
-/// The exit code. Errors: what the job or the folder have wrong; unavailable: the server; bad_data: shards that are missing or
+/// Returns the exit code. Errors: faults of the job or the folder; unavailable (the server); bad_data if shards are missing or
 /// differ from their digests.
 Result<int> run_farm(const FarmCommand& command);
-/// Jobs, their dead shards and their workers, in lines.
+/// Returns lines about the jobs, their dead shards and their workers.
 Result<std::string> describe_farm(Queue& queue);
 
 }  // namespace sonar::farm

@@ -1,4 +1,4 @@
-// A data set's job as it travels to workers: a record, and the bytes of the job file and of every file that it names.
+// The job of a data set as workers get it: a record, and the bytes of the job file and of every file that it names.
 #pragma once
 
 #include <cstdint>

@@ -27,15 +27,15 @@ struct EngineOptionsGiven {
   std::array<std::string, named_switches.size()> switches;  // "on", "off", in the order of named_switches
 };
 
-/// --side-lobes of `side_lobes`.
+/// Returns the option of a switch: --side-lobes for `side_lobes`.
 std::string option_of(const NamedSwitch& part);
 
 void add_device_option(CLI::App& app, EngineOptionsGiven& given);
-/// Everything but the threads, which a benchmark varies, and the device.
+/// Adds all options except those for threads, which a benchmark varies, and for the device.
 void add_model_options(CLI::App& app, EngineOptionsGiven& given);
 void add_engine_options(CLI::App& app, EngineOptionsGiven& given);
 
-/// Usage error: a part that is switched on but left out by the mode or the fixed fan. One of the file's own is no error.
+/// Refuses (usage) an option that switches on a part without effect in this mode or fixed fan. In the file that is no error.
 Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given);
 
 }  // namespace sonar

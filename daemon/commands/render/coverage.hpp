@@ -12,8 +12,8 @@ namespace sonar::render {
 
 struct Coverage {
   std::size_t bins = 0, good = 0;  // good: within 1 dB
-  std::size_t empty = 0;           // 10 dB or more below: no energy to speak of
-  double worst_db = 0;             // signed, of the bin farthest off
+  std::size_t empty = 0;           // 10 dB or more below the closed form
+  double worst_db = 0;             // the largest deviation of a bin, signed
   double mean_db = 0;              // mean of the powers of all bins over their closed form
   double percent() const { return bins == 0 ? 0 : 100.0 * static_cast<double>(good) / static_cast<double>(bins); }
 };
@@ -27,9 +27,9 @@ RenderJob with_bed_only(RenderJob job);
 /// plane below the sonar, a sonar that rolls, flat beams, the comparison modes, beams without a width.
 Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
 
-/// That product over a level bed, a fifth of the range above it and 0.25 rad nose down.
+/// Returns the job of a product over a level bed: a fifth of the range above it, 0.25 rad nose down.
 RenderJob over_a_level_bed(std::shared_ptr<const SonarModel> model, const PingSettings& settings, const std::string& name);
-/// Every mode of every product over a level bed: at its stored range, or its longest if that is shorter.
+/// Returns the jobs of every mode of every product over a level bed, at its stored range or, if shorter, its longest range.
 std::vector<RenderJob> shipped_sonars_over_a_bed();
 
 }  // namespace sonar::render

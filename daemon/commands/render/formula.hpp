@@ -13,7 +13,8 @@ namespace sonar::render {
 
 using Values = std::map<std::string, double, std::less<>>;
 
-/// Angles in radians; deg() and rad() convert. Errors: a sentence when it cannot be parsed or is not a finite number.
+/// Evaluates a formula; angles are in radians, deg() and rad() convert. Errors: a sentence if it cannot be parsed or is not
+/// finite.
 Result<double> evaluate(std::string_view formula, const Values& values);
 
 /// The text with every $name and $(formula) replaced by its number. Errors start with `name`:line.

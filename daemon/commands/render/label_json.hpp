@@ -1,4 +1,4 @@
-// Labels in words: the instances of a scene, and the place of each in a ping, in COCO's form (docs/datasets.md).
+// Labels as JSON: the instances of a scene, and the pixels of each in a ping, in COCO's format (docs/datasets.md).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -18,7 +18,7 @@ nlohmann::json instances_of(const Scene& scene);
 /// `cartesian` in pixels of the fan; `visible`, the share of its energy that nothing in the way takes.
 nlohmann::json annotations_of(const PingLabels& labels, const Ping& ping, const Scene& scene);
 
-/// Where metres lie among the pixels of the Cartesian form, which is the fan of --image-rings off.
+/// Returns the scale and origin of the Cartesian picture, which is the fan of --image-rings off.
 nlohmann::json layout_of(const Ping& ping);
 
 }  // namespace sonar::render

@@ -1,5 +1,5 @@
-// The output folder of `sonard render`: for one set of inputs, and one run at a time. Complete pings in it are kept, so that an
-// interrupted run continues where it stopped.
+// The output folder of `sonard render`. It holds pings of one set of inputs, and one run may write to it at a time. Complete
+// pings are kept, so that an interrupted run continues where it stopped.
 #pragma once
 
 #include <filesystem>
@@ -35,7 +35,7 @@ class OutputFolder {
 
   /// The common start of the names of a ping's files: "folder/000001".
   std::string stem(std::uint64_t number) const;
-  /// Whether all files of a ping are there, of these inputs.
+  /// Returns whether all files of a ping exist and are of these inputs.
   bool holds(std::uint64_t number) const;
   std::uint64_t size_of(std::uint64_t number) const;
   const std::string& digest() const { return digest_; }

@@ -5,7 +5,7 @@
 
 namespace sonar::render {
 
-/// Errors: what the input or the folder has wrong.
+/// Errors: faults of the input or the folder.
 Result<void> run_render(const RenderCommand& command);
 
 }  // namespace sonar::render

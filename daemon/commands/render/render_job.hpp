@@ -58,20 +58,20 @@ Result<RenderInput> load_render_input(const std::filesystem::path& file, const s
 Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder,
                                       ShapeCache* known = nullptr);
 
-/// A sentence when the product cannot be set to the range, which is rendered all the same; else empty.
+/// Returns a sentence if the product cannot be set to the range, which is rendered nevertheless; else empty.
 std::string note_of_range(const RenderJob& job);
-/// Width of a range cell in the job's mode, on the wire at every range; none of a sonar that makes no range images.
+/// Returns the width of a range cell in the mode of the job, equal at every range; nullopt for a sonar without range images.
 std::optional<float> range_cell_m(const RenderJob& job);
 
 /// The vehicle follows its trajectory in a file, in the file's own time; an empty name: of the only body in it. Errors:
 /// name:line: what.
 Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const std::string& name, const std::string& body);
-/// Times of the poses of the vehicle's trajectory; empty without one.
+/// Returns the times of the poses of the vehicle's trajectory; empty if it has none.
 std::vector<Time> pose_times(const RenderJob& job);
 
 /// The vehicles and moving objects of the job, as the daemon has them.
 World world_of(const RenderJob& job);
-/// Everything a ping of the job depends on. `world` = world_of(job).
+/// Returns everything on which a ping of the job depends. `world` = world_of(job).
 PingRequest make_request(const RenderJob& job, const World& world, PingNumber number, Time at);
 
 /// Depth of the sonar at time 0 [m], before there is a scene.

@@ -17,11 +17,11 @@ struct Progress {
   std::uint64_t bytes = 0;  // written
 };
 
-/// When the pings of a job are fired [s], from the first wanted on. usage: more pings than the poses last.
+/// Returns the times of the pings of a job, from the first wanted one. Error usage: the poses are too few for so many pings.
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& options);
 
-/// One sentence when the sonar is above the sea surface, or above z = 0 in a scene that has none, in some of them; else empty,
-/// and where the times are refused.
+/// Returns a sentence if in some pings the sonar is above the sea surface, or above z = 0 in a scene without one. Empty
+/// otherwise, and if the times are refused.
 std::string note_of_air(const RenderInput& input, const OutputOptions& options);
 
 /// Calls `on_progress` after every ping, in order. Errors: io; requests that the engine rejects.

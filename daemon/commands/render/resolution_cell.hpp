@@ -1,5 +1,5 @@
-// The patch that one sample of a beam sums over, from the beam's pattern and the pulse in use: what level predictions multiply
-// scattering strengths with (docs/acoustics.md, sections 3 and 4).
+// The area over which one sample of a beam sums, by the pattern of the beam and the pulse. A predicted level is the scattering
+// strength times this area (docs/acoustics.md, sections 3 and 4).
 #pragma once
 
 #include "daemon/commands/render/render_job.hpp"

@@ -1,5 +1,5 @@
-// Unrelated poses, as in a data set: a file whose poses lie too far apart for a vehicle's trajectory, so that they say nothing
-// about the motion within a ping.
+// Detects files of unrelated poses, as in a data set. Their poses are too far apart for the trajectory of a vehicle, so they do
+// not tell the motion within a ping.
 #pragma once
 
 #include <string>

@@ -25,7 +25,7 @@ class ReplayPage final : public HttpService {
   const LimitConfig& limits_;
   PlayedRecording of_;
   ConnectionServices services_;
-  ControlConfig access_;  // as a sonard without a configuration
+  ControlConfig access_;  // the access rules of a sonard without a configuration
   ViewSecrets secrets_;
   RecordingViews views_;
   ConnectionListener<HttpConnection> listener_;

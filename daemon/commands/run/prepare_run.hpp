@@ -1,5 +1,5 @@
-// All steps of a run before its first socket. `sonard run` starts with them and `sonard check` does only them, so that both
-// refuse the same with the same sentence.
+// The steps of a run before its first socket is opened. `sonard run` begins with them and `sonard check` does nothing else, so
+// that both report the same errors.
 #pragma once
 
 #include <functional>
@@ -23,8 +23,8 @@ struct PreparedRun {
   std::string token_warning;           // warning of Token::read(); empty = the file is safe
 };
 
-/// The configuration as the command line changes it, its token, journal, scene and engine. `json`: how errors are to be written
-/// from then on. `say_with` gives the sentences about a long load their place.
+/// Loads the configuration, applies the command line, checks token and journal, loads the scene and makes the engine. `json`: the
+/// format of errors from then on. `say_with` returns the function for sentences about a long load.
 Result<PreparedRun> prepare_run(const RunCommand& command, bool& json,
                                 const std::function<LoadProgress::Say(const Config&)>& say_with);
 

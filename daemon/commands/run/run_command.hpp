@@ -7,8 +7,8 @@
 
 namespace sonar {
 
-/// Serves until stopped; returns the exit code. `begin` = of the program, for the ready line. `json` is set to how errors are
-/// written: as the log is, as far as that is known by then.
+/// Serves until stopped; returns the exit code. `begin`: start of the program, for the ready line. `json` is set to the format of
+/// errors, which is that of the log once that is known.
 Result<int> run_daemon(const RunCommand& command, std::chrono::steady_clock::time_point begin, bool& json);
 
 }  // namespace sonar
