@@ -12,7 +12,7 @@ enum class SonarChange { untouched, moved, changed, removed };
 /// Change of a sonar that runs as `running`, when `next` takes the place of `now`.
 SonarChange sonar_change(const SonarConfig& running, const Config& now, const Config& next);
 
-/// Null when there is none.
+/// Returns null if there is none.
 const SonarConfig* sonar_named(const std::vector<SonarConfig>& sonars, const std::string& name);
 
 }  // namespace sonar

@@ -21,7 +21,7 @@ using ConnectionId = std::uint64_t;
 
 enum class Role { client, observer, stream };  // stream: the datagrams of a port of kind udp_stream
 
-/// Compute this ping and return it through Sonar::on_ping().
+/// Compute this ping, then call Sonar::on_ping() with it.
 struct ComputePing {
   PingRequest request;
 };
@@ -48,7 +48,7 @@ struct ReadFrom {
   ConnectionId connection = 0;
   bool on = true;
 };
-/// Write the rest of a message that a fault shaped without its pauses.
+/// Write the rest of the message being written without the pauses of a fault.
 struct EndPauses {
   ConnectionId connection = 0;
 };
@@ -56,12 +56,12 @@ struct EndPauses {
 struct Wake {
   ConnectionId connection = 0;
 };
-/// No messages after the one being written, then the end of the stream; on_closed() follows.
+/// Complete the message being written, send no other, and end the stream; on_closed() follows.
 struct Finish {
   ConnectionId connection = 0;
   std::string why;
 };
-/// At once; on_closed() follows. Not of a stream.
+/// Close the connection at once; on_closed() follows. Not for a stream.
 struct Reset {
   ConnectionId connection = 0;
   std::string why;
@@ -70,10 +70,10 @@ struct Reset {
 struct Closed {
   std::string peer;  // name of the peer
   Role role{};
-  bool served = false;  // if false, it waited for a slot
+  bool served = false;  // false: it was waiting for a slot
   std::uint64_t pings_written = 0, pings_dropped = 0;
   std::string why;
-  bool by_client = false;  // it left
+  bool by_client = false;  // the client closed the connection
 };
 /// The status broadcast has news: send it now.
 struct Announce {};
@@ -86,12 +86,12 @@ struct PingQueued {
   bool preview = false;                             // for viewers of the live view alone
   std::optional<protocol::Distance> distance = {};  // of a range finder, unless a fault withholds the ping
 };
-/// A line for the log; those of one topic are limited together.
+/// A line for the log. The lines of one topic share a rate limit.
 struct Report {
   enum class Topic { settings, notice, ignored, refused_ping, state, fault, topics } topic{};
   LogLine line;
 };
-/// The engine failed: no sonar can go on.
+/// The engine has failed, so no sonar can continue.
 struct EngineFailed {
   Error why;
 };
@@ -111,8 +111,8 @@ inline void report(const std::string& sonar, Report::Topic topic, LogLevel level
 struct PingOutcome {
   std::shared_ptr<const Ping> ping = nullptr;  // null on failure
   std::string failure = {};
-  bool refused = false;             // only this ping could not be made: it is invalid or there was no memory for it
-  ErrorKind kind = ErrorKind::bug;  // kind of a failure that is more than that
+  bool refused = false;             // only this ping failed: the request is invalid, or memory is short
+  ErrorKind kind = ErrorKind::bug;  // kind of a failure of the engine
   double seconds = 0;               // wall time of its computation, without pings of other sonars computed in between
 };
 

@@ -27,7 +27,7 @@ struct Connection {
   enum class State {
     waiting,  // for a slot
     served,
-    leaving,  // finishing: gets the rest of its message, is no longer a client when another took over
+    leaving,  // finishing: it gets the rest of its message, and does not count as a client after a take-over
   };
   ConnectionId id = 0;
   Role role = Role::client;
@@ -45,26 +45,26 @@ struct Connection {
     bool after_next = false;  // held until the next ping has overtaken it
   };
   std::deque<Held> held;
-  bool finishing = false;  // no more bytes are taken in, no more pings offered
+  bool finishing = false;  // its bytes are ignored, and no more pings are offered
   Time not_before{};       // earliest next call of dialogue->on_tick, in unskipped time
   std::uint64_t bytes_written = 0, bytes_read = 0;
   std::uint64_t streamed_pings = 0, streamed_bytes = 0;  // sent to the receivers of this client by a stream's datagrams
   std::uint64_t requests = 0;                            // for settings or a ping
-  std::string complaint = {};                            // the last about what it sent
+  std::string complaint = {};                            // the latest complaint about its requests
 
-  /// Whether it gets datagrams: its port is of kind udp_stream or udp_dialogue.
+  /// Returns whether it gets datagrams: its port is of kind udp_stream or udp_dialogue.
   bool takes_datagrams() const { return port != nullptr && port->kind != protocol::Port::Kind::tcp_stream; }
-  /// By its own connection or a stream.
+  /// Pings sent to it by its own connection or a stream.
   std::uint64_t pings_written() const { return outbox.pings_written() + streamed_pings; }
-  /// Names a receiver of that stream.
+  /// Returns whether it has requested a receiver of that stream.
   bool receives(std::size_t stream) const;
-  /// When the conversation has something to do; nothing while it ends.
+  /// The next time at which the conversation must be called; none while the connection ends.
   std::optional<Time> next_tick() const;
-  /// When it will request a ping by itself.
+  /// The time at which the conversation will request a ping by itself.
   std::optional<Time> next_request() const;
 };
 
-/// Adds what was sent to it, dropped and received.
+/// Adds the counts of the connection: sent, dropped and received.
 void add_traffic(DeviceFigures& figures, const Connection& of);
 
 class Connections {
@@ -88,12 +88,12 @@ class Connections {
   Connection* stream(std::size_t number);
   /// Where the datagrams of a stream go: the device's own list and those of the clients, each address once.
   std::vector<protocol::Endpoint> receivers(const Connection& stream) const;
-  /// A client is served or a stream has receivers.
+  /// True if a client is served or a stream has receivers.
   bool has_audience() const;
-  /// Every client has taken what it was sent.
+  /// True if every client has received all that it was sent.
   bool settled() const;
 
-  /// By the rules of max_clients, when_full and max_observers.
+  /// Decides by the rules of max_clients, when_full and max_observers.
   enum class Verdict { serve, take_over, wait, refuse };
   Verdict verdict(Role role) const;
   Connection& add(ConnectionId id, Role role, Peer peer, Connection::State state, const protocol::Port* port);

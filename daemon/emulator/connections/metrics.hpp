@@ -13,7 +13,7 @@
 
 namespace sonar {
 
-/// How often a time was how long. Fixed bounds: adding costs no memory, and pictures of different runs can be compared.
+/// Counts times by their length. The bounds are fixed, so adding needs no memory and different runs can be compared.
 class Histogram {
  public:
   static constexpr std::array bounds_s{0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02,
@@ -25,7 +25,8 @@ class Histogram {
   double sum_s() const { return sum_s_; }
   /// Counts of times up to and including bounds_s[i], above the bound before; the last counts those beyond all bounds.
   const std::array<std::uint64_t, bounds_s.size() + 1>& counts() const { return counts_; }
-  /// Linear between the bounds round it, so right to a factor of 2.5; beyond them the last bound. 0 when empty. q in [0, 1].
+  /// Estimates a quantile, q in [0, 1], linearly between two bounds: accurate to a factor of 2.5. Beyond the last bound it
+  /// returns that; 0 if empty.
   double quantile_s(double q) const;
 
  private:
@@ -34,13 +35,13 @@ class Histogram {
   double sum_s_ = 0;
 };
 
-/// One sonar. ticks = pings + skipped (+ one ping under way, + a trigger that waits);
-/// pings = refused + unwanted + those offered to clients; offered = sent + dropped (+ what is in the outboxes now).
+/// The counters of one sonar. ticks = pings + skipped (+ one ping being computed, + a waiting trigger); pings = refused +
+/// unwanted + those offered to clients; offered = sent + dropped (+ those in the outboxes now).
 struct DeviceFigures {
   std::uint64_t ticks = 0;
-  std::uint64_t skipped_ticks = 0;                       // ticks of which no ping came
-  SkippedTicks skipped;                                  // why
-  std::uint64_t skipped_stale = 0;                       // why, too: the vehicle's poses had stopped (poses.on_stale: stop)
+  std::uint64_t skipped_ticks = 0;                       // ticks without a ping
+  SkippedTicks skipped;                                  // the reasons
+  std::uint64_t skipped_stale = 0;                       // another reason: the vehicle's poses had stopped (poses.on_stale: stop)
   std::uint64_t pings = 0;                               // simulated
   std::uint64_t refused = 0;                             // pings that the engine refused
   std::uint64_t unwanted = 0;                            // pings whose clients had gone or had requested other settings
@@ -56,8 +57,8 @@ struct DeviceFigures {
   std::uint64_t bytes_written = 0, bytes_read = 0;
   double simulation_s = 0;  // wall time of all pings
   Histogram simulation;     // time to compute a ping
-  Histogram lateness;       // from when a tick was due to when it was taken up
-  Histogram jitter;         // how far the time between two pings at a client's socket is off the time between their ticks
+  Histogram lateness;       // delay from a tick to its processing
+  Histogram jitter;         // difference between the interval of two pings at a client's socket and the interval of their ticks
   Histogram latency;        // from a ping's tick to its last byte handed to the kernel, for each client
 };
 

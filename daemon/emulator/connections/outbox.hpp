@@ -1,5 +1,5 @@
-// Messages that wait for one client: the one being written, control replies in order, and at most `depth` waiting pings.
-// Filled by the Sonar, emptied by what writes to the client; whole messages only, so a stream can never be cut or mixed.
+// Messages that wait for one client: the one being written, replies in order, and at most `depth` pings. The Sonar fills it; the
+// session empties it. It holds only whole messages, so a stream is never cut or mixed.
 #pragma once
 
 #include <array>
@@ -16,11 +16,11 @@
 
 namespace sonar {
 
-/// Why a ping that was offered to a client never reached it whole.
+/// The reason why a ping that was offered to a client did not reach it whole.
 enum class DropReason {
-  slow,   // another ping took its place, or it found none
+  slow,   // a newer ping replaced it, or the queue was full
   gone,   // the connection ended first
-  stop,   // we ended the conversation: only the message being written is still finished
+  stop,   // sonard ended the conversation; only the message being written is completed
   fault,  // a fault on purpose
 };
 inline constexpr std::size_t drop_reasons = 4;
@@ -48,31 +48,31 @@ class Outbox {
     std::size_t size() const;  // bytes, without prefixes
   };
   static constexpr std::size_t most_ping_bytes = 8u << 20;    // waiting pings of one client
-  static constexpr std::size_t most_reply_bytes = 64u << 10;  // a client that asks and never reads
+  static constexpr std::size_t most_reply_bytes = 64u << 10;  // limit for a client that sends requests and does not read
   static constexpr std::size_t most_replies = 256;
 
   explicit Outbox(OutboxRules rules) : rules_(rules) {}
 
-  /// False when replies pile up beyond their bound: the session must be closed.
+  /// Returns false if too many replies wait; the session must then be closed.
   bool push_reply(Bytes reply);
   void push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number, std::vector<Bytes> prefixes = {}, Time fired_at = {}) {
     push_ping({std::move(bytes), number, std::move(prefixes), fired_at});
   }
   void push_ping(Message ping) { push(std::move(ping), true); }
-  /// One that a fault held back: beyond the depth, too.
+  /// Adds a ping that a fault held back, also beyond the depth.
   void push_held(Message ping) { push(std::move(ping), false); }
-  /// The next message to write, whole: replies before pings. Empty while one is being written, or when there is nothing.
+  /// Returns the next message to write, replies before pings. Empty while a message is being written, or if none waits.
   Message take();
-  /// The message last taken has been written to its end.
+  /// Reports that the message last taken was written completely.
   void written();
-  /// It could not be written, and others can: it is dropped.
+  /// Reports that the message last taken could not be written; it counts as dropped. Later messages may follow.
   void not_written(DropReason why = DropReason::gone);
-  /// A ping that was offered and does not even wait.
+  /// Counts a ping that was offered and dropped without waiting.
   void drop_offered(DropReason why) { ++pings_offered_, count_drop(why); }
   void use(OutboxRules rules) { rules_ = rules; }
-  /// Leaves the message being written and the replies, which are small.
+  /// Keeps the message being written and the replies, which are small.
   void drop_waiting_pings(DropReason why = DropReason::stop);
-  /// The connection is over: nothing more is written, and what was not is dropped, the message being written too.
+  /// Call it when the connection is over: everything that was not written is dropped, the message being written too.
   void end(DropReason why);
 
   bool idle() const { return !writing_ && replies_.empty() && pings_.empty(); }

@@ -10,15 +10,15 @@
 
 namespace sonar {
 
-/// Time between two pings that these settings allow: the rate asked for, and never less than the two-way travel of sound to the
-/// range plus 2 ms (docs/protocols/oculus.md, section 5.6). Zero in standby.
+/// Returns the time between two pings: that of the requested rate, but at least the two-way travel of sound to the range plus 2
+/// ms (docs/protocols/oculus.md, section 5.6). Zero in standby.
 std::chrono::nanoseconds ping_period(const PingSettings& settings);
 
-/// Ticks and triggers that no ping came of.
+/// Counts of ticks and triggers without a ping.
 struct SkippedTicks {
-  std::uint64_t late = 0;     // the next one was due already
+  std::uint64_t late = 0;     // the next tick was due already
   std::uint64_t busy = 0;     // the ping before it was still being computed
-  std::uint64_t trigger = 0;  // one waited already, or pings ended before its turn
+  std::uint64_t trigger = 0;  // another trigger waited, or pings ended before its turn
   std::uint64_t total() const { return late + busy + trigger; }
 };
 
@@ -28,17 +28,17 @@ class Pacer {
   /// the sound of the last ping has come back, and not sooner after it than the shorter of both periods. A pending trigger is
   /// kept as long as pings are triggered.
   void configure(const PingSettings& settings, Time now);
-  /// The clock jumps ahead by `by`: everything is due as long from now as it was.
+  /// Call it when the clock jumps ahead: moves all times by `by`.
   void skip(std::chrono::nanoseconds by);
   /// No pings until the next configure().
   void stop();
-  /// A trigger from the client; one is kept while the previous ping is still under way, more are counted as skipped,
-  /// unless they join the one that waits.
+  /// A client requests a ping. One trigger waits while the previous ping is computed. Further ones count as skipped, or join the
+  /// waiting one.
   void trigger(Time now, bool joins = false);
-  /// When fire() wants to be called next; none in standby, when stopped or waiting for a trigger.
+  /// The time at which fire() must be called next; none in standby, when stopped, or without a trigger.
   std::optional<Time> next_tick() const;
-  /// At or after next_tick(): true = ping now, stamped with last_tick(). `busy`: the previous ping is still being computed; its
-  /// ticks are skipped and counted, never queued (a trigger waits instead). A late call does not shift the grid.
+  /// Call it at or after next_tick(). True: make a ping now, with the stamp last_tick(). `busy`: the previous ping is being
+  /// computed; ticks are then skipped and counted, and a trigger waits. A late call does not shift the grid.
   bool fire(Time now, bool busy);
 
   Time last_tick() const { return last_tick_; }

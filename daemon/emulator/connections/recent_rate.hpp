@@ -1,4 +1,4 @@
-// The measured rate of a sonar's pings. Of a sonar whose host asks for each ping, no setting tells it.
+// Measures the rate of a sonar's pings, which no setting tells if the host requests each ping.
 #pragma once
 
 #include <algorithm>

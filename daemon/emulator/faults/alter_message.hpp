@@ -12,14 +12,14 @@
 
 namespace sonar {
 
-/// A message on its way through the faults that meet it.
+/// A message, as the faults that act on it change it one after the other.
 struct MessageEdit {
   protocol::Bytes bytes;
   std::vector<Outbox::Shape::Pause> pauses;
   Outbox::Shape::End end = Outbox::Shape::End::none;
   bool dropped = false;
 };
-/// Inputs of a kind beside the message.
+/// Further inputs of a fault.
 struct MessageContext {
   const protocol::Vendor& vendor;
   FaultDraws draws;
@@ -28,15 +28,15 @@ struct MessageContext {
   const protocol::Bytes* before = nullptr;  // for splice: the message before; may be null
 };
 
-/// Returns where the message was touched, if that is not where its bytes first differ (a pause, an end); false in `.second`: the
-/// kind could not act on this message, which stays as it is.
+/// The effect of a fault on a message: whether it acted, and where, if that is not where the bytes first differ (a pause, an
+/// end).
 struct Touch {
   bool acted = true;
   std::optional<std::size_t> place = {};
 };
 Touch alter_message(const Fault& fault, const MessageContext& context, MessageEdit& message);
 
-/// One status message; the list of datagrams sent in its place.
+/// Changes the list of datagrams that is sent for one status message.
 void alter_beacons(const Fault& fault, const protocol::Vendor& vendor, const FaultDraws& draws,
                    std::vector<protocol::Bytes>& datagrams);
 

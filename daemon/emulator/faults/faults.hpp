@@ -39,7 +39,7 @@ struct ApplyRequest {  // applies a client's request late
   protocol::ChangeSettings change;
   std::string who;
 };
-struct ChangePace {};  // rate_factor() is another
+struct ChangePace {};  // rate_factor() has changed
 struct ReadClients {
   bool on = true;
 };
@@ -52,9 +52,9 @@ struct ServeWaiting {};
 using FaultOrder = std::variant<SetListening, EndClients, ForgetSettings, RestartDevice, OverrideSettings, ApplyRequest,
                                 ChangePace, ReadClients, DropNewestPings, ReleaseHeld, StopShaping, ServeWaiting>;
 
-/// Why a sonar cannot have faults.
+/// The reason why a sonar cannot have faults.
 struct FaultRefusal {
-  /// Its vendor has no such thing, so another sonar may take them; or a fault that it has prevents them.
+  /// no_effect: the product has nothing that they could change, but another sonar may. conflict: a present fault prevents them.
   enum class Code { no_effect, conflict } code = Code::conflict;
   std::string text;  // a sentence
 };
@@ -72,12 +72,12 @@ class Faults {
   };
   Faults(Around around, Time now) : around_(around), start_(now) {}
 
-  // ---- what there is
+  // ---- the list of faults
   /// Why this sonar cannot have these faults; nullopt = it can.
   std::optional<FaultRefusal> why_not(const std::vector<Fault>& faults) const;
-  /// Those of `faults` that are for this sonar and take effect on it. `manual` ones end after longest_manual_fault.
+  /// Adds those of `faults` that are for this sonar and take effect on it. `manual` ones end after longest_manual_fault.
   void add(const std::vector<Fault>& faults, bool manual, Time now, Actions& actions);
-  /// Empty `name` = all. False: there is none of that name.
+  /// Ends the faults of that name, or all if `name` is empty. Returns false if there is none.
   bool end(const std::string& name, Time now, Actions& actions);
   struct Listed {
     const Fault* fault;
@@ -96,17 +96,17 @@ class Faults {
   void on(Occasion occasion, Time now);
 
   // ---- pings
-  /// Before anything is made of a ping: triggers, and which faults this ping meets.
+  /// Call it before a ping is framed: begins faults that the ping triggers, and decides which faults act on it.
   void begin_ping(std::uint32_t number, Time now);
-  /// The ping as the device reports it: its samples and stamps.
+  /// Returns the ping as the device reports it, with changed samples or stamps.
   std::shared_ptr<const Ping> altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state, Time now);
   /// True if alter_datagrams() has something to do for this ping. Else the clients of a port share the datagrams.
   bool alters_datagrams(const Connection& stream, std::uint32_t ping) const;
   void alter_datagrams(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
   bool leaves_group() const;
-  /// A message that a client is about to be sent. False: it is not sent.
+  /// Changes a message before it is sent to a client. Returns false if it must not be sent.
   bool shape(const Connection& to, Outbox::Message& message, Time now);
-  /// Whether a ping waits before it goes into a client's outbox.
+  /// Returns whether a ping is held back before it goes into the outbox of a client.
   struct Hold {
     enum class Kind { pass, until, after_next, collect } kind = Kind::pass;
     Time until{};
@@ -140,10 +140,10 @@ class Faults {
     std::uint32_t key = 0;
     bool active = false, over = false;
     std::uint64_t begun = 0, injections = 0, pings_left = 0;
-    std::optional<Time> begins;  // later, by its delay
+    std::optional<Time> begins;  // set if it begins later, after its delay
     Time expires = Time::max(), since{}, until = Time::max(), step = Time::max();
     bool down = false;               // state of a port or link that goes up and down
-    std::deque<std::uint32_t> hits;  // pings it meets, the latest few
+    std::deque<std::uint32_t> hits;  // the latest pings on which it acts
     std::optional<std::uint32_t> first_number;
     std::shared_ptr<const Ping> kept;
     std::optional<Time> kept_time;

@@ -1,5 +1,5 @@
-// Who is connected to an emulated sonar: slots of clients, the queue for them, take-over, receivers of streams, and the end of a
-// connection. It changes no settings and computes no pings: the Sonar asks has_audience() after each change.
+// The connections of an emulated sonar: slots of clients, the queue for slots, take-over, receivers of streams, and the end of a
+// connection. It changes no settings and makes no pings; the Sonar calls has_audience() after each change.
 #pragma once
 
 #include <exception>
@@ -23,26 +23,26 @@ class Audience {
   const Connections& connections() const { return connections_; }
   Connections::List& all() { return connections_.all(); }
   const Connections::List& all() const { return connections_.all(); }
-  /// A client is served or a stream has receivers.
+  /// True if a client is served or a stream has receivers.
   bool has_audience() const { return connections_.has_audience(); }
   bool stopping() const { return stopping_; }
 
-  /// Decides about a connection: the slots do, unless a fault of clients does (`by_fault`). The connection, when it has a slot:
-  /// serve() follows. Null: it waits or is refused. The client that it takes over from counts as gone.
+  /// Decides about a new connection by the slots, or by a fault of clients (`by_fault`). Returns the connection if it has a slot,
+  /// and serve() must follow; null if it waits or is refused. After a take-over the previous client counts as gone.
   Connection* admit(ConnectionId id, Role role, Peer peer, const protocol::Port* port, Faults::Admission by_fault,
                     Actions& actions);
   void serve(Connection& connection, Time now, Actions& actions);
-  /// The client that has waited longest for a slot. Null: there is none, or the sonar stops.
+  /// Returns the client that has waited longest for a slot; null if none waits, or if the sonar stops.
   Connection* next_waiting() { return stopping_ ? nullptr : connections_.longest_waiting(); }
-  /// A port of kind udp_stream is open.
+  /// Adds the stream of an open port of kind udp_stream.
   void open_stream(ConnectionId id, const protocol::Port& port);
-  /// Another host goes on with the dialogue at a port of kind udp_dialogue.
+  /// Gives the dialogue at a port of kind udp_dialogue to another host.
   void hand_over(ConnectionId id, Peer to);
-  /// `from`: whose list it is; null = the device's own. 0.0.0.0 among the addresses becomes `ip`.
+  /// Sets the list of receivers of client `from`, or of the device if null. An address 0.0.0.0 becomes `ip`.
   void set_receivers(Connection* from, protocol::Ipv4 ip, protocol::SetReceivers wanted);
   /// Replaces the device's own list of that stream by the list of its stored configuration.
   void restore_receivers(protocol::SetReceivers initial);
-  /// Called after a client has come or gone: the state that the device reports, and pings that have no receiver left.
+  /// Call it after a client has come or gone: updates the reported client and drops pings that have no receiver left.
   void on_membership();
 
   /// Waiting pings are dropped; the message that is being written and replies are still sent.
@@ -51,18 +51,18 @@ class Audience {
     if (Connection* const connection = connections_.find(id)) finish(*connection);
   }
   void begin_finish(Connection& connection, const std::string& why, Actions& actions);
-  /// Every connection is finished and none is admitted any more.
+  /// Finishes every connection and admits no more.
   void stop(const std::string& why, Actions& actions);
   /// Accounts for a closed connection and removes it.
   void remove(Connection& connection, const std::string& why, bool by_client, Actions& actions);
   // Effects of faults.
   void end_by_fault(Connection& connection, Faults::RequestVerdict verdict, Actions& actions);
-  /// `only` one of them, or all.
+  /// Ends the client `only`, or all clients.
   void end_clients(std::optional<ConnectionId> only, bool reset, Actions& actions);
   void read_clients(bool on, Actions& actions);
   void drop_newest(bool on);
   void end_pauses(Actions& actions);
-  /// An exception may cost this connection, never the others. A stream belongs to the device: it loses a ping only.
+  /// Runs a function; an exception ends this connection and no other. A stream, which belongs to the device, only loses a ping.
   template <class Call>
   void guarded(Connection& connection, Actions& actions, Call call) {
     try {
@@ -75,7 +75,7 @@ class Audience {
     }
   }
 
-  /// The earliest of these times of served clients (Connection::next_tick or next_request), as the daemon's time.
+  /// Returns the earliest time of served clients, by Connection::next_tick or next_request, in the daemon's time.
   std::optional<Time> earliest(std::optional<Time> (Connection::*of)() const) const;
 
  private:

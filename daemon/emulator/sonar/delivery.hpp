@@ -13,7 +13,7 @@
 
 namespace sonar {
 
-/// A ping as the bytes of each port. The parts of a port are made when they are first asked for. Connections share them.
+/// The bytes of a ping for each port. The parts for a port are made when they are first needed; connections share them.
 class FramedPing {
  public:
   using Bytes = protocol::Bytes;
@@ -22,7 +22,7 @@ class FramedPing {
   /// `ping` as the device reports it. All outlive the object.
   FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping);
 
-  /// Null: the vendor sends it as datagrams only.
+  /// The bytes of the ping over TCP; null if the vendor sends only datagrams.
   const std::shared_ptr<const Bytes>& bytes() const { return bytes_; }
   /// The parts of the ping at that port: datagrams, or what a port of kind tcp_stream with a gap sends between pauses.
   const Datagrams& parts(const protocol::Port& port);
@@ -52,21 +52,21 @@ class Delivery {
   using Requests = std::vector<std::pair<Connection*, protocol::Event>>;
   /// Puts the ping into the outbox of every connection that takes it.
   PingQueued queue(const PingOutcome& outcome, Time now, Requests& requests, Actions& actions);
-  /// Pings that a fault held back until now; with `all`, those of later too.
+  /// Sends pings that a fault held back until now; with `all`, also those that are due later.
   void release_held(Time now, bool all, Actions& actions);
-  /// When a ping that is held back is due.
+  /// The time at which the next ping that is held back is due.
   std::optional<Time> next_release() const;
 
-  /// Where a message of the stream, or of the host at a port of kind udp_dialogue, goes, as of now.
+  /// Returns the present receivers of a stream, or of a dialogue at a port of kind udp_dialogue.
   std::vector<protocol::Endpoint> receivers(ConnectionId stream) const;
-  /// The datagrams of a status broadcast.
+  /// Returns the datagrams of a status broadcast.
   std::vector<protocol::Bytes> beacons(Time now);
   // See Sonar, which passes these on.
   Outbox::Message next_message(ConnectionId id, Time now);
   void on_sent(ConnectionId id, std::size_t bytes);
   void on_not_sent(ConnectionId id);
   void on_written(ConnectionId id, const Outbox::Message& message, Time now);
-  /// Pings are numbered from 1 again.
+  /// Call it when pings are numbered from 1 again.
   void restart() { last_served_ = {}; }
 
  private:
