@@ -15,15 +15,15 @@ Trajectory::Trajectory(Points points, Ns duration)
   assert(points_.angular_velocities_radps.empty() || points_.angular_velocities_radps.size() == points_.times.size());
 }
 
-/// Motion on the way that ends at point `after`, at the share u of it.
+/// Motion in the interval that ends at point `after`, at the fraction u of the interval.
 Motion Trajectory::between(std::size_t after, double u) const {
   const std::size_t before = after - 1;
-  // Times of points rise, so there is no division by 0 s.
+  // The times of points increase, so there is no division by 0 s.
   const double per_s = 1 / seconds(points_.times[after] - points_.times[before]);
   const Pose &a = points_.poses[before], &b = points_.poses[after];
   const auto told = [&](const std::vector<Vec3d>& values) { return values[before] + u * (values[after] - values[before]); };
   Motion moves;
-  // Without velocities in the file, the mean ones of the interval: world axes [m/s], body axes [rad/s].
+  // If the file has no velocities, these are the mean ones of the interval: world axes [m/s], body axes [rad/s].
   moves.velocity_mps = points_.velocities_mps.empty() ? per_s * (b.position_m - a.position_m) : told(points_.velocities_mps);
   moves.angular_velocity_radps = points_.angular_velocities_radps.empty() ? per_s * rotation_between(a.orientation, b.orientation)
                                                                           : told(points_.angular_velocities_radps);
@@ -32,14 +32,14 @@ Motion Trajectory::between(std::size_t after, double u) const {
 
 Moment Trajectory::at(Ns time) const {
   const std::vector<Ns>& times = points_.times;
-  // Outside of the points the pose is held, and so at rest.
+  // Before the first point and after the last one the body rests at the pose of that point.
   if (time < times.front()) return {points_.poses.front(), {}};
   if (time > times.back() || times.size() == 1) return {points_.poses.back(), {}};
   if (time == times.back()) return {points_.poses.back(), between(times.size() - 1, 1)};
   // The first point later than `time`. The interval ends at this point.
   const auto after = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), time) - times.begin());
   const Pose &a = points_.poses[after - 1], &b = points_.poses[after];
-  // Share of the interval, in [0, 1); differences of whole nanoseconds are exact.
+  // Fraction of the interval, in [0, 1); differences of whole nanoseconds are exact.
   const double u =
       static_cast<double>((time - times[after - 1]).count()) / static_cast<double>((times[after] - times[after - 1]).count());
   const Motion moves = between(after, u);

@@ -31,8 +31,9 @@ std::string_view trimmed(std::string_view s) {
   return s;
 }
 
-/// Written by hand, because the search functions of strings are slow for words as short as numbers. `between`: a comma, a
-/// semicolon, or a blank, which stands for several and for tabs. A last word that is empty is none.
+/// Splits a line into words. It is written by hand, because the search functions of strings are slow for words as short as
+/// numbers. `between` is a comma, a semicolon or a blank; a blank stands for any number of blanks and tabs. An empty last word is
+/// dropped.
 void split(std::string_view line, char between, Words& words) {
   const bool blanks = between == ' ';
   words.clear();
@@ -59,7 +60,7 @@ bool is_number(std::string_view word) {
 
 std::optional<Frame> frame_called(std::string_view word) {
   std::string upper(word.substr(0, 16));
-  // ASCII alone: toupper depends on the locale.
+  // Converts ASCII only, because toupper depends on the locale.
   std::transform(upper.begin(), upper.end(), upper.begin(),
                  [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; });
   for (std::size_t i = 0; i < frame_names.size(); ++i)
@@ -67,7 +68,7 @@ std::optional<Frame> frame_called(std::string_view word) {
   return std::nullopt;
 }
 
-/// The points of one body while the file is read; stamps are still the file's.
+/// The points of one body while the file is read. Their times are still those of the file.
 struct Track {
   std::string body;
   Points points;
@@ -158,7 +159,7 @@ class Reader {
   }
 
   Format guessed(bool numbers) {
-    // Without a header commas mean EuRoC, 12 values KITTI, 8 values TUM.
+    // Without a header, commas mean EuRoC, 12 values mean KITTI, and 8 values mean TUM.
     if (!numbers) return Format::csv;
     if (between_ != ' ') return words_.size() == 8 && has_seconds(words_.front()) ? Format::tum : Format::euroc;
     if (words_.size() == 12) return Format::kitti;
@@ -230,7 +231,7 @@ class Reader {
     TrajectoryFile file;
     file.format = format_;
     file.frame = frame_ ? *frame_ : *asked_.frame;
-    // Times of all bodies count from the file's earliest.
+    // Times of all bodies count from the earliest time in the file.
     Ns first = tracks_.front().points.times.front(), last = first;
     for (const Track& t : tracks_) {
       first = std::min(first, t.points.times.front());
@@ -274,10 +275,10 @@ Result<std::string> text_of(const std::filesystem::path& file) {
   return text;
 }
 
-/// Logs and recordings have bytes of 0 near their beginning, which no line of numbers has.
+/// Logs and recordings have zero bytes near their beginning; lines of numbers have none.
 bool is_log(std::string_view text) {
   constexpr std::size_t beginning = 4096;
-  return text.substr(0, beginning).find('\0') != std::string_view::npos || text.starts_with("$G");  // of a GPS
+  return text.substr(0, beginning).find('\0') != std::string_view::npos || text.starts_with("$G");  // NMEA of a GPS
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Smooth random fields for made terrain and boulders, drawn from Philox: the same seed gives the same ground everywhere.
-// Used when a scene is loaded; pings never call it.
+// Smooth random fields for generated terrain and boulders. They use the generator Philox: the same seed gives the same terrain on
+// every machine. They are used when a scene is loaded; pings never call them.
 #pragma once
 
 #include <cmath>
@@ -11,10 +11,11 @@
 
 namespace sonar {
 
-/// Value noise on the unit lattice in space, -1..1, smooth; `stream` tells fields of one seed apart.
+/// Smooth value noise on the unit lattice in space, in -1..1. Fields of the same seed differ if their `stream` differs.
 double value_noise(Vec3d p, std::uint32_t seed, std::uint32_t stream);
 
-/// Gradient noise over a rectangle of the plane, about -1..1, with features of one wavelength. The lattice is drawn once.
+/// Gradient noise over a rectangle of the plane, about -1..1, with features of one wavelength. The constructor draws the
+/// gradients of the lattice.
 class GradientField {
  public:
   /// Covers |x| <= half_x, |y| <= half_y, in metres.
