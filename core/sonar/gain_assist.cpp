@@ -10,7 +10,7 @@ namespace {
 
 constexpr double saturated_level = 0.999;
 
-/// The rule of next_gain_db takes codes for a power of the amplitude.
+/// next_gain_db() assumes that codes are a power of the amplitude, which logarithmic samples are not.
 bool is_assisted(const PingSettings& s) { return s.gain_assist && s.format.scale == SampleFormat::Scale::linear; }
 
 }  // namespace
@@ -20,7 +20,7 @@ double percentile_of_full_scale(const Ping& ping, double share) {
   const auto bytes = static_cast<std::size_t>(format.bits / 8);
   const std::size_t count = ping.samples.size() / bytes;
   if (count == 0) return 0;
-  // Little-endian: the two highest bytes are enough.
+  // Samples are little-endian; the two highest bytes are enough.
   const std::size_t high = bytes - 1, low = bytes > 1 ? bytes - 2 : high;
   std::vector<std::uint32_t> histogram(bytes > 1 ? 65536 : 256, 0u);
   for (std::size_t i = 0; i < count; ++i) {
@@ -36,7 +36,7 @@ double percentile_of_full_scale(const Ping& ping, double share) {
 }
 
 double next_gain_db(double gain_db, double level, double gamma, double passed_s, double overload_db) {
-  const double least_level = 1e-3;  // a black picture raises the gain, but in steps
+  const double least_level = 1e-3;  // limits the rise of the gain after a black picture
   double wanted_db = 20 / gamma * std::log10(assisted_level / std::max(level, least_level));
   if (level >= saturated_level) wanted_db -= overload_db;
   const double part = 1 - std::exp(-std::max(passed_s, 0.0) / assist_time_s);

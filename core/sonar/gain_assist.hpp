@@ -1,34 +1,36 @@
-// Gain assist: the device turns its own gain so that the loud parts of the picture just stay below full scale (docs/acoustics.md,
-// section 7). A pure rule and the little a device remembers between two pings; time is the pings' own.
+// Gain assist: the device changes its gain so that the loud parts of the picture stay just below full scale (docs/acoustics.md,
+// section 7). This file has the rule, a pure function, and the state that a device keeps between pings. Time is that of the
+// pings.
 #pragma once
 
 #include "core/sonar/ping.hpp"
 
 namespace sonar {
 
-/// The loud part of a picture and where it should lie: 99 % of the samples at most 97 % of full scale. unknown: fitted to the
-/// first two captured pings of an M1200d (246 and 247 of 254); the third has 243. The time: chosen.
+/// Gain assist aims at 99 % of the samples being at most 97 % of full scale. unknown: both values are fitted to the first two
+/// captured pings of an M1200d (246 and 247 of 254; the third has 243). The time constant is our choice.
 inline constexpr double assisted_share = 0.99, assisted_level = 0.97, assist_time_s = 0.3;
-/// How far above full scale a saturated picture is taken to be, which it does not say [dB]: the first little, so that a scene
-/// that grows louder causes no steps; each further one in a row twice as far.
+/// Assumed level of a saturated picture above full scale [dB], which its samples do not show. It is low for the first saturated
+/// picture, so that the gain has no steps when a scene becomes louder, and doubles with each further one in a row.
 inline constexpr double least_overload_db = 1, most_overload_db = 12;
-/// The knob's whole range, 0 to 100 % (docs/protocols/oculus.md) [dB].
+/// The whole range of the gain setting, 0 to 100 % (docs/protocols/oculus.md) [dB].
 inline constexpr double least_assisted_gain_db = 0, most_assisted_gain_db = 96;
 
-/// The code that `share` of a ping's samples do not exceed, as a part of max_code, 0 to 1.
+/// The code that `share` of a ping's samples do not exceed, as a fraction of max_code, 0 to 1.
 double percentile_of_full_scale(const Ping& ping, double share = assisted_share);
 
-/// The gain `passed_s` after a picture made with `gain_db` whose loud part was `level` of full scale (after the power law
-/// `gamma`): a first-order approach to the gain that would have put it at assisted_level. `overload_db`: of a saturated picture.
+/// The gain `passed_s` after a picture that was made with `gain_db`. The loud part of that picture had the fraction `level` of
+/// full scale, after the power law `gamma`. The gain approaches, as a first-order system, the one that would have given
+/// assisted_level. `overload_db` is the assumed level of a saturated picture above full scale.
 double next_gain_db(double gain_db, double level, double gamma, double passed_s, double overload_db = most_overload_db);
 
-/// State of a device's gain. Starts from the client's gain, and again whenever the mode changes or the assist was off.
+/// State of a device's gain. It starts from the client's gain, and starts again when the mode changes or the assist was off.
 class GainAssist {
  public:
   /// The gain [dB] of a ping fired at `at`; the client's own when settings.gain_assist is off, or the samples
   /// are logarithmic.
   float gain_db(const PingSettings& settings, Time at);
-  /// Every ping that came out. Pings without the assist are not looked at.
+  /// The caller passes every ping that the device made. Pings without gain assist have no effect.
   void look_at(const Ping& ping);
 
  private:
