@@ -1,4 +1,5 @@
-// The CUDA module: a kernel for every step, whose body is the header's, and thin calls of the runtime. It contains no scenes.
+// The CUDA module: a kernel for every step, whose body is in cuda/steps.hpp, and functions that call the CUDA runtime. It
+// contains no code for scenes.
 #include <cuda_runtime.h>
 
 #include <chrono>
@@ -18,11 +19,11 @@
 namespace sonar::cuda {
 namespace {
 
-constexpr int lanes = 3;  // as Machine::lanes
+constexpr int lanes = 3;  // equals Machine::lanes
 constexpr int device = 0;
 
 constexpr std::size_t most_transforms = 8;
-constexpr int timed_things = step_count + 2;  // steps; transforms there, and back
+constexpr int timed_things = step_count + 2;  // the steps, the forward and the inverse transforms
 
 struct Transform {
   int size, rows;
@@ -32,20 +33,21 @@ struct Lane {
   cudaStream_t stream = nullptr;
   cudaEvent_t done = nullptr;
   GraphShelf<cudaGraphExec_t> graphs;
-  std::vector<Transform> transforms;  // newest first; of this lane alone, since a plan has room for one at a time
+  std::vector<Transform> transforms;  // the last used first; each lane has its own, since a plan runs one transform at a time
   cudaEvent_t begin[timed_things] = {}, end[timed_things] = {};  // made when a launch is first timed
-  bool timed[timed_things] = {};                                 // since step_seconds was last asked
+  bool timed[timed_things] = {};                                 // since the last call of step_seconds
   bool timing = false;                                           // the last launch was timed
 };
 struct Opened {
   Lane lane[lanes];
-  bool graphs_work = true;  // until one fails; then launches are plain for good
-  // A wait took too long. Whatever waits for the device would never return: from here on nothing is asked of it or given back.
+  bool graphs_work = true;  // false once a graph has failed: launches use no graphs from then on
+  // A wait took too long. A further call that waits for the device might never return, so none is made, and no memory is
+  // released.
   bool hung = false;
 };
 Opened& opened(void* machine) { return *static_cast<Opened*>(machine); }
 
-/// Like cudaStreamSynchronize, but with an end.
+/// Like cudaStreamSynchronize, but with a time limit.
 cudaError_t wait_for_stream(Opened& m, cudaStream_t stream) {
   if (m.hung) return cudaErrorLaunchTimeout;
   const auto now = [] { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); };
@@ -56,7 +58,7 @@ cudaError_t wait_for_stream(Opened& m, cudaStream_t stream) {
   return error;
 }
 
-// Index by index along x, ping by ping along y.
+// Blocks along x cover the indices of a step; blocks along y are pings.
 template <Step step>
 __global__ void __launch_bounds__(threads_a_block) kernel(const PingView* views) {
   const PingView& view = views[blockIdx.y];
@@ -105,7 +107,7 @@ void close(void* machine) {
   Opened& m = opened(machine);
   for (Lane& l : m.lane) {
     if (l.stream) wait_for_stream(m, l.stream);
-    if (m.hung) return;  // left to the end of the program
+    if (m.hung) return;  // the rest is released when the program ends
     for (auto& entry : l.graphs.entries())
       if (entry.graph) cudaGraphExecDestroy(entry.graph);
     for (const Transform& t : l.transforms) cufft().destroy(t.plan);
@@ -134,14 +136,14 @@ int open(void** machine) {
     close(m);
     return error;
   }
-  // For measurements: graphs save launches, and cost a capture where launches differ.
+  // Measurements switch graphs off: a graph makes launches cheaper, but a launch that differs needs a new capture.
   const char* graphs = std::getenv("SONARD_CUDA_GRAPHS");
   m->graphs_work = !graphs || std::strcmp(graphs, "0") != 0;
   *machine = m;
   return cudaSuccess;
 }
 
-/// The runtime keeps a thread's last error, also one that was reported; the next launch must not find it.
+/// Returns `error` and clears the last error of the thread, which the runtime would report again for the next launch.
 cudaError_t told(cudaError_t error) {
   if (error != cudaSuccess) cudaGetLastError();
   return error;
@@ -161,7 +163,7 @@ int download(void* machine, int lane, void* to, const void* from, std::size_t by
   return cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, opened(machine).lane[lane].stream);
 }
 cudaError_t launch_step(cudaStream_t stream, int step, const GraphKey& what) {
-  cudaGetLastError();  // another engine's, on this thread: not this launch's
+  cudaGetLastError();  // clears an error that another engine left on this thread
   const Kernel k = kernel_of(static_cast<Step>(step), std::make_integer_sequence<int, step_count>());
   k<<<dim3(what.blocks[step], static_cast<unsigned>(what.pings)), threads_a_block, 0, stream>>>(what.views);
   return cudaGetLastError();
@@ -173,11 +175,11 @@ cudaError_t launch_plainly(cudaStream_t stream, const GraphKey& what) {
   return error;
 }
 
-/// The launch as a graph; null when that does not work here. The stream is out of capture in any case.
+/// Captures the launch as a graph; null if that fails. The stream has ended its capture in either case.
 cudaGraphExec_t capture(cudaStream_t stream, const GraphKey& what) {
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t made = nullptr;
-  // Captures this thread only: other engines may allocate on theirs meanwhile.
+  // Captures this thread only, because other engines may allocate on their threads meanwhile.
   if (cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal) == cudaSuccess) {
     const cudaError_t launched = launch_plainly(stream, what);
     const cudaError_t ended = cudaStreamEndCapture(stream, &graph);
@@ -185,7 +187,7 @@ cudaGraphExec_t capture(cudaStream_t stream, const GraphKey& what) {
       made = nullptr;
   }
   if (graph) cudaGraphDestroy(graph);
-  if (!made) cudaGetLastError();  // it is no error of the launch that follows
+  if (!made) cudaGetLastError();  // the launch that follows must not report it
   return made;
 }
 
@@ -193,10 +195,10 @@ cudaError_t launch_by_graph(Opened& m, Lane& lane, const GraphKey& what) {
   cudaGraphExec_t dropped = nullptr;
   auto& entry = lane.graphs.look_up(what, dropped);
   if (dropped) {
-    if (const cudaError_t error = wait_for_stream(m, lane.stream)) return error;  // it may be at work
+    if (const cudaError_t error = wait_for_stream(m, lane.stream)) return error;  // the device may still use it
     cudaGraphExecDestroy(dropped);
   }
-  // Earlier launches were plain: every kernel is loaded by then, which a capture must not do.
+  // A capture must not load kernels. Earlier launches without a graph have loaded them all.
   if (!entry.graph && entry.seen > 1) {
     entry.graph = capture(lane.stream, what);
     m.graphs_work = entry.graph != nullptr;
@@ -204,7 +206,7 @@ cudaError_t launch_by_graph(Opened& m, Lane& lane, const GraphKey& what) {
   return entry.graph ? cudaGraphLaunch(entry.graph, lane.stream) : launch_plainly(lane.stream, what);
 }
 
-/// Begins what is timed, unless it has begun already.
+/// Begins the timing of a step or of the transforms, unless it has begun already.
 cudaError_t begin_timing(Lane& lane, int what) {
   cudaError_t error = cudaSuccess;
   if (!lane.begin[what]) error = cudaEventCreate(&lane.begin[what]);
@@ -243,14 +245,15 @@ int transforms(char* name, std::size_t room) {
   return cufft().loaded() ? 1 : 0;
 }
 
-/// The lane's plan for that size, now the newest. Making one allocates and may wait for the device; it is made once.
+/// The lane's plan for this size, which becomes the last used. A plan is made once, because that allocates memory and may wait
+/// for the device.
 int transform_for(Opened& m, Lane& lane, int size, int rows, CufftLibrary::Handle* plan) {
   std::vector<Transform>& all = lane.transforms;
   std::size_t i = 0;
   while (i < all.size() && (all[i].size != size || all[i].rows != rows)) ++i;
   if (i == all.size()) {
     if (i == most_transforms) {
-      if (const cudaError_t error = wait_for_stream(m, lane.stream)) return error;  // it may be at work
+      if (const cudaError_t error = wait_for_stream(m, lane.stream)) return error;  // the device may still use it
       cufft().destroy(all.back().plan);
       all.pop_back();
     }

@@ -1,5 +1,5 @@
-// CUDA in this build and on this machine, in a few words for the banner.
-// Stands apart from cuda_engine.hpp so that the daemon's texts need no engine.
+// A few words for the banner about CUDA in this build and on this machine. This is not in cuda_engine.hpp, so that the daemon's
+// texts need no engine.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace sonar {
 /// "not installed" (there is no CUDA module), "no device", "no device (<the driver's reason>)", what is wrong with the module, or
 /// "NVIDIA H200, 139.8 GiB, compute 9.0". Queried every time: a device can disappear.
 std::string cuda_status();
-/// "not installed" or "not used", without loading the module: a driver that sleeps takes seconds to answer, and wakes its device.
+/// "not installed" or "not used", without loading the module, which takes seconds and powers the device up if it is suspended.
 std::string cuda_presence();
 
 }  // namespace sonar
