@@ -1,5 +1,5 @@
-// Stage four: beams from columns (docs/acoustics.md, section 6, eq. 9): s_j[n] = sum_k W_jk g_k[n], W signed and not normalised
-// further. Works on a window of samples, so that what it reads and writes stays in cache.
+// Stage four: beams from columns (docs/acoustics.md, section 6, eq. 9): s_j[n] = sum_k W_jk g_k[n]. Weights have signs and
+// are not normalised again. It works on a window of samples, so that its inputs and outputs stay in cache.
 #pragma once
 
 #include <span>
@@ -12,17 +12,17 @@ namespace sonar {
 
 /// Buffers of form_beams, one per worker.
 struct BeamScratch {
-  std::vector<float> window;  // the columns' samples side by side, of a band
-  AlignedFloats transform;    // the line of a transform
+  std::vector<float> window;  // the samples of all columns, copied side by side, for panels of weights
+  AlignedFloats transform;    // working memory of a beam transform
 };
 
-/// Fills the window of samples that `out` has been shaped for.
+/// Fills the window of samples for which `out` has been shaped.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
                 BeamSignals& out);
 
-/// The point's pulse on samples [from, to), as far as it reaches.
+/// The part of the point's pulse that lies within the samples [from, to).
 SampledPulse place_pulse(const PointEcho& point, const PingPlan& plan, int from, int to);
-/// Point echoes at their exact direction, on top. In expected power they are summed coherently among themselves.
+/// Adds point echoes to the beams, each at its exact direction. In expected power they are summed coherently with each other.
 void add_points(std::span<const PointEcho> points, const PingPlan& plan, BeamSignals& out);
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-// Inputs of the steps that make echoes of a scene: the scene as it stands, and values of one ping.
+// Inputs of the steps that make the echoes of a scene: the scene at the time of the ping, and values of one ping.
 #pragma once
 
 #include <span>
@@ -14,13 +14,13 @@
 
 namespace sonar {
 
-/// References that live as long as the ping. Bodies have been placed in `rays`; `cells` belong to its scene.
+/// References that are valid until the ping is finished. The bodies in `rays` are at their poses; `cells` belong to its scene.
 struct PingContext {
   const RayScene& rays;
   SurfaceCells& cells;  // builds the tiles that come into view
   std::span<const Pose> bodies_in_world;
   const std::vector<LawTable>& laws;      // by material (laws_of)
-  const std::vector<float>& turned_away;  // by object (turned_away_of); neither is looked at by rays that are scatterers
+  const std::vector<float>& turned_away;  // by object (turned_away_of); a fixed fan uses neither this nor `laws`
   const PingPlan& plan;
   const PingScalars& scalars;
   const simd::Kernels& kernels;

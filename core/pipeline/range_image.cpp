@@ -19,7 +19,8 @@ double pattern(double angle_rad, double width_rad) {
   return std::abs(x) > reach ? 0 : std::exp(-4 * std::log(2.0) * x * x);
 }
 
-/// Power of one beam by range cell. Even spreads are kept as steps until finish(). As received, it has speckle.
+/// Power of one beam in each range cell. finish() computes it, from differences between neighbouring cells or, with `as_heard`,
+/// from complex amplitudes with speckle.
 class Profile {
  public:
   Profile(double cell_m, std::size_t cells, bool as_heard)
@@ -56,7 +57,7 @@ class Profile {
   std::ptrdiff_t first() const { return first_; }
   std::ptrdiff_t last() const { return last_; }
   double power(std::ptrdiff_t k) const { return k < first_ || k > last_ ? 0 : steps_[static_cast<std::size_t>(k)]; }
-  /// From one cell to another, both among those that have power; of equal ones the first.
+  /// The strongest cell in [from, to], which lies within [first(), last()]; the first if several are equal.
   std::ptrdiff_t strongest(std::ptrdiff_t from, std::ptrdiff_t to) const {
     const auto begin = steps_.begin();
     return std::max_element(begin + from, begin + to + 1) - begin;
@@ -72,7 +73,7 @@ class Profile {
     std::ptrdiff_t from = k, to = k;
     while (power(from - 1) > half) --from;
     while (power(to + 1) > half) ++to;
-    // The next cells, too: the place within a cell is in how an echo is shared among its neighbours.
+    // Includes the next cell on either side: the place of an echo within a cell decides how much power these cells have.
     for (std::ptrdiff_t i = from - 1; i <= to + 1; ++i) take(i);
     return sum > 0 ? moment / sum * cell_ : (static_cast<double>(k) + 0.5) * cell_;
   }
@@ -88,7 +89,7 @@ class Profile {
   std::ptrdiff_t size() const { return static_cast<std::ptrdiff_t>(steps_.size()); }
   double& at(std::ptrdiff_t k) { return steps_[static_cast<std::size_t>(k)]; }
   double cell_;
-  std::vector<double> steps_, re_, im_;  // re_, im_: as heard, of the amplitude
+  std::vector<double> steps_, re_, im_;  // re_, im_: complex amplitude, with `as_heard`
   std::ptrdiff_t first_ = 0, last_ = 0;
 };
 
@@ -108,7 +109,7 @@ class RangeImager {
     cells_ = static_cast<std::size_t>(std::ceil((settings_.range_m + longest_return_half_m) / cell_m_)) + 2;
     first_wanted_ = static_cast<std::ptrdiff_t>(std::ceil(settings_.range_start_m / cell_m_ - 0.5));
     last_wanted_ = static_cast<std::ptrdiff_t>(std::floor(settings_.range_m / cell_m_ - 0.5));
-    FrequencyMode beam = mode_;  // the level of the noise is that of one beam
+    FrequencyMode beam = mode_;  // the noise has the level of one beam
     beam.pattern.elevation_width_rad = static_cast<float>(wanted.beam_height_rad);
     const double rms = noise_rms_upa(beam, true_mps / (2 * cell_m_));
     noise_power_ = rms * rms;
@@ -155,10 +156,10 @@ class RangeImager {
  private:
   /// Value of a pixel before it is quantised; power 0 = no return.
   struct Reported {
-    double power = 0, range_m = 0;  // [uPa^2], the device's metres
+    double power = 0, range_m = 0;  // [uPa^2]; metres as the device computes them
     double shown_m = 0;             // the range after the filters
   };
-  /// Calls f(pixel) for those round a pixel that have a return.
+  /// Calls f(pixel) for each of the pixels around a pixel that has a return.
   template <class F>
   void for_each_round(const std::vector<Reported>& all, int column, int row, F f) const {
     const int block = wanted_.block_rows > 0 ? wanted_.block_rows : grid_.rows, first = row / block * block;
@@ -168,7 +169,8 @@ class RangeImager {
         if ((r != row || c != column) && other.power > 0) f(other);
       }
   }
-  /// Renews every pixel that has a return, of what all were before: change(before, column, row, its own).
+  /// Calls change(before, column, row, pixel) for every pixel that has a return; `before` has the values of all pixels before the
+  /// first call.
   template <class Change>
   void filter(std::vector<Reported>& all, Parallel& pool, Change change) const {
     const std::vector<Reported> before = all;
@@ -187,7 +189,8 @@ class RangeImager {
       if (confirming < wanted_.least_confirming) own = {};
     });
   }
-  /// Medians; where the number is even, the lower of the two in the middle: what is reported is a range that was measured.
+  /// Replaces each range by the median of the pixel and those around it. If their number is even, it is the lower of the two
+  /// middle ones, so that a reported range is always one that was measured.
   void take_medians(std::vector<Reported>& all, Parallel& pool) const {
     filter(all, pool, [this](const std::vector<Reported>& before, int column, int row, Reported& own) {
       double ranges[9] = {own.shown_m};
@@ -229,7 +232,7 @@ class RangeImager {
     return power > least_power() && strength(std::sqrt(power), range_m) >= static_cast<double>(wanted_.least_strength);
   }
 
-  /// The cell within the ranges wanted that is reported; nothing in it is loud enough: the strongest all the same.
+  /// The cell that is reported, within the wanted ranges. If no cell there is detected, it is the strongest of them.
   std::ptrdiff_t chosen(const Profile& profile) const {
     const std::ptrdiff_t from = std::max(profile.first(), first_wanted_), to = std::min(profile.last(), last_wanted_);
     if (from > to) return profile.first();
@@ -270,12 +273,12 @@ class RangeImager {
           im += std::sqrt(noise_power_) * static_cast<double>(noise.im);
         }
         power = re * re + im * im;
-        if (request_.switches.noise && power > least_power())  // an echo's place is as sure as it stands above the noise
+        if (request_.switches.noise && power > least_power())  // the error falls with the signal-to-noise ratio
           range_m += cell_m_ / 2 * std::sqrt(noise_power_ / power) * static_cast<double>(complex_normal(bits.v[2], bits.v[3]).re);
       }
     }
     if (!is_detected(power, range_m) && request_.switches.noise && !request_.switches.expected_power) {
-      // The loudest of all cells of noise, which is a false alarm if it passes.
+      // The strongest of all cells of noise. If it is detected, it is a false alarm.
       const double cells = static_cast<double>(cells_);
       power = -noise_power_ * std::log(-std::expm1(std::log(static_cast<double>(uniform_open(bits.v[2]))) / cells));
       range_m = settings_.range_m * static_cast<double>(uniform_open(bits.v[3]));
@@ -316,7 +319,7 @@ class RangeImager {
   RangeReturns returns_;
   double noise_power_ = 0, scale_ = 1;  // scale_: bearing_scale_of() the request
   std::size_t cells_ = 0;
-  std::ptrdiff_t first_wanted_ = 0, last_wanted_ = 0;  // cells whose centres lie within the ranges set
+  std::ptrdiff_t first_wanted_ = 0, last_wanted_ = 0;  // cells whose centres lie within the range settings
   int column_reach_ = 0, row_reach_ = 0;
   std::vector<double> column_weight_, row_weight_;
   std::vector<PointReturn> points_;
