@@ -144,17 +144,17 @@ int open(void** machine) {
 }
 
 /// Returns `error` and clears the last error of the thread, which the runtime would report again for the next launch.
-cudaError_t told(cudaError_t error) {
+cudaError_t cleared(cudaError_t error) {
   if (error != cudaSuccess) cudaGetLastError();
   return error;
 }
 int free_bytes(void*, std::size_t* bytes) {
   std::size_t all = 0;
-  return told(cudaMemGetInfo(bytes, &all));
+  return cleared(cudaMemGetInfo(bytes, &all));
 }
-int allocate(void*, void** at, std::size_t bytes) { return told(cudaMalloc(at, bytes)); }
+int allocate(void*, void** at, std::size_t bytes) { return cleared(cudaMalloc(at, bytes)); }
 int release(void* machine, void* at) { return opened(machine).hung ? cudaErrorLaunchTimeout : cudaFree(at); }
-int allocate_host(void*, void** at, std::size_t bytes) { return told(cudaMallocHost(at, bytes)); }
+int allocate_host(void*, void** at, std::size_t bytes) { return cleared(cudaMallocHost(at, bytes)); }
 int release_host(void* machine, void* at) { return opened(machine).hung ? cudaErrorLaunchTimeout : cudaFreeHost(at); }
 int upload(void* machine, int lane, void* to, const void* from, std::size_t bytes) {
   return cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, opened(machine).lane[lane].stream);

@@ -161,7 +161,7 @@ class RangeImager {
   };
   /// Calls f(pixel) for each of the pixels around a pixel that has a return.
   template <class F>
-  void for_each_round(const std::vector<Reported>& all, int column, int row, F f) const {
+  void for_each_neighbour(const std::vector<Reported>& all, int column, int row, F f) const {
     const int block = wanted_.block_rows > 0 ? wanted_.block_rows : grid_.rows, first = row / block * block;
     for (int r = std::max(row - 1, first); r <= std::min({row + 1, first + block - 1, grid_.rows - 1}); ++r)
       for (int c = std::max(column - 1, 0); c <= std::min(column + 1, grid_.columns - 1); ++c) {
@@ -184,8 +184,9 @@ class RangeImager {
   void drop_unconfirmed(std::vector<Reported>& all, Parallel& pool) const {
     filter(all, pool, [this](const std::vector<Reported>& before, int column, int row, Reported& own) {
       int confirming = 0;
-      for_each_round(before, column, row,
-                     [&](const Reported& other) { confirming += std::abs(other.shown_m - own.shown_m) <= wanted_.confirming_m; });
+      for_each_neighbour(before, column, row, [&](const Reported& other) {
+        confirming += std::abs(other.shown_m - own.shown_m) <= wanted_.confirming_m;
+      });
       if (confirming < wanted_.least_confirming) own = {};
     });
   }
@@ -195,7 +196,7 @@ class RangeImager {
     filter(all, pool, [this](const std::vector<Reported>& before, int column, int row, Reported& own) {
       double ranges[9] = {own.shown_m};
       std::ptrdiff_t count = 1;
-      for_each_round(before, column, row, [&](const Reported& other) { ranges[count++] = other.shown_m; });
+      for_each_neighbour(before, column, row, [&](const Reported& other) { ranges[count++] = other.shown_m; });
       std::nth_element(ranges, ranges + (count - 1) / 2, ranges + count);
       own.shown_m = ranges[(count - 1) / 2];
     });
