@@ -21,12 +21,15 @@ Motion Trajectory::between(std::size_t after, double u) const {
   // The times of points increase, so there is no division by 0 s.
   const double per_s = 1 / seconds(points_.times[after] - points_.times[before]);
   const Pose &a = points_.poses[before], &b = points_.poses[after];
-  const auto told = [&](const std::vector<Vec3d>& values) { return values[before] + u * (values[after] - values[before]); };
+  const auto interpolated = [&](const std::vector<Vec3d>& values) {
+    return values[before] + u * (values[after] - values[before]);
+  };
   Motion moves;
   // If the file has no velocities, these are the mean ones of the interval: world axes [m/s], body axes [rad/s].
-  moves.velocity_mps = points_.velocities_mps.empty() ? per_s * (b.position_m - a.position_m) : told(points_.velocities_mps);
+  moves.velocity_mps =
+      points_.velocities_mps.empty() ? per_s * (b.position_m - a.position_m) : interpolated(points_.velocities_mps);
   moves.angular_velocity_radps = points_.angular_velocities_radps.empty() ? per_s * rotation_between(a.orientation, b.orientation)
-                                                                          : told(points_.angular_velocities_radps);
+                                                                          : interpolated(points_.angular_velocities_radps);
   return moves;
 }
 

@@ -88,13 +88,13 @@ class Reader {
       take(trimmed(text.substr(at, end - at)));
       at = end + 1;
     }
-    if (wrong_.empty()) look_at_the_whole();
+    if (wrong_.empty()) check_whole_file();
     if (!wrong_.empty()) return failure(ErrorKind::bad_data, wrong_);
     return finished();
   }
 
  private:
-  void complain(const std::string& what) {
+  void set_error(const std::string& what) {
     if (wrong_.empty()) wrong_ = name_ + ":" + std::to_string(line_) + ": " + what;
   }
 
@@ -111,14 +111,14 @@ class Reader {
       if (!wrong_.empty()) return;
     }
     if (words_.size() != columns_->count())
-      return complain(std::to_string(words_.size()) + " values instead of " + std::to_string(columns_->count()));
+      return set_error(std::to_string(words_.size()) + " values instead of " + std::to_string(columns_->count()));
     if (rows_ == 0) columns_->guess_unit(words_);
     Row row;
-    if (const auto wrong = columns_->refuse(words_, row)) return complain(*wrong);
+    if (const auto wrong = columns_->refuse(words_, row)) return set_error(*wrong);
     if (format_ == Format::kitti) {
       // Each time [ns] is computed from the line number, because a sum of intervals would drift.
       const double stamp_ns = static_cast<double>(rows_) * 1e9 / *asked_.rate_hz;
-      if (stamp_ns > static_cast<double>(farthest_stamp_ns)) return complain("the time is beyond 146 years");
+      if (stamp_ns > static_cast<double>(farthest_stamp_ns)) return set_error("the time is beyond 146 years");
       row.stamp_ns = std::llround(stamp_ns);
     }
     keep(row);
@@ -130,30 +130,30 @@ class Reader {
     const bool numbers = is_number(words_.front());
     if (format_ == Format::automatic) format_ = guessed(numbers);
     if (!wrong_.empty()) return false;
-    if (asked_.rate_hz && format_ != Format::kitti) complain("the lines have times, they need no rate_hz");
+    if (asked_.rate_hz && format_ != Format::kitti) set_error("the lines have times, they need no rate_hz");
     switch (format_) {
       case Format::tum:
         columns_ = Columns::tum();
         return false;
       case Format::euroc:
         if (const std::size_t n = words_.size(); n != 8 && n != 11 && n != 17)
-          complain(std::to_string(n) + " values instead of 8, 11 or 17");
+          set_error(std::to_string(n) + " values instead of 8, 11 or 17");
         columns_ = Columns::euroc(words_.size());
         return false;
       case Format::kitti:
         if (!(asked_.rate_hz.value_or(0) > 0))
-          complain("KITTI lines have no time; say how many there are a second: rate_hz, --pose-rate");
+          set_error("KITTI lines have no time; give the number of lines per second (rate_hz or --pose-rate)");
         columns_ = Columns::kitti();
         return false;
       default:
         break;
     }
     if (numbers) {
-      complain("a CSV file begins with a line of column names: t_s,x_m,y_m,z_m,qw,qx,qy,qz");
+      set_error("a CSV file begins with a line of column names: t_s,x_m,y_m,z_m,qw,qx,qy,qz");
       return false;
     }
     Columns columns = Columns::tum();
-    if (const auto wrong = Columns::refuse_header(words_, columns)) complain(*wrong);
+    if (const auto wrong = Columns::refuse_header(words_, columns)) set_error(*wrong);
     columns_ = columns;
     return true;
   }
@@ -163,7 +163,7 @@ class Reader {
     if (!numbers) return Format::csv;
     if (between_ != ' ') return words_.size() == 8 && has_seconds(words_.front()) ? Format::tum : Format::euroc;
     if (words_.size() == 12) return Format::kitti;
-    if (words_.size() != 8) complain(std::to_string(words_.size()) + " values instead of 8 (TUM) or 12 (KITTI)");
+    if (words_.size() != 8) set_error(std::to_string(words_.size()) + " values instead of 8 (TUM) or 12 (KITTI)");
     return Format::tum;
   }
 
@@ -180,21 +180,22 @@ class Reader {
     Words words;
     split(line.substr(word + 6), ' ', words);
     const auto frame = words.empty() ? std::nullopt : frame_called(words.front());
-    if (!frame) return complain("the frame must be ENU_FLU or NED_FRD");
+    if (!frame) return set_error("the frame must be ENU_FLU or NED_FRD");
     // Frames that contradict each other are an error, because the frame of the file must not be ignored silently.
-    if (frame_.value_or(*frame) != *frame) return complain("an earlier comment names another frame; a file has one frame");
+    if (frame_.value_or(*frame) != *frame) return set_error("an earlier comment names another frame; a file has one frame");
     if (asked_.frame.value_or(*frame) != *frame)
-      return complain("the file says " + std::string(name_of(*frame)) + ", but it was to be read as " +
-                      std::string(name_of(*asked_.frame)));
+      return set_error("the file says " + std::string(name_of(*frame)) + ", but it was to be read as " +
+                       std::string(name_of(*asked_.frame)));
     frame_ = frame;
   }
 
   void keep(const Row& row) {
     Track* const track = track_of(row.body);
-    if (track == nullptr) return complain("more than " + std::to_string(most_bodies) + " bodies");
+    if (track == nullptr) return set_error("more than " + std::to_string(most_bodies) + " bodies");
     Points& p = track->points;
     if (!p.times.empty() && Ns(row.stamp_ns) < p.times.back())
-      return complain("the time is earlier than before" + (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
+      return set_error("the time is earlier than the previous one" +
+                       (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
     // As with live poses, a pose replaces an earlier one of the same time. So no interval between poses has length 0.
     if (!p.times.empty() && Ns(row.stamp_ns) == p.times.back()) {
       ++replaced_;
@@ -217,7 +218,7 @@ class Reader {
     return &tracks_.emplace_back(Track{std::string(body), {}});
   }
 
-  void look_at_the_whole() {
+  void check_whole_file() {
     if (tracks_.empty()) {
       wrong_ = name_ + ": the file has no poses; write one pose per line (docs/poses.md)";
     } else if (!frame_ && !asked_.frame) {

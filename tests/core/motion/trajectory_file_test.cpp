@@ -176,7 +176,7 @@ TEST(TrajectoryFile, HoldsSeveralBodiesOnOneClock) {
   EXPECT_TRUE(trajectory_of(nameless, "p.csv", ""));
   EXPECT_THAT(trajectory_of(nameless, "p.csv", "rov").error().text, HasSubstr("remove the key \"body\""));
   EXPECT_THAT(refusal("body,t,x,y,z\nrov,1,0,0,0\nbuoy,0,0,0,0\nrov,0.5,0,0,0\n"),
-              "p.csv:4: the time is earlier than before for \"rov\"");
+              "p.csv:4: the time is earlier than the previous one for \"rov\"");
   EXPECT_THAT(refusal("body,t,x,y,z\n,1,0,0,0\n"), "p.csv:2: a body's name must have 1 to 64 printable characters");
 }
 
@@ -187,7 +187,7 @@ TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
       {"", "p.csv: the file has no poses"},
       {"t,x,y,z\n", "p.csv: the file has no poses"},
       {"t,x,y,z\n0,1,2\n", "p.csv:2: 3 values instead of 4"},
-      {"t,x,y,z\n1,1,2,3\n0,1,2,3\n", "p.csv:3: the time is earlier than before"},
+      {"t,x,y,z\n1,1,2,3\n0,1,2,3\n", "p.csv:3: the time is earlier than the previous one"},
       {"t,x,y,z\n0,1,two,3\n", "p.csv:2: \"two\" is not a number"},
       {"t,x,y,z\n0,1,nan,3\n", "p.csv:2: \"nan\" is not a number"},
       {"t,x,y,z\n0,1,-inf,3\n", "p.csv:2: \"-inf\" is not a number"},
