@@ -1,4 +1,4 @@
-// Vectors of floats that begin on a cache line, as loops over whole vector registers need.
+// Vectors of floats that begin on a cache line, because loops over whole vector registers need this.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// Runs one of our programs for work that may crash it. Its standard streams are files in memory; it gets nothing else of this
-// process.
+// Runs one of our programs for work that may crash the process. Its standard streams are files in memory, and it inherits no
+// other files of this process.
 #pragma once
 
 #include <filesystem>
@@ -26,12 +26,12 @@ class MemoryFile {
 };
 
 struct ChildEnd {
-  int signal = 0;     // signal that ended it; 0 = it exited
-  int exit_code = 0;  // -1: not known, because this process ignores its children
+  int signal = 0;     // signal that ended the program; 0 = it exited
+  int exit_code = 0;  // -1: unknown, because this process ignores its children
 };
 
-/// Waits for the end of the program. It gets `arguments` after its name, this process's environment and folder, and the three
-/// files as its standard streams; no other descriptor, no blocked or ignored signal, and a process group of its own.
+/// Runs the program and waits for its end. It gets `arguments` after its name, this process's environment and folder, and the
+/// three files as its standard streams; no other descriptor, no blocked or ignored signal, and a process group of its own.
 Result<ChildEnd> run_child(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                            const MemoryFile& input, const MemoryFile& output, const MemoryFile& errors);
 

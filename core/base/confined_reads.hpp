@@ -1,14 +1,14 @@
-// Confines the reads of programs that load files of unknown origin, so that names in them cannot lead to other files of this
-// computer.
+// Limits which files a program can read while it loads files of unknown origin, because these can name any
+// file of this computer.
 #pragma once
 
 #include <filesystem>
 
 namespace sonar {
 
-/// From now on open_regular() opens only what is below `folder`, links followed. Call it once, before there are threads.
+/// From now on open_regular() opens only files whose real path is below `folder`. Call it once, before threads start.
 void confine_reads(const std::filesystem::path& folder);
-/// That folder; empty when everything may be read.
+/// The folder passed to confine_reads(); empty if every file may be read.
 const std::filesystem::path& readable_folder();
 
 }  // namespace sonar

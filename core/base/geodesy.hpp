@@ -10,7 +10,7 @@ namespace sonar {
 
 struct Geodetic {
   double latitude_rad = 0, longitude_rad = 0;
-  double altitude_m = 0;  // above the ellipsoid; any other level serves as long as all places are given above the same one
+  double altitude_m = 0;  // above the ellipsoid, or above any other level that is the same for all places
   bool operator==(const Geodetic&) const = default;
 };
 
@@ -34,7 +34,7 @@ inline Pose enu_in_ecef(const Geodetic& place) {
   return {ecef_from(place), about_z * about_x};
 }
 
-/// The axes east, north, up at `place`, expressed in those at `origin`: where it is, and how little they are turned.
+/// The axes east, north, up at `place`, expressed in those at `origin`: position, and the small rotation between the two.
 inline Pose enu_in_enu_of(const Geodetic& origin, const Geodetic& place) {
   return compose(inverse(enu_in_ecef(origin)), enu_in_ecef(place));
 }

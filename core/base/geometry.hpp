@@ -36,7 +36,7 @@ inline constexpr double pi = 3.14159265358979323846;
 SONAR_HD constexpr double rad_from_deg(double deg) { return deg * (pi / 180.0); }
 SONAR_HD constexpr double deg_from_rad(double rad) { return rad * (180.0 / pi); }
 
-// By hand: C++17 has no defaulted comparison.
+// These are written by hand, because C++17 has no defaulted comparison.
 SONAR_HD constexpr bool operator==(Vec3 a, Vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 SONAR_HD constexpr bool operator==(Vec3d a, Vec3d b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 SONAR_HD constexpr bool operator==(Quatd a, Quatd b) { return a.w == b.w && a.x == b.x && a.y == b.y && a.z == b.z; }
@@ -123,7 +123,7 @@ SONAR_HD constexpr Rotation transposed(const Rotation& r) {
   return t;
 }
 
-/// The turn about the vector's direction by its length [rad].
+/// The rotation about the vector's direction by its length [rad].
 SONAR_HD inline Quatd turned_by(Vec3d rotation_rad) {
   const double angle = length(rotation_rad);
   const double part = angle > 0 ? std::sin(angle / 2) / angle : 0.5;
@@ -146,7 +146,7 @@ SONAR_HD inline RollPitchYaw rpy_from_quat(Quatd q) {
 SONAR_HD constexpr Vec3d enu_from_ned(Vec3d ned) { return {ned.y, ned.x, -ned.z}; }
 /// Forward-Right-Down to Forward-Left-Up: its own inverse.
 SONAR_HD constexpr Vec3d flu_from_frd(Vec3d frd) { return {frd.x, -frd.y, -frd.z}; }
-/// Orientation of a FRD body in NED, as that of the same body's FLU axes in ENU.
+/// Converts the orientation of a body's FRD axes in NED to that of the same body's FLU axes in ENU.
 SONAR_HD inline Quatd enu_flu_from_ned_frd(Quatd frd_in_ned) {
   const double h = std::sqrt(0.5);
   const Quatd ned_in_enu{0, h, h, 0};
@@ -156,7 +156,7 @@ SONAR_HD inline Quatd enu_flu_from_ned_frd(Quatd frd_in_ned) {
 SONAR_HD inline Pose enu_flu_from_ned_frd(const Pose& p) {
   return {enu_from_ned(p.position_m), enu_flu_from_ned_frd(p.orientation)};
 }
-/// Offset and rotation of a FRD-described mount, in the body's FLU axes.
+/// Converts the pose of a mount from the body's FRD axes to its FLU axes.
 SONAR_HD inline Pose flu_from_frd(const Pose& p) {
   return {flu_from_frd(p.position_m), Quatd{p.orientation.w, p.orientation.x, -p.orientation.y, -p.orientation.z}};
 }

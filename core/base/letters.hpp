@@ -1,4 +1,4 @@
-// Small letters of ASCII, whatever the locale.
+// Converts ASCII capitals to small letters; the locale has no effect.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ inline std::string small_letters(std::string_view text) {
   return small;
 }
 
-/// Whether both are the same but for capital and small letters.
+/// Whether both are equal if capital and small letters count as the same.
 inline bool same_letters(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return small_letter(x) == small_letter(y); });
 }

@@ -1,4 +1,4 @@
-// The handlers of the types of a std::variant as one visitor.
+// Makes one visitor of a std::variant from a handler for each of its types.
 #pragma once
 
 namespace sonar {

@@ -1,5 +1,5 @@
-// A fixed pool of compute threads for the loops inside the stages of a ping. core/ has no other threads. Items are handed out
-// from an atomic counter; results must not depend on which thread takes which item.
+// A fixed pool of compute threads for the loops inside the stages of a ping. core/ has no other threads. Threads take
+// items from an atomic counter; results must not depend on which thread takes which item.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ class Parallel {
   int threads() const { return threads_; }
 
   /// Calls body(item, worker) once for every item in [0, count) and returns when all are done; worker is in [0, threads()).
-  /// One caller at a time. What a body throws ends the loop: the first exception is thrown on when every worker has stopped.
+  /// Only one thread may call it at a time. The first exception of a body ends the loop, and the caller gets it afterwards.
   template <class Body>
   void for_each(std::size_t count, Body&& body) {
     using Plain = std::remove_reference_t<Body>;

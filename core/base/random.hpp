@@ -36,23 +36,23 @@ SONAR_HD constexpr Random4 philox(std::uint32_t c0, std::uint32_t c1, std::uint3
   return {{c0, c1, c2, c3}};
 }
 
-/// Every stream of draws of a ping and of its scene's cells. The values keep the streams apart: most are the last word of the
-/// counter, some are combined with the key or another word by exclusive or, as the comment says.
+/// All streams of draws of pings and of scenes. Different values make the streams independent: most values are the last word of
+/// the counter; where a comment says so, the value is combined with another word by exclusive or.
 enum class Domain : std::uint32_t {
   cells = 0,                // speckle and places of surface cells; the counter's last word is the level
-  cell_blocks = 0x6e6574u,  // places within blocks of cells: in the key's low word
-  texture = 0x74657874u,    // combined with the object's index
+  cell_blocks = 0x6e6574u,  // places within blocks of cells; combined with the key's low word
+  texture = 0x74657874u,    // combined with the index of the object
   grain = 0x67726169u,      // the same
   noise_table = 0x6e6f6973u,
   noise_place = 0x706c6163u,
-  leak = 0x6c65616bu,           // in the sonar's number, of noise_place
+  leak = 0x6c65616bu,           // with noise_place: combined with the number of the sonar
   fixed_fan = 0x66616eu,        // a hit of the fixed fan
   paper_speckle = 0x50323521u,  // a hit of the modes paper and raster
-  other_sonar = 0x6f746872u,  // phase and carrier offset of another sonar; with the key's words exchanged, of each of its pulses
-  range_speckle = 0x72736b6cu,    // speckle of a ray in range images, by the place that the ray met
+  other_sonar = 0x6f746872u,  // phase and carrier offset of another sonar; of each of its pulses if the key's words are exchanged
+  range_speckle = 0x72736b6cu,    // speckle of a ray in range images, by the place that the ray hit
   range_noise = 0x726e6f69u,      // noise of a pixel in range images
-  relief_value = 0x76616c75u,     // seabed and rocks: the key's high word, combined with the stream
-  relief_gradient = 0x67726164u,  // the same, as it is
+  relief_value = 0x76616c75u,     // seabed and rocks: the key's high word; combined with the stream
+  relief_gradient = 0x67726164u,  // the same, not combined
 };
 
 /// The key of one stream of draws.

@@ -1,5 +1,5 @@
-// Opens the files that configurations, scenes and users name, only if they are regular files. A FIFO could block for ever; a
-// device could be read without end, or act when it is read. Every reader of such files opens them here.
+// Opens the files that configurations, scenes and users name, only if they are regular files. A FIFO could block for ever;
+// reading a device could never end or could trigger it. Every reader of such files opens them here.
 #pragma once
 
 #include <cstddef>

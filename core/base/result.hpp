@@ -1,4 +1,4 @@
-// The one way functions report failure that comes from outside: a value or a sentence. See docs/architecture.md, "Errors".
+// How functions report failures with an outside cause: they return a value or an error. See docs/architecture.md, "Errors".
 #pragma once
 
 #include <string>
@@ -7,13 +7,13 @@
 
 namespace sonar {
 
-/// Kinds of errors, in the sysexits classes the programs exit with.
+/// Kinds of errors. Their values are the exit codes of the programs, as in sysexits.h.
 enum class ErrorKind : int {
   usage = 64,     // arguments
   bad_data = 65,  // a scene, a mesh, a recording
   missing_file = 66,
   unavailable = 69,  // a port, an interface, a device
-  bug = 70,          // ours
+  bug = 70,          // a mistake in sonard
   io = 74,
   config = 78
 };

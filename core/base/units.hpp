@@ -1,4 +1,4 @@
-// Strong names for values whose swap would go unnoticed, the time type, and decibel arithmetic.
+// Types for values that could be mistaken for each other, the type of times, and decibel arithmetic.
 #pragma once
 
 #include <chrono>

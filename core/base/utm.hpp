@@ -1,4 +1,4 @@
-// Universal Transverse Mercator on WGS 84: the eastings and northings of charts and elevation models as latitude and longitude.
+// Converts the eastings and northings of charts (Universal Transverse Mercator on WGS 84) to latitudes and longitudes.
 // Source: C. F. F. Karney, "Transverse Mercator with an accuracy of a few nanometers", Journal of Geodesy 85 (2011): the series
 // of Krueger in the third flattening, here to its fourth power, which is exact to micrometres within 10 degrees of a zone.
 #pragma once
@@ -24,7 +24,7 @@ std::optional<UtmZone> utm_zone_from(std::string_view text);
 /// The zone that a place lies in, without the exceptions of Norway and Svalbard.
 UtmZone utm_zone_at(const Geodetic& place);
 
-/// Whether the coordinates [m] may be of a zone, or of the margin that grids have.
+/// Whether the coordinates [m] can lie in a zone or in the margin of grids around it.
 bool are_utm(double easting_m, double northing_m);
 /// The place on the ellipsoid with these coordinates [m].
 Geodetic geodetic_from_utm(UtmZone zone, double easting_m, double northing_m);

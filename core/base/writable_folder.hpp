@@ -1,4 +1,4 @@
-// Checks that files can be made in a folder that a user named; makes none.
+// Checks whether files can be made in a folder that a user named, without making one.
 #pragma once
 
 #include <filesystem>
@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// A reason, to stand behind the folder's name: "is read-only"; empty = they can be made.
+/// The reason why not, to follow the folder's name in an error: "is read-only"; empty = files can be made.
 std::string why_no_files_in(const std::filesystem::path& folder);
 
 }  // namespace sonar
