@@ -10,8 +10,8 @@
 
 namespace sonar {
 
-/// Sine of the direction that a beam looks in over the one that the device reports; 1 where bearings are true. In steps of
-/// 1.2e-4, so that a vehicle keeps its tables until it has changed its depth by some 10 m.
+/// Sine of the true direction of a beam divided by that of the reported one; 1 if bearings are true. It is rounded to steps of
+/// 1.2e-4, so that tables need no change until the vehicle has changed its depth by some 10 m.
 inline double bearing_scale_of(const PingRequest& r) {
   constexpr double steps = 1 << 13;
   if (r.bearings == Bearings::are_true) return 1;
@@ -19,7 +19,7 @@ inline double bearing_scale_of(const PingRequest& r) {
   return std::round(true_mps / static_cast<double>(r.settings.device_sound_speed_mps) * steps) / steps;
 }
 
-/// The angle that a beam looks at, of the reported one.
+/// The true angle of a beam whose reported angle is given.
 inline double looks_at_rad(double reported_rad, double bearing_scale) {
   return bearing_scale == 1 ? reported_rad : std::asin(std::clamp(bearing_scale * std::sin(reported_rad), -1.0, 1.0));
 }

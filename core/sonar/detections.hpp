@@ -8,14 +8,14 @@
 namespace sonar {
 
 struct Detection {
-  double azimuth_rad = 0;  // as of beams: positive to port
-  double range_m = 0;      // in the device's metres
+  double azimuth_rad = 0;  // positive to port, like those of beams
+  double range_m = 0;      // metres as the device computes them
 };
 
-/// At most one for each of `directions` even parts of the sector, of samples on a logarithmic scale, `above_db` over the median
-/// of their beam. In each row the peaks across beams of that width (-3 dB) show where echoes come from; the strongest peak of
-/// each direction counts. A direction without a peak, between two that have one, has the centroid of what its own beams receive,
-/// if every direction of the gap has an echo. A small target is one point, a floor one in each direction. Most to port first.
+/// At most one point for each of `directions` equal parts of the sector, from port to starboard. Samples are logarithmic; echoes
+/// are at least `above_db` above the median of their beam. In each row, peaks across beams (-3 dB width `beam_width_rad`) give
+/// directions; each part has its strongest peak. Parts without a peak, between parts with one, have the centroid of the echo in
+/// their own beams, if each of them has an echo. So a small target is one point, and a floor is one point in each part.
 std::vector<Detection> detect_points(const Ping& ping, int directions, double above_db, double beam_width_rad);
 
 }  // namespace sonar

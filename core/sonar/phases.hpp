@@ -5,8 +5,8 @@
 
 namespace sonar {
 
-/// Vendor settings that are of this type make a ping keep the signals of its beams (Ping::beam_signal_upa), whose phases its
-/// message needs.
+/// With vendor settings of this type a ping keeps the signals of its beams (Ping::beam_signal_upa), because the vendor's message
+/// has their phases.
 struct PhasedSettings : VendorSettings {};
 
 inline bool has_phases(const PingRequest& request) {

@@ -1,4 +1,4 @@
-// One ping: everything it depends on (PingRequest) and what came back (Ping). A ping is a pure function of its request and the
+// One ping: all its inputs (PingRequest) and its result (Ping). A ping is a pure function of its request and the
 // scene.
 #pragma once
 
@@ -18,11 +18,11 @@
 
 namespace sonar {
 
-/// Models that make scatterers of the scene (docs/acoustics.md, section 8).
+/// Models that convert the scene to scatterers (docs/acoustics.md, section 8).
 enum class Mode {
   canonical,  // surface cells: the model of docs/acoustics.md
   paper,      // Choi 2025 as printed: a fixed fan of rays, a frequency sum, its own beamforming
-  raster,     // as paper, but with scatterers on a perspective pixel grid, as rasterising simulators have them
+  raster,     // as paper, but with scatterers on a perspective pixel grid, as in simulators that rasterise
 };
 inline constexpr std::array<std::string_view, 3> mode_names = {"canonical", "paper", "raster"};
 
@@ -32,14 +32,14 @@ inline constexpr std::string_view name_of(Mode mode) { return mode_names[static_
 struct Switches {
   Mode mode = Mode::canonical;
   bool expected_power = false;  // |sum a|^2 replaced by sum |a|^2: deterministic radiometry
-  int fixed_fan = 0;            // n > 0: n uniform rays a column, one scatterer a ray, no cells
+  int fixed_fan = 0;            // n > 0: n uniform rays per column, one scatterer per ray, no cells
   bool keep_pressure = false;   // fill Ping::pressure_upa
   bool keep_beams = false;      // fill Ping::beam_signal_upa
   bool keep_truth = false;      // fill Ping::truth
   bool keep_labels = false;     // fill Ping::labels, where samples can have them; only the CPU engine computes such pings
 
-  // Switched by name, see named_switches. A part (volume, interference, leak, ...) for which the scene or the model has no data
-  // has no effect, even when it is on.
+  // The switches below have names for users, see named_switches. A part (volume, interference, leak, ...) for which the scene or
+  // the model has no data has no effect, even when it is on.
   bool noise = true;
   bool specular = true;
   bool texture = true;
@@ -97,16 +97,16 @@ struct Twist {
   Vec3d angular_rate_radps;  // sonar axes
 };
 
-/// Base of what a vendor's protocol keeps beside PingSettings, such as the client's own request; core does not read it: a
-/// ping is framed with the settings that it was made with. Exception: with RangeImageSettings (core/sonar/range_image.hpp) the
-/// ping is a range image.
+/// Base class of settings that a vendor's protocol needs beside PingSettings, such as the client's request: the message of a ping
+/// states the settings with which the ping was made. core does not read them. Exceptions: RangeImageSettings
+/// (core/sonar/range_image.hpp) makes the ping a range image, PhasedSettings (core/sonar/phases.hpp) keeps signals of beams.
 struct VendorSettings {
   virtual ~VendorSettings() = default;
-  /// Whether a client would see no difference; both are of the same vendor.
+  /// Whether a client would see no difference between the two. `other` is of the same vendor.
   virtual bool equals(const VendorSettings& other) const = 0;
 };
 
-/// Angles that a sonar reports, where its sound speed is not the water's (docs/acoustics.md, section 6).
+/// Meaning of the reported angles if the sonar assumes another sound speed than that of the water (docs/acoustics.md, section 6).
 enum class Bearings {
   are_true,             // beams point where the sonar reports them
   follow_device_speed,  // the beamformer's delays are those of the device's sound speed
@@ -117,17 +117,17 @@ struct PingRequest {
   std::shared_ptr<const SonarModel> model;
   PingNumber number{};
   Time fired_at{};
-  Pose sonar_in_world;                // when it fires
-  Twist sonar_moves;                  // from then on
+  Pose sonar_in_world;                // at the time of firing
+  Twist sonar_moves;                  // from firing to the last echo
   Pose vehicle_in_world;              // for the attitude and heading in packets
   std::vector<Pose> bodies_in_world;  // moving bodies, in the scene's order; empty = where the scene file put them
   Water water;
   PingSettings settings;
   std::shared_ptr<const VendorSettings> vendor_settings;  // may be null
-  std::uint32_t sonar_id = 0;                             // keys the receiver noise
+  std::uint32_t sonar_id = 0;                             // part of the key of the receiver noise
   Seed seed{};
   Bearings bearings = Bearings::are_true;
-  bool blank = false;  // no scene, noise only: on_stale: blank, or the sonar is out of the water
+  bool blank = false;  // noise only, no scene: poses are stale (on_stale: blank), or the sonar is out of the water
   Switches switches;
 };
 
@@ -140,7 +140,7 @@ struct BeamTruth {
 
 struct PingLabels;  // core/sonar/ping_labels.hpp
 
-/// Vendor-neutral result. Rows by range, row 0 nearest; beam 0 = most to port (azimuth falls from + to -).
+/// The result of a ping, for all vendors. Row 0 is the nearest; beam 0 is the one farthest to port (azimuth falls from + to -).
 struct Ping {
   PingRequest request;
   std::vector<float> beam_azimuth_rad;  // [beams], positive to port

@@ -12,10 +12,10 @@ struct PingLabels {
   int rows = 0, beams = 0;
   std::vector<std::uint16_t> instance;  // instance whose energy is largest, if above the receiver's noise; 0 = none
   std::vector<std::uint8_t> share;      // share of that instance in the sample's energy, noise included; 255 = all
-  /// Where no instance is: the object, of several the nearest, that blocks the line of sight over all of the beam's -3 dB width;
-  /// 0 = no shadow. What the beam receives there through its side lobes is ignored.
+  /// For samples without an instance: the nearest object that blocks the line of sight over the whole -3 dB width of the beam;
+  /// 0 = no shadow. Echoes through the side lobes of the beam are ignored.
   std::vector<std::uint16_t> caster;
-  /// [instance - 1]: the share of its energy that arrives, 0 to 1, where 1 means that nothing is in the way; -1 for an object
+  /// [instance - 1]: the fraction of the instance's energy that arrives, 0 to 1; 1 means that nothing hides it; -1 for an object
   /// without a label.
   std::vector<float> visible;
 

@@ -1,5 +1,5 @@
-// Settings that a client may change between two pings, in our terms. The vendor's law (protocol/<vendor>) makes the grid from
-// the settings of its own protocol.
+// Settings that a client may change between two pings, independent of the vendor. protocol/<vendor>/settings.cpp computes them
+// from the settings of the vendor's protocol.
 #pragma once
 
 #include <cstdint>
@@ -18,35 +18,35 @@ struct SampleFormat {
   float gamma = 1;               // linear only
   bool row_gains = false;        // a power gain per row, see Ping::row_gain; linear only
   Scale scale = Scale::linear;
-  float floor_db = 0, ceiling_db = 80;  // logarithmic: what codes 0 and max_code stand for [dB re full scale], -300 to 300
+  float floor_db = 0, ceiling_db = 80;  // logarithmic: levels of codes 0 and max_code [dB re full scale], -300 to 300
 
   bool operator==(const SampleFormat&) const = default;
 };
 
-/// Rows in the device's metres (with its believed sound speed): row i covers range_start_m + [i, i + 1) range_bin_m. The picture
-/// ends at range_start_m + range_bin_count range_bin_m, which is range_m except for the vendor's rounding to whole rows.
+/// Ranges use the sound speed that the device assumes. Row i covers range_start_m + [i, i + 1) range_bin_m. The picture ends at
+/// range_start_m + range_bin_count range_bin_m, which is range_m except for the vendor's rounding to whole rows.
 struct PingSettings {
   int mode = 0;  // index into SonarModel::modes
   int beam_count = 512;
   int range_bin_count = 437;      // rows
-  double range_m = 10;            // the far end, as used by the device, full scale
-  double range_start_m = 0;       // the near edge of row 0, below range_m; nearer echoes show by the tails of their pulses alone
+  double range_m = 10;            // the far end of the picture, as the device rounds it
+  double range_start_m = 0;       // the near edge of row 0, below range_m; of nearer echoes only the tails of their pulses show
   double range_bin_m = 0.0229;    // row spacing; packets carry it exactly
-  double row_centre = 0.5;        // where in a row its samples centre, see range_of_row: 0 near edge, 1 far edge
+  double row_centre = 0.5;        // position of the samples' centre in a row, see range_of_row: 0 near edge, 1 far edge
   float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (docs/acoustics.md, section 4)
-  int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples across it
+  int samples_per_row = 1;        // 1: a row is the sample at its centre; n: it has the mean power of n samples
   float rate_hz = 10;             // 0 = standby
   double ping_interval_s = 0;     // between the pings of a picture, see FrequencyMode::interleaved_pings
   float gain_db = 0;
-  bool gain_assist = false;              // the device turns the gain itself, from gain_db on (core/sonar/gain_assist.hpp)
+  bool gain_assist = false;              // the device changes the gain itself, starting at gain_db (core/sonar/gain_assist.hpp)
   bool tvg = true;                       // false: no time-varied gain, G0 only (Oculus 32-bit "scientific" data)
   float device_sound_speed_mps = 1500;   // sound speed that the device assumes
-  float device_absorption_db_per_m = 0;  // one way, what its TVG believes
+  float device_absorption_db_per_m = 0;  // one way, as its TVG assumes
   bool triggered = false;                // one ping per request of the client
   bool transmit = true;                  // false: it receives noise only
   SampleFormat format;
 
-  /// Device range of a row's samples [m]; of places between rows, too.
+  /// Range of a row's samples as the device computes it [m]; `row` may lie between two rows.
   double range_of_row(double row) const { return range_start_m + (row + row_centre) * range_bin_m; }
 
   bool operator==(const PingSettings&) const = default;

@@ -12,31 +12,31 @@
 
 namespace sonar {
 
-/// Vendor settings that are of this type make a ping a range image. PingSettings then mean: beam_count columns by range_bin_count
-/// rows, pulse_width_m the width of a range cell, samples of 32 bits whose full scale, format.max_code, is that of the strength.
-/// The mode's horizontal_aperture_rad and pattern.elevation_width_rad are the field of view, the centres of the outer beams lie
-/// on its edges; pattern.azimuth_width_rad is the two-way -3 dB width of a beam.
+/// With vendor settings of this type a ping is a range image. PingSettings then have other meanings: the image has beam_count
+/// columns and range_bin_count rows, pulse_width_m is the width of a range cell, samples have 32 bits, and format.max_code is the
+/// full scale of the strength. The mode's horizontal_aperture_rad and pattern.elevation_width_rad are the field of view; the
+/// centres of the outer beams lie on its edges. pattern.azimuth_width_rad is the two-way -3 dB width of a beam.
 struct RangeImageSettings : VendorSettings {
   double beam_height_rad = 0;        // two-way -3 dB width of a beam in elevation
   double range_unit_m = 0;           // unit of the ranges in samples; 65535 of them must reach range_m
-  std::uint32_t least_strength = 1;  // weaker returns are none
-  double detection = 16;             // returns below so many times the noise power are none
+  std::uint32_t least_strength = 1;  // weaker returns are dropped
+  double detection = 16;             // returns below so many times the noise power are dropped
   bool nearest = false;              // use the nearest return of a direction, not the strongest
-  bool chosen_as_heard = false;      // the strongest by its speckle, which each range cell has of its own
+  bool chosen_as_heard = false;      // choose the strongest cell with speckle, which each range cell has of its own
   double range_sample_m = 0;         // ranges are whole multiples of it, 0 = any
-  // The device's filters, in this order; the pixels round one are the eight beside it, as far as they are of its block of rows.
+  // The filters of the device, in the order of use. Neighbours of a pixel are those of the eight around it in its block of rows.
   int block_rows = 0;        // rows that are measured together; 0 = all
-  int least_confirming = 0;  // a return is dropped if fewer of the pixels round it confirm it
-  double confirming_m = 0;   // a pixel confirms a return if its range differs by no more than this
-  int median_passes = 0;     // each range becomes the median of its own and of those round it, so many times over
+  int least_confirming = 0;  // a return is dropped if fewer of its neighbours confirm it
+  double confirming_m = 0;   // a neighbour confirms a return if its range differs by no more than this
+  int median_passes = 0;     // number of passes that replace each range by the median of itself and its neighbours
 };
 
 inline const RangeImageSettings* range_image_of(const PingRequest& request) {
   return dynamic_cast<const RangeImageSettings*>(request.vendor_settings.get());
 }
 
-/// A pixel as it lies in Ping::samples, little-endian: the strength in the upper 16 bits, so that a sample is read as a level,
-/// the range in the lower. 0 = no return; row 0 is the lowest, column 0 the one most to port.
+/// A pixel in Ping::samples, little-endian. The upper 16 bits are the strength, so that the sample as a whole can be used as a
+/// level; the lower 16 bits are the range. 0 = no return. Row 0 is the lowest; column 0 is the one farthest to port.
 struct RangePixel {
   static constexpr std::uint32_t most_range = 0xFFFF, most_strength = 0x7FFF;
   std::uint32_t strength = 0, range = 0;  // amplitude, linear; in range_unit_m
@@ -49,7 +49,7 @@ inline RangePixel range_pixel(const Ping& ping, std::size_t index) {
   return {code >> 16, code & 0xFFFFu};
 }
 
-/// Where the beams look [rad]: azimuth positive to port, elevation positive up.
+/// Directions of the beams [rad]: azimuth positive to port, elevation positive up.
 struct RangeImageGrid {
   int columns = 0, rows = 0;
   double horizontal_rad = 0, vertical_rad = 0;

@@ -1,4 +1,4 @@
-// The constants of a product, frequency mode by frequency mode. Filled by protocol/<vendor>/models.cpp.
+// The constants of a product, for each of its frequency modes. protocol/<vendor>/models.cpp has their values.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace sonar {
 
 /// Aperture shading of the receive array; sets the side lobes. `unit` switches the pattern off (1 everywhere).
 enum class Taper { uniform, taylor30, hamming, hann, unit };
-/// Which data-sheet number the vertical width is (docs/acoustics.md, section 6): of one pattern, or of transmit times receive.
+/// Whether the data sheet's vertical width is that of one pattern, or of transmit times receive (docs/acoustics.md, section 6).
 enum class ElevationWidthIs { one_way, two_way };
 enum class BeamSpacing {
   uniform_in_sine,   // beam azimuths asin(s), s linear over +-sin(half aperture): Oculus
@@ -27,13 +27,13 @@ struct BeamPattern {
   ElevationWidthIs elevation_width_is = ElevationWidthIs::two_way;
 };
 
-/// Differences between beams, as far as a recording shows them (docs/acoustics.md, sections 5 and 6). Tables at sines that are
-/// even over the sector, from its port edge to the other; empty = no difference.
+/// Differences between beams that a recording shows (docs/acoustics.md, sections 5 and 6). The tables have values at sines that
+/// are uniform from the port edge of the sector to its starboard edge; empty = no difference.
 struct BeamProfile {
   std::vector<float> noise_db;       // receiver noise re (30), far from the sonar
-  std::vector<float> near_noise_db;  // and at range 0; as long as noise_db
-  float near_m = 0.2f;               // noise_db's share at range r is 1 - e^{-r / near_m}
-  std::vector<float> blend;          // amplitude of each neighbour, half a beam width away, in a beam, re its own
+  std::vector<float> near_noise_db;  // the same at range 0; same length as noise_db
+  float near_m = 0.2f;               // weight of noise_db at range r: 1 - e^{-r / near_m}
+  std::vector<float> blend;          // amplitude of each neighbour, half a beam width away, that is added to a beam, re its own
 };
 
 /// Noise that receive channels share, with opposite signs in neighbours (docs/acoustics.md, section 5).
@@ -42,33 +42,33 @@ struct SharedNoise {
   int channels = 128;     // even
   int group = 32;      // number of neighbours that share it, with weights that fall to both ends; even; its half divides channels
   float sine = 0.56f;  // sine of the direction it seems to come from, at long range: half a wavelength / channel spacing
-  float full_m = 0.25f;  // nearer, its power is proportional to the range
-  float steady = 0;      // share of its power that is the same in every ping, of one phase, shared by all channels
-  float focus_rows = 0;  // the array is focused that many rows behind a row's centre
+  float full_m = 0.25f;  // below this range its power is proportional to the range
+  float steady = 0;      // fraction of its power that is the same in every ping and has one phase in all channels
+  float focus_rows = 0;  // number of rows by which the array's focus lies behind the centre of a row
   float nearest_focus_m = 0;
 };
 
 /// How the receiver turns pressure into samples (docs/acoustics.md, section 7); constants of the product.
 struct ReceiverModel {
-  float tvg_slope_db = 30;  // X of X log10 r
+  float tvg_slope_db = 30;  // X in X log10 r
   float tvg_minimum_range_m = 0.5f;
   float tvg_ceiling_db = 80;  // infinity switches it off
   float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
   float noise_width = 1;      // -3 dB width of the noise filter divided by the pulse's; with a measured pulse it is the pulse's
-  float crosstalk_db = -200;  // amplitude that every channel leaks to every beam, re the channel; below -150 = none
+  float crosstalk_db = -200;  // amplitude of every channel that is added to every beam, re the channel; below -150 = none
   float leak_upa = 0;         // rms pressure of the transmitter's direct leakage, at range 0; 0 = none
   float leak_decay_db_per_m = 30;
   std::vector<float>
-      leak_ring_db;  // level re leak_upa every leak_ring_step_m from 0 on, none behind the last; replaces leak_decay_db_per_m
+      leak_ring_db;  // level re leak_upa at multiples of leak_ring_step_m, none after the last; replaces leak_decay_db_per_m
   float leak_ring_step_m = 0.003f;
-  bool leak_is_shared = false;  // shared by the channels, as shared_noise is; else its phases are random from column to column
+  bool leak_is_shared = false;  // the channels share it, like shared_noise; false: each column has a random phase
   BeamProfile profile;
-  /// Gains of the receive channels, each of which serves as many neighbouring beams, from port; empty = no difference.
+  /// Gains of the receive channels, from port; the same number of neighbouring beams uses each. Empty = no difference.
   std::vector<float> channel_gain_db;
   SharedNoise shared_noise;
-  /// 0: receive beams are focused at every range and bearing; 1: with the delays of broadside, which leave near beams off it
-  /// blurred (docs/acoustics.md, section 6).
+  /// 0: receive beams are focused at every range and bearing. 1: all use the delays of broadside, so that other beams are blurred
+  /// at short range (docs/acoustics.md, section 6).
   float defocus = 0;
   /// Codes of a linear scale are floor((max_code + 1) v^gamma), not rounded (docs/acoustics.md, section 7).
   bool truncates = false;
@@ -82,14 +82,14 @@ struct FrequencyMode {
   float max_range_m = 0;
   float source_level_db = 0;  // dB re 1 uPa rms at 1 m
   BeamSpacing beam_spacing = BeamSpacing::uniform_in_sine;
-  /// listed: where each beam looks, positive to port and strictly falling, within +- horizontal_aperture_rad / 2 (the sector that
-  /// the transmitter lights). PingSettings::beam_count is their number.
+  /// listed: direction of each beam, positive to port and strictly falling, within +- horizontal_aperture_rad / 2 (the sector
+  /// that the transmitter lights). PingSettings::beam_count is their number.
   std::vector<double> beam_azimuths_rad;
   /// listed: -3 dB width of each beam in azimuth, in its own direction; empty = pattern.azimuth_width_rad at broadside for all,
   /// which widens as 1 / cos(azimuth). The noise level is that of a beam of the pattern's width.
   std::vector<float> beam_widths_rad;
-  /// Number of successive pings that neighbouring beams come from; the last beam is from the first ping (docs/acoustics.md,
-  /// section 6).
+  /// A picture is made of so many successive pings, which neighbouring beams come from in turn; the last beam is from the first
+  /// ping (docs/acoustics.md, section 6).
   int interleaved_pings = 1;
   BeamPattern pattern;
   Waveform waveform;

@@ -1,6 +1,6 @@
-// Properties of the water, its sound speed and its absorption. Used by the physics, and by devices that compute the sound speed
-// that they assume. The functions state their formulae and sources; oracles 27-29 are in tests/core/sonar. C++17-clean, standard
-// library only.
+// Properties of the water, its sound speed and its absorption. The physics uses them, and so do devices that compute the sound
+// speed that they assume. Comments name the formulae and sources; tests of the oracles 27 to 29 are in tests/core/sonar. The code
+// is C++17 and uses only the standard library.
 #pragma once
 
 namespace sonar {
@@ -18,7 +18,7 @@ constexpr bool operator==(const Water& a, const Water& b) {
 
 /// Francois & Garrison 1982. Frequency [Hz], depth [m]; one-way, dB/m.
 double absorption_db_per_m(const Water& water, double depth_m, double frequency_hz);
-/// Ainslie & McColm 1998, the cross-check. dB/m.
+/// Ainslie & McColm 1998, to check the other formula. dB/m.
 double absorption_ainslie_mccolm_db_per_m(const Water& water, double depth_m, double frequency_hz);
 /// Mackenzie 1981. T 2..30 C, S 25..40, depth 0..8000 m.
 double sound_speed_mackenzie_mps(double temperature_c, double salinity_psu, double depth_m);
@@ -30,9 +30,9 @@ double sound_speed_fresh_mps(double temperature_c);
 double density_kg_per_m3(double temperature_c, double salinity_psu);
 /// Absolute pressure [bar] at a depth: 1.013 + 0.0981 depth rho / 1000; depth below 0 counts as 0.
 double absolute_pressure_bar(const Water& water, double depth_m);
-/// The sound speed the world really has: as given, or UNESCO at that depth.
+/// The true sound speed: Water::sound_speed_mps if it is given, else UNESCO at that depth.
 double true_sound_speed_mps(const Water& water, double depth_m);
-/// Depth of a place in the world: z = 0 is the surface, depth = -z, at least 0.
+/// Depth of a place in the world: -z, at least 0, because z = 0 is the surface.
 inline double depth_from_z(double z_m) { return z_m < 0 ? -z_m : 0; }
 
 }  // namespace sonar

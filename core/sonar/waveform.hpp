@@ -1,5 +1,5 @@
-// The matched filter's output for one point echo: the pulse p(t), p(0) = 1. A constant of the product; its width
-// follows the client's settings (PingSettings::pulse_width_m) unless it was measured (docs/acoustics.md, section 4).
+// The output of the matched filter for one point echo: the pulse p(t), p(0) = 1. Its shape is a constant of the product. Its
+// width is PingSettings::pulse_width_m unless the pulse was measured (docs/acoustics.md, section 4).
 #pragma once
 
 #include <complex>
@@ -15,15 +15,15 @@ struct Waveform {
     measured,  // `samples`
   };
   Shape shape = Shape::gaussian;
-  /// lfm: time the sweep takes, and its sign (falling sweeps shift the other way). Decides the Doppler range shift only.
+  /// lfm: duration of the sweep, from low to high frequency. Only the Doppler range shift uses it.
   float sweep_s = 1e-3f;
   bool falling = false;
   /// measured: complex envelope after the matched filter at sample_rate_hz, the peak in the middle, at most 65536 samples.
   std::vector<std::complex<float>> samples;
   double sample_rate_hz = 0;
-  /// Frequency-domain synthesis (exact up to the band limit) where the tabulated pulse would do; `measured` always uses it.
+  /// Uses synthesis in the frequency domain (exact up to the band limit), not a table of the pulse; `measured` always does.
   bool exact = false;
-#if __cplusplus >= 202002L  // device code is C++17 and compares none
+#if __cplusplus >= 202002L  // device code is C++17 and needs no comparison
   bool operator==(const Waveform&) const = default;
 #endif
 };
