@@ -1,5 +1,6 @@
-// Memory of one batch of pings, taken slice by slice and given back all at once: on the device, on the host, or on both alike,
-// so that many small tables travel in one copy. Pieces stay where they are until clear(). Several threads may allocate at once.
+// Memory of one batch of pings: pieces are allocated one by one and released all at once. It is on the device, on the host, or on
+// both with the same layout, so that one copy sends many small tables. Pieces do not move before clear(). Several threads may
+// allocate at once.
 #pragma once
 
 #include <cstddef>
@@ -17,8 +18,9 @@ class Arena {
  public:
   enum class Where { device, host, both };
   static constexpr int not_cleared = -1;
-  /// `clear_lane`: the lane on which new memory is set to zero, both copies; Where::both only. A copy of whole chunks then reads
-  /// nothing that was never written, gaps between pieces included, which compute-sanitizer's initcheck would report.
+  /// `clear_lane`: the lane on which both copies of new memory are set to zero; Where::both only. A copy of whole chunks includes
+  /// the gaps between pieces; without this, compute-sanitizer's initcheck would report that it reads memory that was never
+  /// written.
   Arena(Machine& machine, Where where, std::size_t chunk_bytes, int clear_lane = not_cleared)
       : machine_(machine), where_(where), chunk_bytes_(chunk_bytes), clear_lane_(clear_lane) {}
   ~Arena();
@@ -51,10 +53,10 @@ class Arena {
     return put(std::span<const T>(values));
   }
 
-  void upload(int lane);    // all that was taken; Where::both only
-  void download(int lane);  // likewise
+  void upload(int lane);    // all pieces; Where::both only
+  void download(int lane);  // the same
   void clear();
-  void give_back();  // the memory too; nothing queued may need it any more
+  void give_back();  // releases the memory; no queued work may still use it
   std::size_t taken_bytes() const;
 
  private:

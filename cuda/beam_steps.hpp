@@ -1,5 +1,5 @@
-// Kernel bodies from columns to codes: the receive pattern, points and other sonars on top, crosstalk, envelope, gain and
-// quantisation, as form_beams, interference and receive do it (core/pipeline).
+// Kernel bodies that make codes of columns: the receive pattern, the pulses of points and of other sonars, crosstalk, envelope,
+// gain and quantisation. They compute the same as form_beams, interference and receive (core/pipeline).
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace sonar::cuda {
 
-// One load of a device instead of two or four.
+// The device loads such a struct at once, not value by value.
 struct alignas(8) Pair {
   float re, im;
 };
@@ -37,7 +37,7 @@ SONAR_HD inline void point_weights(const PingView& p, std::uint32_t i) {
   p.point_weights[i] = p.beam_patterns[i % beams](from.sine - p.beam_sines[i % beams]);
 }
 
-/// Adds what points are at sample `n` of beam `j`.
+/// Adds the pulses of points at sample `n` of beam `j`.
 SONAR_HD inline void add_points(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
   const auto beams = static_cast<std::uint32_t>(p.beams);
   const bool power = p.sea.expected_power != 0;
@@ -52,7 +52,7 @@ SONAR_HD inline void add_points(const PingView& p, std::uint32_t j, std::int32_t
   re += static_cast<float>(power ? sum_re * sum_re + sum_im * sum_im : sum_re);
   if (!power) im += static_cast<float>(sum_im);
 }
-/// The same of other sonars.
+/// Adds the pulses of other sonars, likewise.
 SONAR_HD inline void add_pulses(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
   const auto beams = static_cast<std::uint32_t>(p.beams);
   const bool power = p.sea.expected_power != 0;
@@ -66,7 +66,7 @@ SONAR_HD inline void add_pulses(const PingView& p, std::uint32_t j, std::int32_t
   }
 }
 
-/// Adds the noise that channels share, at sample `n` of beam `j`.
+/// Adds the noise that channels share at sample `n` of beam `j`.
 SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
   if (p.shared_noise == nullptr || n >= p.shared_samples) return;
   const bool noise = p.has_noise != 0;
@@ -94,7 +94,7 @@ SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::i
   im += sum_im;
 }
 
-/// Sums of one sample over columns, for the beams of `panels` panels that hear the same columns. `weight`: of each panel.
+/// Sums of one sample over columns, for the beams of `panels` panels that use the same columns. `weight`: weights of each panel.
 template <std::uint32_t panels>
 SONAR_HD inline void sum_over_columns(const float* const* weight, const float* column, std::int64_t stride, std::int32_t count,
                                       float* re, float* im) {
@@ -111,8 +111,8 @@ SONAR_HD inline void sum_over_columns(const float* const* weight, const float* c
   }
 }
 
-/// Sample `i` of [pairs of panels][samples]: the eight beams of two panels at once, which as a rule hear the same columns; so
-/// every sample is read once for all of them.
+/// Sample `i` of [pairs of panels][samples], for the eight beams of two panels. These mostly use the same columns, so that each
+/// sample is read once for all of them.
 SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
   const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
   const std::uint32_t panels = (beams + beams_a_panel - 1) / beams_a_panel;
@@ -138,7 +138,7 @@ SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
     const std::uint32_t j = first * beams_a_panel + beam;
     if (j >= beams) break;
     add_points(p, j, n, re[beam], im[beam]);
-    if (p.mixed == nullptr) {  // else behind the blur, in refocus(), and behind the blend
+    if (p.mixed == nullptr) {  // else refocus() and blend() add them, after the blur and the blend
       add_pulses(p, j, n, re[beam], im[beam]);
       add_shared_noise(p, j, n, re[beam], im[beam]);
     }
@@ -148,7 +148,7 @@ SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
   }
 }
 
-/// Sample `i` of [beams][samples]: from the beams into `mixed`.
+/// Blurs sample `i` of [beams][samples]: reads the beams, writes `mixed`.
 SONAR_HD inline void refocus(const PingView& p, std::uint32_t i) {
   const auto j = static_cast<std::int32_t>(i / static_cast<std::uint32_t>(p.samples));
   const auto n = static_cast<std::int32_t>(i % static_cast<std::uint32_t>(p.samples));
@@ -162,7 +162,7 @@ SONAR_HD inline void refocus(const PingView& p, std::uint32_t i) {
   to[0] = s.re;
   to[1] = s.im;
 }
-/// Sample `i` from `mixed`, blended, back into the beams.
+/// Blends sample `i`: reads `mixed`, writes the beams.
 SONAR_HD inline void blend(const PingView& p, std::uint32_t i) {
   const auto j = static_cast<std::int32_t>(i / static_cast<std::uint32_t>(p.samples));
   const auto n = static_cast<std::int32_t>(i % static_cast<std::uint32_t>(p.samples));
@@ -212,12 +212,12 @@ SONAR_HD inline void receive(const PingView& p, std::uint32_t i) {
   if (p.pressure != nullptr) p.pressure[i] = std::sqrt(power);
   if (p.beam_power_factor != nullptr) power *= p.beam_power_factor[j];
   const auto max_code = static_cast<float>(p.max_code);
-  // Eq. 37 and 40, as codes_of and quantise_levels (core/pipeline/simd/quantise.inl).
+  // Eq. 37 and 40, the same as codes_of and quantise_levels (core/pipeline/simd/quantise.inl).
   const float octaves = log2_of(larger(power * p.row_power_factor[row], 1e-30f));
   const float code = p.logarithmic != 0
                          ? std::floor(smaller(larger(p.per_octave * octaves + (p.at_full_scale + 0.5f), 0.0f), max_code))
                          : smaller(std::floor(exp2_of(p.half_gamma * octaves) * p.code_factor + p.code_rounding), max_code);
-  // 2^32 - 1 is no float: compare before the conversion can overflow.
+  // 2^32 - 1 is not a float, so the comparison comes before the conversion, which could overflow.
   const std::uint32_t whole = code >= max_code ? p.max_code : static_cast<std::uint32_t>(code);
   std::uint8_t* out = p.codes + static_cast<std::int64_t>(i) * p.bytes_a_sample;
   for (int b = 0; b < p.bytes_a_sample; ++b) out[b] = static_cast<std::uint8_t>(whole >> (8 * b) & 0xFFu);

@@ -1,6 +1,6 @@
-// Kernel bodies between the depth map and the columns' signals: every cell in view becomes an echo or none, echoes are sorted
-// into columns in the order of tiles and cells, and each column adds its own up in that order. So a sum is the CPU's, addition by
-// addition, and needs no atomic on floats.
+// Kernel bodies between the depth map and the columns' signals: each cell in view gives one echo or none; echoes are sorted into
+// columns in the order of tiles and cells; each column adds its echoes in this order. So the additions are those of the CPU, in
+// the same order, and need no atomic operations on floats.
 #pragma once
 
 #include <cmath>
@@ -12,13 +12,13 @@
 namespace sonar::cuda {
 
 enum CellColumn { cell_x, cell_y, cell_z, cell_normal_x, cell_normal_y, cell_normal_z, cell_weight_re, cell_weight_im };
-inline constexpr float cell_normal_unit = 1.0f / 32767.0f;  // as CellTile::normal_unit
+inline constexpr float cell_normal_unit = 1.0f / 32767.0f;  // equals CellTile::normal_unit
 
 SONAR_HD inline float cell_value(const TileView& t, int column, int cell) {
   return static_cast<float>(t.cells[static_cast<std::int64_t>(column) * t.count + cell]);
 }
 
-/// Where a cell is, and whether the sonar sees it.
+/// The position of a cell, and whether it is visible to the sonar.
 struct CellPlace {
   float range, offset, cosine, sine2, sample;
   std::int32_t column;
@@ -38,7 +38,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float h = g.conical != 0 ? x : std::sqrt(x * x + y * y);
   const float inverse_h = 1.0f / larger(h, 1e-6f);
   const float column = (g.first_edge_sine - y * (g.conical != 0 ? inverse_r : inverse_h)) * g.columns_per_sine;
-  // Where the rays looked for it: the sonar may have turned since.
+  // Its direction from the place of the rays; the sonar may have turned since.
   float seen_column = column, seen_z = z, seen_inverse_h = inverse_h;
   if (t.moves != 0) {
     const float *w = t.seen_turn, *o = t.seen_place;
@@ -70,7 +70,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float along = cell_value(t, cell_normal_x, cell) * (qx + dx) + cell_value(t, cell_normal_y, cell) * (qy + dy) +
                       cell_value(t, cell_normal_z, cell) * (qz + dz);
   if (!(along * t.turned_away <= 0)) return false;
-  // The plane of another object's facet, followed from the ray's place in the column to the cell's.
+  // The plane of another object's facet, extended from the ray's place in the column to that of the cell.
   const float* slope = p.depth_slope + map_at;
   const auto differs = [&](std::int32_t i) {
     const auto in_map = static_cast<std::int32_t>(bits_of(map[i])), in_slope = static_cast<std::int32_t>(bits_of(slope[i]));
@@ -95,7 +95,7 @@ SONAR_HD inline Echo scatter_cell(const PingView& p, const TileView& t, int cell
   CellPlace at{};
   if (!place_cell(p, t, cell, at)) return echo;
   const SeaView& g = p.sea;
-  // Eq. 6 of docs/acoustics.md, as scatter_cells has it.
+  // Eq. 6 of docs/acoustics.md, the same as in scatter_cells.
   const float law = t.law != nullptr ? law_root(t.law, at.cosine) : at.cosine;
   const float re = cell_value(t, cell_weight_re, cell), im = cell_value(t, cell_weight_im, cell);
   const float x = g.elevation_aperture * std::sqrt(at.sine2);
@@ -105,7 +105,7 @@ SONAR_HD inline Echo scatter_cell(const PingView& p, const TileView& t, int cell
   echo.column = at.column;
   if (g.expected_power != 0) {
     const float slope = std::fabs(cell_value(t, cell_normal_x + t.axis, cell)) * cell_normal_unit;
-    const float per_area = re != 0 || im != 0 ? 1.0f / slope : 0.0f;  // padding is no cell
+    const float per_area = re != 0 || im != 0 ? 1.0f / slope : 0.0f;  // cells that are padding have no echo
     const float amplitude = t.area_amplitude * law * pattern * std::exp(-g.decay_per_m * at.offset) / (at.range * at.range);
     echo.re = amplitude * amplitude * level_weight(t, at.range) * per_area;
     return echo;
@@ -120,7 +120,7 @@ SONAR_HD inline Echo scatter_cell(const PingView& p, const TileView& t, int cell
   return echo;
 }
 
-/// The tile that slot `i` belongs to.
+/// The tile of slot `i`.
 SONAR_HD inline std::uint32_t tile_of(const PingView& p, std::uint32_t i) {
   std::uint32_t low = 0, high = p.tile_count;
   while (high - low > 1) {
@@ -138,7 +138,7 @@ SONAR_HD inline void scatter(const PingView& p, std::uint32_t i) {
   p.echoes[i] = scatter_cell(p, p.tiles[tile], static_cast<int>(i - p.tile_first_slot[tile]));
 }
 
-/// How many of a slot's chunk come before it in the same column, and how many the chunk has there.
+/// Counts the slots of a chunk in the same column: those before slot `i`, and all of them.
 SONAR_HD inline void rank(const PingView& p, std::uint32_t i) {
   const std::int32_t column = p.echoes[i].column;
   if (column < 0) return;
@@ -149,10 +149,10 @@ SONAR_HD inline void rank(const PingView& p, std::uint32_t i) {
   add_count(p.in_chunk[chunk * static_cast<std::uint32_t>(p.sea.columns) + static_cast<std::uint32_t>(column)], 1u);
 }
 
-/// Column `k`: counts of the chunks become sums over the chunks before.
+/// Column `k`: replaces the count of each chunk by the sum of the counts of earlier chunks.
 SONAR_HD inline void scan_chunks(const PingView& p, std::uint32_t k) {
   const auto columns = static_cast<std::uint32_t>(p.sea.columns);
-  constexpr std::uint32_t at_once = 8;  // read before they are written: so the device waits for memory once for all of them
+  constexpr std::uint32_t at_once = 8;  // values that are read before any is written: the device waits only once for memory
   std::uint32_t before = 0;
   for (std::uint32_t from = 0; from < p.chunks; from += at_once) {
     const std::uint32_t some = p.chunks - from < at_once ? p.chunks - from : at_once;
@@ -179,18 +179,18 @@ SONAR_HD inline void place(const PingView& p, std::uint32_t i) {
   p.sorted[p.column_at[column] + p.in_chunk[chunk * static_cast<std::uint32_t>(p.sea.columns) + column] + p.rank[i]] = echo;
 }
 
-/// The pulses of a column's echoes, at the samples n = part modulo sum_parts: i = column * sum_parts + part.
+/// Adds the pulses of a column's echoes at the samples n = part modulo sum_parts, where i = column * sum_parts + part.
 SONAR_HD inline void sum_columns(const PingView& p, std::uint32_t i) {
   const std::uint32_t k = i / sum_parts;
   const int part = static_cast<int>(i % sum_parts);
   constexpr int parts = static_cast<int>(sum_parts);
-  // Read once: for all that the compiler knows, the sums below might change the view.
+  // Copies, because the compiler must assume that the sums below can change the view.
   const int samples = p.samples, taps = p.taps;
   const float* const pulse_rows = p.pulse_rows;
   float* const signal = p.signals + 2 * static_cast<std::int64_t>(k) * samples;
   for (int n = part; n < samples; n += parts) signal[2 * n] = signal[2 * n + 1] = 0;
   if (p.slots == 0) return;
-  // Eq. 8: the pulse's row for the echo's place between two samples.
+  // Eq. 8: the row of the pulse table for the position of the echo between two samples.
   const int reach = taps / 2 - 1;
   const float steps = static_cast<float>(p.pulse_steps);
   const Echo* echo = p.sorted + p.column_at[k];

@@ -1,6 +1,6 @@
-// The tiles of surface cells that the device holds: each is sent once, when a ping first sees it, and stays. They are the CPU's
-// own bytes (core/scene/cells), so position and speckle are the same by construction; a tile that the CPU has forgotten and made
-// again is recognised by what it is.
+// The tiles of surface cells that are stored on the device. Each is sent once, when it first comes into view. They are copies of
+// the CPU's bytes (core/scene/cells), so that positions and speckle are the same. If the CPU has dropped a tile and made it
+// again, the hash of its weights identifies it.
 #pragma once
 
 #include <cstdint>
@@ -16,30 +16,31 @@ namespace sonar::cuda {
 
 class CellStore {
  public:
-  /// `budget_bytes`: of the device's memory; what one ping sees is kept whatever it takes.
+  /// `budget_bytes`: limit of the device's memory in use; the tiles of a single ping may exceed it.
   CellStore(Machine& machine, std::size_t budget_bytes);
 
-  /// Where each tile's cells lie on the device, in the order of `tiles`. What was not there is queued on `lane`; it travels by
-  /// way of `staging`, which must stay until that is done. False: they do not fit in beside those that are held; clear() first,
-  /// when no ping under way needs them. Several threads may call it at once, each with staging that is its own or locks itself.
+  /// Returns the address on the device of each tile's cells, in the order of `tiles`. Copies of tiles that are not there yet are
+  /// queued on `lane`; `staging` has their bytes and must stay unchanged until they have been copied. False: there is no room for
+  /// them beside the stored tiles; call clear() when no unfinished ping needs these, and call again. Several threads may call it
+  /// at once, each with its own staging or with one that locks itself.
   bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();
-  void give_back();  // its memory too
+  void give_back();  // releases the memory, too
 
   std::size_t bytes() const { return memory_.taken_bytes(); }
 
  private:
   struct Held {
-    const std::int16_t* data = nullptr;  // where the CPU has the tile; null = a free place
-    std::uint64_t weights_hash = 0;      // by chance only do other tiles have the same
+    const std::int16_t* data = nullptr;  // the tile's address on the CPU; null = a free entry
+    std::uint64_t weights_hash = 0;      // differs between tiles, except by chance
     std::int32_t object = 0, axis = 0, level = 0, count = 0;
     Vec3d centre_m;
     const std::int16_t* device = nullptr;
   };
-  /// By where the CPU has them: a pair of cache lines a tile, since a ping looks up thousands.
+  /// Tiles by their addresses on the CPU. A look-up reads few cache lines, because a ping needs thousands of look-ups.
   class Table {
    public:
-    const Held& at(const std::int16_t* data) const { return places_[place_of(data)]; }  // free where there is none
+    const Held& at(const std::int16_t* data) const { return places_[place_of(data)]; }  // a free entry if there is none
     void put(const Held& held);
     void clear();
     bool empty() const { return taken_ == 0; }
@@ -48,7 +49,7 @@ class CellStore {
    private:
     std::size_t first_place(const std::int16_t* data) const;
     std::size_t place_of(const std::int16_t* data) const;
-    std::vector<Held> places_ = std::vector<Held>(1024);  // a power of two, at most half of them taken
+    std::vector<Held> places_ = std::vector<Held>(1024);  // a power of two; at most half of the entries are in use
     std::size_t taken_ = 0;
   };
   const Held* held(const CellTile& tile) const;

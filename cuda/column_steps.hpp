@@ -1,5 +1,5 @@
 // Kernel bodies that complete the columns' signals: multipath, volume reverberation, the transmitter's pattern, receiver
-// noise and leak, as simulate() does (core/pipeline/cpu/simulate.cpp), which begins with the noise: sums differ by rounding.
+// noise and leak. simulate() (core/pipeline/cpu/simulate.cpp) begins with the noise, so that sums differ by rounding.
 #pragma once
 
 #include <cmath>
@@ -13,7 +13,7 @@ struct Complex {
   float re = 0, im = 0;
 };
 
-/// Adds `rms` times sample `n` of the noise that begins at `place`.
+/// Adds `rms` times sample `n` of the noise whose first sample is at `place` in the table.
 SONAR_HD inline void add_noise(const float* table, const NoisePlace& place, std::uint32_t n, float rms, Complex& to) {
   const float* from = table + 2 * static_cast<std::int64_t>((place.first + n) % noise_table_samples);
   const float sign = place.negative ? -rms : rms;
@@ -38,7 +38,7 @@ SONAR_HD inline void add_multipath(const PingView& p, std::uint32_t i) {
   p.signals[2 * static_cast<std::int64_t>(i) + 1] += from[1];
 }
 
-/// Column `k`: the fan narrows from sample to sample by what of it ends at a surface.
+/// Column `k`: from sample to sample, the fan loses the slices that end at a surface.
 SONAR_HD inline void volume(const PingView& p, std::uint32_t k) {
   const SeaView& s = p.sea;
   const auto columns = static_cast<std::int64_t>(s.columns);

@@ -1,4 +1,4 @@
-// Counting by many threads at once. The counts are integers, so that their sum does not depend on the order.
+// Counters that many threads increment. They are integers, so that the sum does not depend on the order.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// The CUDA side of the seam in core/pipeline/ping_engine.hpp: the place where an engine is made for a device, if there is one.
-// How it works: device_engine.hpp; what it does and what it leaves to the CPU: docs/cuda.md.
+// Makes the CUDA engine, an implementation of the interface in core/pipeline/ping_engine.hpp, if there is a device.
+// device_engine.hpp says how it works; docs/cuda.md says what it computes and what the CPU computes.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace sonar {
 
-/// Unavailable, in one sentence: no module, no driver, no device, not enough memory on it. The pool must outlive the engine.
+/// Error `unavailable`: no module, no driver, no device, or not enough memory on it. The pool must outlive the engine.
 Result<std::unique_ptr<PingEngine>> make_cuda_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
                                                      const EngineOptions& options = {},
                                                      cuda::DeviceEngineOptions device_options = {});

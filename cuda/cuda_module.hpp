@@ -1,5 +1,5 @@
-// The seam between the program and the CUDA module, which is built by another compiler and loaded by name: plain C, checked for
-// its version and for the layout of what crosses it. cuda_machine.cpp is on this side, cuda_module.cu on the other.
+// The interface between the program and the CUDA module, which another compiler builds and the program loads by name. It is plain
+// C; the program checks its version and the sizes of its structs. cuda_machine.cpp calls it, cuda_module.cu implements it.
 #pragma once
 
 #include <cstddef>
@@ -17,9 +17,10 @@ inline constexpr const char* module_entry = "sonard_cuda_module";
 struct CudaModule {
   std::uint32_t version, view_bytes, tile_bytes, steps;
   const char* (*reason)(int code);
-  /// Whether the code says that memory is full; any other is the end of the machine.
+  /// Whether the code means that memory is full. After any other code the machine cannot be used.
   int (*is_memory_full)(int code);
-  /// Devices that there are; the name of the first: "NVIDIA H200, 139.8 GiB, compute 9.0"; of none, why, or nothing.
+  /// Number of devices, and the name of the first: "NVIDIA H200, 139.8 GiB, compute 9.0". Without a device the name is the
+  /// reason, or empty.
   int (*query)(int* devices, char* name, std::size_t room);
   int (*open)(void** machine);
   void (*close)(void* machine);
@@ -31,7 +32,7 @@ struct CudaModule {
   int (*upload)(void* machine, int lane, void* to_device, const void* from, std::size_t bytes);
   int (*download)(void* machine, int lane, void* to, const void* from_device, std::size_t bytes);
   int (*run)(void* machine, int lane, const Launch* launch);
-  /// Whether there is cuFFT, which one, or which file is missing. Needs no machine.
+  /// Whether cuFFT is present. `name` gets its version, or the file that is missing. Needs no machine.
   int (*transforms)(char* name, std::size_t room);
   int (*transform)(void* machine, int lane, void* values, int size, int rows, int inverse);
   int (*step_seconds)(void* machine, int lane, StepSeconds* seconds);

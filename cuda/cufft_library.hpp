@@ -14,7 +14,7 @@
 
 namespace sonar::cuda {
 
-inline constexpr int cufft_codes = 100000;  // codes from here on are cuFFT's own
+inline constexpr int cufft_codes = 100000;  // codes of cuFFT begin here
 
 #if __has_include(<cufft.h>)
 
@@ -26,7 +26,7 @@ class CufftLibrary {
   using Handle = cufftHandle;
 
   CufftLibrary() {
-    // The version whose header this was compiled with, where the loader searches, and beside the toolkit's compiler.
+    // Searches for the version of the header used here: first where the loader searches, then beside the compiler of the toolkit.
     void* library = dlopen(SONAR_CUFFT_NAME(CUFFT_VER_MAJOR), RTLD_NOW | RTLD_LOCAL);
     if (!library) return;
     bool all = true;
@@ -52,7 +52,7 @@ class CufftLibrary {
   }
   /// `rows` transforms of `size` values, one row after the other, on `stream`.
   int make(Handle* plan, int size, int rows, cudaStream_t stream) const {
-    // Without embedding, strides and distances are those of rows that touch.
+    // Without embedding, rows follow each other without gaps.
     const cufftResult made = plan_many_(plan, 1, &size, nullptr, 1, size, nullptr, 1, size, CUFFT_Z2Z, rows);
     if (made != CUFFT_SUCCESS) return cufft_codes + made;
     const cufftResult set = set_stream_(*plan, stream);
@@ -110,7 +110,7 @@ class CufftLibrary {
 
 #endif
 
-/// Looked for when a machine is first asked about it; stays loaded.
+/// The library, which the first call loads. It stays loaded.
 inline const CufftLibrary& cufft() {
   static const CufftLibrary library;
   return library;

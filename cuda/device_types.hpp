@@ -13,21 +13,21 @@
 
 namespace sonar::cuda {
 
-inline constexpr std::uint32_t no_object = 0xFFFFFFFFu;  // what a ray that hits nothing has met
+inline constexpr std::uint32_t no_object = 0xFFFFFFFFu;  // the object of a ray that hits nothing
 inline constexpr std::uint32_t slots_a_chunk = 256;      // cells that are sorted into columns together
 inline constexpr std::uint32_t counters_a_ping = 2;
-inline constexpr std::uint32_t beams_a_panel = 4;   // as BeamPanel has
-inline constexpr std::uint32_t sum_parts = 8;       // threads that share the sum of one column: a pulse has about as many taps
-inline constexpr std::uint32_t spread_parts = 32;   // likewise, of one column's grid
+inline constexpr std::uint32_t beams_a_panel = 4;   // equals the beams of BeamPanel
+inline constexpr std::uint32_t sum_parts = 8;       // threads that share the sum of one column; a pulse has about as many taps
+inline constexpr std::uint32_t spread_parts = 32;   // threads that share the grid of one column
 inline constexpr std::uint32_t panels_at_once = 2;  // panels that one thread sums
 
-/// Boxes of both children, one line of the cache. Links as in bvh_link.
+/// Boxes of both children; one cache line. bvh_link says what links are.
 struct alignas(64) BvhNode {
   float low[2][3], high[2][3];
   std::int32_t link[2];
   std::int32_t unused[2];
 };
-/// A link is the index of a node, or of a leaf: its first item and how many there are, 1 to 8.
+/// A link refers to a node by its index, or to a leaf by its first item and the number of its items, 1 to 8.
 struct BvhLeaf {
   std::uint32_t first, count;
 };
@@ -47,21 +47,21 @@ struct alignas(16) FlatTriangle {
   float c[3];
   std::uint32_t unused;
 };
-/// A moving body where this ping finds it.
+/// A moving body at its pose in this ping.
 struct PlacedBody {
   float turn[9];      // body to world axes, row-major
   float position[3];  // relative to the scene's origin [m]
   std::int32_t root;  // root of its hierarchy
 };
 struct TracerView {
-  const BvhNode* nodes = nullptr;  // everything that stands still, and all bodies
+  const BvhNode* nodes = nullptr;  // hierarchies of fixed objects and of all bodies
   const FlatTriangle* triangles = nullptr;
   const BvhNode* top = nullptr;  // over `bodies`
   const PlacedBody* bodies = nullptr;
   std::int32_t still_root = -1, has_still = 0, body_count = 0, unused = 0;
 };
 
-/// One ray of the fan, as FanSample with its SurfaceHit (core/pipeline/fan_refinement.hpp).
+/// One ray of the fan: FanSample and its SurfaceHit (core/pipeline/fan_refinement.hpp).
 struct FanRay {
   float elevation_rad, tangent, forward;
   std::uint32_t object;
@@ -82,7 +82,7 @@ struct FirstHit {
   std::uint32_t object;
 };
 
-/// simd::TileSeen, with the tile's own numbers.
+/// simd::TileSeen and the values of its tile.
 struct TileView {
   const std::int16_t* cells;  // eight columns of `count`, in the order of CellTile::Column
   const float* law;           // null = Lambert's cosine
@@ -122,14 +122,14 @@ struct VolumeSlice {
   double range_per_x, weight;
   std::int32_t bin, unused;
 };
-/// A point's pulse on the sample grid, or another sonar's; values[from, to) are complex doubles.
+/// The pulse of a point or of another sonar on the sample grid; values[from, to) are complex doubles.
 struct PulseInBeams {
   double sine;
   const double* values;
   std::int32_t from, to;
 };
 
-/// Pulses by way of the spectrum, see spectral_steps.hpp; grids null = by their table.
+/// Tables of spectral_steps.hpp; grids null = pulses come from pulse_rows.
 struct SpectralView {
   double* grids;             // complex [columns][points]
   double* folded;            // complex [columns][period]
@@ -151,7 +151,7 @@ struct PingView {
   // plan
   const ColumnSine* column_sines;        // [columns]
   const BaseElevation* base_elevations;  // [elevations]
-  const float* pulse_rows;               // null where `spectral` serves
+  const float* pulse_rows;               // null if `spectral` is used
   const float* transmit;                 // [columns]
   const float* weights;
   const BeamWeightRow* panels;          // [beams / 4, rounded up]
@@ -159,9 +159,9 @@ struct PingView {
   const ReceivePattern* beam_patterns;  // [beams]
   const double* column_u;               // [columns], in double
   const float* noise_table;             // complex, table_samples of them
-  const float* grain_table;             // the same of leak and volume, with the pulse's correlation
+  const float* grain_table;             // the same, for leak and volume, with the correlation of the pulse
   std::int32_t taps, pulse_steps, samples, per_row, rows, beams;
-  SpectralView spectral;  // grids and folded are the ping's own
+  SpectralView spectral;  // grids and folded belong to this ping
   // surfaces
   const TileView* tiles;
   const std::uint32_t* tile_first_slot;  // [tiles + 1]
@@ -172,10 +172,10 @@ struct PingView {
   FirstHit* first_hits;      // [elevations - 1][columns], null = not wanted
   FirstHit* column_truth;    // [columns], a result
   Echo* echoes;              // [slots]
-  std::uint32_t* rank;       // [slots]: how many of the chunk came before in the same column
-  std::uint32_t* in_chunk;   // [chunks][columns]: how many; then, how many in the chunks before
+  std::uint32_t* rank;       // [slots]: number of earlier echoes of the chunk in the same column
+  std::uint32_t* in_chunk;   // [chunks][columns]: number of echoes; later, that of all earlier chunks
   std::uint32_t* in_column;  // [columns]
-  std::uint32_t* column_at;  // [columns]: where the column's echoes begin
+  std::uint32_t* column_at;  // [columns]: first of the column's echoes in `sorted`
   Echo* sorted;              // [slots]
   // columns
   float* signals;          // complex [columns][samples]
@@ -188,7 +188,7 @@ struct PingView {
   double open_fan, volume_samples_per_m, volume_sample_offset;
   const float* leak_rms;  // [leak_samples]
   std::int32_t slice_count, leak_samples, has_noise, unused;
-  const float *noise_far, *noise_near_less_far, *noise_decay;  // NoiseProfile, null = even
+  const float *noise_far, *noise_near_less_far, *noise_decay;  // NoiseProfile, null = uniform
   std::int64_t noise_decays;                                   // samples
   float noise_rms, leak_steady, leak_changing, crosstalk_own, crosstalk_leaked;
   NoiseKey noise_key;
@@ -198,7 +198,7 @@ struct PingView {
   const PulseInBeams* pulses;               // [pulse_count], of other sonars
   double* point_weights;                    // [point_count + pulse_count][beams]
   float* crosstalk;                         // complex [samples], null = none
-  float* mixed;                             // complex [beams][samples], null = beams keep to themselves
+  float* mixed;                             // complex [beams][samples], null = beams are not mixed
   const float* shared_noise;                // [shared_parts][beams][2][shared_samples], SharedNoiseTable; null = none
   const float *shared_rms, *shared_steady;  // [shared_samples] in a channel
   const float* shared_leak;                 // [shared_leak_samples] amplitude in a channel
@@ -208,8 +208,8 @@ struct PingView {
   std::int32_t point_count, pulse_count;
   // samples
   const float* row_power_factor;                // [rows]
-  const float* beam_power_factor;               // [beams], null = alike
-  float half_gamma, per_octave, at_full_scale;  // the latter two of LevelLine
+  const float* beam_power_factor;               // [beams], null = all equal
+  float half_gamma, per_octave, at_full_scale;  // the last two are LevelLine's
   float code_factor, code_rounding;             // simd::CodeScale
   std::uint32_t max_code;
   std::int32_t bytes_a_sample, logarithmic;
@@ -219,7 +219,7 @@ struct PingView {
   std::uint32_t* counters;  // [0] rays, [1] echoes: counters_a_ping of them
 };
 
-/// The kernels of a ping, in order. What each does: steps.hpp.
+/// The kernels of a ping, in the order of their launches; steps.hpp has their bodies.
 enum class Step : std::int32_t {
   clear,
   trace_base,

@@ -1,6 +1,7 @@
-// Kernel bodies of the fan of rays: what trace_fan does, in another order. An interval between two base rays is refined by one
-// thread, from below to above, and drawn into the depth map as it goes: no list of samples is kept, and no order of threads can
-// show. The rule when to look closer is FanRefinement's (core/pipeline/fan_refinement.hpp); tests hold the two equal.
+// Kernel bodies of the fan of rays. They compute the same as trace_fan, in another order: one thread refines the interval between
+// two base rays from bottom to top and draws it into the depth map at once. So no list of samples is stored, and results do not
+// depend on the order of threads. FanRefinement (core/pipeline/fan_refinement.hpp) has the rule for refining; tests compare the
+// two.
 #pragma once
 
 #include <cmath>
@@ -13,11 +14,11 @@
 namespace sonar::cuda {
 
 namespace fan {
-inline constexpr int deepest = 4;  // as in FanRefinement
+inline constexpr int deepest = 4;  // equals that of FanRefinement
 inline constexpr float slope_tolerance_in_pulses = 2, golden_turn = 0.61803399f, widest_skew = 0.15f;
 }  // namespace fan
 
-/// Sine and cosine rounded from double: the same on host and device.
+/// Sine and cosine are rounded from double, so that they are the same on host and device.
 SONAR_HD inline BaseElevation elevation_at(float angle_rad) {
   const auto angle = static_cast<double>(angle_rad);
   return {angle_rad, static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle))};
@@ -93,7 +94,7 @@ SONAR_HD inline float per_column(const SeaView& s, const FanRay& a, ColumnSine c
   return -s.column_spacing * (to_port - forward * column.along / column.across) / a.offset;
 }
 
-/// Draws one column's depth map from below to above.
+/// Draws one column's depth map from bottom to top.
 struct DepthPen {
   const SeaView* sea;
   ColumnSine column;
@@ -138,7 +139,7 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   struct Above {
     FanRay ray;
     int depth;
-    bool settled;  // known to interpolate from the ray below
+    bool settled;  // can be interpolated from the ray below
   };
   Above above[fan::deepest + 2];
   int waiting = 1;
@@ -176,7 +177,7 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   if (rays > 0) add_count(p.counters[0], rays);
 }
 
-/// Column `i`: the nearest of its intervals', the lower one where two are as near.
+/// Column `i`: the nearest hit of its intervals; the lower one if two are equally near.
 SONAR_HD inline void first_hits(const PingView& p, std::uint32_t i) {
   FirstHit nearest{0, no_object};
   for (int e = 0; e + 1 < p.sea.elevations; ++e) {

@@ -1,5 +1,5 @@
-// The scene as rays on the device see it: triangles and hierarchies of boxes in plain arrays, made once; the bodies' places, made
-// for every ping. The counterpart of core/scene/embree_scene.cpp, with the same floats relative to the same origin.
+// The scene for rays on the device: triangles and hierarchies of boxes in plain arrays, made once, and the poses of the bodies,
+// set for every ping. core/scene/embree_scene.cpp does the same for the CPU, with the same floats relative to the same origin.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace sonar::cuda {
 
-/// Where the bodies are for one ping: TracerView::top and ::bodies.
+/// The poses of the bodies in one ping: TracerView::top and ::bodies.
 struct BodyPlaces {
   std::vector<BvhNode> top;
   std::vector<PlacedBody> bodies;
@@ -22,16 +22,16 @@ class FlatScene {
  public:
   explicit FlatScene(const Scene& scene);
 
-  Vec3d origin() const { return origin_; }  // world position that float coordinates are relative to
+  Vec3d origin() const { return origin_; }  // world position to which float coordinates are relative
   const std::vector<BvhNode>& nodes() const { return nodes_; }
   const std::vector<FlatTriangle>& triangles() const { return triangles_; }
   std::int32_t still_root() const { return groups_.front().root; }
   bool has_still() const { return groups_.front().has_triangles; }
-  /// Bodies that are not given stay where the scene put them.
+  /// Bodies without a pose here keep the pose of the scene file.
   BodyPlaces place(std::span<const Pose> bodies_in_world) const;
 
  private:
-  struct Group {  // [0] everything that stands still, [1 + b] body b
+  struct Group {  // [0] all fixed objects, [1 + b] body b
     std::int32_t root = 0;
     bool has_triangles = false;
     Box bounds{};

@@ -12,9 +12,9 @@ namespace sonar::cuda {
 
 inline constexpr std::uint32_t threads_a_block = 128;
 
-/// Blocks for a step's indices, rounded up by at most an eighth and up to 8 or 16 where they are fewer, so that pings whose cells
-/// or points differ a little are launched alike: threads beyond a ping's own step_size return at once. Never so many that an
-/// index could wrap.
+/// Number of blocks for a step's indices. It is rounded up, by at most an eighth or to 8 or 16, so that pings with slightly
+/// different numbers of cells or points have the same launch: threads beyond the step_size of a ping return at once. It is never
+/// so large that an index could overflow.
 inline std::uint32_t blocks_for(std::uint32_t largest) {
   constexpr std::uint64_t most = (std::uint64_t{1} << 32) / threads_a_block;
   const std::uint64_t blocks = (std::uint64_t{largest} + threads_a_block - 1) / threads_a_block;
@@ -25,7 +25,7 @@ inline std::uint32_t blocks_for(std::uint32_t largest) {
   return static_cast<std::uint32_t>(rounded < most ? rounded : most);
 }
 
-/// A launch, as far as its graph depends on it.
+/// The values of a launch that its graph depends on.
 struct GraphKey {
   const PingView* views = nullptr;
   std::int32_t pings = 0, from = 0, to = 0;
@@ -42,8 +42,8 @@ struct GraphKey {
   }
 };
 
-/// The launches seen last on one lane, newest first, with the graphs of those that came twice: capturing costs more than one
-/// launch saves. `Graph` is a pointer.
+/// The last launches on one lane, newest first, with the graphs of those that occurred twice: a capture takes longer than a graph
+/// saves in one launch. `Graph` is a pointer.
 template <class Graph>
 class GraphShelf {
  public:
@@ -53,7 +53,7 @@ class GraphShelf {
     Graph graph = nullptr;
     int seen = 0;
   };
-  /// The launch's place, now the newest; the graph that had to make room is left in `dropped`, else null.
+  /// The entry of this launch, which becomes the newest. `dropped` gets the graph of the entry that it replaces, or null.
   Entry& look_up(const GraphKey& key, Graph& dropped) {
     dropped = nullptr;
     std::size_t i = 0;

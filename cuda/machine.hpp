@@ -1,5 +1,6 @@
-// The device engine's interface to a device: memory, copies and the steps of a ping. Two of them: CUDA, in a module of its own
-// that is loaded when there is one (open_cuda_machine), and plain loops on the host, which run the same bodies (HostLoops).
+// The device engine's interface to a device: memory, copies and the steps of a ping. It has two implementations: CUDA, in a
+// separate module that is loaded if it is installed (open_cuda_machine), and HostLoops, which runs the same bodies on the
+// host.
 #pragma once
 
 #include <cstddef>
@@ -13,15 +14,15 @@
 
 namespace sonar::cuda {
 
-/// The device's memory is full, or that which it shares with the computer: it works on, with less.
+/// The memory of the device, or the host memory for copies, is full. The device can be used again with smaller allocations.
 class DeviceMemoryFull : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Lanes are queues of work: in order within one, at the same time between two. Whatever fails throws std::runtime_error: the
-/// device is not to be used again, unless that is DeviceMemoryFull. One caller at a time, except for allocate, allocate_host and
-/// upload: threads that prepare pings call them at once.
+/// Lanes are queues of work: a lane keeps the order of its work; different lanes run at the same time. Failures throw
+/// std::runtime_error, after which the device must not be used again, except after DeviceMemoryFull. Only one thread may call it
+/// at a time, except for allocate, allocate_host and upload, which threads that prepare pings call at the same time.
 class Machine {
  public:
   static constexpr int lanes = 3;
@@ -31,38 +32,38 @@ class Machine {
   /// Free bytes of the device's memory at this moment; other programs may take some of it.
   virtual std::size_t free_bytes() const { return std::numeric_limits<std::size_t>::max(); }
   virtual void* allocate(std::size_t bytes) = 0;  // in the device's memory
-  /// For tests: every piece that an arena hands out is an allocation of its own, of just its size.
+  /// For tests: if true, each piece of an arena is a separate allocation of exactly its size.
   virtual bool pieces_apart() const { return false; }
   virtual void release(void* device) = 0;
-  virtual void* allocate_host(std::size_t bytes) = 0;  // where copies to and from the device are fast
+  virtual void* allocate_host(std::size_t bytes) = 0;  // host memory from which and to which copies are fast
   virtual void release_host(void* host) = 0;
 
-  /// Queued; `from` must stay as it is until the lane has been waited for.
+  /// Queues a copy; `from` must not change before wait() for the lane has returned.
   virtual void upload(int lane, void* to_device, const void* from, std::size_t bytes) = 0;
   virtual void download(int lane, void* to, const void* from_device, std::size_t bytes) = 0;
-  /// Queues steps, one after the other. A launch that is timed is for benchmarks: each step is then timed on its own.
+  /// Queues steps, one after the other. For benchmarks, a timed launch measures each step separately.
   virtual void run(int lane, const Launch& launch) = 0;
-  /// Empty when transform() can be had; else what is missing, and pulses by way of the spectrum are the CPU's. What it takes is
-  /// loaded at the first call.
+  /// Empty if transform() works, else what is missing; the CPU then computes pings whose pulses need a spectrum. The first call
+  /// loads the library.
   virtual std::string why_no_transforms() const = 0;
   /// Queues x[k] = sum_n x[n] e^{-+ i 2 pi k n / size} over `rows` rows of complex values, one after the other on the device, in
   /// place, not scaled. Timed when the launch before it on the lane was.
   virtual void transform(int lane, double* values, int size, int rows, bool inverse) = 0;
-  /// How long each step took in the timed launches since the last call; the lane must have been waited for.
+  /// The times of the steps in timed launches since the last call. wait() for the lane must have returned before.
   virtual StepSeconds step_seconds(int lane) = 0;
   /// Work queued on `lane` from now on begins after the work queued on `earlier` before.
   virtual void order(int lane, int earlier) = 0;
   virtual void wait(int lane) = 0;
 };
 
-/// The order in which host loops take a step's indices. A device takes them in any: where another order makes other bytes, there
-/// is a race. But forwards, memory begins with what is no number, as a device's may: where that shows, something was read
-/// unwritten.
+/// The order in which host loops process a step's indices. A device uses any order, so a result that depends on the order shows a
+/// race. With the two orders other than forwards, new memory has the value NaN, so that a NaN in a result shows that a step read
+/// memory that was not written.
 enum class LoopOrder { forwards, backwards, scattered };
-/// Loops on the calling thread; for tests, which so run what the device runs.
+/// Loops on the calling thread. Tests use them to run the code of the device without one.
 std::unique_ptr<Machine> make_host_loops(LoopOrder order = LoopOrder::forwards);
 
-/// Loads the module and takes the first device. The error says what is missing and where was looked.
+/// Loads the module and opens the first device. The error says what is missing and where it was searched for.
 Result<std::unique_ptr<Machine>> open_cuda_machine();
 
 }  // namespace sonar::cuda

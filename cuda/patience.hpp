@@ -1,15 +1,15 @@
-// Decides how to wait for a device that may never answer. It needs no device, so that it can be tested.
+// Waits for a device that may never answer. It needs no device, so that it can be tested.
 #pragma once
 
 namespace sonar::cuda {
 
 // Seconds. A batch takes milliseconds; a service's watchdog ends the program after 30 s (daemon/systemd/sonard.service).
 inline constexpr double longest_wait_s = 20;
-// Until then the question is repeated at once: a sleep would lengthen every ping.
+// During this time the device is queried without pauses, because a sleep would lengthen every ping.
 inline constexpr double busy_wait_s = 0.02;
 
-/// Asks `answer` until it is something else than `not_yet`, and returns that; after longest_wait_s, `hung`. `now` is a clock [s];
-/// `rest` gives the processor away for a moment.
+/// Calls `answer` until it returns something else than `not_yet`, and returns that; after longest_wait_s it returns `hung`. `now`
+/// is a clock [s]; `rest` sleeps for a short time.
 template <class Code, class Answer, class Now, class Rest>
 Code wait_for(Code not_yet, Code hung, const Answer& answer, const Now& now, const Rest& rest) {
   Code code = answer();

@@ -1,5 +1,5 @@
-// The device's tables of a plan, which follow from product, settings and seed, sent once and used by every ping that
-// has them (core/pipeline/ping_plan.hpp).
+// The tables of a plan on the device (core/pipeline/ping_plan.hpp). They depend on product, settings and seed; they are sent once
+// and used by every ping with the same values.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ namespace sonar::cuda {
 
 class PlanTables {
  public:
-  /// Queues the tables on `lane`. They are valid as long as this.
+  /// Queues copies of the tables on `lane`. They are valid while this object lives.
   PlanTables(Machine& machine, int lane, const PingRequest& request);
 
   bool serves(const PingRequest& request) const;
   PingPlan& plan() { return plan_; }
   const PingPlan& plan() const { return plan_; }
-  /// Noise, or what has the pulse's correlation: drawn when a ping first needs it. Queues the tables on `lane`.
+  /// Makes the tables of noise when a ping first needs them, and queues their copies on `lane`.
   void need_noise(int lane);
-  /// The part of a ping's view that is the plan's.
+  /// Sets the pointers and values of a ping's view that belong to the plan.
   void fill(PingView& view) const;
 
  private:

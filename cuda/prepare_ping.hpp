@@ -1,6 +1,6 @@
-// The CPU's share of a ping that the device computes: which tiles are in view and what this ping makes of them, echoes that are
-// points, echoes via mirrors, a few hundred numbers of the water and the receiver. Fills a PingView; nothing here is slow but
-// multipath, whose echoes are summed by core/pipeline/multipath and sent as columns.
+// The part of a device ping that the CPU computes: the tiles in view and their values for this ping, point echoes, multipath
+// echoes, and a few hundred values of the water and the receiver. It fills a PingView. Only multipath is slow:
+// core/pipeline/multipath sums its echoes, which are sent as columns.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@
 
 namespace sonar::cuda {
 
-/// A ping that was asked for, until it is taken.
+/// A requested ping, from its request until its result has been taken.
 struct WantedPing {
   enum class State { open, under_way, done };
   PingRequest request;
@@ -30,12 +30,12 @@ struct WantedPing {
   State state = State::open;
 };
 
-/// A batch's place: its memory, its lane, its pings.
+/// The memory, lane and pings of one batch.
 struct BatchRoom {
   BatchRoom(Machine& machine, int which_lane, std::size_t most_pings);
 
   struct Ping {
-    sonar::Ping ping;  // sized, not filled
+    sonar::Ping ping;  // has the right sizes, but no values yet
     WantedPing* wanted;
     std::shared_ptr<const PlanTables> plan;
     Arena::Slice<std::uint8_t> codes;
@@ -50,10 +50,10 @@ struct BatchRoom {
   std::vector<Ping> pings;
   bool launched = false;
 
-  /// All that a batch fills.
+  /// All arenas that a batch uses.
   std::array<Arena*, 4> arenas() { return {&tables, &work, &results, &cells}; }
-  /// Queues views and tables. The views lie where those of the batch before lay: what was captured of it (cuda_module.cu) serves
-  /// again.
+  /// Queues copies of views and tables. The views have the same addresses as those of the batch before, so that a captured graph
+  /// (cuda_module.cu) can be used again.
   const PingView* upload();
 
  private:
@@ -61,13 +61,13 @@ struct BatchRoom {
   Arena::Slice<PingView> view_table_;
 };
 
-/// A ping that is to be added to a batch.
+/// A ping to be added to a batch.
 struct AskedPing {
   WantedPing* wanted;
   std::shared_ptr<PlanTables> plan;
 };
 
-/// Scene and cells of an engine, and what it keeps between pings.
+/// Scene and cells of an engine, and the state that it keeps between pings.
 class PingPreparer {
  public:
   PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene, const RayScene& rays, const simd::Kernels& kernels,
@@ -80,7 +80,7 @@ class PingPreparer {
   /// Whether nothing that one of them needs is changed for the other: places of bodies, gain of a plan, mirrors.
   static bool may_go_together(const AskedPing& a, const AskedPing& b);
   void forget_cells() { store_.clear(); }
-  /// Likewise, and their memory goes back to the device.
+  /// The same, and releases their memory.
   void give_back() { store_.give_back(); }
 
  private:
@@ -105,7 +105,7 @@ class PingPreparer {
     std::size_t samples() const { return static_cast<std::size_t>(plan.samples); }
     std::size_t beams() const { return static_cast<std::size_t>(plan.settings.beam_count); }
   };
-  struct Worker {  // what one thread keeps between pings
+  struct Worker {  // buffers of one thread, kept between pings
     SpecularEchoes specular_echoes;
     std::vector<PreparedTile> tiles;
     std::vector<const std::int16_t*> tile_cells;
@@ -135,7 +135,7 @@ class PingPreparer {
   TracerView tracer_;
   CellStore store_;
   MultipathWork multipath_;
-  std::vector<CellsInView> found_;  // cells of the pings that are being added
+  std::vector<CellsInView> found_;  // cells of the pings that add() is adding
   std::vector<Worker> workers_;     // by number of the thread
 };
 

@@ -1,5 +1,5 @@
-// The steps of a ping by number: how many indices each has, and its body. The one place where the CUDA back end and the host
-// loops meet: both call run_step for every index below step_size, in the order of Step, with nothing but that order between them.
+// The steps of a ping: the number of indices of each, and its body. Both the CUDA module and the host loops call run_step for
+// every index below step_size; a step begins when the step before it in Step has ended.
 #pragma once
 
 #include "cuda/beam_steps.hpp"
@@ -16,7 +16,7 @@ SONAR_HD inline void clear(const PingView& p, std::uint32_t i) {
   if (i < p.chunks * static_cast<std::uint32_t>(p.sea.columns)) p.in_chunk[i] = 0;
 }
 
-/// How many indices a step has for this ping; 0 = nothing to do.
+/// Number of indices of a step for this ping; 0 = the step is not needed.
 SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
   const auto columns = static_cast<std::uint32_t>(p.sea.columns), elevations = static_cast<std::uint32_t>(p.sea.elevations);
   const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
@@ -69,7 +69,7 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
   return 0;
 }
 
-/// The body of a step, chosen when compiled: a kernel holds one only.
+/// The body of a step, chosen at compile time, so that a kernel has one body only.
 template <Step step>
 SONAR_HD inline void run_step(const PingView& p, std::uint32_t i) {
   if constexpr (step == Step::clear) clear(p, i);

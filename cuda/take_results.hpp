@@ -1,4 +1,4 @@
-// Pings from the results that a batch has copied back from the device.
+// Makes pings of the results that a batch has copied from the device.
 #pragma once
 
 #include "cuda/prepare_ping.hpp"
@@ -7,7 +7,7 @@ namespace sonar::cuda {
 
 /// Adds the times of a batch's steps to the statistics of its pings, in equal shares.
 void share_times(const StepSeconds& seconds, BatchRoom& room);
-/// Completes the ping that was wanted from its results, which have been downloaded.
+/// Completes a ping from its downloaded results.
 void take_results(BatchRoom::Ping& from, const PingView& view);
 
 }  // namespace sonar::cuda

@@ -1,5 +1,5 @@
-// The first surface a ray meets: down the hierarchy of what stands still, then down those of the bodies in its way. Runs on host
-// and device, for each ray by itself. No rounding can open a crack between two triangles.
+// Finds the first surface that a ray hits: in the hierarchy of fixed objects, then in those of the bodies in its way. It runs on
+// host and device, for one ray at a time. Rounding cannot make a ray pass between two adjacent triangles.
 #pragma once
 
 #include <cmath>
@@ -17,7 +17,8 @@ struct RayHit {
   Vec3 normal;  // geometric, world axes, any length, either side
 };
 
-/// Values of a ray for the descent, computed once. Directions of exactly 0 become tiny ones: no quotient is then undefined.
+/// Values of a ray that the descent uses, computed once. A direction component of exactly 0 becomes a tiny one, so that all
+/// quotients are defined.
 struct Descent {
   float from[3], per[3];
   int upper[3];  // 1 where the ray enters boxes by their high side
@@ -34,8 +35,8 @@ SONAR_HD inline Descent descent_of(const Ray& ray) {
   return d;
 }
 
-/// Where the ray enters a child's box, or a negative number if it does not before `far_m`. The way out is taken a little longer
-/// than it is, by the rounding of the quotients (Ize 2013), so that flat boxes and shared sides are never missed.
+/// The range at which the ray enters a child's box; negative if it does not do so before `far_m`. The range at which it leaves is
+/// increased by the rounding error of the quotients (Ize 2013), so that flat boxes and shared sides are never missed.
 SONAR_HD inline float enters(const BvhNode& node, int side, const Descent& d, float far_m) {
   float in = 0, out = far_m;
   for (int k = 0; k < 3; ++k) {
@@ -48,7 +49,7 @@ SONAR_HD inline float enters(const BvhNode& node, int side, const Descent& d, fl
   return in <= out * 1.0000005f ? in : -1.0f;
 }
 
-/// Calls leaf(leaf, far_m) for the leaves in the ray's way, nearer ones first; it may bring far_m nearer.
+/// Calls leaf(leaf, far_m) for the leaves in the ray's way, nearer ones first. The call may decrease far_m.
 template <class Leaf>
 SONAR_HD inline void descend(const BvhNode* nodes, std::int32_t root, const Descent& d, float& far_m, Leaf& leaf) {
   struct Waiting {
@@ -84,8 +85,8 @@ SONAR_HD inline void descend(const BvhNode* nodes, std::int32_t root, const Desc
   }
 }
 
-/// The side on which the ray passes the edge from `p` to `q`, both seen from where it starts. With the ends swapped the sign
-/// alone changes, so that a ray between two triangles is in one of them.
+/// The side on which the ray passes the edge from `p` to `q`, both relative to the ray's origin. If the ends are exchanged, only
+/// the sign changes, so that a ray at the edge of two triangles hits one of them.
 SONAR_HD inline float passes(Vec3 p, Vec3 q, Vec3 along) { return dot(cross(q - p, p + q), along); }
 
 SONAR_HD inline float largest(Vec3 v) { return std::fmax(std::fabs(v.x), std::fmax(std::fabs(v.y), std::fabs(v.z))); }
@@ -103,7 +104,7 @@ struct TriangleTest {
                c = Vec3{t.c[0], t.c[1], t.c[2]} - from;
     const float u = passes(a, b, along), v = passes(b, c, along), w = passes(c, a, along);
     const Vec3 ab = b - a, ac = c - a;
-    // Edges alone are tight; around a corner all triangles could think the ray is past them. A few micrometres more close that.
+    // At a corner, rounding could let a ray miss all triangles that meet there. A tolerance of a few micrometres prevents this.
     const float grace = 5e-7f * std::fabs(dot(a, along)) * (largest(ab) + largest(ac));
     if (!((u >= -grace && v >= -grace && w >= -grace) || (u <= grace && v <= grace && w <= grace))) return;
     const Vec3 normal = cross(ab, ac);
@@ -111,7 +112,7 @@ struct TriangleTest {
     if (speed == 0) return;
     const float range_m = dot(normal, a) / speed;
     if (!(range_m >= 0 && range_m <= far_m)) return;
-    // From two hits at the very same range always the same one is chosen, in any order.
+    // If two hits have exactly the same range, the same one is chosen in any order.
     if (range_m == hit.range_m && hit.object != no_object &&
         (t.object > hit.object || (t.object == hit.object && t.triangle >= hit.triangle)))
       return;
