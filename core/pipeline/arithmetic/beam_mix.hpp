@@ -1,4 +1,4 @@
-// Mixing of neighbouring beams: the blur of a focus that fits broadside only, and a fitted share of the next beams
+// Mixes neighbouring beams: the blur of an array that is focused for broadside only, and a fitted fraction of the next beams
 // (docs/acoustics.md, section 6). C++17-clean, standard library only.
 #pragma once
 
@@ -13,13 +13,13 @@ namespace sonar {
 struct BeamMixView {
   const float* turn_m;                          // [beams]: phase error at the aperture's ends times range [rad m]
   const float* taps;                            // complex [sets][2 reach + 1], beams j - reach to j + reach
-  const std::int32_t* reach;                    // [sets]: how many on either side are not 0
-  const float *own, *share;                     // [beams]: of the beam, of either neighbour
-  std::int32_t beams, sets, widest, step;       // widest: reach of the table; step: beams to the neighbour
+  const std::int32_t* reach;                    // [sets]: number of taps on either side that are not 0
+  const float *own, *share;                     // [beams]: weight of the beam, and of each neighbour
+  std::int32_t beams, sets, widest, step;       // widest: largest reach; step: distance of neighbours in beams
   float sets_per_rad, first_range_m, sample_m;  // range of sample 0; spacing
 };
 
-/// Which set of taps serves this beam and sample; 0 leaves it as it is.
+/// The set of taps for this beam and sample; 0 = no change.
 SONAR_HD inline std::int32_t focus_set(const BeamMixView& v, std::int32_t beam, std::int32_t sample) {
   const float range_m = v.first_range_m + v.sample_m * static_cast<float>(sample);
   const float set = v.turn_m[beam] * v.sets_per_rad / (range_m > v.sample_m ? range_m : v.sample_m) + 0.5f;
@@ -29,7 +29,7 @@ SONAR_HD inline std::int32_t focus_set(const BeamMixView& v, std::int32_t beam, 
 struct MixedSample {
   float re, im;
 };
-/// Sample at `from + 2 column` of beam `j` as it arrives under a wrong focus; `set` from focus_set.
+/// Sample at `from + 2 column` of beam `j` with the blur of a wrong focus; `set` is from focus_set().
 SONAR_HD inline MixedSample refocused(const BeamMixView& v, const float* from, std::int64_t stride, std::int32_t j,
                                       std::int32_t column, std::int32_t set) {
   const std::int32_t reach = v.reach[set];
@@ -45,7 +45,7 @@ SONAR_HD inline MixedSample refocused(const BeamMixView& v, const float* from, s
   return sum;
 }
 
-/// The same with a share of both neighbours; the outermost beams have one.
+/// The same sample with a fraction of both neighbours; the outermost beams have one neighbour.
 SONAR_HD inline MixedSample blended(const BeamMixView& v, const float* from, std::int64_t stride, std::int32_t j,
                                     std::int32_t column) {
   const float* s = from + j * stride + 2 * static_cast<std::int64_t>(column);

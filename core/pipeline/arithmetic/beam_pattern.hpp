@@ -1,6 +1,6 @@
 // Directivity of the receive array in azimuth and of transmitter times receiver in elevation, as closed forms.
 // Used by the beamforming of columns to beams, by the cells' amplitudes, and for predicted levels.
-// C++17-clean, standard library only: nvcc reads it too.
+// C++17-clean, standard library only, because nvcc compiles it, too.
 #pragma once
 
 #include <cmath>
@@ -90,7 +90,7 @@ SONAR_HD inline double directivity(Taper taper, double aperture_wavelengths, dou
   return beam_amplitude(taper, aperture_wavelengths * du);
 }
 
-/// directivity() with its constants worked out once, for loops.
+/// directivity() with constants that are computed once, for loops.
 struct ReceivePattern {
   bool unit = false;
   TaperSeries series;
@@ -102,7 +102,7 @@ SONAR_HD inline ReceivePattern receive_pattern(const BeamPattern& pattern) {
           aperture_in_wavelengths(pattern.azimuth_taper, static_cast<double>(pattern.azimuth_width_rad))};
 }
 
-/// Pattern of beam `j`, which in a list may have a width of its own: in sine it spans 2 sin(w / 2) cos(azimuth).
+/// Pattern of beam `j`. Listed beams may have different widths w; in sine, w spans 2 sin(w / 2) cos(azimuth).
 inline ReceivePattern receive_pattern(const FrequencyMode& mode, std::size_t j) {
   ReceivePattern pattern = receive_pattern(mode.pattern);
   if (!mode.has_own_widths()) return pattern;
@@ -112,7 +112,7 @@ inline ReceivePattern receive_pattern(const FrequencyMode& mode, std::size_t j) 
   return pattern;
 }
 
-/// Integral of D^2 over u = what sum_k W_jk^2 du_k tends to: the width in sine space whose scatterers a beam collects.
+/// Integral of D^2 over u, the limit of sum_k W_jk^2 du_k: the width in sine space from which a beam collects scatterers.
 /// The terms of the series are orthonormal, so this is exact. Not defined for `unit`.
 SONAR_HD inline double effective_beam_width_u(Taper taper, double aperture_wavelengths) {
   const TaperSeries series = taper_series(taper);
@@ -121,8 +121,8 @@ SONAR_HD inline double effective_beam_width_u(Taper taper, double aperture_wavel
   return sum / aperture_wavelengths;
 }
 
-/// Vertical aperture in wavelengths of each of the two equal sincs (transmit, receive). Of the quoted width, half lies on
-/// either side; there the one pattern (one_way) or the product (two_way) is at half power.
+/// Vertical aperture in wavelengths of each of the two equal sincs (transmit, receive). At half the data sheet's width to either
+/// side, one pattern (one_way) or the product of both (two_way) is at half power.
 SONAR_HD inline double elevation_aperture_in_wavelengths(const BeamPattern& pattern) {
   const double level = pattern.elevation_width_is == ElevationWidthIs::one_way ? std::sqrt(0.5) : std::sqrt(std::sqrt(0.5));
   const double half_width = 0.5 * static_cast<double>(pattern.elevation_width_rad);
@@ -135,13 +135,13 @@ SONAR_HD inline double elevation_two_way(double elevation_aperture_wavelengths, 
   const double d = sinc(elevation_aperture_wavelengths * std::sin(psi_rad));
   return d * d;
 }
-/// The same from the data sheet's numbers. Solves for the aperture each time: keep the aperture in loops.
+/// The same from the data sheet's widths. It solves for the aperture; in loops, compute the aperture once.
 SONAR_HD inline double elevation_two_way(const BeamPattern& pattern, double psi_rad) {
   if (pattern.elevation_taper == Taper::unit) return std::fabs(psi_rad) < 0.5 * pi ? 1 : 0;
   return elevation_two_way(elevation_aperture_in_wavelengths(pattern), psi_rad);
 }
 
-/// |psi| at which Dtx * Erx has fallen to `level` (0 < level < 1, amplitude): how far out a fan must reach. pi / 2 for `unit`.
+/// |psi| at which Dtx * Erx has fallen to `level` (0 < level < 1, amplitude), which a fan must reach. pi / 2 for `unit`.
 SONAR_HD inline double elevation_reach_rad(const BeamPattern& pattern, double level) {
   if (pattern.elevation_taper == Taper::unit) return 0.5 * pi;
   const double sine = main_lobe_crossing(TaperSeries{}, std::sqrt(level)) / elevation_aperture_in_wavelengths(pattern);
@@ -169,7 +169,7 @@ SONAR_HD inline Vec3d sonar_from_flat(const ConicalDirection& d) {
   const double across = std::sqrt(std::fmax(0.0, 1 - d.u * d.u));
   return {across * std::cos(d.psi_rad), d.u * std::cos(d.psi_rad), std::sin(d.psi_rad)};
 }
-/// The same for rays, which decide shadows only, from sines and cosines that are at hand: u, sqrt(1 - u^2), of psi.
+/// The same in float from known sines and cosines: u, sqrt(1 - u^2), and those of psi. Rays use it, which decide shadows only.
 SONAR_HD constexpr Vec3 ray_in_sonar(bool conical, float u, float across, float cosine, float sine) {
   return {across * cosine, conical ? u : u * cosine, conical ? across * sine : sine};
 }

@@ -1,5 +1,5 @@
-// Fresnel integrals C(x) and S(x): how much of a mirror's echo comes from a part of its surface (docs/acoustics.md, section 3).
-// Used by specular.cpp. C++17-clean, standard library only.
+// Fresnel integrals C(x) and S(x), which give the part of a mirror's echo that comes from a part of its surface
+// (docs/acoustics.md, section 3). Used by specular.cpp. C++17-clean, standard library only.
 #pragma once
 
 #include <cmath>

@@ -10,22 +10,22 @@
 
 namespace sonar {
 
-/// Terms of the even polynomial that stands for the elevation pattern, in w = sin^2(elevation angle).
+/// Terms of the even polynomial that approximates the elevation pattern, in w = sin^2(elevation angle).
 inline constexpr int elevation_terms = 9;
-/// Which object a place of the depth map is of: the last bits of 1 / x hold its number modulo 64; in a scene of more objects
-/// those of the slope, whose precision matters little, hold ten bits more.
+/// A place of the depth map states its object: the last bits of 1 / x are the object's number modulo 64. In scenes with more
+/// objects the last bits of the slope, whose precision matters little, are ten more bits of the number.
 inline constexpr int surface_mark_bits = 6;
 inline constexpr std::int32_t surface_marks = (1 << surface_mark_bits) - 1, upper_marks = 1023;
 SONAR_HD constexpr std::int32_t surface_mark(std::uint32_t object) { return static_cast<std::int32_t>(object & 0xFFFFu); }
 SONAR_HD constexpr std::int32_t upper_mark(std::int32_t mark) { return mark >> surface_mark_bits; }
 SONAR_HD constexpr bool has_upper_marks(std::size_t objects) { return objects > static_cast<std::size_t>(surface_marks) + 1; }
-/// A cell of another object is hidden from so much behind the surface that was hit [m], and this share of its range.
+/// Distance behind the surface that was hit at which a cell of another object is hidden [m], and the part added per range.
 inline constexpr float contact_m = 1e-3f, contact_share = 2e-5f;
-/// The depth map's axis: bins even in the tangent, narrow up to an edge on either side and wide in the side lobes beyond.
+/// The axis of the depth map. Bins are uniform in the tangent: narrow between two edges, and wide in the side lobes beyond them.
 struct TangentAxis {
   float middle_bin, edge_tangent, bins_per_tangent, side_bins_per_tangent;
 };
-/// Bins are looked up so far below the last at most: a tangent just below the fan's edge may be rounded onto it.
+/// Look-ups stay at least this far below the last bin's end, because a tangent just below the fan's edge may be rounded to it.
 inline constexpr float bin_rounding = 1.0f / 1024;
 /// Intervals of a tabulated scattering law; the table has law_steps + 2 values.
 inline constexpr int law_steps = 128;
@@ -50,7 +50,7 @@ SONAR_HD inline float tangent_of_bin(const TangentAxis& a, float bin) {
 SONAR_HD inline float with_last_bits(float x, std::int32_t bits, std::int32_t among) {
   return float_of((bits_of(x) & ~static_cast<std::uint32_t>(among)) | static_cast<std::uint32_t>(bits & among));
 }
-/// 0, nothing, stays as it is.
+/// The value 0, which means nothing, does not change.
 SONAR_HD inline float with_mark(float inverse_x, std::int32_t mark) {
   return inverse_x > 0 ? with_last_bits(inverse_x, mark, surface_marks) : inverse_x;
 }

@@ -1,5 +1,5 @@
-// The place in the table of shaped noise at which a column of a ping begins to read, and the quarter turn of what it reads: the
-// draw that receiver noise, the leak and the water's grains share. C++17-clean, standard library only.
+// Computes the place in the table of shaped noise where the noise of a column in a ping begins, and the quarter turns by which it
+// is rotated. Receiver noise, the leak and the grains of the water use it. C++17-clean, standard library only.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@ namespace sonar {
 
 inline constexpr std::uint32_t noise_table_samples = 1u << 18;
 
-/// The leak's draws: its sonar numbers, and the ping number of the part that is the same in every ping.
+/// The leak has its own sonar numbers, and its own ping number for the part that is the same in every ping.
 SONAR_HD constexpr std::uint32_t leak_sonar(std::uint32_t sonar) { return sonar ^ static_cast<std::uint32_t>(Domain::leak); }
 inline constexpr std::uint32_t every_ping = 0xFFFFFFFFu;
-/// The water's grains have these columns; the receiver's noise has the columns below.
+/// Column numbers of the grains of the water begin here; receiver noise has lower ones.
 inline constexpr std::uint32_t first_volume_column = 1u << 24;
-/// Noise columns reserved for noise shared by groups of channels, more than there are groups.
+/// Column numbers of noise that groups of channels share begin here; there are fewer groups than numbers.
 inline constexpr std::uint32_t first_shared_noise_column = first_volume_column - 4096;
 
-/// A random start and one of four quarter turns: the table's own pattern never stands still. `key`: Domain::noise_place.
+/// A random start and one of four quarter turns, so that patterns of the table do not repeat. `key`: Domain::noise_place.
 struct NoisePlace {
   std::uint32_t first = 0;
   bool negative = false, quarter = false;

@@ -30,8 +30,8 @@ SONAR_HD inline double noise_rms_upa(const FrequencyMode& mode, double noise_ban
   return std::pow(10.0, noise_level_db(mode, noise_bandwidth_hz) / 20);
 }
 
-/// Time-varied gain [dB] (docs/acoustics.md, eq. 36): X log10 r + 2 alpha r, r held below the minimum range, the sum held at the
-/// ceiling. `range_m` and `alpha_db_per_m` (one way) are what the device believes.
+/// Time-varied gain [dB] (docs/acoustics.md, eq. 36): X log10 r + 2 alpha r. r is at least the minimum range, the sum at most the
+/// ceiling. `range_m` and `alpha_db_per_m` (one way) are the values that the device assumes.
 SONAR_HD inline double tvg_db(const ReceiverModel& law, double range_m, double alpha_db_per_m) {
   const double floor_m = static_cast<double>(law.tvg_minimum_range_m), ceiling_db = static_cast<double>(law.tvg_ceiling_db);
   const double r = range_m > floor_m ? range_m : floor_m;
@@ -39,12 +39,12 @@ SONAR_HD inline double tvg_db(const ReceiverModel& law, double range_m, double a
   return gain_db < ceiling_db ? gain_db : ceiling_db;
 }
 
-/// Amplitude factor from pressure [uPa] to fractions of full scale, for a total gain [dB] (TVG + the client's knob).
+/// Amplitude factor from pressure [uPa] to fractions of full scale, for a total gain [dB] (TVG + the client's gain).
 SONAR_HD inline double full_scale_factor(const ReceiverModel& law, double gain_db) {
   return std::pow(10.0, gain_db / 20) / static_cast<double>(law.full_scale_upa);
 }
 
-/// Power gain of a row that is sent with its gain: the integer nearest to its TVG over the smallest one, at least 1.
+/// Power gain of a row in formats that send it: the integer nearest to the row's TVG over the smallest TVG, at least 1.
 /// Exactly sqrt(row gain) is then applied to the amplitude, so that sample / sqrt(gain) undoes it.
 SONAR_HD inline std::uint32_t row_power_gain(double row_tvg_db, double smallest_tvg_db) {
   const double gain = std::floor(std::pow(10.0, 0.1 * (row_tvg_db - smallest_tvg_db)) + 0.5);
@@ -62,8 +62,8 @@ SONAR_HD inline LevelLine level_line(const SampleFormat& format) {
   return {10 * std::log10(2.0) * per_db, -floor_db * per_db};
 }
 
-/// Sample code of v = amplitude over full scale (eq. 37 and 40), held at max_code; NaN and negative give 0. `truncates`: see
-/// ReceiverModel.
+/// Sample code of v = amplitude over full scale (eq. 37 and 40), at most max_code; 0 for NaN and negative values. `truncates`:
+/// see ReceiverModel.
 SONAR_HD inline std::uint32_t quantise(double v, const SampleFormat& format, bool truncates = false) {
   if (!(v > 0)) return 0;
   if (format.scale == SampleFormat::Scale::logarithmic) {

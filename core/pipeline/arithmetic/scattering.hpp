@@ -9,9 +9,9 @@
 
 namespace sonar {
 
-/// Cosine of incidence below which a facet's area per solid angle is held: silhouettes must not blow up.
+/// Lower limit of the cosine of incidence in a facet's area per solid angle, which is infinite at silhouettes.
 inline constexpr double cosine_floor = 1e-3;
-/// Range [m] below which nothing echoes: inside the housing, and 1/r^2 has no meaning.
+/// Range [m] below which there are no echoes: it lies inside the housing, and 1/r^2 has no meaning.
 inline constexpr double nearest_scatterer_m = 1e-2;
 
 /// mu [1/sr] from 10 log10 mu.

@@ -1,6 +1,6 @@
-// The pulses p(t) after the receiver's filter that have a formula, and the widths that follow from it: Gaussian, rectangular
-// tone, linear sweep. Used by synthesis, shaped noise and level predictions (docs/acoustics.md, section 4). C++17-clean, standard
-// library.
+// Pulses p(t) after the receiver's filter that have a formula, and their widths: Gaussian, rectangular tone, linear sweep.
+// Synthesis, shaped noise and level predictions use them (docs/acoustics.md, section 4). C++17-clean, standard library
+// only.
 #pragma once
 
 #include <cmath>
@@ -15,7 +15,7 @@ namespace sonar {
 inline constexpr double half_power_bt = 0.58870501125773734;
 
 /// b [1/s] of the pulse whose -3 dB intensity width is `pulse_width_m` in one-way range at sound speed c: 0.5887 c / width.
-/// Take the c the width was specified with; b is a property of the signal in time.
+/// Use the c with which the width was specified, because b is a property of the signal in time.
 SONAR_HD inline double envelope_parameter_hz(double sound_speed_mps, double pulse_width_m) {
   return half_power_bt * sound_speed_mps / pulse_width_m;
 }
@@ -56,7 +56,7 @@ SONAR_HD inline double tone_envelope_spectrum_s(double length_s, double frequenc
 inline constexpr double tone_width_per_length = 0.58578643762690485;
 
 /// Linear sweep over B after its matched filter with a Hamming window: the transform of 0.54 + 0.46 cos(2 pi nu / B), side lobes
-/// at -42.6 dB and falling as 1 / t. Let fade from 24 / B on, and over at 48 / B, where they are at -60 dB.
+/// at -42.6 dB and falling as 1 / t. They fade out from 24 / B to 48 / B, where they are at -60 dB.
 SONAR_HD inline double sweep_envelope(double bandwidth_hz, double time_s) {
   constexpr double fade_from = 24, over_at = 48, neighbour = 0.23 / 0.54;
   const double x = std::fabs(bandwidth_hz * time_s);
