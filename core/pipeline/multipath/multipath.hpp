@@ -1,5 +1,5 @@
-// Multipath, opt-in (Switches::multipath): all echoes by way of flat mirrors, as column signals that are added to the direct
-// ones. Runs once per ping before the columns are simulated (docs/acoustics.md, section 3).
+// Multipath, off by default (Switches::multipath): computes all echoes via flat mirrors as column signals, which are added to the
+// direct ones. It runs once per ping, before the columns are simulated (docs/acoustics.md, section 3).
 #pragma once
 
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace sonar {
 
-/// Kept from ping to ping; belongs to one scene.
+/// Values kept from ping to ping. They belong to one scene.
 struct MultipathWork {
   bool faces_found = false;
   FlatFaces faces;
@@ -18,14 +18,14 @@ struct MultipathWork {
   ColumnSignals columns;                     // echoes via mirrors
   bool has_echoes = false;                   // whether there are any
   std::vector<std::vector<Echoes>> batches;  // echoes waiting, per batch of tiles and group of columns
-  std::vector<SpectralScratch> spectral;     // per group of columns, where pulses are summed via the spectrum
+  std::vector<SpectralScratch> spectral;     // per group of columns, if pulses are summed via the spectrum
 };
 struct MultipathCounts {
   std::size_t rays = 0, echoes = 0;
 };
 
 /// Fills `work.columns` (before the transmitter's pattern and noise) and appends the ghosts of point targets to `points`.
-/// Calls in_view of the cells: results of earlier calls become invalid.
+/// It calls SurfaceCells::in_view(), so that results of earlier calls become invalid.
 MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& work, std::vector<PointEcho>& points);
 
 /// Adds columns [first, last) of the multipath echoes to `signals`.

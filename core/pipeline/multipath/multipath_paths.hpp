@@ -1,5 +1,5 @@
-// Paths between the sonar and a place: straight, or via one or two flat mirrors (docs/acoustics.md, section 3). By the image
-// method a path is a straight line to the place's image, so each is a mirroring of the sonar's axes.
+// Paths between the sonar and a place: straight, or via one or two flat mirrors (docs/acoustics.md, section 3). In the
+// image method a path is a straight line to the image of the place, so that each path is a reflection of the sonar's axes.
 #pragma once
 
 #include <vector>
@@ -10,14 +10,14 @@
 
 namespace sonar {
 
-/// At most so many mirrors take part in a ping: the largest that can reflect.
+/// Largest number of mirrors in a ping; the largest mirrors that can reflect are used.
 inline constexpr int most_mirrors = 16;
 /// A mirror that reflects less than this (pressure, at the angle of incidence) is ignored.
 inline constexpr double least_reflectance = 0.05;
 /// A point, or the sonar, nearer to a mirror than this lies in the mirror.
 inline constexpr double touching_m = 1e-3;
 
-/// A flat face as one ping meets it, in the axes of PingScalars::seen_from: dot(normal, p) + height_m = 0 on its plane.
+/// A flat face in one ping, in the axes of PingScalars::seen_from: dot(normal, p) + height_m = 0 on its plane.
 struct FlatMirror {
   int face = 0;  // index into FlatFaces::faces
   Vec3d normal;  // unit, towards the sonar
@@ -25,18 +25,18 @@ struct FlatMirror {
   double reflection = 0;
   double twice_kh_squared = 0;  // 2 (k h)^2, h = rms roughness
 
-  /// Pressure reflectance at a cosine of incidence: Rc exp(-2 k^2 h^2 cos^2), the specular echo's factor, off normal incidence.
+  /// Pressure reflectance at a cosine of incidence: Rc exp(-2 k^2 h^2 cos^2), the factor of specular echoes at any incidence.
   double reflectance(double cosine) const { return reflection * std::exp(-twice_kh_squared * cosine * cosine); }
   double height_of(Vec3d p) const { return dot(normal, p) + height_m; }
 };
 
-/// One path out or back. The image of a place p lies at turn * p + shift_m, straight ahead of where the path leaves the sonar.
+/// One path out or back. The image of a place p is at turn * p + shift_m, in the direction in which the path leaves the sonar.
 struct Path {
   int first = -1, second = -1;  // indices of mirrors in the order of the path out; -1 = none
   Rotation turn;                // improper for one bounce
   Vec3d shift_m;
   Vec3d second_normal;       // normal of the second mirror, as seen in the first
-  bool beyond_front = true;  // places lie on the sonar's side of the last mirror, or on the other
+  bool beyond_front = true;  // whether places are on the sonar's side of the last mirror
 
   Vec3d image_of(Vec3d p) const { return turn * p + shift_m; }
 };
@@ -48,10 +48,10 @@ Path path_by(const std::vector<FlatMirror>& mirrors, int first, int second = -1)
 
 /// Product of the reflectances for a path that leaves in this unit direction.
 double reflectance_of(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d direction);
-/// Whether a place lies where the path can come from its last mirror: off the mirror itself, on the side that is lit.
+/// Whether the path can reach a place from its last mirror: the place is on the lit side, and not on the mirror.
 bool is_lit(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place);
 
-/// Pressure factor of a layer of bubbles over one path to a place, bend by bend.
+/// Pressure factor of a layer of bubbles over all legs of one path to a place.
 double bubble_factor(const BubbleLayer& bubbles, const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place,
                      const PingScalars& scalars);
 

@@ -1,5 +1,5 @@
 // Echoes via mirrors: every pair of paths, one out and one back, between the sonar and a cell or a point target. Pairs that
-// differ in direction only have one delay and one phase, and so add coherently (docs/acoustics.md, section 3).
+// differ only in direction have the same delay and phase, and so add coherently (docs/acoustics.md, section 3).
 #pragma once
 
 #include <span>
@@ -14,12 +14,12 @@ namespace sonar {
 /// Inputs of one ping's echoes via mirrors.
 struct ImagePaths {
   std::vector<FlatMirror> mirrors;
-  std::vector<Path> paths;  // paths that own a part of the map; [0] is the straight one
+  std::vector<Path> paths;  // paths with a part of the map; [0] is the straight one
   BounceMap map;
   BubbleLayer bubbles;
 };
 
-/// By how long a path a ball about a place in the axes of PingScalars::seen_from can be seen, with a delay within the record.
+/// Lengths of a path on which a ball around a place (axes of PingScalars::seen_from) is visible with a delay within the record.
 class PathReach {
  public:
   PathReach(const Path& path, const ImagePaths& image_paths, const PingPlan& plan, const PingScalars& scalars);
@@ -46,7 +46,7 @@ class OneWayPattern {
   float aperture_ = 0;  // wavelengths, 0 = no pattern
 };
 
-/// Sounds tiles of cells; one per worker and ping.
+/// Computes the echoes of tiles of cells via mirrors; one per worker and ping.
 class MultipathScatterer {
  public:
   static constexpr int group_columns = 64;  // echoes are sorted by groups of so many receiving columns
@@ -56,7 +56,7 @@ class MultipathScatterer {
   void scatter(const TileInView& tile, std::vector<Echoes>& by_group);
 
  private:
-  struct TilePath {  // a path as it looks at one tile
+  struct TilePath {  // a path to one tile
     const Path* path;
     float from_sonar_object[3], from_sonar[3], turn[9];  // geometry of the tile's image, as in simd::TileSeen
     float range_m, sample_shift, half_turns, amplitude;
@@ -102,7 +102,7 @@ class MultipathScatterer {
   bool direct_ = false;  // whether arrivals_[0] is the direct path
 };
 
-/// sum_k W(k) W(k + n) / sum_k W(k)^2 of the receive pattern over columns: how much two columns n apart have in common.
+/// sum_k W(k) W(k + n) / sum_k W(k)^2 of the receive pattern over columns: the correlation of two columns n apart.
 std::vector<float> beam_correlation_over_columns(const PingPlan& plan);
 
 /// Echoes of the point targets; appends to `points`.

@@ -1,5 +1,5 @@
-// The view via mirrors: the rays of a fan are followed through up to two flat mirrors. Every direction meets one
-// chain of mirrors, so one map of directions serves all paths; multipath_scatter reads from it which places a path reaches.
+// Traces the view via mirrors: the rays of a fan are followed via up to two flat mirrors. Each direction has one
+// sequence of mirrors, so that one map is enough for all paths. multipath_scatter finds in it the places that a path reaches.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@
 
 namespace sonar {
 
-/// Directions that echoes via mirrors leave and come by: columns as in PingPlan, elevations wider than for direct echoes,
-/// because only one path of two may be far off the axis: out to 0.1 of the one-path pattern.
+/// Directions in which echoes via mirrors leave and arrive. Columns are those of PingPlan. Elevations are wider than for direct
+/// echoes, because only one of the two paths may be far off the axis: they extend to 0.1 of the one-way pattern.
 struct BounceFan {
   double half_angle_rad = 0;
   float first_tangent = 0, bins_per_tangent = 0;
@@ -23,7 +23,7 @@ struct BounceFan {
 };
 BounceFan make_bounce_fan(const PingPlan& plan);
 
-/// Part of a block of columns that a path owns; empty when it owns nothing.
+/// The part of a block of columns that belongs to a path; may be empty.
 struct PathWindow {
   int first_bin = std::numeric_limits<int>::max(), last_bin = -1;  // inclusive
   bool empty() const { return last_bin < first_bin; }
@@ -33,7 +33,7 @@ struct PathWindow {
 struct BounceMap {
   static constexpr std::uint8_t no_mirror = 0xFF;
   struct Node {
-    float inverse_x[3];      // after 0, 1, 2 bounces: 1 / x of the surface met, x along the unfolded path (DepthMap), 0 = none
+    float inverse_x[3];      // after 0, 1, 2 bounces: 1 / x of the surface hit, x along the unfolded path (DepthMap), 0 = none
     std::uint8_t mirror[2];  // index of the first and the second mirror, or no_mirror
   };
   BounceFan fan;
@@ -55,7 +55,7 @@ struct BounceMap {
 std::size_t trace_bounces(const PingContext& context, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors,
                           BounceMap& map);
 
-/// One line followed through the mirrors of a path to a place: whether nothing is in between.
+/// Follows a path via its mirrors to a place, and returns whether no surface blocks it.
 bool reaches(const RayScene& scene, const PingScalars& scalars, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors,
              const Path& path, Vec3d place);
 
