@@ -1,4 +1,4 @@
-// The layer of bubbles that breaking waves leave under the surface: extra absorption on the part of a path that runs through it
+// The layer of bubbles that breaking waves leave under the surface: it adds absorption on the part of a path inside it
 // (docs/acoustics.md, section 3). Applied tile by tile to the echoes of surface cells.
 #pragma once
 

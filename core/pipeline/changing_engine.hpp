@@ -9,8 +9,8 @@ namespace sonar {
 
 class ChangingEngine : public PingEngine {
  public:
-  /// Replaces the scene, and keeps the tables of the settings, and the trees and cells of meshes that both scenes share (the same
-  /// object in memory, not an equal one). Pings are those of a new engine.
+  /// Replaces the scene. It keeps the tables of the settings, and the trees and cells of meshes that both scenes share (the same
+  /// object in memory, not an equal one). The next pings are the same as those of a new engine.
   virtual void change_scene(const std::shared_ptr<const Scene>& scene) = 0;
 };
 

@@ -1,5 +1,5 @@
-// How fans of rays are refined: a column's interval between two directions is halved until both ends see one surface that
-// interpolates, or an edge. This one rule is used for direct views (trace_fan) and for views by way of mirrors (multipath_trace).
+// Refines fans of rays: an interval between two directions of a column is halved until its ends are on one surface that can be
+// interpolated, or until it is an edge. Direct views (trace_fan) and views via mirrors (multipath_trace) use the same rule.
 #pragma once
 
 #include <algorithm>
@@ -17,12 +17,12 @@ namespace sonar {
 /// A ray's hit at one stage of its path. Ranges run along the whole path, unfolded where mirrors bend it.
 struct SurfaceHit {
   std::uint32_t object = RayPacket::miss;
-  float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = nothing met
+  float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = no hit
   Vec3 normal;                       // normal of the facet, of any length, in world axes as seen along the last leg of the path
   float offset = 0;                  // the facet's plane is normal . p = offset, p from the sonar's last image
-  Vec3 direction;                    // unit, of that last path, in the same axes
+  Vec3 direction;                    // unit direction of the last leg, in the same axes
 
-  /// Hit of a ray after `range_m` along the whole path; `forward`: x of the unit direction it left in.
+  /// Hit of a ray after `range_m` along the whole path; `forward`: x of the unit direction in which the path left the sonar.
   static SurfaceHit by(const RayPacket& rays, std::size_t lane, float range_m, float forward) {
     SurfaceHit surface;
     surface.object = rays.object[lane];
@@ -36,14 +36,14 @@ struct SurfaceHit {
   }
 };
 
-/// One direction of a column; those who trace add what it met, one surface a stage.
+/// One direction of a column. Code that traces rays derives from it and adds the hits, one surface per stage.
 struct FanSample {
   float elevation_rad = 0, tangent = 0, forward = 0;  // forward: x of the unit direction
   std::int32_t next = -1;                             // the sample above in the same column, -1 = last
   bool edge_above = false;                            // the interval up to `next` hides an edge: do not interpolate
 };
 
-/// Between two samples of a column, to be looked at in the middle.
+/// The interval between two samples of a column, whose middle is to be traced.
 struct FanInterval {
   std::int32_t below, above;
   std::int32_t column;
@@ -51,22 +51,22 @@ struct FanInterval {
 };
 
 /// Sample: a FanSample with `int stages() const`, `const SurfaceHit& surface_at(int stage) const` and `bool same_mirrors(b)
-/// const`: whether both met the same number of surfaces by the same mirrors.
+/// const`: whether both hit the same number of surfaces via the same mirrors.
 template <class Sample>
 class FanRefinement {
  public:
-  /// The caller keeps the buffers from ping to ping. `first_column`: the plan's column that the intervals count from, so
-  /// that what a column sees does not depend on those it is traced with.
+  /// The caller keeps the buffers from ping to ping. `first_column`: the plan's column from which the intervals count, so
+  /// that the hits of a column do not depend on the columns traced with it.
   FanRefinement(std::vector<Sample>& samples, std::vector<FanInterval>& open, std::vector<FanInterval>& halves,
                 float pulse_width_m, int first_column)
       : samples_(samples), open_(open), halves_(halves), tolerance_m_(pulse_width_m), first_column_(first_column) {
     open_.clear();
   }
 
-  /// Opens the interval between two neighbours if it needs a look at its middle.
+  /// Adds the interval between two neighbours to the open ones if its middle must be traced.
   void consider_base(std::int32_t below, std::int32_t above, std::int32_t column) { consider(below, above, column, 0, open_); }
 
-  /// trace(intervals): one packet, which appends the samples of their middles in order.
+  /// trace(intervals) traces the middles of intervals as one packet and appends their samples in order.
   template <class Trace>
   void run(const Trace& trace) {
     for (int depth = 1; depth <= deepest && !open_.empty(); ++depth) {
@@ -80,8 +80,8 @@ class FanRefinement {
       std::swap(open_, halves_);
     }
   }
-  /// The middle where an edge is looked for. Within one surface a place near it that is another in every column: rays in even
-  /// steps can fall in step with ripples, and then every column at once would take crests alone for a plain.
+  /// The elevation at which an interval is halved: the middle if it has an edge. Within one surface it is a place near the middle
+  /// that differs between columns, because rays in equal steps may hit only the crests of ripples, which then look like a plain.
   float middle_rad(const FanInterval& v) {
     const float below = at(v.below).elevation_rad, above = at(v.above).elevation_rad;
     if (!hit_the_same(at(v.below), at(v.above))) return 0.5f * (below + above);
@@ -91,14 +91,14 @@ class FanRefinement {
   }
 
  private:
-  // Edges are found to 1/16 of a base interval; a surface that still will not interpolate hides itself.
+  // Edges are found to 1/16 of a base interval. A surface that cannot be interpolated even then hides itself.
   static constexpr int deepest = 4;
-  // A surface strays from the straight line between two hits by about a quarter of what its slopes promise: half a pulse width.
-  // With the pulse width that the middle may be off it stays within the 1.5 of PingPlan::depth_tolerance_m. Beyond, a middle that
-  // happens to lie on the line proves nothing: the rays may fall in step with ripples.
+  // A surface deviates from the straight line between two hits by about a quarter of what its slopes allow: half a pulse width.
+  // The middle may deviate by one pulse width more, which is within the 1.5 of PingPlan::depth_tolerance_m. With larger slopes a
+  // middle on the line proves nothing, because the rays may hit equal phases of ripples.
   static constexpr float slope_tolerance_in_pulses = 2;
   static constexpr float golden_turn = 0.61803399f;  // its multiples fill a turn evenly
-  static constexpr float widest_skew = 0.15f;        // share of an interval, to either side of its middle
+  static constexpr float widest_skew = 0.15f;        // fraction of an interval, to either side of its middle
 
   Sample& at(std::int32_t i) { return samples_[static_cast<std::size_t>(i)]; }
 
@@ -109,7 +109,7 @@ class FanRefinement {
     return true;
   }
 
-  /// Whether an interval needs a look at its middle; what is left undecided becomes an edge.
+  /// Opens an interval if its middle must be traced. It is an edge if its ends hit different surfaces, or at the largest depth.
   void consider(std::int32_t below, std::int32_t above, std::int32_t column, int depth, std::vector<FanInterval>& list) {
     Sample &a = at(below), &b = at(above);
     const bool same = hit_the_same(a, b);
@@ -145,7 +145,7 @@ class FanRefinement {
     }
     return true;
   }
-  /// Whether the plane through either hit meets the other's ray about where that hit.
+  /// Whether the plane of each hit crosses the ray of the other near the other's hit.
   bool planes_agree(const SurfaceHit& a, const SurfaceHit& b) const {
     const float most = slope_tolerance_in_pulses * tolerance_m_;
     return std::abs(a.offset / dot(a.normal, b.direction) - b.range_m) <= most &&

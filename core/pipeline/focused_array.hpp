@@ -9,12 +9,13 @@
 
 namespace sonar {
 
-/// Sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}, d the delay of a channel at x against the array's middle, from a
-/// point at a range and sine u. Parts: groups, which overlap by half and whose w^2 add to 1 in every channel; last, all channels
-/// alike.
+/// Sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}, where d is the delay of a channel at x relative to the array's
+/// middle, from a point at a range and sine u. The parts are groups of channels, which overlap by half and whose w^2 add to 1 in
+/// every channel; the last part is all channels with equal weights.
 ///
-/// A half of a group is short: except for the delay of its middle, its sum hardly changes with the sine. It is summed at few
-/// sines of a segment of beams, Chebyshev's, and interpolated: to 1e-5 of the loudest, as the rounding of the phases.
+/// A half of a group is short, so that its sum, except for the delay of its middle, hardly changes with the sine. It is computed
+/// at a few Chebyshev points of a segment of beams and interpolated. The error is 1e-5 of the largest, like the rounding of the
+/// phases.
 class FocusedArray {
  public:
   FocusedArray(const std::vector<double>& beam_sines, const SharedNoise& law);
@@ -23,11 +24,11 @@ class FocusedArray {
   void focus(double range_in_wavelengths);
   /// [parts][2][beams], real and imaginary parts.
   const std::vector<float>& sums() const { return sums_; }
-  /// How far, in turns, the phase of a channel changes at most between two focal ranges.
+  /// The largest change of a channel's phase between two focal ranges, in turns.
   double turns_between(double range, double other_range) const;
 
  private:
-  /// Beams side by side, and sines that stand for them: their own if they are few.
+  /// Neighbouring beams, and the sines at which sums are computed for them: those of the beams if these are few.
   struct Segment {
     std::size_t first_beam = 0, beams = 0, first_node = 0, nodes = 0, weights = 0;  // weights: [nodes][beams] from there on
     bool is_direct() const { return nodes == beams; }
@@ -50,7 +51,7 @@ class FocusedArray {
 /// Chebyshev's points of [from, to], and weights of polynomials through values at them: [points][places].
 std::vector<double> chebyshev_points(double from, double to, int count);
 std::vector<double> chebyshev_weights(const std::vector<double>& points, const std::vector<double>& places);
-/// How many points hold the error below some 5e-6 for what turns by `radians` to either side of the middle.
+/// Number of points with an error below some 5e-6 for a phase that changes by `radians` to either side of the middle.
 int chebyshev_count(double radians);
 
 }  // namespace sonar

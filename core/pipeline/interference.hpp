@@ -15,12 +15,12 @@
 
 namespace sonar {
 
-/// Direct leakage of the transmitter, from the moment it fires: rms pressure at a beam's output leak_upa 10^(-decay r / 20) over
-/// the device's range r, complex Gaussian with the pulse's correlation, per column like the noise. Nearly the same in every ping.
-/// The steady part of a leak that the channels share is added by SharedNoiseTable.
+/// Direct leakage of the transmitter, from the time of firing: rms pressure at a beam's output leak_upa 10^(-decay r / 20) over
+/// the device's range r, complex Gaussian with the pulse's correlation, per column like the noise. It is nearly the same in every
+/// ping. SharedNoiseTable adds the steady part of a leak that the channels share.
 class Leak {
  public:
-  /// How far it may decay before it is left out [dB]. A table ends with its last entry, and may have nulls.
+  /// The leak is left out after it has decayed by this much [dB]. A leak with a table ends at the table's last entry instead.
   static constexpr double forgotten_db = 100;
   /// unknown: chosen. Share of its power that is new in every ping; in the captured M1200d pings 0.2 % in the first two rows,
   /// about a quarter in the next five.
@@ -31,7 +31,7 @@ class Leak {
   static_assert(changing_part * changing_part / changing_share > 1 - 1e-15 &&
                 changing_part * changing_part / changing_share < 1 + 1e-15);
 
-  /// Where it ends [m]; infinity where it does not decay, 0 where there is none.
+  /// Range at which it ends [m]; infinity if it does not decay, 0 without a leak.
   static double reach_m(const ReceiverModel& law);
 
   Leak() = default;
@@ -39,8 +39,8 @@ class Leak {
   bool is_audible() const { return !rms_upa_.empty(); }
   const std::vector<float>& rms_upa() const { return rms_upa_; }  // rms of a column, for each sample
   float steady() const { return steady_; }                        // amplitude of the part that the columns receive in every ping
-  /// Adds it to columns [first, last). The table of `noise` must be prepared with the request's seed and the plan's filter;
-  /// unused in expected power.
+  /// Adds the leak to columns [first, last). The table of `noise` must be prepared with the request's seed and the plan's filter;
+  /// in expected power it is not used.
   void add(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) const;
 
  private:
@@ -48,24 +48,24 @@ class Leak {
   float steady_ = 0;
 };
 
-/// A pulse of another sonar while we listen: a tone through our receiver, somewhere on the sample grid.
+/// A pulse of another sonar during reception: a tone through our receiver, at any place on the sample grid.
 struct ReceivedPulse {
   double sine = 0;  // direction from which it comes, y / r at its arrival
   double from_sample = 0, to_sample = 0;
-  double amplitude_upa = 0;     // in a beam that looks at it
+  double amplitude_upa = 0;     // in a beam that points at it
   double phase_turns = 0;       // at from_sample
-  double turns_per_sample = 0;  // off our carrier
-  double edge_per_sample = 0;   // b t of one sample: how softly our filter lets it begin and end
+  double turns_per_sample = 0;  // difference from our carrier
+  double edge_per_sample = 0;   // b t of one sample: softness of its edges after our filter
 };
-/// The pulses of the scene's other sonars that arrive during this ping: each sends at its own rate from a hashed moment on, its
-/// sound travels one way; a surface in between hides it.
+/// The pulses of the scene's other sonars that arrive during this ping. Each sonar sends at its own rate, starting at a hashed
+/// time; its sound travels one way, and a surface in between blocks it.
 std::vector<ReceivedPulse> receive_other_sonars(const PingContext& context, const PingRequest& request);
-/// Samples [from, to) of a pulse in a beam that points at it, as far as it reaches.
+/// The part of a pulse that lies within samples [from, to), in a beam that points at it.
 SampledPulse tone_of(const ReceivedPulse& pulse, int from, int to);
-/// On top of the beams, through the receive pattern with all its side lobes. In expected power, its power.
+/// Adds pulses to the beams, through the receive pattern with all its side lobes. In expected power it adds their power.
 void add_pulses(std::span<const ReceivedPulse> pulses, const PingPlan& plan, BeamSignals& beams);
 
-/// Every channel in every beam: a lone echo of amplitude A in one direction adds e A to all beams, e = crosstalk_db.
+/// Each channel leaks into every beam: a single echo of amplitude A in one direction adds e A to all beams, e = crosstalk_db.
 class Crosstalk {
  public:
   Crosstalk() = default;
@@ -80,8 +80,8 @@ class Crosstalk {
 
  private:
   double amplitude_ = 0;
-  double share_ = 1;         // share of the sum over beams that belongs to one echo, because beams overlap
-  double own_in_power_ = 0;  // expected power: 2 sum W / sum W^2, how a beam adds up with its own leakage
+  double share_ = 1;         // part of the sum over beams that one echo contributes once, because beams overlap
+  double own_in_power_ = 0;  // expected power: 2 sum W / sum W^2, from a beam and its own leakage
 };
 
 }  // namespace sonar

@@ -9,11 +9,12 @@
 
 namespace sonar {
 
-/// How many pings a picture is made of; the request is valid.
+/// Number of pings in a picture. The request must be valid.
 int pings_in(const PingRequest& picture);
-/// Its pings, the first first, each when and where it is fired. Their numbers, which key the noise, are their own.
+/// The requests of a picture's pings in the order of firing, each with its own time, pose, and number, which is a key of the
+/// noise.
 std::vector<PingRequest> pings_of(const PingRequest& picture);
-/// The picture, with its own request: every beam as its ping found it. `pings`: of pings_of(), in their order.
+/// The picture, with its own request; each beam is from its ping. `pings` are the results of pings_of(), in the same order.
 Ping interleaved(const PingRequest& picture, std::span<Ping> pings);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// Finds out which object's echo each sample holds: expected energy per object, from the cells, columns, pulse and beams that the
-// picture is made of (docs/datasets.md). Multipath, crosstalk, defocus and echoes of the water have no labels.
+// Finds the object whose echo is in each sample. It computes the expected energy of each object with the same cells, columns,
+// pulse and beams as the picture (docs/datasets.md). Multipath, crosstalk, defocus and echoes of the water have no labels.
 #pragma once
 
 #include <cstdint>
@@ -16,25 +16,26 @@
 
 namespace sonar {
 
-/// Why the samples of such pings have no labels; empty = they have.
+/// The reason why samples of such pings cannot have labels; empty = they can.
 std::string why_unlabelled(const PingRequest& request, const Scene& scene);
 /// Labels of a ping that receives nothing.
 PingLabels no_labels(const PingRequest& request, const Scene& scene);
 
-/// The labels of one ping while it is made. Kept from ping to ping for its buffers.
+/// Computes the labels of one ping. The object is kept from ping to ping for its buffers.
 class LabelWork {
  public:
   /// `context`, `tiles` and `by_group` must live until finish().
   void begin(const PingContext& context, const std::vector<PreparedTile>& tiles,
              const std::vector<std::vector<std::uint32_t>>& by_group, int group_columns);
-  /// Notes occlusions in columns [first, last), which the fan has just traced. Any thread, each column once.
+  /// Stores the shadows in columns [first, last), which `fan` has traced. Any thread may call it, once for each column.
   void note_shadows(const FanScratch& fan, int first, int last);
-  /// Makes room for the group that begins at `group.first_column`. Any thread, each group once.
+  /// Makes room for the group that begins at `group.first_column`. Any thread may call it, once for each group.
   void begin_group(const simd::GroupView& group);
-  /// Adds the energy of the cells that the picture is made of, with their `power`; forgets whose they are. Any number of times a
-  /// group.
+  /// Adds the energy of cells in the picture from Echoes::power, and clears the list of their tiles. It may be called several
+  /// times for a group.
   void add_cells(const simd::GroupView& group, Echoes& echoes);
-  /// Adds what the group's objects with a label would send if nothing were in the way. After the last add_cells().
+  /// Adds the energy that the group's objects with a label would send if nothing hid them. To be called after the last
+  /// add_cells().
   void finish_group(const simd::GroupView& group, Echoes& scratch);
   PingLabels finish(std::span<const PointEcho> points);
 
@@ -45,14 +46,14 @@ class LabelWork {
     int first_column = 0, columns = 0;
     int first_sample = 0, last_sample = 0;     // half-open
     int first_row = 0, rows = 0;               // multiples of `window`
-    std::vector<float> power = {};             // [columns][rows], the pulse's length included
-    std::vector<double> seen = {}, open = {};  // energy of objects with a label, by column; `open`: as if nothing were in the way
+    std::vector<float> power = {};             // [columns][rows], spread over the length of the pulse
+    std::vector<double> seen = {}, open = {};  // energy of objects with a label, by column; `open`: if nothing hid them
   };
-  struct Gap {  // samples of a column that lie in an object's shadow, where nothing else is
+  struct Gap {  // samples of a column that lie in an object's shadow and have no echo
     float from = 0, to = 0;
     std::uint32_t object = 0;
   };
-  struct Point;  // an echo without surface: where its energy is
+  struct Point;  // place and energy of an echo without a surface
 
   void spread(Part& part, const std::vector<float>& by_sample) const;
   static int row_of(double sample, int per_row);
@@ -76,7 +77,7 @@ class LabelWork {
   double first_sine_ = 0, spacing_ = 0;
   std::vector<float> pulse_;  // |p|^2 at whole samples, the peak in the middle
   struct Group {
-    std::vector<Part> parts;                    // the first `used` are of this ping; all keep their memory
+    std::vector<Part> parts;                    // the first `used` belong to this ping; all keep their memory
     std::vector<std::vector<float>> by_sample;  // values of each part: [columns][samples], before the pulse
     std::size_t used = 0;
     std::vector<std::size_t> part_of;  // by object; SIZE_MAX: none

@@ -1,5 +1,5 @@
-// Receiver noise: white complex Gaussian per column, shaped in range like the pulse, injected before beamforming so that
-// neighbouring beams share it as in a real array (docs/acoustics.md, section 5). Drawn from a pre-filtered table at hashed
+// Receiver noise: white complex Gaussian noise per column, shaped in range like the pulse. It is added before beamforming, so
+// that neighbouring beams share it as in a real array (docs/acoustics.md, section 5). It is read from a filtered table at hashed
 // places.
 #pragma once
 
@@ -16,16 +16,16 @@ namespace sonar {
 
 class NoiseTable {
  public:
-  /// Draws the table anew when seed or filter changed, or shares the table of one of `others` that has the same seed and
-  /// filter. E|n|^2 = 1 per sample.
+  /// Makes a new table if seed or filter changed, or shares the table of one of `others` with the same seed and filter.
+  /// E|n|^2 = 1 per sample.
   void prepare(Seed seed, const std::vector<float>& filter, std::span<const NoiseTable* const> others = {});
-  /// column[2 n], column[2 n + 1] += rms * noise for n in [0, samples). A function of (seed, sonar, ping, column, n) alone.
+  /// column[2 n], column[2 n + 1] += rms * noise for n in [0, samples). It depends only on (seed, sonar, ping, column, n).
   void add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// As add(), but replaces the values of the column.
   void set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The table that add() reads: noise_table_samples complex values (core/pipeline/arithmetic/noise_place.hpp).
   const std::vector<float>& shaped() const { return *shaped_; }
-  /// Size of the table in memory, without draws in `counted`, which other tables share.
+  /// Size of the table in memory. Leaves out memory in `counted`, which other tables share, and adds its own there.
   std::size_t bytes(std::set<const void*>& counted) const;
 
  private:
@@ -37,7 +37,7 @@ class NoiseTable {
   std::shared_ptr<const std::vector<float>> white_, shaped_ = std::make_shared<std::vector<float>>();  // complex, interleaved
 };
 
-/// The draws of one ping of one sonar; `table` null = none.
+/// The noise of one ping of one sonar; `table` null = none.
 struct PingNoise {
   const NoiseTable* table = nullptr;
   std::uint32_t sonar = 0, ping = 0;

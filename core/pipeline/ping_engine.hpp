@@ -1,4 +1,4 @@
-// The interface between the daemon and the engines that compute pings: CPU here, CUDA in cuda/.
+// The interface between the daemon and the engines that compute pings: the CPU engine here, the CUDA engine in cuda/.
 #pragma once
 
 #include <array>
@@ -47,9 +47,9 @@ inline void add(PingStatistics& to, const PingStatistics& more) {
 class Interruption {
  public:
   virtual ~Interruption() = default;
-  /// Whether such a ping is likely to come: this one is then made in smaller parts.
+  /// Whether such a ping is likely; the present one is then computed in smaller parts.
   virtual bool expected() const = 0;
-  /// Between two parts, on the thread of run(); may call run() of the same engine, but not from within that again.
+  /// Called between two parts, on the thread of run(). It may call run() of the same engine, which does not call it again.
   virtual void run_other() = 0;
 };
 
@@ -63,19 +63,19 @@ class PingEngine {
  public:
   virtual ~PingEngine() = default;
   /// A request that cannot be simulated (why_invalid in core/pipeline/check_request.hpp) throws std::invalid_argument with the
-  /// reason. One caller at a time.
+  /// reason. Only one thread may call it at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
-  /// run() in two halves: an engine with a device of its own works on the requests while its caller uses the pings of an earlier
-  /// submit(). Requests are copied; what run() would throw for them, collect() throws.
+  /// submit() and collect() are the two halves of run(): an engine with a device works on the requests while its caller uses the
+  /// pings of an earlier submit(). Requests are copied. collect() throws the exceptions that run() would throw.
   virtual void submit(std::span<const PingRequest> requests) { submitted_.emplace_back(requests.begin(), requests.end()); }
-  /// The pings of the oldest submit() that was not collected; there must be one.
+  /// The pings of the oldest submit() that has not been collected; there must be one.
   virtual std::vector<Ping> collect() {
     const std::vector<PingRequest> requests = std::move(submitted_.front());
     submitted_.pop_front();
     return run(requests);
   }
-  /// How many requests that are like these two one run() computes sooner than several; 1 = none, or one of the two would take
-  /// much longer beside the other than alone.
+  /// Largest number of requests like these two for which one run() is faster than several. 1: it is not faster, or one of the two
+  /// would take much longer together with the other than alone.
   virtual std::size_t most_together(const PingRequest& a, const PingRequest& b) const {
     return static_cast<void>(a), static_cast<void>(b), 1;
   }

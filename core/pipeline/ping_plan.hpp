@@ -1,5 +1,5 @@
-// Everything about a ping that follows from the model and the client's settings alone: columns, sample grid, pulse and
-// beamforming tables, noise filter, gains. Made when settings change, used by every stage until they change again.
+// All values of a ping that depend only on the model and the client's settings: columns, sample grid, pulse and beamforming
+// tables, noise filter, gains. They are made when settings change, and every stage uses them until settings change again.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ struct Fan {
   TangentAxis axis{};
   int bins = 0;
   std::vector<float> tangent;        // tangents of the lower edge of every bin, and of the end: bins + 1
-  std::vector<float> elevation_rad;  // the base fan, from below to above
+  std::vector<float> elevation_rad;  // the base fan, from bottom to top
   int side_elevations = 0;           // elevations at each end that lie in side lobes: not refined, shared by side_columns columns
   bool is_side(int interval) const {
     return interval < side_elevations || interval + 1 >= static_cast<int>(elevation_rad.size()) - side_elevations;
@@ -48,20 +48,20 @@ struct BeamPanel {
 };
 /// How beams are made of columns.
 struct BeamWeightOptions {
-  double dropped_energy = 1e-4;  // share of the energy outside the band: -40 dB
-  bool transform = true;         // where beams allow it, in place of a band that would be wider than the transform is long
+  double dropped_energy = 1e-4;  // part of the energy outside the band: -40 dB
+  bool transform = true;  // if beams allow it, use a transform in place of a band that would be wider than the transform is long
 };
 struct BeamWeights {
   int half_band = 0;  // number of columns on either side that a beam sums
   std::vector<BeamPanel> panels;
   std::vector<float> weights;
-  std::shared_ptr<const BeamTransformTables> transform;  // when set: gives the result of panels over all columns at less cost
+  std::shared_ptr<const BeamTransformTables> transform;  // if set, it gives the result of panels over all columns at less cost
   double weight_energy = 1;                              // sum_k W_jk^2 of a beam of the pattern's width
 };
 
 /// Power of a column's noise at a sample over column_noise_upa squared: far + near_less_far decay (docs/acoustics.md, section 5).
 struct NoiseProfile {
-  std::vector<float> far, near_less_far;  // [columns]; empty = even
+  std::vector<float> far, near_less_far;  // [columns]; empty = uniform
   std::vector<float> decay;               // [samples], up to the last one that is not negligible
 
   bool is_even() const { return far.empty(); }
@@ -80,7 +80,7 @@ struct PingPlan {
   BeamWeights beam_weights;
   double bearing_scale = 1;                  // bearing_scale_of() the request
   std::vector<float> beam_azimuth_rad;       // reported
-  std::vector<double> beam_sine;             // of true directions, as all sines here but those of tables by reported sine
+  std::vector<double> beam_sine;             // true directions, like all sines here except in tables by reported sine
   std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
@@ -90,11 +90,11 @@ struct PingPlan {
   double sample_offset = 0.5;  // start_samples plus the sample's position in its spacing, see PingSettings::row_centre
   double sample_time_s = 0;    // 2 sample_spacing_m / the device's sound speed
   Pulse pulse_shape;
-  double pulse_width_m = 0;       // -3 dB, in the device's metres: the settings', or a measured pulse's own
+  double pulse_width_m = 0;       // -3 dB, metres as the device computes them: from the settings, or from a measured pulse
   std::vector<float> pulse_rows;  // simd::PulseRows
   int taps = 8, pulse_steps = 256;
   double envelope_hz = 0;                           // b of the Gaussian of that width
-  std::shared_ptr<const SpectralColumns> spectral;  // takes the place of pulse_rows when set
+  std::shared_ptr<const SpectralColumns> spectral;  // if set, it is used in place of pulse_rows
 
   std::vector<CellLevel> levels;    // coarsest first
   std::vector<float> elevation;     // polynomial of the two-way pattern in sin^2(angle)
@@ -106,24 +106,24 @@ struct PingPlan {
   BeamMix beam_mix;
   std::vector<float> row_power_factor;   // per row: (gain * TVG / full scale)^2
   std::vector<std::uint32_t> row_gain;   // when settings.format.row_gains
-  std::vector<float> beam_power_factor;  // per beam: gain of its channel, squared; empty = alike
+  std::vector<float> beam_power_factor;  // per beam: gain of its channel, squared; empty = all equal
 
-  /// Direction of a place in the sonar's axes: about the array's axis, or for flat beams.
+  /// Direction of a place in the sonar's axes, for conical beams (about the array's axis) or flat ones.
   ConicalDirection direction_of(Vec3d from_sonar) const {
     return switches.conical ? conical_from_sonar(from_sonar) : flat_from_sonar(from_sonar);
   }
   /// nullopt: the direction is outside the fan, or farther than half_angle_rad from its middle.
   std::optional<std::size_t> column_of(const ConicalDirection& direction, double half_angle_rad) const;
-  /// How far behind the depth map a cell may lie and still be visible: the map is straight between rays.
+  /// A cell is visible up to this distance behind the depth map, because the map is straight between rays.
   float depth_tolerance_m() const { return depth_tolerance_in_pulses * static_cast<float>(pulse_width_m); }
   static constexpr float depth_tolerance_in_pulses = 1.5f;  // docs/acoustics.md, section 3
-  /// Largest angle about the array's axis in a fan of that half angle. For flat beams it is larger than the half angle: off the
-  /// middle an elevation is a larger angle about the axis.
+  /// Largest angle about the array's axis in a fan with this half angle. With flat beams it is larger than the half angle,
+  /// because away from the middle an elevation is a larger angle about the axis.
   double widest_about_axis_rad(double half_angle_rad) const;
   /// The column that is traced for a column in the side lobes.
   int side_column(int k) const { return std::min(k - k % side_columns + side_columns / 2, columns.count - 1); }
   static constexpr int side_columns = 4;
-  /// Sets the view of the fan and of the levels of cells.
+  /// Sets the values of `view` that describe the fan and the levels of cells.
   void aim(CellView& view) const;
   bool truncates() const { return switches.truncation && mode.receiver.truncates; }
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
@@ -135,12 +135,12 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, double bearing_scale = 1);
 /// Wavelength of the centre frequency, at the sound speed that the device assumes [m].
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
-/// The client's gain alone, which may change with every ping.
+/// Changes only the client's gain, which may differ in every ping.
 void set_gain(PingPlan& plan, float gain_db);
-/// Whether the plan still serves this request, except for its gain.
+/// Whether the plan is valid for this request, except for the gain.
 bool serves(const PingPlan& plan, const PingRequest& request);
 
-// The parts of a plan, callable alone.
+// Functions that make parts of a plan.
 Columns make_columns(const FrequencyMode& mode, int beam_count);
 std::vector<ReceivePattern> receive_patterns(const FrequencyMode& mode, std::size_t beams);
 std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count);

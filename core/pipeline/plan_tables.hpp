@@ -1,5 +1,5 @@
-// Tables that a plan holds: of the beams of all columns at once, of their mixing, and of noise that channels share. Each is laid
-// out and used in the file of its step: beam_transform.cpp, beam_mix.cpp, shared_noise.cpp.
+// Tables in a plan: for beamforming by a transform, for mixing beams, and for noise that channels share. The file of each step
+// makes and uses its table: beam_transform.cpp, beam_mix.cpp, shared_noise.cpp.
 #pragma once
 
 #include <cstddef>
@@ -18,24 +18,24 @@ namespace sonar {
 
 struct PingPlan;
 
-/// Beams of all columns at once: where the columns are even in the sine, the sum over columns (form_beams.hpp) is a convolution,
-/// exact by a Fourier transform across a line twice as long; beams between columns are read off by a few weights, since the
-/// response of an array varies no faster than its aperture allows. Used by form_beams() in place of wide bands of weights.
+/// Forms all beams of all columns at once. Columns are uniform in the sine, so that the sum over columns (form_beams.hpp) is a
+/// convolution, which a Fourier transform of twice the length computes exactly. Beams between columns are interpolated by a few
+/// weights, since the aperture limits how fast the response changes. form_beams() uses it in place of wide bands of weights.
 class BeamTransformTables {
  public:
-  /// Relative error of the reading between columns at most 2e-6 for columns up to 0.35 of a beam apart (single precision: 1e-6).
+  /// The relative error of the interpolation is at most 2e-6 for columns up to 0.35 of a beam apart (single precision: 1e-6).
   BeamTransformTables(const ReceivePattern& pattern, const Columns& columns, const std::vector<double>& beam_sines);
-  /// As many beams as columns, each on its column, which counts columns d away with the weight of_distance[d].
+  /// One beam on each column. The weight of columns d away is of_distance[d].
   explicit BeamTransformTables(const std::vector<double>& of_distance);
   BeamTransformTables(const BeamTransformTables&) = delete;
   BeamTransformTables& operator=(const BeamTransformTables&) = delete;
 
   const simd::BeamTransform& tables() const { return tables_; }
-  /// Floats of scratch for the kernel, 64-byte aligned.
+  /// Number of floats of working memory for the kernel, 64-byte aligned.
   std::size_t work_floats() const { return static_cast<std::size_t>(4 * tables_.quarter) * 32; }
 
   std::size_t bytes() const;
-  /// Vector operations a group of sixteen samples takes, to compare with a band's.
+  /// Vector operations for a group of sixteen samples, to compare with those of a band.
   double cost() const;
 
  private:
@@ -51,15 +51,15 @@ class BeamTransformTables {
   std::vector<std::int32_t> first_column_;
 };
 
-/// A table of a product at a sine, see BeamProfile; linear between its values, `top` the sine of the sector's edge.
+/// Value at a sine of a product's table (BeamProfile), linear between the table's values. `top`: sine of the sector's edge.
 double at_sine(const std::vector<float>& table, double sine, double top);
 
-/// Mixes neighbouring beams: near the sonar because the array is focused only for broadside, and everywhere by a fitted share
-/// (docs/acoustics.md, section 6). A function of the plan alone.
+/// Mixes neighbouring beams: near the sonar, because the array is focused only for broadside, and everywhere by a fitted fraction
+/// (docs/acoustics.md, section 6). It depends only on the plan.
 class BeamMix {
  public:
   BeamMix() = default;
-  /// Empty where beams are not even in the sine.
+  /// Empty if beams are not uniform in the sine.
   explicit BeamMix(const PingPlan& plan);
   bool blurs() const { return !turn_m_.empty(); }
   bool blends() const { return !own_.empty(); }
@@ -70,7 +70,7 @@ class BeamMix {
   const std::vector<float>& share() const { return share_; }
   BeamMixView view() const;
   std::size_t bytes() const;
-  /// Works in place; `scratch` keeps its memory. Does nothing if blurs() or blends() is false.
+  /// Both work in place; `scratch` keeps its memory. Does nothing if blurs() or blends() is false.
   void blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector<float>& scratch) const;
   void blend(BeamSignals& beams, std::vector<float>& scratch) const;
 
@@ -84,37 +84,39 @@ class BeamMix {
   float first_range_m_ = 0, sample_m_ = 1, largest_turn_m_ = 0;
 };
 
-/// Weights of the beams for shared noise, a function of the plan alone.
+/// Weights of the beams for shared noise. They depend only on the plan.
 class SharedNoiseTable {
  public:
-  static constexpr std::size_t block_samples = 32;  // kept or left out together
+  static constexpr std::size_t block_samples = 32;  // samples that are kept or left out together
   SharedNoiseTable() = default;
-  /// Empty if the receiver has none. Needs the plan's columns and the level of their noise.
+  /// Empty if the receiver has no shared noise. Needs the plan's columns and the level of their noise.
   SharedNoiseTable(const PingPlan& plan, Parallel& pool);
   bool is_audible() const { return samples_ > 0; }
   bool has_leak() const { return !leak_upa_.empty(); }
-  int samples() const { return samples_; }  // from the first on; at larger ranges the signal falls outside the sector
+  int samples() const {
+    return samples_;
+  }  // number of samples with shared noise, from the first; at larger ranges it falls outside the sector
   std::size_t parts() const { return parts_; }
-  /// Real and imaginary part, [parts][beams][2][samples]: of a signal of amplitude 1 in the channels of a group; in the last
-  /// part, in all channels.
+  /// Real and imaginary part, [parts][beams][2][samples], of the response to a signal of amplitude 1 in the channels of a group;
+  /// in the last part, in all channels.
   std::vector<float> response() const;
   std::size_t bytes() const {
     return sizeof(float) * (heard_.capacity() + noise_upa_.capacity() + steady_upa_.capacity() + leak_upa_.capacity()) +
            sizeof(std::uint32_t) * at_.capacity();
   }
-  // In a channel. Of what is new in every ping and by group, rms [samples]; of what is not, amplitude [samples]; of the leak,
-  // amplitude [as far as it reaches].
+  // Levels in a channel: rms [samples] of the noise that differs between pings and groups, amplitude [samples] of the noise that
+  // does not, and amplitude of the leak [up to its last sample].
   const std::vector<float>& noise_upa() const { return noise_upa_; }
   const std::vector<float>& steady_upa() const { return steady_upa_; }
   const std::vector<float>& leak_upa() const { return leak_upa_; }
   double noise_power(std::size_t beam, std::size_t sample) const;  // [uPa^2]; 0 beyond the samples
   /// Draws the shared part of one ping's channels, [parts][2][samples], or its rms; without the noise, or without the leak.
   void draw(const PingNoise& key, bool noise, bool leak, bool expected_power, std::vector<float>& shared) const;
-  /// On top of the beams.
+  /// Adds the shared signals to the beams.
   void add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const;
 
  private:
-  /// [2][block_samples] of a part in a beam, or null where it is left out.
+  /// [2][block_samples] of a part in a beam, or null if the block is left out.
   const float* heard(std::size_t part, std::size_t beam, std::size_t block) const;
   struct Block;
   void gather(std::vector<Block>& blocks);

@@ -1,5 +1,5 @@
-// The table of contents of a ping: from a request and the scene to samples, stage by stage. A pure function of its arguments;
-// what it keeps between calls (Workspace, SurfaceCells) only saves work.
+// Calls the stages of a ping, which make samples of a request and a scene. The result depends only on the arguments; values kept
+// between calls (Workspace, SurfaceCells) only save work.
 #pragma once
 
 #include <memory>
@@ -19,10 +19,10 @@ class Workspace {
   explicit Workspace(double (*now_s)() = nullptr);  // a clock for the statistics
   ~Workspace();
 
-  /// Asked between groups of columns; null = never. Not while a ping is under way.
+  /// Sets the interruption that is tried between groups of columns; null = none. Must not be called during a ping.
   void set_between(Interruption* between);
   const PingStatistics& statistics() const;  // statistics of the last ping
-  /// The next ping is of another scene.
+  /// To be called when the next ping has another scene.
   void change_scene();
 
  private:
@@ -31,8 +31,8 @@ class Workspace {
   std::unique_ptr<Buffers> buffers_;
 };
 
-/// `cells` must belong to the scene of `scene` and to the request's seed; bodies must have been placed. `labels`, when given, are
-/// filled; the ping is the same without.
+/// `cells` must belong to the scene of `scene` and to the request's seed; bodies must have been placed. If `labels` is not
+/// null, it is filled; the ping does not depend on it.
 Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
               Workspace& work, Parallel& pool, PingLabels* labels = nullptr);
 
