@@ -1,5 +1,5 @@
-// The hot loops of a ping, compiled once per instruction set from kernels.inl and picked at run time. They read and write plain
-// arrays. What they compute is explained where they are called (scatter, synthesize, form_beams, receive).
+// The hot loops of a ping, which are compiled from kernels.inl for each instruction set and chosen at run time. They read and
+// write plain arrays. Their callers explain what they compute (scatter, synthesize, form_beams, receive).
 #pragma once
 
 #include <cstddef>
@@ -13,27 +13,27 @@
 
 namespace sonar::simd {
 
-/// One tile as one ping sees it.
+/// One tile in one ping.
 struct TileSeen {
   const CellTile* tile = nullptr;
   float from_sonar_object[3];  // tile centre minus sonar, object axes [m]
   float from_sonar[3];         // the same, sonar axes [m]
   float turn[9];               // object to sonar axes, row-major
   float range_m;               // range of the tile's centre
-  float sample_shift;          // echoes appear so much later (Doppler)
+  float sample_shift;          // delay of its echoes by the Doppler effect
   float phase_turns;           // carrier phase of the tile centre, in [0, 1)
-  float amplitude;             // everything that is constant over the tile, times weight_unit
+  float amplitude;             // product of all factors that are constant over the tile, and of weight_unit
   const float* law;            // root of the scattering strength over sqrt(1 - cosine), law_steps + 2 values; null = cosine
   float area_amplitude;        // the same with the cell size in place of the speckle (expected power)
   float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
-  // Which tangents its cells count at, from 0: those of the fan's main part, or those of the side lobes, where cells are coarser.
+  // Tangents of its cells (absolute values): those of the fan's main part, or of the side lobes, where cells are coarser.
   float from_tangent, to_tangent;
   bool in_side_lobes;
-  float tolerance_share;  // share of the range, in addition to GroupView::depth_tolerance_m
-  float turned_away;  // the side of its facets that scatters nothing: cells with normal * direction * turned_away > 0; 0: none
-  std::int32_t mark;  // surface_mark of its object
-  bool moves;  // while the ping is under way: the depth map is looked up with the cells' place in the axes it was traced in
-  float seen_turn[9], seen_place[3];  // there = seen_turn * place + seen_place, row-major
+  float tolerance_share;              // fraction of the range, in addition to GroupView::depth_tolerance_m
+  float turned_away;                  // cells with normal * direction * turned_away > 0 scatter nothing; 0: all scatter
+  std::int32_t mark;                  // surface_mark of its object
+  bool moves;                         // during the ping: look-ups in the depth map use the place of cells in the axes of its rays
+  float seen_turn[9], seen_place[3];  // place in these axes = seen_turn * place + seen_place, row-major
 };
 
 /// Linear codes (eq. 37): floor(factor v^gamma + rounding), at most max_code.
@@ -48,8 +48,8 @@ struct GroupView {
   int first_column, last_column;            // half-open
   TangentAxis axis;                         // axis t of the depth map
   int bins;                                 // values per column of the depth map; the map has bins + 1
-  int map_first_column, fan_columns;        // first of the depth map; of the whole fan
-  int columns_beside;                       // how far from its own column a cell is looked up while the sonar moves
+  int map_first_column, fan_columns;        // first column of the depth map; number of columns of the fan
+  int columns_beside;                       // columns beside its own in which a cell is looked up if the sonar moves
   const float* inverse_depth;               // DepthMap::inverse_x
   const float* depth_slope;                 // DepthMap::per_column
   bool has_upper_marks;                     // in depth_slope
@@ -62,22 +62,22 @@ struct GroupView {
   bool expected_power;
 };
 
-/// Echoes waiting to be summed: structure of arrays, the caller owns the memory.
+/// Echoes to be summed, as a structure of arrays. The caller owns the memory.
 struct EchoArrays {
   float* sample;  // fractional sample index
   float* re;
   float* im;
   std::int32_t* column;    // absolute column
-  float* power = nullptr;  // what is expected of |re + i im|^2, for labels; null: not wanted, or re is that already
+  float* power = nullptr;  // expected value of |re + i im|^2, for labels; null: not wanted, or re has it
 };
 
-/// Rays that are scatterers: each draws a complex Gaussian of its own, a function of its counters (core/base/random.hpp).
+/// Rays that are scatterers. Each has its own complex Gaussian, which depends on its counters (core/base/random.hpp).
 struct HitDraw {
   const std::uint32_t* counter[3];
   RandomKey key;
 };
 struct HitsToScatter {
-  static constexpr int most = 256;  // at once
+  static constexpr int most = 256;  // largest number of hits per call
   HitDraw draw;
   const float* range_m;
   const float* weight;  // amplitude except for the absorption of the water
@@ -85,13 +85,13 @@ struct HitsToScatter {
   double turns_per_m;   // 2 f / c
 };
 
-/// The grid of a non-uniform transform (core/pipeline/pulses/spectral.hpp): `points` complex values, and room for a kernel more.
+/// The grid of a non-uniform transform (core/pipeline/pulses/spectral.hpp): `points` complex values, room for a kernel more.
 struct SpreadGrid {
   static constexpr int width = 8;
   int points = 0, terms = 0;
   const double* polynomial = nullptr;  // [terms][width], highest first
 };
-/// Echoes to be spread, turned on by e^{-i 2 pi turn_on turns} first.
+/// Echoes to be spread, multiplied by e^{-i 2 pi turn_on turns} first.
 struct SpreadEchoes {
   const double *turns, *re, *im;
   double turn_on;
@@ -103,7 +103,7 @@ struct PulseRows {
   int taps, steps;
 };
 
-/// Complex taps of a beam's neighbours, the same on either side, and how many neighbours there are.
+/// Complex taps of a beam's neighbours, which are the same on either side, and the number of neighbours.
 struct FocusTaps {
   const float* taps;
   int below, above;
@@ -113,38 +113,38 @@ struct Kernels {
   const char* name;
   /// Appends the visible cells of a tile; `out` has room for tile.count + 16 more. Returns how many were appended.
   int (*scatter_tile)(const TileSeen&, const GroupView&, EchoArrays out);
-  /// re + i im = weight * draw * exp(-decay_per_m range - i 2 pi turns_per_m range), of n <= HitsToScatter::most hits.
+  /// re + i im = weight * draw * exp(-decay_per_m range - i 2 pi turns_per_m range), for n <= HitsToScatter::most hits.
   void (*scatter_hits)(const HitsToScatter&, int n, float* re, float* im);
-  /// Adds the echoes' kernels to grid[2 (points + width)].
+  /// Adds the kernels of the echoes to grid[2 (points + width)].
   void (*spread)(const SpreadGrid&, const SpreadEchoes&, int count, double* grid);
   /// columns[(column - first_column) * stride + 2 * (sample + lead)] += pulse * (re, im). Reads and
-  /// writes the aligned vectors that a pulse reaches into: two of 8 samples or three of 4, at most 16 samples from that of a
-  /// multiple of 8 at or before its first. Reads up to a whole vector of echoes past `count`; their values are ignored.
+  /// writes all aligned vectors that overlap a pulse: two of 8 samples or three of 4, at most 16 samples from the multiple of 8
+  /// at or before its first sample. Reads up to one vector of echoes past `count` and ignores their values.
   void (*accumulate)(const EchoArrays&, int count, const PulseRows&, float* columns, std::ptrdiff_t stride, int first_column,
                      int lead);
   /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.
   void (*form_beam_panel)(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats);
-  /// Beams of `floats` (a multiple of 32) interleaved values of each column, by way of a transform across the columns; `work`:
+  /// Makes beams of `floats` (a multiple of 32) interleaved values of each column, by a transform across the columns; `work`:
   /// BeamTransformTables::work_floats(), 64-byte aligned.
   void (*transform_beams)(const BeamTransform&, const float* columns, std::ptrdiff_t stride, int floats, float* work, float* out,
                           std::ptrdiff_t out_stride);
-  /// to[floats] = the complex samples at `from`, of rows `stride` floats apart, times tap 0, plus those of the rows d below and d
-  /// above, together times tap d. Reads up to a whole vector past the end of a row.
+  /// to[floats] = tap 0 times the complex samples at `from`, plus tap d times the sum of the samples d rows before and d rows
+  /// after it. Rows are `stride` floats apart. Reads up to one vector past the end of a row.
   void (*refocus)(const float* from, std::ptrdiff_t stride, const FocusTaps&, int floats, float* to);
   /// power[row * width + beam] = |beams[beam * stride + 2 * row ...]|^2.
   void (*detect)(const float* beams, std::ptrdiff_t stride, int beam_count, int rows, float* power, int width);
-  /// codes[i], as float, of v^2 = power[i] * gain; n is a multiple of 16.
+  /// codes[i] is the code, as float, of v^2 = power[i] * gain; n is a multiple of 16.
   void (*quantise)(const float* power, float gain, const CodeScale&, float* codes, int n);
-  /// The same as bytes, max_code at most 255.
+  /// The same codes as bytes; max_code is at most 255.
   void (*quantise_bytes)(const float* power, float gain, const CodeScale&, std::uint8_t* codes, int n);
   /// Logarithmic codes, as float: per_octave log2(power[i] * gain) + at_full_scale, rounded, from 0 to max_code (LevelLine).
   void (*quantise_levels)(const float* power, float gain, float per_octave, float at_full_scale, float max_code, float* codes,
                           int n);
 };
 
-/// The kernels of a level; `automatic` takes the one that the environment variable SONARD_SIMD names, or the best this processor
-/// has. A level it lacks falls back to the next lower one, AVX to NEON on ARM. Throws std::runtime_error when SONARD_SIMD names
-/// no level.
+/// The kernels of a level; `automatic` is the level in the environment variable SONARD_SIMD, or the best of this processor. If
+/// the processor does not have the level, it is the next lower one (on ARM, NEON in place of AVX). Throws std::runtime_error if
+/// SONARD_SIMD is not the name of a level.
 const Kernels& kernels_for(SimdLevel level);
 
 extern const Kernels portable_kernels, avx2_kernels, avx512_kernels, neon_kernels;

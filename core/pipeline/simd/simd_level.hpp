@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// Instruction sets the hot loops are compiled for; chosen at run time.
+/// Instruction sets for which the hot loops are compiled. One is chosen at run time.
 enum class SimdLevel { automatic, portable, avx2, avx512, neon };
 inline constexpr std::array<std::string_view, 5> simd_level_names = {"auto", "portable", "avx2", "avx512", "neon"};
 
