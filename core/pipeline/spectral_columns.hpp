@@ -1,5 +1,5 @@
-// Column synthesis by way of the spectrum, for pulses without a real table and for the exact mode (docs/acoustics.md, section 4):
-// echoes -> sums over frequencies -> times P(nu) -> values at the sample centres. Stands where `synthesize` does otherwise.
+// Synthesis of columns via the spectrum, for pulses without a table of real values and for the exact mode (docs/acoustics.md,
+// section 4): echoes -> sums over frequencies -> times P(nu) -> values at the sample centres. It replaces `synthesize`.
 #pragma once
 
 #include "core/pipeline/pulses/pulse.hpp"
@@ -8,32 +8,32 @@
 
 namespace sonar {
 
-/// One worker's sums, a group of columns at a time.
+/// The sums of one worker for one group of columns.
 struct SpectralScratch {
   std::vector<spectral::Complex> grids;  // grids of the columns of a group
   std::vector<spectral::Complex> sums, folded;
 };
 
-/// The record is taken as one period of a longer one: padded by the pulse's reach on both sides, so that nothing that rings in
-/// from beyond either end comes out at the other. Its frequencies are the multiples of 1 / period inside the pulse's band, and
-/// since the samples are an even fraction of the period apart, folding the spectrum down to that many values makes the inverse
-/// transform land on the samples themselves. Errors: of FrequencySums at width 6, 1e-5.
+/// The period is the record plus the reach of the pulse on both sides, so that pulses beyond one end do not appear at the other
+/// end. The frequencies are the multiples of 1 / period in the pulse's band. The period is a whole number of samples; the
+/// spectrum is folded to as many values, so that the inverse transform gives the samples themselves. The error is that of
+/// FrequencySums at width 6, 1e-5.
 class SpectralColumns {
  public:
-  /// `taps`: samples that a pulse may reach, as PingPlan::taps. For any pulse; real ones are cheaper in time.
+  /// `taps`: number of samples of a pulse, as in PingPlan::taps. Any pulse is possible; real ones are faster by `synthesize`.
   SpectralColumns(const Pulse& pulse, double sample_time_s, int samples, int taps);
 
   int period_samples() const { return period_; }
   int frequencies() const { return sums_.count(); }
   const spectral::FrequencySums& sums() const { return sums_; }
-  /// Factor of every sum: the pulse's spectrum over the period.
+  /// Factor of every sum: the pulse's spectrum divided by the period.
   std::span<const spectral::Complex> response() const { return response_; }
-  std::size_t bytes() const;  // about
+  std::size_t bytes() const;  // approximate
 
   void begin(int columns, SpectralScratch& scratch) const;
-  /// Takes the echoes in; their columns must lie in [first_column, first_column + columns of begin).
+  /// Adds the echoes to the grids; their columns must lie in [first_column, first_column + columns of begin()).
   void add(Echoes& echoes, int first_column, SpectralScratch& scratch) const;
-  /// Adds what they make at the samples to columns [first, last) of `signals`.
+  /// Adds the resulting samples to columns [first, last) of `signals`.
   void finish(int first, int last, SpectralScratch& scratch, ColumnSignals& signals) const;
 
  private:

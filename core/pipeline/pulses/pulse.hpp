@@ -1,5 +1,5 @@
-// The pulse of one ping: what the receiver makes of one point echo, as a function of time and of frequency, whatever its shape
-// (docs/acoustics.md, section 4); and the tables that synthesis and noise are made with.
+// The pulse of one ping: the receiver's output for one point echo, as a function of time and of frequency, for all shapes
+// (docs/acoustics.md, section 4); and the tables of the pulse that synthesis and noise use.
 #pragma once
 
 #include <complex>
@@ -14,18 +14,18 @@ namespace sonar {
 class Pulse {
  public:
   Pulse() = default;
-  /// `width_s`: -3 dB width of |p|^2 in delay, 2 / c times the one in range. A measured pulse has its own.
+  /// `width_s`: -3 dB width of |p|^2 in delay, 2 / c times the one in range. A measured pulse ignores it.
   Pulse(const Waveform& waveform, double width_s);
 
   Waveform::Shape shape() const { return shape_; }
   bool is_real() const { return shape_ != Waveform::Shape::measured; }
-  /// p(t), p(0) = 1. A measured pulse between its samples: by 32 neighbours, exact to 1e-4 up to 0.8 of the band they carry.
+  /// p(t), p(0) = 1. A measured pulse is interpolated from 32 samples; the error is 1e-4 up to 0.8 of its band.
   std::complex<double> at(double time_s) const;
   /// P(nu) = integral of p(t) e^{-i 2 pi nu t} dt [s].
   std::vector<std::complex<double>> spectrum_s(const spectral::FrequencyGrid& grid) const;
 
   double width_s() const { return width_s_; }
-  /// Beyond this delay p is zero (Gaussian: below 2e-10).
+  /// p is zero beyond this delay (Gaussian: below 2e-10).
   double reach_s() const { return reach_s_; }
   /// Width of the band about zero outside of which P is negligible: below 1e-6 of its peak; for a tone, whose corners need an
   /// unlimited band, 4e-4; for a measured pulse 1e-4.
@@ -44,11 +44,11 @@ class Pulse {
   Waveform::Shape shape_ = Waveform::Shape::gaussian;
   double scale_hz_ = 1;  // Gaussian b, 1 / the tone's length, the sweep's bandwidth, the sample rate
   double width_s_ = 1, reach_s_ = 1, band_hz_ = 1, energy_width_s_ = 1, noise_bandwidth_hz_ = 1;
-  std::vector<std::complex<double>> samples_;  // measured: what is worth keeping; the peak is samples_[middle_]
+  std::vector<std::complex<double>> samples_;  // measured: the samples that matter; the peak is samples_[middle_]
   int middle_ = 0;
 };
 
-/// A sentence with the reason why such a pulse cannot be used on a grid of this sample time; empty when it can.
+/// The reason why such a pulse cannot be used with this sample time, as a sentence; empty = it can be used.
 std::string why_invalid(const Waveform& waveform, double sample_time_s);
 
 /// The sweep's bandwidth for a -3 dB width of the compressed pulse in delay.
@@ -56,11 +56,11 @@ double sweep_bandwidth_hz(double width_s);
 
 /// simd::PulseRows of the real part of p, or of |p|^2, on a grid of this sample time.
 std::vector<float> make_pulse_rows(const Pulse& pulse, double sample_time_s, int taps, int steps, bool squared);
-/// How many taps such rows need: a multiple of 8.
+/// Number of taps of such rows, a multiple of 8.
 int taps_of(const Pulse& pulse, double sample_time_s);
 
 /// Real taps h with sum_n h_n h_{n+k} = Re correlation(k sample times), h_n h_n summing to 1: white noise filtered by h has the
-/// pulse's correlation on this grid. (Of a complex pulse that is the mean of its spectrum and the mirrored one.)
+/// pulse's correlation on this grid. (For a complex pulse, this is the mean of its spectrum and the mirrored spectrum.)
 std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s);
 
 }  // namespace sonar

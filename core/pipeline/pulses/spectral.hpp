@@ -1,5 +1,5 @@
-// Sums over frequencies: what delayed echoes add up to at every frequency of a regular grid, by the definition and fast.
-// The path for pulses that have no formula, for the exact mode, and for the frequency sum of Choi 2025
+// Sums of delayed echoes at every frequency of a regular grid, by the definition and by a fast method. They are used for
+// pulses that have no formula, for the exact mode, and for the frequency sum of Choi 2025
 // (docs/acoustics.md, section 4).
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace sonar::spectral {
 
-/// e^{i 2 pi turns}, exact however many turns.
+/// e^{i 2 pi turns}, exact for any number of turns.
 inline Complex turned(double turns) { return std::polar(1.0, 2 * pi * fraction_of_turn(turns)); }
 
 /// Frequencies first_hz + m step_hz, m in [0, count).
@@ -22,7 +22,7 @@ struct FrequencyGrid {
   int count = 0;
 };
 
-/// One echo: when it arrives, and its complex amplitude.
+/// One echo: its time of arrival and its complex amplitude.
 struct Arrival {
   double delay_s = 0;
   Complex amplitude;
@@ -31,34 +31,34 @@ struct Arrival {
 /// F[m] = sum_i A_i e^{-i 2 pi f_m tau_i}, term by term in double: the test oracle. Needs no transform.
 std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid);
 
-/// The same by a non-uniform transform; relative L2 error about 8e-6 at width 6, see FrequencySums.
+/// The same sums by a non-uniform transform; relative L2 error about 8e-6 at width 6, see FrequencySums.
 std::vector<Complex> fast_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid, int width = 6);
 
 /// Non-uniform Fourier transform, type 1: every echo is spread over `width` points of a grid twice as fine as needed with the
-/// kernel exp(2.3 width (sqrt(1 - x^2) - 1)) (docs/acoustics.md, eq. 26), the grid is transformed, and the kernel's own transform
-/// divided out. Relative L2 errors by width: 4 8e-4, 5 7e-5, 6 8e-6, 7 9e-7, 8 1e-7, 10 1e-9. Made once; may then be used by many
-/// threads, each with a grid of its own.
+/// kernel exp(2.3 width (sqrt(1 - x^2) - 1)) (docs/acoustics.md, eq. 26), the grid is transformed, and the result is divided by
+/// the transform of the kernel. Relative L2 errors by width: 4 8e-4, 5 7e-5, 6 8e-6, 7 9e-7, 8 1e-7, 10 1e-9. It is made once;
+/// many threads may then use it, each with its own grid.
 class FrequencySums {
  public:
   explicit FrequencySums(int count, int width = 6);
   int count() const { return count_; }
-  /// Values of the grid that the caller keeps, zero before the first add.
+  /// Number of values in the grid, which the caller owns and sets to zero before the first add().
   int grid_points() const { return points_; }
-  /// Tables of add and transform, for an engine that does the same elsewhere.
+  /// Tables of add() and transform(), for an engine that computes the same on a device.
   struct Tables {
     int width, terms, padded;
     std::span<const double> polynomial;  // [terms][padded], highest power first: the kernel at each of `width` points
     std::span<const double> correction;  // per sum: 1 / the kernel's transform
   };
   Tables tables() const { return {width_, terms_, padded_, polynomial_, correction_}; }
-  /// `turns`: delay times the frequency step, any finite number; delays a whole turn apart look the same.
+  /// `turns`: delay times the frequency step, any finite number; delays that differ by whole turns give the same result.
   void add(double turns, Complex amplitude, Complex* grid) const;
-  /// The same of many at once, each turned on by e^{-i 2 pi turn_on turns}; only of width 8. The grid has room for `padding`
-  /// more.
+  /// Adds many echoes, each multiplied by e^{-i 2 pi turn_on turns} first; only with width 8. The grid needs room for `padding`
+  /// more values.
   void add(std::span<const double> turns, std::span<const double> re, std::span<const double> im, double turn_on,
            const simd::Kernels& kernels, Complex* grid) const;
   static constexpr int padding = simd::SpreadGrid::width;
-  /// sums[m] = sum_i A_i e^{-i 2 pi (m - count / 2) turns_i}, m in [0, count). Leaves the grid in disorder.
+  /// sums[m] = sum_i A_i e^{-i 2 pi (m - count / 2) turns_i}, m in [0, count). The grid has no defined values afterwards.
   void transform(Complex* grid, Complex* sums) const;
 
  private:
@@ -68,7 +68,7 @@ class FrequencySums {
   int count_, width_, points_, padded_;
   Fft forward_;
   int terms_ = 0;
-  std::vector<double> polynomial_;  // [terms][padded]: the kernel at each point, by where between points the echo lies
+  std::vector<double> polynomial_;  // [terms][padded]: the kernel at each point, for an echo at a place between two points
   std::vector<double> correction_;  // 1 / the kernel's transform, per sum
 };
 

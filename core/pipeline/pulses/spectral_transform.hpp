@@ -9,9 +9,9 @@ namespace sonar::spectral {
 
 using Complex = std::complex<double>;
 
-/// Whether this build has a transform. Without one an Fft must not be made.
+/// Whether this build has a transform. If not, no Fft may be made.
 extern const bool have_transform;
-/// The reason and what to do, as one sentence for the user.
+/// The error for users in such a build: the reason and what to do.
 inline constexpr const char* no_transform =
     "this build has no Fourier transform: measured and exact pulses need one; install libfftw3-dev and build with SONAR_FFTW=ON";
 

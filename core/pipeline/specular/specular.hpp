@@ -1,5 +1,5 @@
-// Specular echoes: smooth surfaces whose normal passes through the sonar send back a part of the wave as a whole (eq. 7 of the
-// model; docs/acoustics.md, section 3). Their echoes are points, added to the beams at their exact direction.
+// Specular echoes: a smooth surface with a normal through the sonar reflects a part of the wave coherently (docs/acoustics.md,
+// section 3, eq. 7). Such echoes are points, which are added to the beams at their exact direction.
 #pragma once
 
 #include <memory>
@@ -15,26 +15,26 @@
 
 namespace sonar {
 
-/// Pressure reflected coherently at normal incidence: reflection times exp(-2 k^2 h^2), 0 for surfaces too rough to mirror
-/// (smooth_below_kh) and where less than a hundredth is left.
+/// Pressure reflected coherently at normal incidence: reflection times exp(-2 k^2 h^2), 0 for rough surfaces
+/// (smooth_below_kh) and if the result is less than a hundredth.
 double coherent_reflection(const Material& material, double wavelength_m);
 
-/// Values kept between pings: every mesh with smooth materials, prepared when it is first in view.
+/// Values kept between pings: all meshes with smooth materials, which are prepared when they first come into view.
 class SpecularEchoes {
  public:
-  /// Appends the specular echoes of the scene's surfaces, as far as rays find them in sight.
+  /// Appends the specular echoes of those surfaces that rays find visible.
   void find(const PingContext& context, std::vector<PointEcho>& echoes);
-  /// Forgets meshes that no scene has any more.
+  /// Drops meshes that no scene uses.
   void forget_unused();
 
  private:
   struct PreparedMesh {
     std::shared_ptr<const Mesh> mesh;
-    std::vector<std::uint16_t> materials;  // used by it
+    std::vector<std::uint16_t> materials;  // materials of the mesh
     Vec3d centre_m;
     double radius_m = 0;
-    /// As far as it mirrors, which depends on the frequency: one for every set of its materials that does, or a ping would depend
-    /// on those before it.
+    /// The part of the mesh that reflects. It depends on the frequency; there is one for every set of reflecting materials, so
+    /// that a ping does not depend on earlier pings.
     struct Surface {
       std::vector<bool> mirrors;  // by material
       std::unique_ptr<const SpecularMesh> mesh;
@@ -44,10 +44,10 @@ class SpecularEchoes {
   PreparedMesh& prepared(std::size_t object, const std::shared_ptr<const Mesh>& mesh);
   void candidates(const Object& object, PreparedMesh& mesh, const SpecularQuery& query);
 
-  std::vector<PreparedMesh> meshes_;  // in the order in which they were met
+  std::vector<PreparedMesh> meshes_;  // in the order of their first use
   std::vector<std::size_t> mesh_of_;  // object to place in meshes_
   std::vector<double> reflection_;    // per material, this ping
-  std::vector<bool> mirrors_;         // those of a mesh that do
+  std::vector<bool> mirrors_;         // materials of a mesh that reflect
   std::vector<SpecularPoint> points_;
 };
 
