@@ -1,5 +1,5 @@
-// The ping of a sonar that reports ranges (core/sonar/range_image.hpp): traces rays through the cell of each beam, sums the power
-// within a beam's pattern by range cell, and reports the strongest or the nearest cell that is detected.
+// The ping of a sonar that reports ranges (core/sonar/range_image.hpp): it traces rays through the cell of each beam, sums the
+// power within a beam's pattern for each range cell, and reports the strongest or the nearest detected cell.
 #pragma once
 
 #include "core/base/parallel.hpp"
@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-/// `wanted` is the request's; bodies must have been placed. The same bytes on any number of threads.
+/// `wanted` belongs to the request; bodies must have been placed. The bytes do not depend on the number of threads.
 /// Not simulated: motion while the sound travels, mirrors (specular echoes, multipath), texture, volume, other sonars.
 Ping make_range_image(const RayScene& scene, const PingRequest& request, const RangeImageSettings& wanted, Parallel& pool);
 

@@ -1,5 +1,5 @@
 // The hits of the rays of a range image (core/pipeline/range_image.hpp): one ray passes through the middle of each cell of the
-// beam grid and a few around it; in cells with objects thinner than a cell, many rays do.
+// beam grid and of a few cells around the grid; many rays pass through cells with objects thinner than a cell.
 #pragma once
 
 #include <cstddef>
@@ -16,21 +16,22 @@
 
 namespace sonar {
 
-/// An echo that a beam receives from one direction, spread evenly over range_m -+ half_m in the device's metres.
+/// An echo that a beam receives from one direction, with uniform power over range_m -+ half_m, in metres of the device.
 struct RangeReturn {
-  double range_m = 0, half_m = 0, power = 0;  // power [uPa^2] in a beam that looks there; 0 = nothing
+  double range_m = 0, half_m = 0, power = 0;  // power [uPa^2] in a beam in this direction; 0 = no echo
   ComplexNormal speckle{1, 0};
   std::uint32_t draw = 0;  // draw for the speckle of its range cells, see RangeReturns::speckle_in()
   std::uint32_t object = BeamTruth::nothing;
-  // Power by range cells `first` to `last`: of_first in the first, of_last in the last if it is a different one, of_each between.
+  // Power in the range cells `first` to `last`: of_first in the first, of_last in the last if it is another, of_each in the
+  // others.
   std::int32_t first = 0, last = 0;
   double of_first = 0, of_each = 0, of_last = 0;
-  // The patch of surface: cosine of the incidence, how far its ranges are from range_m, how many of the cell's rays met it.
+  // The patch of surface: cosine of the incidence, deviation of its ranges from range_m, number of the cell's rays that hit it.
   double cosine = 0, spread_m = 0;
   int rays = 0;
 
   void share_among_cells(double cell_m);
-  /// In a cell from `first` to `last`.
+  /// Power in a cell from `first` to `last`.
   double power_in(std::ptrdiff_t cell) const { return cell == first ? of_first : cell == last ? of_last : of_each; }
 };
 
@@ -38,7 +39,7 @@ struct PointReturn : RangeReturn {
   double azimuth_rad = 0, elevation_rad = 0;
 };
 
-// Half of the longest interval of ranges in the patch of one ray, at grazing incidence.
+// Half of the longest interval of ranges that the patch of one ray can have, at grazing incidence.
 constexpr double longest_return_half_m = 0.5;
 
 class RangeReturns {
@@ -46,7 +47,7 @@ class RangeReturns {
   /// `cell_m`: width of a range cell. Bodies must have been placed.
   RangeReturns(const RayScene& scene, const PingRequest& request, double cell_m);
 
-  /// The same on any number of threads.
+  /// Traces all rays. The result does not depend on the number of threads.
   void trace(Parallel& pool);
   /// Returns of a cell of the grid; none before trace().
   std::span<const RangeReturn> of(int column, int row) const {
@@ -57,11 +58,11 @@ class RangeReturns {
   }
   /// Returns of the point targets that are not hidden.
   std::vector<PointReturn> of_points() const;
-  /// Speckle of a return in one range cell, for returns whose speckle differs from cell to cell.
+  /// Speckle of a return in one range cell, if each cell has its own speckle.
   ComplexNormal speckle_in(const RangeReturn& r, std::ptrdiff_t cell) const {
     return draws_[(r.draw + static_cast<std::uint32_t>(cell) * 389u) % static_cast<std::uint32_t>(draws_.size())];
   }
-  double device_per_true() const { return device_per_true_; }  // ranges
+  double device_per_true() const { return device_per_true_; }  // factor from true ranges to ranges of the device
 
  private:
   struct Angle {
@@ -70,13 +71,13 @@ class RangeReturns {
   /// A row of the grid: the returns of its cells, side by side.
   struct Row {
     std::vector<RangeReturn> returns;
-    std::vector<std::size_t> begin;  // begin of each column, and the end
+    std::vector<std::size_t> begin;  // first return of each column, and the end
   };
   struct Cell {
     int column = 0, row = 0;
     bool operator==(const Cell&) const = default;
   };
-  /// So many rays across a cell and up, evenly spread over it.
+  /// Number of rays across a cell and up, which are uniform over the cell.
   struct Lattice {
     int across = 1, up = 1;
   };
@@ -105,7 +106,7 @@ class RangeReturns {
   const PingRequest& request_;
   RangeImageGrid grid_;
   double cell_m_;
-  double column_step_rad_ = 0, row_step_rad_ = 0;  // between the directions that beams look in, amid the picture
+  double column_step_rad_ = 0, row_step_rad_ = 0;  // between directions of beams, in the middle of the picture
   Rotation world_from_sonar_;
   Vec3 origin_;
   double device_per_true_ = 1, absorption_np_ = 0, source_ = 1;

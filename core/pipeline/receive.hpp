@@ -16,9 +16,9 @@ struct ReceiveScratch {
   std::vector<std::uint8_t> bytes;
 };
 
-/// Sizes the parts of the ping that receive fills.
+/// Sets the sizes of the parts of the ping that receive() fills.
 void shape_ping(const PingPlan& plan, const Switches& switches, Ping& ping);
-/// Rows of the window that `beams` holds; the window must begin and end on whole rows.
+/// Fills the rows in the window of `beams`, which must begin and end on whole rows.
 void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels& kernels, ReceiveScratch& scratch, Ping& ping);
 
 }  // namespace sonar

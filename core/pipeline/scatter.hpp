@@ -1,5 +1,5 @@
-// Stage two: the surface cells in view, as far as the rays saw them, become echoes, each with its place on the sample grid,
-// column, amplitude and carrier phase. Their speckle is the surface's own. Also the fixed fan and analytic point targets.
+// Stage two: makes an echo of each visible surface cell, with its place on the sample grid, column, amplitude and carrier phase.
+// The speckle is fixed to the surface. This file also has the scatterers of the fixed fan and the analytic point targets.
 #pragma once
 
 #include <complex>
@@ -28,30 +28,30 @@ std::vector<float> turned_away_of(const Scene& scene, std::span<const Skin> skin
                                   Vec3d sonar_m);
 
 /// Prepares the tiles in view, in parallel; the order is kept. The tiles point into the laws, which must outlive them.
-/// `sonar_from_object`: of the view, per object.
+/// `sonar_from_object`: rotations of the view, per object.
 void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles);
 
-/// View of columns [first, last); the map may hold more.
+/// View of columns [first, last); the map may have more columns.
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen, int first, int last);
 
 /// For each group of `group_columns` columns, the tiles that reach into it, in order.
 void sort_tiles(const std::vector<PreparedTile>& tiles, int group_columns, int groups,
                 std::vector<std::vector<std::uint32_t>>& by_group);
 
-/// Appends the echoes of tiles[wanted[from, ...)] until they or the room run out; returns the next place in `wanted`.
+/// Appends the echoes of tiles[wanted[from, ...)] until all are done or `echoes` is full; returns the next index into `wanted`.
 std::size_t scatter(const std::vector<PreparedTile>& tiles, std::span<const std::uint32_t> wanted, std::size_t from,
                     const simd::GroupView& group, const simd::Kernels& kernels, Echoes& echoes);
 
-/// One echo a hit (paper-style): sigma = mu cos r^2 dOmega, speckle keyed by (seed, object, column, ray). Appends.
+/// Appends one echo per hit (as in the paper): sigma = mu cos r^2 dOmega, speckle keyed by (seed, object, column, ray).
 void scatter_hits(const PingContext& context, std::span<const FanHit> hits, Seed seed, Echoes& echoes);
 
-/// The echo of a place in the axes of PingScalars::seen_from whose backscattering amplitude is `strength_m` [m]: pressure at 1 m
-/// per pressure there, sqrt of the cross-section, with a phase if it has one. nullopt if that place lies outside the fan or the
-/// record; the caller tests occlusion.
+/// The echo of a place in the axes of PingScalars::seen_from. `strength_m` [m] is its backscattering amplitude: echo pressure at
+/// 1 m per incident pressure, the square root of the cross-section, which may have a phase. nullopt if the place lies outside the
+/// fan or the record. The caller tests occlusion.
 std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> strength_m, const PingPlan& plan,
                                     const PingScalars& scalars);
-/// Point targets in the fan that no surface hides.
+/// The echoes of point targets in the fan that no surface hides.
 std::vector<PointEcho> scatter_points(const PingContext& context);
 
 }  // namespace sonar

@@ -14,7 +14,7 @@
 
 namespace sonar {
 
-/// The tables that one model needs with one set of settings, from ping to ping.
+/// The tables of one model with one set of settings.
 struct PreparedSettings {
   std::shared_ptr<const SonarModel> model;
   PingPlan plan;
@@ -26,13 +26,14 @@ struct PreparedSettings {
 
 class SettingsCache {
  public:
-  /// Some eight of the largest tables of an M1200d with 512 beams, or hundreds of small ones.
+  /// Enough for some eight of the largest tables (M1200d with 512 beams), or for hundreds of small ones.
   static constexpr std::size_t usual_bytes = std::size_t{64} << 20;
   explicit SettingsCache(std::size_t most_bytes = usual_bytes) : most_bytes_(most_bytes) {}
 
-  /// Makes what is missing, and forgets what was used least recently until all fit, except for these. Valid until the next call.
+  /// Returns the tables of a request, and makes them if needed. Drops the least recently used others until all fit. The result is
+  /// valid until the next call.
   PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Parallel& pool);
-  /// About, of all that are kept.
+  /// Approximate size of all tables.
   std::size_t bytes() const;
   std::size_t count() const { return prepared_.size(); }
 

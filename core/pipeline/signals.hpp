@@ -1,4 +1,4 @@
-// Values that the stages of a ping pass on: columns, depth map, echoes, signals by column and by beam.
+// Values that the stages of a ping pass to later stages: columns, depth map, echoes, signals by column and by beam.
 #pragma once
 
 #include <complex>
@@ -17,19 +17,19 @@ struct Columns {
   int count = 0;
   double first_sine = 0;        // centre of column 0
   double spacing = 0;           // in u
-  std::vector<float> transmit;  // amplitude of the transmitter per column: flat over the sector, soft beyond
+  std::vector<float> transmit;  // amplitude of the transmitter per column: 1 in the sector, falling to 0 beyond
   double sine(int column) const { return first_sine - column * spacing; }
 };
 
 /// Hits of the rays, column by column: 1 / x (x = forward coordinate in the sonar's frame) against the tangent z / x. For flat
-/// beams (conical off) the horizontal distance stands in for x.
+/// beams (conical off) x is the horizontal distance.
 struct DepthMap {
   int first_column = 0, columns = 0, bins = 0;
   bool has_upper_marks = false;
   std::vector<float> inverse_x;   // [columns][bins + 1], 0 = nothing was hit; its last bits are the surface_mark
-  std::vector<float> per_column;  // [columns][bins + 1]: by how much it changes from column to column along the facet hit
+  std::vector<float> per_column;  // [columns][bins + 1]: its change from column to column along the facet that was hit
 
-  /// Prepares columns [first, last), to be drawn.
+  /// Sets the size for columns [first, last).
   void shape(int first, int last, int bin_count) {
     first_column = first, columns = last - first, bins = bin_count;
     inverse_x.resize(static_cast<std::size_t>(columns) * static_cast<std::size_t>(bins + 1));
@@ -61,22 +61,22 @@ struct Echoes {
   std::vector<float> sample, re, im;
   std::vector<std::int32_t> column;
 
-  // For labels, kept on request: the expected power of each echo, and whose cells they are.
+  // For labels, if keeps_power is set: the expected power of each echo, and the tile of its cell.
   struct Run {
     std::uint32_t tile;
-    int end;  // behind the last echo of the tile
+    int end;  // index after the last echo of the tile
   };
   bool keeps_power = false;
   std::vector<float> power;
   std::vector<Run> runs;
 };
 
-/// An echo without a surface: beamformed to the beams at its exact direction, never snapped to a column.
+/// An echo without a surface. Beams receive it from its exact direction, not from that of a column.
 struct PointEcho {
   double sine = 0;  // y / r
   double sample = 0;
   std::complex<double> amplitude;  // [uPa]
-  std::uint32_t instance = 0;      // instance that sent it, in labels (core/pipeline/labels.hpp); 0 = none
+  std::uint32_t instance = 0;      // instance of its object in labels (core/pipeline/labels.hpp); 0 = none
 };
 
 /// A pulse on the sample grid: complex values of samples from first_sample on.
@@ -88,7 +88,7 @@ struct SampledPulse {
 /// Complex signals per column at the sample centres, interleaved; in expected power, re is a power.
 struct ColumnSignals {
   int columns = 0, samples = 0;
-  int lead = 0;               // samples of room before sample 0, for pulses that begin earlier
+  int lead = 0;               // number of samples before sample 0, for pulses that begin earlier
   std::ptrdiff_t stride = 0;  // floats from column to column
   AlignedFloats data;         // every column is aligned to a cache line, too
 
@@ -103,7 +103,7 @@ struct BeamSignals {
   std::ptrdiff_t stride = 0;  // floats from beam to beam
   std::vector<float> data;
 
-  /// Prepares samples [first, first + count), rows of whole vectors.
+  /// Sets the size for samples [first, first + count); rows consist of whole vectors.
   void shape(int beam_count, int first, int count);
   const float* beam(int j) const { return data.data() + j * stride; }
   float* beam(int j) { return data.data() + j * stride; }

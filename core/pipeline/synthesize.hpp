@@ -1,5 +1,5 @@
-// Stage three: pulses summed in time, per column, at the sample centres (docs/acoustics.md, section 4). The pulse is analytic, so
-// it is evaluated only where a row takes its sample; no frequency loop and no transform is needed.
+// Stage three: sums pulses in time for each column, at the sample centres (docs/acoustics.md, section 4). The pulse has a
+// formula, so that it is evaluated only at samples, without sums over frequencies or a transform.
 #pragma once
 
 #include "core/pipeline/noise.hpp"
@@ -11,8 +11,8 @@ namespace sonar {
 /// Zeroes columns [first, last).
 void clear_columns(ColumnSignals& signals, int first, int last);
 
-/// Empty columns [first, last): zero, or where the transmitter's pattern is 1 the noise already, which saves going over them
-/// twice.
+/// Sets columns [first, last) to zero, or to the noise where the transmitter's pattern is 1, which saves a second pass over these
+/// columns.
 void begin_columns(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals);
 /// Adds the pulses of the echoes, whose columns must lie in [first_column, ...) of `signals`.
 void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernels& kernels, ColumnSignals& signals);

@@ -1,5 +1,5 @@
-// Stage one: a sparse fan of rays from the aperture finds what is visible. The result is a depth map per column; scatterers
-// come from the surfaces (scatter.hpp), so rays decide shadows only.
+// Stage one: a sparse fan of rays from the aperture finds the visible surfaces. The result is a depth map per column. Scatterers
+// belong to the surfaces (scatter.hpp), so that rays decide shadows only.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ struct FanScratch {
 std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                       FanScratch& scratch, DepthMap& seen);
 
-/// The plan's fixed fan for every column of [first, last); appends to `hits`.
+/// Traces the plan's fixed fan for every column of [first, last), and appends to `hits`.
 void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                      std::vector<FanHit>& hits);
 

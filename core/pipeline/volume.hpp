@@ -1,4 +1,4 @@
-// Reverberation of the water itself: particles in it scatter a little everywhere, up to the first solid surface. Added to the
+// Reverberation of the water: its particles scatter a little everywhere, up to the first solid surface. It is added to the
 // column signals between synthesis and beamforming (docs/acoustics.md, section 3).
 #pragma once
 
@@ -14,14 +14,14 @@ namespace sonar {
 
 /// Buffers of Volume::add that are kept from ping to ping; one per worker.
 struct VolumeScratch {
-  std::vector<double> blocked;     // how much of the fan ends at each sample
+  std::vector<double> blocked;     // part of the fan that ends at each sample
   std::vector<float> rms, grains;  // by sample; grains are complex
 };
 
 /// Solid angle of a column per radian about the array.
 double volume_column_width(const PingPlan& plan, int column);
 
-/// One ping's volume reverberation. Silent in clear water, and when switched off.
+/// The volume reverberation of one ping. It has no effect in clear water, and if it is switched off.
 class Volume {
  public:
   Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars);
@@ -33,13 +33,13 @@ class Volume {
   };
 
   bool is_audible() const { return !open_power_.empty(); }
-  /// Adds to columns [first, last), before the transmitter's pattern is applied. `seen`: what the rays saw of these columns; null
-  /// = the fan is open as far as it reaches. Drawn anew for every (seed, sonar, ping); in expected power the mean is added, and
-  /// `noise` is not used.
+  /// Adds to columns [first, last), before the transmitter's pattern is applied. `seen`: the depth map of these columns; null
+  /// = no surface ends the fan. It differs for every (seed, sonar, ping); in expected power the mean is added, and `noise` is not
+  /// used.
   void add(const DepthMap* seen, const PingNoise& noise, int first, int last, VolumeScratch& scratch,
            ColumnSignals& signals) const;
 
-  // The data of add(), for engines that do the same on a device.
+  // The data of add(), for engines that compute the same on a device.
   const std::vector<Slice>& slices() const { return slices_; }
   double open_fan() const { return open_fan_; }
   const std::vector<double>& open_power_upa2() const { return open_power_; }
@@ -51,7 +51,7 @@ class Volume {
   const PingScalars& scalars_;
   std::vector<Slice> slices_;
   double open_fan_ = 0;             // sum of the weights
-  std::vector<double> open_power_;  // by sample, per weight and before the column's own factor [uPa^2]
+  std::vector<double> open_power_;  // by sample, per weight, without the factor of the column [uPa^2]
 };
 
 }  // namespace sonar
