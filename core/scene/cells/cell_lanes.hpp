@@ -1,6 +1,6 @@
-// The loops of cell building that run over many lattice points at once. Every lane does the same correctly rounded operations in
-// the same order whatever the instruction set, so the bytes do not depend on it. Points of a tile lie in the order of its cells:
-// 4 x 4 blocks one after the other, a block's rows one after the other.
+// Loops of the building of cells that process many lattice points at once. Every lane does the same correctly rounded operations
+// in the same order, so that the bytes do not depend on the instruction set. Points of a tile have the order of its cells:
+// 4 x 4 blocks one after the other, and the rows of a block one after the other.
 #pragma once
 
 #include <cstdint>
@@ -9,15 +9,15 @@
 
 namespace sonar::cell_lanes {
 
-constexpr int side = 16, points = side * side;  // sides and points of a tile
+constexpr int side = 16, points = side * side;  // points along a side of a tile, and in all
 constexpr int block = 16, blocks = points / block;
 
-/// Inputs of a tile's draws, beside the cells' indices along u and v.
+/// Inputs of a tile's random draws, in addition to the indices of the cells along u and v.
 struct DrawKey {
   std::uint32_t patch, level, lo, hi;
 };
 
-/// A tile's lattice points: places in the lattice plane [m], and the draws that their speckle comes from.
+/// A tile's lattice points: places in the lattice plane [m], and the draws from which speckle is computed.
 struct Points {
   alignas(64) double u[points], v[points];
   alignas(64) std::uint32_t speckle_a[points], speckle_b[points];
@@ -25,7 +25,7 @@ struct Points {
 /// first_i, first_j: lattice indices of the tile's first cell.
 void draw_points(const DrawKey& key, std::int32_t first_i, std::int32_t first_j, double cell_size_m, Points& to);
 
-/// A facet as the points of one cube meet it. A point is owned when it lies within the open box, on the inner side of the three
+/// A facet in tests against the points of one cube. It owns a point that lies within the open box, on the inner side of the three
 /// edges (du (v - pv) - dv (u - pu) at least `least`), and at a height within [low_w, end_w).
 struct FacetTest {
   struct Edge {
@@ -40,23 +40,23 @@ struct Owners {
   alignas(64) std::int64_t facet[points];  // -1: no owner
   alignas(64) double w[points];
 };
-/// Which points of a block the facet owns, as bits, and their heights.
+/// The points of a block that the facet owns, as bits, and their heights.
 struct BlockHeights {
   alignas(64) double w[block];
   alignas(64) std::int64_t owned[block];  // all bits or none
 };
-/// Gives the points of one block to a facet. Returns false, with `found` filled and no owner changed, where one of them is owned
-/// already: another surface at the same height, or another that folds back.
+/// Makes a facet the owner of its points in one block. If one of them has an owner already (another surface at the same height,
+/// or one that folds back), it returns false, fills `found` and changes no owner.
 bool own_block(const FacetTest& test, const Points& in, int which, std::int64_t facet, Owners& owners, BlockHeights& found);
 
-/// Circular complex Gaussians with E|z|^2 = 1 from pairs of draws (Box-Muller, as complex_normal), good to about 2e-7 of their
-/// magnitude, times a root; n must be a multiple of `block`. Returns the largest |re| or |im|.
+/// Circular complex Gaussians with E|z|^2 = 1 from pairs of draws (Box-Muller, as complex_normal), accurate to about 2e-7 of
+/// their magnitude, times a root; n must be a multiple of `block`. Returns the largest |re| or |im|.
 float speckle(const std::uint32_t* a, const std::uint32_t* b, const double* root, int n, float* re, float* im);
 
 struct Extent {
   double low, high;
 };
-/// Counts of (place - middle) / unit, rounded half away from zero and held within +-32767; n must be a multiple of `block`.
+/// Counts of (place - middle) / unit, rounded half away from zero and clamped to +-32767; n must be a multiple of `block`.
 /// Returns the least and largest place - middle.
 Extent pack_places(const double* place, int n, double middle, double unit, std::int16_t* counts);
 void pack_weights(const float* weight, int n, float unit, std::int16_t* counts);

@@ -1,5 +1,5 @@
-// The geometry under the surface cells: triangles seen along the dominant axis of their normals, the half-open test that gives
-// every lattice point exactly one owner, and the cubes that tiles live in.
+// The geometry of the surface cells: triangles projected along the dominant axis of their normals, the half-open test by which
+// every lattice point has exactly one owner, and the cubes of tiles.
 #pragma once
 
 #include <array>
@@ -51,8 +51,8 @@ inline Facet facet_of(const Mesh& mesh, std::uint32_t triangle, int axis) {
   return f;
 }
 
-/// Twice the signed area of (p, q, x), computed from the same operands in the same order whichever way the edge runs, so that
-/// two triangles that share an edge get exactly opposite values.
+/// Twice the signed area of (p, q, x), computed from the same operands in the same order for both directions of the edge, so
+/// that two triangles that share an edge get exactly opposite values.
 inline double edge(double pu, double pv, double qu, double qv, double xu, double xv) {
   const bool forward = pu < qu || (pu == qu && pv < qv);
   if (forward) return (qu - pu) * (xv - pv) - (qv - pv) * (xu - pu);
@@ -79,7 +79,7 @@ inline double height(const Facet& f, double xu, double xv) {
   return f.w[0] - (f.nu * (xu - f.u[0]) + f.nv * (xv - f.v[0])) / f.nw;
 }
 
-/// Bounds of a facet that all its tests against cubes use, computed once.
+/// Bounds of a facet, computed once for all its tests against cubes.
 struct FacetBounds {
   double low[3], high[3];  // along u, v, w
   double u[3], v[3], du[3], dv[3], edge_reach[3];
@@ -108,7 +108,7 @@ inline FacetBounds bounds_of(const Facet& f) {
   return b;
 }
 
-/// Whether a facet may own points inside the cube; may say yes too often, never no.
+/// Whether a facet may own points inside the cube. It may be true for facets that own none, but is never false for one that does.
 inline bool may_touch(const FacetBounds& f, double cu, double cv, double cw, double half) {
   const double slack = half * 1e-6 + 1e-9;
   const double h = half + slack;

@@ -1,5 +1,5 @@
-// A tile of surface cells, and how it is built from the triangles that touch its cube. Pure: the same arguments give the same
-// bytes.
+// A tile of surface cells, and the function that builds it from the triangles that touch its cube. The same arguments give the
+// same bytes.
 #pragma once
 
 #include <cstddef>
@@ -21,10 +21,10 @@ struct CellTile {
   int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
   Vec3d centre_m;                                     // object coordinates
   float half_edge_m = 0;                              // half an edge of the cube
-  Vec3 box_middle_m, box_half_m;                      // the box round its cells, from the centre, object axes
+  Vec3 box_middle_m, box_half_m;                      // the box around its cells, from the centre, object axes
   float position_unit_m = 0;
   float weight_unit = 0;           // xi * sqrt(cell area) [m] per count
-  std::uint64_t weights_hash = 0;  // of the first block's weights: tells tiles apart whose memory is reused
+  std::uint64_t weights_hash = 0;  // of the first block: differs between tiles that use the same memory in turn
   int count = 0;                   // padded to a multiple of CellTile::block
   int stride = 0;                  // int16 values per column
   std::unique_ptr<std::int16_t[]> data;
@@ -33,7 +33,7 @@ struct CellTile {
   static constexpr float normal_unit = 1.0f / 32767.0f;
   enum Column { x, y, z, normal_x, normal_y, normal_z, weight_re, weight_im, columns };
   const std::int16_t* column(Column c) const { return data.get() + static_cast<std::ptrdiff_t>(c) * stride; }
-  /// Place of a cell in the middle of the tile, from the tile's centre, which need not be on the surface. Object axes.
+  /// Place of a cell in the middle of the tile, relative to the tile's centre, which may be off the surface. Object axes.
   Vec3d middle_cell_m() const {
     const auto along = [this, unit = static_cast<double>(position_unit_m)](Column c) { return unit * column(c)[count / 2]; };
     return {along(x), along(y), along(z)};
@@ -41,7 +41,7 @@ struct CellTile {
   std::size_t bytes() const { return static_cast<std::size_t>(stride) * columns * sizeof(std::int16_t); }
 };
 
-/// Which lattice cube, of which patch: the triangles of one object that share material, dominant axis and side.
+/// Identifies a lattice cube and its patch: the triangles of one object that share material, dominant axis and side.
 struct TileAddress {
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
@@ -49,12 +49,12 @@ struct TileAddress {
   std::int32_t i = 0, j = 0, k = 0;  // cube index along u, v, w (cell_lattice.hpp)
 };
 
-/// Statistics of the cells' weights: complex Gaussian, or of one magnitude and random phase, by which few cells in a sample have
-/// the statistics of many.
+/// Statistics of the cells' weights: complex Gaussian, or with one magnitude and random phases, so that few cells in a sample
+/// have the statistics of many.
 enum class CellWeights { gaussian, of_one_magnitude };
 
-/// `data` stays null when no cell lies in the cube. `texture`, `grain`: null = none. Cost: about 20 ns a cell, with
-/// either of them 60 more.
+/// `data` is null if no cell lies in the cube. `texture`, `grain`: null = none. Cost: about 20 ns per cell, and 60 more
+/// for each of the two.
 CellTile build_tile(const TileAddress& address, const Mesh& mesh, std::span<const std::uint32_t> triangles,
                     std::uint32_t texture_seed, Seed seed, const TextureField* texture = nullptr,
                     const TextureField* grain = nullptr, CellWeights weights = CellWeights::gaussian);

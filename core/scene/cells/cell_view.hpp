@@ -1,4 +1,4 @@
-// The view of a ping upon the surface cells: the bounds of its fan, and the size of the cells by range.
+// The view of a ping on the surface cells: the bounds of its fan, and the size of cells at each range.
 #pragma once
 
 #include <functional>
@@ -28,14 +28,14 @@ struct CellView {
   float max_sine = 1;             // |y / r| of the outermost column
   float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first
-  // Fans with side lobes: the main part, about the array axis, and where the rest begins. Cells of a whole cube there have one
-  // level, and beyond `side_coarser` levels above the coarsest of `levels` they are no coarser.
+  // Fans with side lobes: half angle of the main part about the array axis, and angle at which the side lobes begin. There all
+  // cells of a cube have one level, which is at most `side_coarser` levels coarser than the coarsest of `levels`.
   float main_elevation_rad = 2, side_from_rad = 2;
-  float side_area_per_range_m = 0;  // area of a cell on a surface that is grazed, over its range; a steep one has larger cells
+  float side_area_per_range_m = 0;  // cell area divided by range, at grazing incidence; cells are larger at steep incidence
   int side_coarser = 0;
-  bool exact_small = false;  // objects of few cells get finer ones: where no speckle hides which place each has
-  /// When set, stands for the bounds of the fan: between which distances a ball about a place in the sonar's axes is seen, which
-  /// mirrors can make farther than it is; nothing when it is not.
+  bool exact_small = false;  // objects with few cells get finer ones, because no speckle hides the places of cells
+  /// If set, it replaces the bounds of the fan. It returns the distances at which a ball around a place in the sonar's axes is
+  /// visible, which mirrors can make larger than the true one; nothing if it is not visible.
   std::function<std::optional<DistanceSpan>(Vec3d from_sonar_m, double radius_m)> seen_between;
 };
 

@@ -1,6 +1,6 @@
-// Scatterers as a property of the surfaces: a lattice of cells in object coordinates, made on demand from the mesh triangles and
+// Scatterers that belong to surfaces: a lattice of cells in object coordinates, made on demand from the triangles of meshes and
 // kept between pings (docs/architecture.md, "Surface cells"; Choi 2025 eq. 2 for the statistics of one scatterer).
-// `scatter` asks for the tiles in view of a ping; the cells' speckle does not depend on ray or ping.
+// `scatter` uses the tiles in view of a ping. The speckle of cells does not depend on rays or pings.
 #pragma once
 
 #include <array>
@@ -24,28 +24,28 @@
 
 namespace sonar {
 
-/// A tile in view and where the sonar is, seen from it.
+/// A tile in view, and its place relative to the sonar.
 struct TileInView {
   const CellTile* tile = nullptr;
   const CellLevel* level = nullptr;
   Vec3d from_sonar_object_m;  // tile centre minus sonar, object axes
   Vec3d from_sonar_m;         // the same in the sonar's axes
   int object = 0;
-  bool in_side_lobes = false;  // for its cells there, whose weights have one magnitude; those of the main part are another tile's
+  bool in_side_lobes = false;  // whether it is for side lobes, with weights of one magnitude; another tile is for the main part
 };
 
 /// Cells of a view. Valid until the next call of in_view() or in_views().
 struct CellsInView {
   std::vector<TileInView> tiles;
   std::vector<Rotation> sonar_from_object;  // rotations to the sonar's axes, per object
-  std::size_t built = 0;                    // tiles that were missing, also where another view of the call wanted them too
+  std::size_t built = 0;  // number of tiles built for it, including those that other views of the call need, too
 };
 
 class SurfacePatch;
 class TextureField;
 struct CellNode;
 
-/// Which random fields of the materials the cells carry.
+/// The random fields of materials that the cells use.
 struct CellFields {
   bool texture = true, grain = true;
 };
@@ -53,33 +53,33 @@ struct CellFields {
 class SurfaceCells {
  public:
   SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, CellFields fields = {});
-  /// Replaces the scene. Objects with the same mesh and materials at the same place of the list keep their cells, also when
-  /// scenes alternate.
+  /// Replaces the scene. Objects with the same mesh and materials at the same index keep their cells, also if scenes
+  /// alternate.
   void change(std::shared_ptr<const Scene> scene);
   ~SurfaceCells();
   SurfaceCells(const SurfaceCells&) = delete;
   SurfaceCells& operator=(const SurfaceCells&) = delete;
 
   Seed seed() const { return seed_; }
-  /// Whether these are the cells of that seed, with or without a field; where no material has it, both are the same.
+  /// Whether these are the cells for this seed and these fields. Fields that no material has do not matter.
   bool serves(Seed seed, CellFields fields) const {
     return seed == seed_ && (fields.texture == fields_.texture || !there_.texture) &&
            (fields.grain == fields_.grain || !there_.grain);
   }
-  /// Tiles that may lie in the view, missing ones built first, in an order that does not depend on the pool.
+  /// Tiles that may lie in the view, in an order that does not depend on the pool. Missing tiles are built first.
   /// Valid until the next call. `view` must outlive the result.
   const std::vector<TileInView>& in_view(const CellView& view, Parallel& pool);
-  /// The same for several views, one thread a view: what in_view() finds for each of them. `found` has room for each.
+  /// The same for several views, with one thread per view, and with the same results. `found` has an element for each view.
   void in_views(std::span<const CellView> views, Parallel& pool, std::span<CellsInView> found);
   /// Rotation from object to sonar axes of the last view of in_view(), per object.
   const Rotation& sonar_from_object(int object) const { return looked_.rotations[static_cast<std::size_t>(object)]; }
   std::span<const Rotation> sonar_from_objects() const { return looked_.rotations; }
   /// Skins of all objects' meshes; empty for objects that are not visible.
   std::span<const Skin> skins() const { return skins_; }
-  /// Views so far.
+  /// Number of views so far.
   std::uint64_t views() const { return now_; }
-  /// From now on nothing is forgotten of that view and later ones: others may be asked for while its tiles are in use. 0 = of
-  /// none.
+  /// From now on, tiles of this view and of later ones are not dropped, so that other views can be requested while they are in
+  /// use. 0 = no such view.
   void keep_since(std::uint64_t view) { kept_since_ = view; }
   /// Bytes of the tiles and of the tree that leads to them.
   std::size_t cached_bytes() const { return cached_bytes_; }
@@ -95,31 +95,31 @@ class SurfaceCells {
     bool of_side;  // the tile for side lobes
     auto operator<=>(const Missing&) const = default;
   };
-  struct Found {  // by those who look through some of the roots
+  struct Found {  // results for some of the roots
     std::vector<TileInView> in_view;
     std::vector<Missing> missing;
     std::size_t new_bytes = 0;
   };
-  struct Look {  // a view as the cubes are compared with it
+  struct Look {  // values of a view for comparisons with cubes
     const CellView* view = nullptr;
     std::uint64_t number = 0;
     struct Wedge {  // |angle about the array axis| below a half angle
       double cosine = 0, sine = 1;
-      /// How far a place is outside of it; where it is inside, minus how far it is to its edge.
+      /// Distance of a place from the wedge; inside it, minus the distance to its edge.
       double outside(Vec3d p) const { return std::abs(p.z) * cosine - p.x * sine; }
     };
     Wedge fan, main, before_side;
     std::vector<Pose> sonar_in_object;  // per object
     std::vector<Rotation> rotations;
   };
-  struct Known;  // cells of scenes before
+  struct Known;  // cells of earlier scenes
   void lay_out();
   bool take_known(std::size_t object);
   void plant(std::size_t object);
   void forget_known();
   void raise_roots(const CellView& view);
   void prepare(const CellView& view, std::uint64_t number, Look& look) const;
-  /// Through the roots [from, to).
+  /// Searches the roots [from, to).
   void look_through(const Look& look, std::size_t from, std::size_t to, Found& found);
   void visit(SurfacePatch& patch, CellNode& node, const Look& look, Found& found);
   void list(CellNode& node, bool of_side, const TileInView& seen, Found& found);
@@ -129,18 +129,18 @@ class SurfaceCells {
   std::shared_ptr<const Scene> scene_;
   Seed seed_{};
   std::vector<Skin> skins_;                                             // per object
-  CellFields fields_, there_{false, false};                             // wanted; that some material has
+  CellFields fields_, there_{false, false};                             // wanted fields; fields that a material has
   std::vector<std::unique_ptr<const TextureField>> textures_, grains_;  // per material, null = none
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
-  std::uint64_t now_ = 0, kept_since_ = 0;  // views; kept: what was seen in that one or later, 0 = nothing
+  std::uint64_t now_ = 0, kept_since_ = 0;  // number of views; tiles of this view and later ones are kept, 0 = none
   std::vector<std::unique_ptr<SurfacePatch>> patches_;
   std::unique_ptr<Known> known_;
-  std::vector<Root> roots_;  // roots of all patches, in order; then, level by level, those of raise_roots()
-  int raised_;               // down to this level all patches have roots
+  std::vector<Root> roots_;  // roots of all patches in order, then those of raise_roots(), level by level
+  int raised_;               // coarsest level at which all patches have roots
   std::vector<TileInView> in_view_;
   Look looked_;                          // used by in_view()
   std::vector<Look> looks_;              // used by in_views()
-  std::vector<Found> found_;             // for each stretch of roots, or for each view
+  std::vector<Found> found_;             // for each range of roots, or for each view
   std::array<std::mutex, 64> dividing_;  // locked while a cube that several views need is divided
 };
 

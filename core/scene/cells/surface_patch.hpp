@@ -16,7 +16,7 @@ namespace sonar {
 
 struct Cube {
   double u, v, w, half;
-  double radius() const { return half * 1.7320508075688772 * 1.0001; }  // of a ball around it
+  double radius() const { return half * 1.7320508075688772 * 1.0001; }  // of a ball around the cube
 };
 inline Cube cube_of(const TileAddress& a) {
   const double e = lattice::tile_edge_m(a.level);
@@ -24,20 +24,20 @@ inline Cube cube_of(const TileAddress& a) {
 }
 inline bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lattice::may_touch(f, c.u, c.v, c.w, c.half); }
 
-/// A cube of the lattice: the triangles that may own points in it, the tile of its level once wanted, the eight cubes inside.
+/// A cube of the lattice: triangles that may own points in it, the tile of its level if it was needed, the eight cubes in it.
 struct CellNode {
-  // Fields that every visit reads come first, side by side.
+  // The fields that every visit reads come first, so that they are close in memory.
   TileAddress address;
-  std::atomic<bool> divided = false;                      // children are there for those who read true
-  bool built = false, side_built = false, alone = false;  // alone: of SurfacePatch::raise, without cubes inside
+  std::atomic<bool> divided = false;                      // a thread that reads true may use `children`
+  bool built = false, side_built = false, alone = false;  // alone: made by SurfacePatch::raise(), without cubes in it
   std::atomic<std::uint64_t> last_visited = 0;
-  std::array<std::unique_ptr<CellNode>, 8> children;  // null where no triangle goes
+  std::array<std::unique_ptr<CellNode>, 8> children;  // null if it has no triangles
   std::vector<std::uint32_t> triangles;
   CellTile tile, side_tile;  // side_tile: for side lobes
 
   std::size_t tile_bytes() const { return tile.bytes() + side_tile.bytes(); }
   std::size_t own_bytes() const { return sizeof(CellNode) + triangles.capacity() * sizeof(std::uint32_t) + tile_bytes(); }
-  /// Returns the bytes that frees.
+  /// Drops the tiles. Returns the number of bytes freed.
   std::size_t forget_tiles() {
     const std::size_t bytes = tile_bytes();
     tile = CellTile{}, side_tile = CellTile{};
@@ -53,7 +53,7 @@ class SurfacePatch {
   bool negative_side = false;
   Texture texture, grain;  // texture and grain of the material, with its seed, for the tiles
   std::uint32_t texture_seed = 0;
-  int coarsest = 0;  // level that gives the object its fewest cells, where asked for
+  int coarsest = 0;  // level with the fewest cells of an object, used with exact_small
   std::shared_ptr<const Mesh> mesh;
   std::vector<std::unique_ptr<CellNode>> roots;
   std::size_t first_coarsest = 0;  // index of the first root with the coarsest level
@@ -62,23 +62,23 @@ class SurfacePatch {
   bool has_tiles_of(const Material& m) const {
     return texture == m.texture && grain == m.grain && texture_seed == m.texture_seed;
   }
-  /// Size of the mesh, and of the roots without their tiles.
+  /// Bytes of the mesh and of the roots without their tiles.
   std::size_t fixed_bytes() const;
 
   void plant(const std::vector<std::uint32_t>& triangles);
   static constexpr int finest_root = 4;  // level
-  /// Adds roots one level coarser than the coarsest, if those are finer than `level`. They carry tiles only: what is finer is
-  /// reached from the planted roots.
+  /// Adds roots one level coarser than the coarsest, if these are finer than `level`. They have only tiles; finer cubes belong to
+  /// the first roots.
   void raise(int level);
-  /// Returns the bytes that the new cubes take.
+  /// Makes the cubes in `node`. Returns the bytes that they take.
   std::size_t divide(CellNode& node) const;
-  /// Level that the side lobes' cells in a cube should have, seen from `sonar_m`, in the object's axes.
+  /// Level that cells for side lobes in a cube should have, for a sonar at `sonar_m` in the object's axes.
   int side_level(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
-  /// Whether a cube has the side lobes' cells of its place: its own level will do, and that of no cube around it.
+  /// Whether this cube has the cells for side lobes at its place: its level is fine enough, and that of no larger cube is.
   bool has_side_cells(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
-  /// Forgets the tiles and keeps the cubes; returns the bytes that frees.
+  /// Drops the tiles and keeps the cubes. Returns the number of bytes freed.
   std::size_t forget_tiles();
-  /// Forgets all cubes below `node` that were last visited before `then`; returns the bytes that frees.
+  /// Drops all cubes below `node` that were last visited before `then`. Returns the number of bytes freed.
   static std::size_t forget_below(CellNode& node, std::uint64_t then);
 };
 

@@ -14,14 +14,14 @@
 namespace sonar {
 
 /// One material's field: a smooth Gaussian field of unit variance (normals on a cubic lattice of the correlation length, blended
-/// by quadratic splines) whose values are carried over to the Gamma distribution, quantile by quantile.
+/// by quadratic splines) whose values are mapped to the Gamma distribution at equal quantiles.
 class TextureField {
  public:
-  /// texture.shape > 0; texture.correlation_m: where the correlation of the field has fallen to about 1 / e.
+  /// texture.shape must be > 0. texture.correlation_m is the distance at which the correlation has fallen to about 1 / e.
   TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed, Domain domain = Domain::texture);
 
   double lattice_m() const { return lattice_m_; }
-  /// Standard normal of a lattice point; a function of (seed, texture seed, object, point) alone.
+  /// Standard normal of a lattice point. It depends only on (seed, texture seed, object, point).
   float normal_at(int object, std::int32_t i, std::int32_t j, std::int32_t k) const;
   /// Root of the Gamma variable (mean 1) at the same quantile as a standard normal.
   float root_of(float normal) const;
@@ -32,7 +32,7 @@ class TextureField {
   std::vector<float> roots_;
 };
 
-/// A field near one place on one object; remembers the lattice points that neighbouring cells share. One thread at a time.
+/// A field near one place on one object. It stores the lattice points that neighbouring cells share. Only one thread may use it.
 class TexturePatch {
  public:
   TexturePatch(const TextureField& field, int object);
@@ -50,7 +50,7 @@ class TexturePatch {
   const TextureField& field_;
   int object_;
   bool stands_ = false;
-  std::int32_t near_i_ = 0, near_j_ = 0, near_k_ = 0;  // the first of the points about the last place
+  std::int32_t near_i_ = 0, near_j_ = 0, near_k_ = 0;  // the first of the points around the last place
   std::array<float, 27> near_{};                       // their normals, i fastest
   std::vector<Point> points_;
 };
