@@ -1,5 +1,5 @@
 // The shipped scenes that are part of the program, so that the demo and the benchmark need no files on disk.
-// Made from scenes/ when the program is configured; read by the scene loader, chosen by the daemon.
+// CMake makes them from scenes/; the scene loader reads them.
 #pragma once
 
 #include <algorithm>

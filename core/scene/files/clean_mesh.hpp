@@ -1,4 +1,4 @@
-// Checks and cleans the triangles of a mesh, whatever file they come from.
+// Checks and cleans the triangles of a mesh, for all file formats.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@
 
 namespace sonar {
 
-/// Takes the corners of a triangle and its material.
+/// A function that receives the corners of a triangle and its material.
 using TriangleSink = std::function<void(std::span<const Vec3d, 3>, std::uint16_t)>;
-/// Gives every triangle to the sink, each time it is called the same ones in the same order.
+/// A function that passes every triangle to the sink. Each call passes the same triangles in the same order.
 using TriangleSource = std::function<void(const TriangleSink&)>;
 
-/// Shared checks of all meshes: finite, within 1e7 m; drops triangles without area and merges equal vertices, recentres. Asks for
-/// the triangles twice, so that no copy of their corners is held. Errors lack the file name.
+/// Checks that vertices are finite and within 1e7 m, drops triangles without area, merges equal vertices, and moves the middle to
+/// the origin. It calls `source` twice, so that it needs no copy of the corners. Errors do not contain the file name.
 Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t most = max_mesh_triangles);
 /// As above, for a list of corners, three for each triangle.
 Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material,

@@ -1,4 +1,4 @@
-// The keys of a GeoTIFF (OGC 19-008r4, annex B), which say the coordinate system of its cells. They are read without libtiff.
+// The keys of a GeoTIFF (OGC 19-008r4, annex B), which state the coordinate system of its cells. They are read without libtiff.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class GeoKeys {
   enum : std::uint16_t { raster_type = 1025 };
   static constexpr std::uint16_t pixel_is_point = 2;
 
-  /// The values of the tags 34735, 34736 and 34737; of a file that is wrong, any.
+  /// The values of the tags 34735, 34736 and 34737, which may be invalid.
   GeoKeys(std::vector<std::uint16_t> directory, std::vector<double> numbers, std::string texts)
       : words_(std::move(directory)), numbers_(std::move(numbers)), texts_(std::move(texts)) {}
 
@@ -35,7 +35,7 @@ class GeoKeys {
   std::string texts_;
 };
 
-/// `height_unit`: the code of the unit that the file names elsewhere. Errors lack the file's name.
+/// `height_unit`: the code of the unit that the file names elsewhere. Errors do not contain the file name.
 Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::uint16_t> height_unit);
 
 /// Codes of units of length.

@@ -11,18 +11,18 @@
 
 namespace sonar {
 
-/// The number of a grid file, which may have zeros before it ("007"); nan is one too.
+/// Parses a number of a grid file, which may have leading zeros ("007") or be nan.
 std::optional<double> height_number(std::string_view word);
 bool is_nan_word(std::string_view word);
-/// A word that is no number, for an error text.
+/// A word that is not a number, made fit for an error text.
 std::string word_text(std::string_view word);
 /// The byte order mark that may precede the first word of a text in UTF-8.
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
-/// Which values of a file stand for no data: nan, the declared one, and fill values beyond every height.
+/// Recognises values that mean no data: nan, the declared value, and fill values beyond every height.
 class HeightValues {
  public:
-  /// `declared` as the file writes it, which may have fewer digits than its values.
+  /// `declared` is the value in the file's header, which may have fewer digits than in the grid.
   explicit HeightValues(std::optional<std::string_view> declared);
   /// NaN for no data; nothing for a number that is neither a height nor a usual fill value.
   std::optional<float> height_of(double value);
@@ -40,9 +40,9 @@ struct CoordinateSystem {
   double unit_m = 1;                    // unit of coordinates that are not degrees
   double height_unit_m = 1;
   bool web_mercator = false;  // its metres are longer than metres on the ground
-  /// On a datum that agrees with WGS 84 within 2 m.
+  /// The zone, if the datum agrees with WGS 84 within 2 m.
   std::optional<UtmZone> utm = {};
-  /// The name that the file gives it; empty for systems without a name, and for places on the ground alone.
+  /// The name that the file gives it; empty for systems without a name, and for local coordinates.
   std::string name = {};
   bool other_datum = false;  // degrees that may be some 100 m from those of WGS 84
 };
@@ -52,23 +52,23 @@ struct TransverseMercator {
   double latitude_deg = 0, central_meridian_deg = 0, scale = 1, false_easting_m = 0, false_northing_m = 0;
 };
 
-/// As a file has them.
+/// The values of a file, before finish_heights().
 struct RawHeights {
   std::vector<double> x = {}, y = {};  // rising
   std::vector<float> z = {};           // [y][x], NaN: no data
-  std::size_t fill_values = 0;         // undeclared ones beyond every height, which are NaN already
+  std::size_t fill_values = 0;         // number of undeclared fill values beyond every height, which have become NaN
   CoordinateSystem system = {};
 
-  /// The other row first: files that begin in the north have their rows turned so. `columns`: of `z`.
+  /// Reverses the order of the rows, for files that begin in the north. `columns`: those of `z`.
   void turn_rows(std::size_t columns);
 };
 
-/// Scale, holes, and the origin of degrees. Errors lack the file's name.
+/// Applies the scale, checks for holes, and sets the origin of degrees. Errors do not contain the file name.
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 
-/// Read from the .prj file beside the heights: WKT of version 1 or 2, or the lines that Arc/Info writes.
+/// Reads the .prj file beside the heights: WKT of version 1 or 2, or the lines that Arc/Info writes.
 CoordinateSystem system_by_prj(const std::filesystem::path& heights);
-/// From WKT; units that it does not name are metres.
+/// Parses WKT; units that it does not name are metres.
 CoordinateSystem system_of_wkt(std::string_view text);
 /// The zone of a projected system of the EPSG data set; empty for other projections, and for older datums.
 std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
@@ -76,7 +76,7 @@ std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
 bool agrees_with_wgs84(std::uint32_t code);
 /// True for GRS 80 and the ellipsoid of WGS 84, which all datums since about 1980 have.
 bool is_modern_ellipsoid(double semi_major_m, double inverse_flattening);
-/// The zone; its false easting may have the number of the zone before it, as 32500000.
+/// The zone; its false easting may begin with the number of the zone, as in 32500000.
 std::optional<UtmZone> utm_of_parameters(const TransverseMercator& by);
 
 }  // namespace sonar

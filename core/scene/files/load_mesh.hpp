@@ -6,9 +6,9 @@
 
 namespace sonar {
 
-/// Refused with one sentence: missing, unknown format, unreadable, empty, not finite, beyond 1e7 m, more than 20 million
+/// Errors: missing, unknown format, unreadable, empty, not finite, beyond 1e7 m, more than 20 million
 /// triangles, no triangle with an area, files elsewhere, too much memory or time. y up becomes z up by (x, y, z) -> (x, -z, y).
-/// All but binary STL is read by a program of its own (docs/decisions/0023-meshes-in-a-child.md).
+/// A separate program reads all formats but binary STL (docs/decisions/0023-meshes-in-a-child.md).
 Result<LoadedMesh> load_mesh(const MeshFile& request);
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-// Names of materials while a scene is read: the scene's own first, then the library every scene may use. Internal to the loader.
+// Names of materials while a scene is read: first those of the scene, then the library for all scenes. Internal to the loader.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,9 @@ extern const char* const material_library_yaml;  // scenes/materials.yaml
 
 class MaterialTable {
  public:
-  /// Starts with the library.
+  /// Has the materials of the library at first.
   explicit MaterialTable(Scene& scene);
-  /// Reads `materials: {name: {...}}`; later names win over the library's.
+  /// Reads `materials: {name: {...}}`, which replace materials of the same name in the library.
   void read(text::Map materials);
   /// Index into Scene::materials, where the material is put at its first use.
   std::optional<std::uint16_t> find(std::string_view name);

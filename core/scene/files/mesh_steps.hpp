@@ -8,15 +8,15 @@ namespace sonar {
 
 constexpr std::uintmax_t max_mesh_bytes = std::uintmax_t{2} << 30;  // limit for a file and those that it refers to, together
 
-/// ".obj", in small letters.
+/// The extension in small letters, such as ".obj".
 std::string mesh_extension(const std::filesystem::path& file);
 
 tl::unexpected<Error> bad_mesh(const MeshFile& request, const std::string& what);
 
-/// Refused when the memory left does not hold what the importer takes for files of so many bytes.
+/// Error if the importer would need more memory for files of so many bytes than is left.
 Result<void> check_import_memory(const MeshFile& request, std::uintmax_t bytes);
 
-/// `source` gives the corners in units and axes of the file, `triangles` of them at most.
+/// `source` passes at most `triangles` triangles, in units and axes of the file.
 Result<LoadedMesh> finish_mesh(const MeshFile& request, bool y_up_by_default, std::uint64_t triangles,
                                std::vector<std::string> names, const TriangleSource& source);
 

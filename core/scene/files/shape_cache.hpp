@@ -1,5 +1,5 @@
-// Meshes of shapes that were made before, for readers of many similar scenes. Equal shapes share one mesh, so that everything
-// that is computed from meshes can be kept too. Used by one thread at a time.
+// Keeps meshes of shapes for code that reads many similar scenes. Equal shapes share one mesh, so that values computed from
+// meshes can be kept, too. Only one thread may use it at a time.
 #pragma once
 
 #include <algorithm>
@@ -15,16 +15,17 @@ namespace sonar {
 
 struct Shape {
   std::shared_ptr<const Mesh> mesh;  // null after an error
-  Vec3d centre_m;                    // the mesh's own zero in the object's frame
-  Primitive primitive = {};          // the true surface, of shapes that have one
+  Vec3d centre_m;                    // origin of the mesh in the object's frame
+  Primitive primitive = {};          // the exact surface of shapes that have one
 };
 
 class ShapeCache {
  public:
-  // Shapes of the last `always_kept` calls of shape() are never removed; older ones are, while there are too many triangles.
+  // While there are too many triangles, old shapes are removed, except those of the last `always_kept` calls of shape().
   static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;
 
-  /// Returns the shape of that key; calls make() if the cache does not have it. A shape without a mesh is made again each time.
+  /// Returns the shape of this key, and calls make() if it is not in the cache. A shape without a mesh is made again at each
+  /// call.
   template <class Make>
   Shape shape(const std::string& key, const Make& make) {
     Kept& kept = shapes_[key];
@@ -38,7 +39,7 @@ class ShapeCache {
     }
     return shape;
   }
-  /// Mesh files that were read, by path and options. They stay as they were read.
+  /// Mesh files that were read, by path and options. They are not read again if the files change.
   std::map<std::string, LoadedMesh>& mesh_files() { return mesh_files_; }
 
  private:

@@ -24,20 +24,20 @@ struct ShapeReader {
   Scene& scene;
   MaterialTable& materials;
   std::filesystem::path folder;                   // paths in the scene are relative to it
-  std::span<const BuiltInFile> in_memory = {};    // mesh files of a built-in scene, which are then not looked for on disk
+  std::span<const BuiltInFile> in_memory = {};    // mesh files of a built-in scene, which are not read from disk
   ShapeCache* cache = nullptr;                    // shapes of earlier scenes
-  std::optional<Geodetic> world_origin = {};      // for grids that know their latitudes and longitudes
+  std::optional<Geodetic> world_origin = {};      // for grids with latitudes and longitudes
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
-  std::set<std::string> noted = {};               // meshes whose losses are in the scene's notes
-  std::map<std::string, Shape> files = {};        // the same with their materials: objects that agree share one
+  std::set<std::string> noted = {};               // meshes whose lost triangles are in the scene's notes
+  std::map<std::string, Shape> files = {};        // the same with materials; objects with equal keys share one
 
   /// Names that `type` may have here, without "point".
   static const std::vector<std::string_view>& types();
-  /// Reads the keys of that type, `material` among them.
+  /// Reads the keys of this type, including `material`.
   Shape read(std::string_view type, text::Map& keys);
 
  private:
-  /// One of scenes before, or a new one.
+  /// A shape of an earlier scene, or a new one.
   template <class Make>
   Shape known_or(const std::string& key, const Make& make) const {
     return cache != nullptr ? cache->shape(key, make) : make();

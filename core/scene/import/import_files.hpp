@@ -1,4 +1,4 @@
-// The files that the importer may open: the mesh, and what it names in its own folder or the scene's. Regular files only.
+// The files that the importer may open: the mesh, and files that it names in its folder or the scene's. Only regular files.
 #pragma once
 
 #include <assimp/DefaultIOSystem.h>
@@ -14,10 +14,11 @@ namespace sonar {
 
 class ImportFiles final : public Assimp::DefaultIOSystem {
  public:
-  /// `fault` is set when a file is not opened for a reason that its author must know; `opened` gets how many bytes are open.
+  /// `fault` is set if a file is rejected for a reason that its author must know. `opened` is called with the number of bytes
+  /// opened.
   ImportFiles(const MeshFile& request, std::optional<Error>& fault, std::function<void(std::uintmax_t)> opened);
 
-  /// The mesh, where its folder has no links or dots left.
+  /// The path of the mesh, with links and dots in its folder resolved.
   const std::string& mesh() const { return mesh_; }
 
   /// Number of triangles that an OBJ file lists; nullopt for other formats.

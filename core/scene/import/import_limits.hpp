@@ -1,4 +1,4 @@
-// Limits of the program that imports meshes. It ends at each of them, with a sentence as its answer.
+// Limits of the program that imports meshes. At each of them it ends with an error as its answer.
 #pragma once
 
 #include <cstdint>
@@ -7,16 +7,17 @@
 
 namespace sonar {
 
-/// Memory for an import: this, and so much for each byte of its files, but at most nine tenths of what is left.
+/// Memory of an import: a fixed part and a part for each byte of its files, but at most nine tenths of the memory left.
 constexpr std::uint64_t import_memory_bytes = std::uint64_t{512} << 20, import_memory_of_a_byte = 64;
-/// Processor time: this, and so much for each million bytes. By the clock it is twenty times that: the processor may be busy.
+/// Processor time: a fixed part and a part for each million bytes. The limit of elapsed time is twenty times that, for busy
+/// machines.
 constexpr std::uint64_t import_seconds = 30, import_seconds_of_a_million = 2;
 
-/// Once, first of all. The answer goes to `descriptor`.
+/// To be called once, before all else. Errors are written to `descriptor`.
 void begin_import_limits(const ImportRequest& request, int descriptor);
-/// The files hold so many bytes. Once at least, before they are read.
+/// Sets the limits for files of so many bytes. To be called at least once before they are read.
 void limit_import(std::uintmax_t bytes);
-/// The importer is done; our own code checks the memory that it needs.
+/// Lifts the limit of memory when the importer has finished, because our own code checks the memory that it needs.
 void release_import_memory();
 
 }  // namespace sonar

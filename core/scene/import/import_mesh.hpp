@@ -1,5 +1,5 @@
-// The importer of mesh files. Its library is not ours and trusts what it reads, so it runs in a program of its own
-// (docs/decisions/0023-meshes-in-a-child.md); fuzzers call it directly.
+// The importer of mesh files. Its library does not check all that it reads, so that it runs in a separate program
+// (docs/decisions/0023-meshes-in-a-child.md). Fuzzers call it directly.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 namespace sonar {
 
 struct ImportHooks {
-  std::function<void(std::uintmax_t bytes)> opened = [](std::uintmax_t) {};  // the files opened by now hold so many
-  std::function<void()> imported = [] {};                                    // what follows is code of ours
+  std::function<void(std::uintmax_t bytes)> opened = [](std::uintmax_t) {};  // bytes of all files opened so far
+  std::function<void()> imported = [] {};                                    // called before code of ours continues
 };
 
 /// Errors begin with the file's name.

@@ -1,5 +1,5 @@
-// The nodes of a mesh file and which of them contain which, to find out how large they would become before an importer reads
-// them.
+// The graph of the nodes of a mesh file, from which the size of the scene is computed before an importer reads
+// it.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@ namespace sonar {
 class NodeGraph {
  public:
   static constexpr std::uint32_t deepest = 200;
-  /// Beyond the nodes that the file lists: those that it repeats by naming a node several times.
+  /// Limit of repeated nodes: those that the file shows in addition to the nodes that it lists, by naming a node several times.
   static constexpr std::uint64_t most_repeated = 200'000;
 
   std::size_t add(std::string name) {
@@ -22,11 +22,11 @@ class NodeGraph {
   }
   void contains(std::size_t parent, std::size_t child) { nodes_[parent].children.push_back(child); }
 
-  /// The fault of the graph, as a sentence that lacks the file's name: nodes within themselves, too deep, or too many of them
-  /// below the roots together. nullopt if there is no fault. Linear in its edges.
+  /// The fault of the graph, as a sentence without the file's name: nodes within themselves, too deep, or too many of them
+  /// below the roots together. nullopt if there is no fault. Time: linear in the edges.
   std::optional<std::string> fault(const std::vector<std::size_t>& roots) const;
 
-  /// The nodes below the roots and these themselves, each as often as it is shown. Of a graph without a fault.
+  /// The roots and the nodes below them, each as often as it is shown. The graph must have no fault.
   std::vector<std::size_t> shown(std::vector<std::size_t> roots) const;
 
  private:
