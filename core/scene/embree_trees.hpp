@@ -1,4 +1,4 @@
-// Embree's handles, and trees that are changed from scene to scene. Included by embree_scene.cpp and nowhere else.
+// Embree's handles, and trees that change from scene to scene. Only embree_scene.cpp may include it.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,8 @@
 
 namespace sonar::embree {
 
-// SONARD_EMBREE_ISA holds Embree to a lesser instruction set than the processor's: the tests run on one machine what others do.
+// SONARD_EMBREE_ISA limits Embree to a lower instruction set than the processor's, so that tests can run the code of other
+// machines.
 inline std::string device_settings(int threads) {
   std::string settings = "threads=" + std::to_string(threads);
   const char* isa = std::getenv("SONARD_EMBREE_ISA");
@@ -29,7 +30,7 @@ inline std::string device_settings(int threads) {
   if (std::find(std::begin(known), std::end(known), isa) == std::end(known))
     throw std::runtime_error(std::string("SONARD_EMBREE_ISA: unknown instruction set \"") + isa +
                              "\"; use sse2, sse4.2, avx, avx2 or avx512");
-  // The best there is. Embree's name for it differs between versions, and a name that Embree does not know means SSE2.
+  // avx512 needs no limit. Embree's name for it differs between versions, and an unknown name would mean SSE2.
   return isa == std::string_view("avx512") ? settings : settings + ",max_isa=" + isa;
 }
 
@@ -53,8 +54,8 @@ struct Device {
     if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::runtime_error("not enough memory to build the scene for ray tracing");
     if (error != RTC_ERROR_NONE) throw std::runtime_error("the ray tracer failed with code " + std::to_string(error));
   }
-  // The widest packet of rays that Embree has code for on this processor. It traces wider ones as a stream, which is slower, and
-  // in Embree 3.13 also reads rays that `valid` leaves out.
+  // The widest packet of rays for which Embree has code on this processor. Embree traces wider packets as a stream, which is
+  // slower, and Embree 3.13 then also reads rays that `valid` excludes.
   int widest_packet() const {
     if (rtcGetDeviceProperty(handle, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) return 16;
     return rtcGetDeviceProperty(handle, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0 ? 8 : 4;
@@ -74,7 +75,7 @@ struct SceneHandle {
   }
 };
 
-/// The corners as rays meet them.
+/// The corners in the coordinates of rays.
 inline void place_vertices(const Mesh& mesh, const Pose& placed, float* to) {
   const Rotation turn = rotation_from(placed.orientation);
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
@@ -87,7 +88,8 @@ inline void place_vertices(const Mesh& mesh, const Pose& placed, float* to) {
   }
 }
 
-/// A structure that is changed from scene to scene: each geometry has a tree of its own, which it keeps while it stays as it is.
+/// A structure that changes from scene to scene. Each geometry has its own tree, which is kept while the geometry does not
+/// change.
 class ChangingGroup {
  public:
   struct Wanted {
@@ -107,7 +109,7 @@ class ChangingGroup {
     for (const Standing& s : standing_) sum += s.mesh->triangles.size();
     return sum;
   }
-  /// Triangles of `wanted` that are there already.
+  /// Number of triangles of `wanted` that exist already.
   std::size_t there(const std::vector<Wanted>& wanted) const {
     std::size_t triangles = 0;
     for (const Wanted& w : wanted)

@@ -1,5 +1,5 @@
-// The box that things fill along some axes, and mistakes that its size may reveal. Used to judge scenes and poses: `sonarctl
-// scene`, daemon/emulator/world/plausibility.
+// The box around points or meshes, and limits for sizes that suggest a mistake. `sonarctl scene` and
+// daemon/emulator/world/plausibility use it to check scenes and poses.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace sonar {
 
-/// Along the axes it is given in [m]; empty while low > high.
+/// A box in the axes of its points [m]; empty if low > high.
 struct Extent {
   Vec3d low_m{1e300, 1e300, 1e300}, high_m{-1e300, -1e300, -1e300};
   void add(Vec3d p) {
@@ -37,7 +37,7 @@ struct Extent {
   bool operator==(const Extent&) const = default;
 };
 
-/// Along the mesh's own axes.
+/// The box in the axes of the mesh.
 Extent extent_of(const Mesh& mesh);
 
 /// A mesh longer than this was probably not written in metres.

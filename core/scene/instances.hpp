@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-/// Objects, then point targets; `index` is the instance less 1.
+/// Objects come first, then point targets; `index` is the instance minus 1.
 inline std::size_t instance_count(const Scene& scene) { return scene.objects.size() + scene.point_targets.size(); }
 
 inline const std::string& instance_name(const Scene& scene, std::size_t index) {
@@ -16,7 +16,7 @@ inline const std::string& instance_name(const Scene& scene, std::size_t index) {
   return index < objects ? scene.objects[index].name : scene.point_targets.at(index - objects).name;
 }
 
-/// Its label, else that of its first material, else that material's name; of a point target without a label "point".
+/// The label of the object, else that of its first material, else this material's name; "point" for points without a label.
 inline std::string instance_class(const Scene& scene, std::size_t index) {
   if (index >= scene.objects.size()) {
     const std::string& label = scene.point_targets.at(index - scene.objects.size()).label;

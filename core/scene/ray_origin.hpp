@@ -1,5 +1,5 @@
-// The world position that the rays' float coordinates are relative to. It is separate from RayScene, so that code that changes a
-// scene can keep exactly the same floats for everything that does not change.
+// The world position to which float coordinates of rays are relative. It is separate from RayScene, so that code that changes a
+// scene can keep exactly the same floats for all objects that do not change.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace sonar {
 
-/// Scene::ray_origin where it is given, else the middle of what is visible and stands still, or of what moves when nothing does.
+/// Scene::ray_origin if it is given, else the middle of all visible static objects, or of the moving ones if there are none.
 inline Vec3d ray_origin_of(const Scene& scene) {
   if (scene.ray_origin) return *scene.ray_origin;
   struct Bounds {

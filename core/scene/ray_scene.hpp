@@ -1,7 +1,7 @@
 // The scene for rays: its triangles behind a bounding-volume hierarchy (Embree, in embree_scene.cpp and nowhere else).
-// Static geometry is built once at high quality relative to `origin()`; moving bodies are instances, re-placed per ping. The seam
-// for another tracer is the linker: a program that defines the members of RayScene itself is linked without Embree's, as the
-// tests do that trace analytic primitives under the thread sanitizer (tests/core/pipeline/analytic_rays.cpp).
+// Static geometry is built once at high quality relative to `origin()`; moving bodies are instances, re-placed per ping. A
+// program can replace the tracer when it is linked: if it defines the members of RayScene, Embree's are not linked. Tests that
+// trace analytic primitives under the thread sanitizer do so (tests/core/pipeline/analytic_rays.cpp).
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ struct alignas(64) RayPacket {
 
 class RayScene {
  public:
-  /// `build_threads` caps the threads Embree uses for building.
+  /// `build_threads` is the largest number of threads that Embree uses for building.
   RayScene(std::shared_ptr<const Scene> scene, int build_threads);
   ~RayScene();
   RayScene(const RayScene&) = delete;
@@ -38,13 +38,13 @@ class RayScene {
   /// alternate. The hits are those of a new RayScene.
   void change(std::shared_ptr<const Scene> scene);
   const Scene& scene() const;
-  Vec3d origin() const;  // world position that float coordinates are relative to
-  /// Moves the bodies; called by the thread that owns the scene, before tracing. Costs nothing when nothing moved.
+  Vec3d origin() const;  // world position to which float coordinates are relative
+  /// Moves the bodies; called by the thread that owns the scene, before tracing. It takes no time if no body moved.
   void place(std::span<const Pose> bodies_in_world);
-  /// First hits of the active lanes (bit i of `active`). Inactive lanes may hold anything; only their `object` changes, to miss.
-  /// An active ray that meets nothing keeps `far` and gets the normal 0. Thread-safe between calls of place().
+  /// First hits of the active lanes (bit i of `active`). Inactive lanes may have any values; of them only `object` changes, to
+  /// miss. An active ray without a hit keeps `far` and gets the normal 0. Thread-safe between calls of place().
   void trace(RayPacket& rays, std::uint32_t active, bool coherent) const;
-  /// How many rays are traced together on this processor: 16 with AVX-512, 8 with AVX, otherwise 4.
+  /// Number of rays that are traced together on this processor: 16 with AVX-512, 8 with AVX, otherwise 4.
   int rays_at_once() const;
   static std::string version();  // "Embree 3.13.5"
 
@@ -57,7 +57,7 @@ class RayScene {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether anything stands between two places of the world; what lies at the far one itself does not count.
+/// Whether a surface lies between two places of the world; a surface at the far place does not count.
 bool is_occluded(const RayScene& scene, Vec3d from, Vec3d place);
 
 }  // namespace sonar

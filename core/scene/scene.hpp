@@ -1,5 +1,5 @@
-// The world as the physics sees it: triangle meshes with materials, placed by poses in double precision, and point targets.
-// Made once by load_scene (or a test) and validated there; the pipeline only reads it.
+// The world for the physics: triangle meshes with materials, placed by poses in double precision, and point targets.
+// load_scene (or a test) makes and validates it; the pipeline only reads it.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace sonar {
 
-/// How strongly a surface scatters back per unit area, against the incidence angle a (docs/acoustics.md, section 3).
+/// Backscattering per unit area of a surface as a function of the incidence angle a (docs/acoustics.md, section 3).
 enum class ScatteringLaw {
   lambert,  // mu cos^2 a
   gsab,     // A exp(-a^2 / 2 B^2) + C cos^D a + E exp(-a^2 / 2 F^2), generalised seafloor angular backscatter
@@ -24,7 +24,7 @@ struct GsabLaw {
   bool operator==(const GsabLaw&) const = default;
 };
 
-/// Largest backscatter that conserves energy: Lambert's surface that sends back all it receives has mu = 1 / pi per steradian.
+/// Largest backscatter that conserves energy: a Lambert surface that scatters all it receives has mu = 1 / pi per steradian.
 inline constexpr double largest_lambert = 1 / pi;
 inline constexpr double largest_lambert_db = -4.97;  // 10 log10 of it, as scene files and messages give it
 
@@ -42,10 +42,10 @@ struct Material {
   GsabLaw gsab = {};              // when law is gsab
   float trend_db_per_decade = 0;  // change of the scattering strength with frequency, re trend_reference_hz
   float trend_reference_hz = 1e6f;
-  float roughness_m = 1e-3f;  // rms; decides how much mirrors and how much scatters
+  float roughness_m = 1e-3f;  // rms; decides which part is reflected coherently and which is scattered
   float reflection = 0.5f;    // pressure reflection coefficient at normal incidence, water-referenced, -1..1
   Texture texture = {};
-  Texture grain = {};  // the same for shells and stones: shorter than a beam is wide
+  Texture grain = {};  // the same for shells and stones: patches smaller than a beam
   std::uint32_t texture_seed = 0;
   std::string label = {};  // class of its surfaces in labels of samples; empty: its name
   bool operator==(const Material&) const = default;
@@ -59,26 +59,26 @@ struct Mesh {
   bool operator==(const Mesh&) const = default;
 };
 
-/// The true surface behind a mesh that was made from one: where specular echoes are exact. Same frame as the mesh.
+/// The exact surface of which a mesh was made, for exact specular echoes. Same frame as the mesh.
 struct Primitive {
   enum class Kind { none, sphere, cylinder, box, plane };
   Kind kind = Kind::none;
   double radius_m = 0;  // sphere, cylinder
   Vec3d size_m = {};    // box: edges; plane: x, y; cylinder: z = length along z
-  bool inside = false;  // seen from within, open at the top: a tank
+  bool inside = false;  // a tank: seen from inside, open at the top
   bool operator==(const Primitive&) const = default;
 };
 
-/// A mesh placed in the world. `id` is its place in Scene::objects and keys its speckle.
+/// A mesh placed in the world. `id` is its index in Scene::objects and a key of its speckle.
 struct Object {
   std::string name;
   std::shared_ptr<const Mesh> mesh;
-  Pose in_world;  // static objects: for ever; moving ones: initially
+  Pose in_world;  // pose of static objects; initial pose of moving ones
   int body = -1;  // index into PingRequest::bodies_in_world, -1 = static
   bool visible = true;
   Primitive primitive = {};
-  std::string label = {};  // its class in labels of samples; empty: an instance of no class, shown by its material's
-  bool operator==(const Object&) const = default;  // true for the same mesh, not for an equal one
+  std::string label = {};                          // its class in labels of samples; empty: the class of its material
+  bool operator==(const Object&) const = default;  // compares addresses of meshes, not their contents
 };
 
 /// An analytic echo without a surface.
@@ -87,14 +87,14 @@ struct PointTarget {
   Vec3d position_m;  // in the world, or in its body when body >= 0
   float target_strength_db = 0;
   int body = -1;
-  std::string label = {};  // as Object::label
+  std::string label = {};  // like Object::label
   bool operator==(const PointTarget&) const = default;
 };
 
 struct SeaSurface {
   bool present = false;
   float lambert_db = -30;
-  float roughness_m = 0.01f;       // rms height; still water (0) mirrors
+  float roughness_m = 0.01f;       // rms height; 0 = still water, which is a mirror
   float bubble_layer_m = 0;        // thickness of the layer of bubbles under it
   float bubble_loss_db_per_m = 0;  // extra absorption in that layer, one way
   bool operator==(const SeaSurface&) const = default;
@@ -107,11 +107,11 @@ struct WaterColumn {
   bool operator==(const WaterColumn&) const = default;
 };
 
-/// Another sonar within earshot; its pulses arrive whenever they do.
+/// Another sonar nearby, whose pulses arrive at times independent of ours.
 struct OtherSonar {
   std::string name;
   Vec3d position_m;     // in the world
-  float level_upa = 0;  // amplitude in a channel of ours that looks at it, 1 m away; falls as 1 / r and with absorption
+  float level_upa = 0;  // amplitude in a channel of ours that points at it, 1 m away; falls as 1 / r and with absorption
   float rate_hz = 7;
   float pulse_s = 1e-4f;
   bool operator==(const OtherSonar&) const = default;
@@ -127,15 +127,15 @@ struct Scene {
   SeaSurface sea_surface;               // its mesh, if present, is one of the objects
   WaterColumn water_column;
   std::vector<OtherSonar> other_sonars;
-  std::optional<Vec3d> ray_origin;  // for a scene that was changed while it ran: as before (core/scene/ray_origin.hpp)
-  std::vector<std::string> notes;   // what the loader did that its user should know, one sentence each
+  std::optional<Vec3d> ray_origin;  // the origin to be kept when a running scene is changed (core/scene/ray_origin.hpp)
+  std::vector<std::string> notes;   // sentences about decisions of the loader that the user should know
 
-  /// Where an object sits in its body; in the world for a static one.
+  /// Pose of an object in its body; in the world for a static one.
   Pose in_body(const Object& object) const {
     if (object.body < 0) return object.in_world;
     return compose(inverse(bodies_in_world.at(static_cast<std::size_t>(object.body))), object.in_world);
   }
-  /// Where an object, or a point, is while the bodies are there; bodies that are not given stay where the scene put them.
+  /// Pose of an object, or place of a point, with these poses of bodies. Bodies without one keep the pose of the scene file.
   Pose in_world(const Object& object, std::span<const Pose> bodies) const {
     return is_attached(object.body, bodies) ? compose(bodies[static_cast<std::size_t>(object.body)], in_body(object))
                                             : object.in_world;

@@ -1,4 +1,4 @@
-// Numbers the vertices of a mesh so that equal places are one vertex. Used where meshes are read and prepared.
+// Numbers the vertices of a mesh, so that equal places are one vertex. Code that reads and prepares meshes uses it.
 #pragma once
 
 #include <array>
@@ -10,11 +10,11 @@
 
 namespace sonar {
 
-/// A hash table of indices: 8 to 16 bytes a vertex. Places are equal by their bits, -0 counting as 0. Neighbouring triangles name
-/// the same vertices, so the last ones found are kept in a table that fits the processor's cache.
+/// A hash table of indices: 8 to 16 bytes per vertex. Places are compared by their bits, with -0 equal to 0. Neighbouring
+/// triangles have the same vertices, so that a small table, which fits in the processor's cache, has the last ones found.
 class VertexTable {
  public:
-  /// `vertices` receives the new ones; only this table may append to it. About `expected` of them are to come.
+  /// New vertices are appended to `vertices`; only this table may do so. `expected` is their approximate number.
   VertexTable(std::vector<Vec3>& vertices, std::size_t expected)
       : vertices_(vertices), slots_(std::bit_ceil(2 * expected + 1), none) {}
 
@@ -63,7 +63,7 @@ class VertexTable {
 
   static constexpr int recent_bits = 15;
   std::vector<Vec3>& vertices_;
-  std::vector<std::uint32_t> slots_;                                                                     // a power of two of them
+  std::vector<std::uint32_t> slots_;                                                                     // size is a power of two
   std::vector<std::uint32_t> recent_ = std::vector<std::uint32_t>(std::size_t{1} << recent_bits, none);  // by the hash
 };
 

@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-/// Segments round a circle of this radius [m] so that no chord is farther than a millimetre from it; 16..512.
+/// Number of segments of a circle with this radius [m] for which no chord is farther than a millimetre from it; 16..512.
 int segments_for(double radius_m);
 
 /// A rectangle in the x-y plane, normals up, in patches of at most `patch_m`.
@@ -17,11 +17,11 @@ Mesh make_box(Vec3d size_m, double patch_m = 1);
 Mesh make_sphere(double radius_m, int segments);
 enum class Caps { both, bottom, none };
 Mesh make_cylinder(double radius_m, double length_m, int segments, Caps caps = Caps::both);
-/// `length_m` is that of the straight part, between the two half spheres.
+/// `length_m` is the length of the straight part between the two half spheres.
 Mesh make_capsule(double radius_m, double length_m, int segments);
-/// Base down at -length/2. A top radius above zero makes it a frustum.
+/// The base is at z = -length/2. With a top radius above zero it is a frustum.
 Mesh make_cone(double base_radius_m, double top_radius_m, double length_m, int segments);
-/// Ring of `radius_m` (to the middle of the tube) in the x-y plane. Radius above tube radius.
+/// A ring of `radius_m` (to the middle of the tube) in the x-y plane. `radius_m` must exceed `tube_radius_m`.
 Mesh make_torus(double radius_m, double tube_radius_m, int segments);
 /// A boulder: an ellipsoid with the given semi-axes and bumps of `bumpiness` (0..0.5) of its size, drawn from `seed`.
 Mesh make_rock(Vec3d semi_axes_m, double bumpiness, std::uint32_t seed, int segments);

@@ -1,5 +1,5 @@
-// Ground as a height over a rectangular grid: read from files (PNG, ESRI ASCII, XYZ, GeoTIFF) or made from a seed.
-// All become meshes about their own middle, so that far coordinates stay in the double precision of a pose.
+// Ground as heights over a rectangular grid, read from files (PNG, ESRI ASCII, XYZ, GeoTIFF) or generated from a seed.
+// Meshes are relative to their middle, whose coordinates, which may be large, are in the double precision of a pose.
 #pragma once
 
 #include <array>
@@ -22,13 +22,13 @@ inline constexpr std::size_t max_mesh_triangles = 20'000'000;
 struct HeightGrid {
   std::vector<double> x, y;  // rising, at least two each; metres, or with an origin but no zone degrees of longitude and latitude
   std::vector<float> z_m;    // [y][x]
-  /// Set: the ground lies in the plane that touches the ellipsoid here. A height stays what it is, above a flat sea.
+  /// If set, x and y are converted to the plane that touches the ellipsoid here. Heights do not change: the sea is flat.
   std::optional<Geodetic> origin = {};
   std::optional<UtmZone> zone = {};     // only with an origin: x and y are metres of this zone
-  std::vector<std::string> notes = {};  // what the reader did that the scene's author should know
+  std::vector<std::string> notes = {};  // sentences about decisions of the reader that the scene's author should know
 };
 
-/// A mesh about its own middle, and where that middle lies in the coordinates it was described in.
+/// A mesh relative to its middle, and the place of this middle in the original coordinates.
 struct CentredMesh {
   Mesh mesh;
   Vec3d centre_m;
@@ -43,33 +43,33 @@ Result<CentredMesh> mesh_from_grid(const HeightGrid& grid);
 Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double size_x_m, double size_y_m, double low_m,
                                     double high_m);
 
-/// How a file of heights with coordinates of its own is read.
+/// Options for files of heights that have coordinates.
 struct HeightOptions {
   double z_scale = 1;                   // -1 for depths
-  std::optional<bool> geographic = {};  // coordinates in degrees; unset: as the file says or shows
-  std::optional<UtmZone> utm = {};      // zone of coordinates in metres; unset: as the file says, unless `geographic` is set
+  std::optional<bool> geographic = {};  // coordinates in degrees; unset: from the file
+  std::optional<UtmZone> utm = {};      // zone of coordinates in metres; unset: from the file, unless `geographic` is set
   std::optional<Geodetic> origin = {};  // origin of a grid in degrees or UTM
-  /// Used if `origin` is unset. Without both, degrees are about the middle of the grid, and UTM stays as it is.
+  /// Used if `origin` is unset. Without both, degrees are relative to the middle of the grid, and UTM coordinates stay.
   std::optional<Geodetic> world_origin = {};
-  bool centred = false;  // the caller puts the middle of the grid elsewhere, so its place does not matter
+  bool centred = false;  // the caller places the middle of the grid, so that its coordinates do not matter
 };
 /// ESRI ASCII grid (.asc).
 Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const HeightOptions& options);
-/// Lines "x y z" of an even grid (.xyz).
+/// Lines "x y z" of a uniform grid (.xyz).
 Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const HeightOptions& options);
-/// GeoTIFF (.tif): one band of numbers, not turned. Unavailable where sonard was built without libtiff.
+/// GeoTIFF (.tif): one band of numbers, not rotated. Error `unavailable` if sonard was built without libtiff.
 Result<HeightGrid> read_geo_tiff_heights(const std::filesystem::path& file, const HeightOptions& options);
 
 struct Ripples {
   double wavelength_m = 0;   // 0 = none
   double height_m = 0;       // crest to trough
-  double direction_rad = 0;  // the way the crests follow each other, from x towards y
-  double bend = 0.35;        // how far the crest lines wander, in wavelengths
+  double direction_rad = 0;  // direction perpendicular to the crests, from x towards y
+  double bend = 0.35;        // amplitude of the bends of crest lines, in wavelengths
 };
-/// Made ground. Waves and bumps that the grid cannot carry fade out where it is coarse.
+/// Generated ground. Waves and bumps that are too short for the grid fade out where it is coarse.
 struct SeabedShape {
   double size_x_m = 40, size_y_m = 40;
-  double fine_x_m = 40, fine_y_m = 40;  // inside, the grid has its spacing; outside it widens, up to 1 m
+  double fine_x_m = 40, fine_y_m = 40;  // area in which the grid has its spacing; outside, the spacing grows up to 1 m
   double spacing_x_m = 0.2, spacing_y_m = 0.2;
   std::uint32_t seed = 1;
   double relief_m = 0.1;    // amplitude of the longest octave
@@ -79,7 +79,7 @@ struct SeabedShape {
   Ripples ripples = {};
   std::array<double, 2> slope{0, 0};  // rise per metre along x and y
 };
-/// Triangles the shape will have; the caller bounds it before making anything.
+/// Number of triangles of the shape, which the caller checks before it makes the mesh.
 std::size_t seabed_triangles(const SeabedShape& shape);
 HeightGrid make_seabed(const SeabedShape& shape);
 

@@ -1,5 +1,5 @@
 // The flat faces of a scene, big enough to be mirrors for sound: sides of boxes and tanks, planes, the still sea surface.
-// Found once per scene from the triangles; the pipeline decides from frequency and material which of them mirror.
+// Found once per scene from the triangles; the pipeline decides by frequency and material which of them are mirrors.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct FlatFace {
 
 struct FlatFaces {
   std::vector<FlatFace> faces;  // largest first
-  /// [object][triangle]: index into `faces`, or -1. Empty for an object without any.
+  /// [object][triangle]: index into `faces`, or -1. Empty for an object without such faces.
   std::vector<std::vector<std::int32_t>> of_triangle;
 
   int face_of(std::uint32_t object, std::uint32_t triangle) const {
@@ -28,8 +28,8 @@ struct FlatFaces {
   }
 };
 
-/// Faces of at least 0.05 m^2 that are nowhere narrow and that do not curve on into their neighbours, as the facets of a round
-/// wall do. Materials that reflect less than `least_reflection` are passed over.
+/// Faces of at least 0.05 m^2 that have no narrow parts and are not facets of a round wall, whose neighbours meet at small
+/// angles. Materials that reflect less than `least_reflection` are ignored.
 FlatFaces find_flat_faces(const Scene& scene, double least_reflection);
 
 }  // namespace sonar

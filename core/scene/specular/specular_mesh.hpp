@@ -1,5 +1,5 @@
-// Mirror points of triangle meshes. The mesh is prepared once: facets that meet at small angles form patches; a patch in one
-// plane becomes a face with an outline, any other a curved surface with normals and curvatures at its vertices.
+// Finds mirror points of triangle meshes. The mesh is prepared once: facets that meet at small angles form patches; a patch in
+// one plane becomes a face with an outline, any other a curved surface with normals and curvatures at its vertices.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace sonar {
 
-/// Facets that meet at less than this are one smooth surface, as a modeller meant it.
+/// Facets that meet at a smaller angle than this approximate one smooth surface.
 inline constexpr double smooth_edge_rad = 0.42;
 
 class SpecularMesh {
@@ -27,7 +27,7 @@ class SpecularMesh {
   std::size_t curved_triangles() const { return triangles_.size(); }
 
  private:
-  /// Facets in one plane.
+  /// A face: facets in one plane.
   struct Face {
     Vec3d origin, normal;
     std::array<Vec3d, 2> along;
@@ -41,21 +41,21 @@ class SpecularMesh {
   };
   struct Triangle {
     std::array<std::uint32_t, 3> vertex{};
-    std::array<std::int32_t, 3> across{-1, -1, -1};  // the triangle beyond the edge opposite to that vertex; -1: the surface ends
+    std::array<std::int32_t, 3> across{-1, -1, -1};  // the triangle across the edge opposite to each vertex; -1: the surface ends
     std::uint16_t material = 0;
   };
-  /// Node of a tree over the curved triangles: a ball around the places, a cone around the normals.
+  /// Node of a tree over the curved triangles, with a ball around their places and a cone around their normals.
   struct Node {
     Vec3 centre, axis;
     float radius = 0, angle_rad = 0;
     std::uint32_t first = 0, count = 0;  // triangles of a leaf
     std::uint32_t second_child = 0;      // the first child follows its parent; 0 in a leaf
   };
-  /// Where a triangle's interpolated normal meets the sonar.
+  /// The place of a triangle whose interpolated normal passes through the sonar.
   struct Foot {
-    std::array<double, 3> weight{};  // weights of the vertices; negative beside the triangle
-    Vec3d normal;                    // the mesh's side
-    double height_m = 0;             // height of the sonar along it
+    std::array<double, 3> weight{};  // weights of the vertices; one is negative outside the triangle
+    Vec3d normal;                    // on the side of the mesh's normals
+    double height_m = 0;             // height of the sonar along the normal
   };
   class Maker;
 

@@ -15,11 +15,11 @@ class SpecularMesh::Maker {
  private:
   struct Facet {
     std::array<std::uint32_t, 3> vertex{};           // into place_
-    std::array<std::int32_t, 3> across{-1, -1, -1};  // opposite to that vertex
+    std::array<std::int32_t, 3> across{-1, -1, -1};  // facet across the edge opposite to each vertex
     Vec3d normal;
     double area = 0;
     std::uint16_t material = 0;
-    std::uint32_t patch = ~0u;  // its first facet
+    std::uint32_t patch = ~0u;  // index of the patch's first facet
   };
 
   void join_edges();
@@ -36,8 +36,8 @@ class SpecularMesh::Maker {
   SpecularMesh& out_;
   std::vector<Vec3d> place_;  // welded vertices
   std::vector<Facet> facets_;
-  std::vector<std::uint32_t> vertex_now_;   // by index in place_: the vertex that was made last
-  std::vector<std::int32_t> triangle_now_;  // by index in facets_: the curved triangle that was made
+  std::vector<std::uint32_t> vertex_now_;   // by index in place_: the last vertex made for this place
+  std::vector<std::int32_t> triangle_now_;  // by index in facets_: the curved triangle made of the facet
   std::vector<Vec3> middle_;                // middles of the curved triangles, times three
 };
 

@@ -1,6 +1,6 @@
-// Places on smooth surfaces that throw an echo straight back: where the surface's normal passes through the sonar, how the
-// surface bends there and how far it reaches. Found by specular_primitives and specular_mesh, turned into echoes by
-// core/pipeline/specular.
+// Places on smooth surfaces that reflect sound straight back, because the surface's normal passes through the sonar, with the
+// curvatures and the extent of the surface. specular_primitives and specular_mesh find them; core/pipeline/specular makes echoes
+// of them.
 #pragma once
 
 #include <array>
@@ -18,23 +18,23 @@ struct OutlineEdge {
   double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
-/// The foot of the perpendicular from the sonar, in object coordinates. It may lie beside the surface that it belongs to; its
-/// echo then comes from the surface's edge.
+/// The foot of the perpendicular from the sonar, in object coordinates. It may lie outside its surface; the echo
+/// then comes from the surface's edge.
 struct SpecularPoint {
   Vec3d foot_m;
   Vec3d normal;                       // unit, toward the sonar
   std::array<Vec3d, 2> along;         // principal directions, unit
-  std::array<double, 2> curvature{};  // 1/m, along them; positive where the surface bends away from the sonar
+  std::array<double, 2> curvature{};  // 1/m, along the principal directions; positive if the surface curves away from the sonar
   double range_m = 0;                 // sonar to foot
 
-  // How far the surface reaches from the foot along the principal directions (arc length) [m]; infinite where it just curves
+  // Extent of the surface from the foot along the principal directions (arc length) [m]; infinite if it only ends by curving
   // away.
   std::array<double, 2> from{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   std::array<double, 2> to{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   std::vector<OutlineEdge> outline;  // closed, relative to the foot; empty = the rectangle of `from` and `to`
   std::uint16_t material = 0;
 
-  /// The place so far along the principal directions, on arcs of the two curvatures.
+  /// The place at these arc lengths along the principal directions, on arcs of the two curvatures.
   Vec3d place(double x, double y) const {
     const auto arc = [](double s, double k) { return std::abs(k * s) > 1e-9 ? std::sin(k * s) / k : s; };
     const auto drop = [](double s, double k) { return std::abs(k * s) > 1e-4 ? (1 - std::cos(k * s)) / k : 0.5 * k * s * s; };
@@ -43,23 +43,23 @@ struct SpecularPoint {
   }
 };
 
-/// The sonar as the search for specular points needs it.
+/// Values of the sonar for the search for specular points.
 struct SpecularQuery {
   Vec3d sonar_m;  // in object coordinates
   double wavelength_m = 1e-3;
   double max_range_m = 0;
-  // Echoes from outside a cone about a direction are of no interest; by default there is no cone.
+  // Echoes from outside this cone are not needed; by default there is no cone.
   Vec3d ahead{1, 0, 0};
   double widest_rad = 4;
 };
 
-/// Surfaces whose edge is farther from the foot than this many Fresnel units sqrt(lambda rho) / 2 are left out: below -33 dB.
+/// Surfaces with an edge farther from the foot than so many Fresnel units sqrt(lambda rho) / 2 are left out: below -33 dB.
 inline constexpr double farthest_edge_in_units = 10;
-/// Nor those that lie at more than about 30 degrees from the perpendicular.
+/// Surfaces at more than about 30 degrees from the perpendicular are left out, too.
 inline constexpr double farthest_edge_in_ranges = 0.6;
-/// sqrt(lambda rho) / 2 along a direction: the length that the Fresnel integral counts in.
+/// sqrt(lambda rho) / 2 along a direction: the unit of length of the Fresnel integral.
 double fresnel_unit_m(double wavelength_m, double range_m, double curvature_per_m);
-/// 1 + r / R, its modulus held above 0.05: at a focus the sum of rays would be infinite.
+/// 1 + r / R, with a modulus of at least 0.05, because the sum of rays is infinite at a focus.
 double bending(double range_m, double curvature_per_m);
 
 }  // namespace sonar

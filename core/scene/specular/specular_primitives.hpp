@@ -1,5 +1,5 @@
-// Mirror points of spheres, cylinders, boxes and planes in closed form, from outside and, for tanks, from inside.
-// Feeds core/pipeline/specular with exact radii and extents where a mesh would only have facets.
+// Computes mirror points of spheres, cylinders, boxes and planes in closed form, from outside and, for tanks, from inside.
+// core/pipeline/specular thus has exact radii and extents, where a mesh has only facets.
 #pragma once
 
 #include <vector>
