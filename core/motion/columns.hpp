@@ -1,5 +1,5 @@
-// One line of a trajectory file as a pose: which column means what, by the file's header or by its format.
-// Used by trajectory_file.cpp, which cuts the file into lines and words.
+// Converts a line of a trajectory file to a pose. The header or the format of the file decides the meaning of columns.
+// trajectory_file.cpp uses it, after it has split the file into lines and words.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ namespace sonar::motion {
 
 using Words = std::vector<std::string_view>;
 
-/// Values as written, in the frame of the file.
+/// Values of a line, in the frame of the file.
 struct Row {
   std::int64_t stamp_ns = 0;
   Pose pose;
@@ -24,12 +24,12 @@ struct Row {
   std::string_view body;  // from the column "body"
 };
 
-/// A word of a file made printable and short enough for an error text.
+/// A word of a file, made printable and short for an error text.
 std::string in_quotes(std::string_view word);
 
 class Columns {
  public:
-  /// An error is the part of the message that follows "file:line: ".
+  /// Returns an error without its beginning "file:line: ", or nullopt.
   static std::optional<std::string> refuse_header(const Words& header, Columns& out);
   static Columns tum();
   /// 8 words: without velocity; 11: with velocity; 17: with velocity and the biases of an IMU, which are ignored.
@@ -38,15 +38,15 @@ class Columns {
   static Columns kitti();
 
   std::size_t count() const { return count_; }
-  /// Takes whole numbers that are beyond every time in seconds for milliseconds, microseconds or nanoseconds since 1970, unless
-  /// the header names the unit. `words`: the first line with values.
+  /// Unless the header names the unit: whole numbers too large for seconds are taken as milliseconds, microseconds or nanoseconds
+  /// since 1970. `words`: the first line with values.
   void guess_unit(const Words& words);
   /// Unit of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
   std::string_view unit() const;
   bool has_body() const { return has(body); }
   bool has_velocity() const { return has(vx); }
   bool has_angular_velocity() const { return has(wx); }
-  /// Reads a line, or returns what is wrong with it. `words` must have count() elements.
+  /// Reads a line, or returns its error. `words` must have count() elements.
   std::optional<std::string> refuse(const Words& words, Row& out) const;
 
  private:

@@ -1,5 +1,5 @@
-// Reads time stamps from text, exact to the nanosecond; a double would round UNIX times to a quarter of a microsecond. Used by
-// the readers of trajectory files.
+// Reads time stamps from text, exact to the nanosecond; a double would round UNIX times to a quarter of a microsecond. Readers of
+// trajectory files use it.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,12 @@
 
 namespace sonar::motion {
 
-/// Farthest from 0 that a stamp may be, [ns]: 146 years, so that differences cannot overflow.
+/// Largest absolute value of a stamp [ns]: 146 years, so that differences cannot overflow.
 inline constexpr std::int64_t farthest_stamp_ns = 4'600'000'000'000'000'000;
 
 /// "1403636579.763555584", "1.40363657976e+09", "-2": decimal text [s], rounded to the nearest nanosecond.
 std::optional<std::int64_t> nanoseconds_of_seconds(std::string_view text);
-/// Text that is a number of 10^`power` ns, such as 6 for milliseconds.
+/// Reads a number in units of 10^`power` ns; 6 means milliseconds.
 std::optional<std::int64_t> nanoseconds_of(std::string_view text, int power);
 /// "1403636579763555584" or, as some programs write whole numbers, "1.403636579763555584e+18".
 std::optional<std::int64_t> nanoseconds_of_nanoseconds(std::string_view text);

@@ -1,5 +1,5 @@
-// The way of one body through the world: poses at known times, and the pose and the motion at any time between them.
-// Read from files by trajectory_file.hpp, played against a clock by playback.hpp; pure, no clock, no file.
+// The trajectory of one body: poses at known times, and the pose and motion at any time between them.
+// trajectory_file.hpp reads it from files; playback.hpp plays it by a clock. It uses neither clocks nor files.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@ namespace sonar::motion {
 
 using Ns = std::chrono::nanoseconds;
 
-/// How a body moves; at rest by default.
+/// The motion of a body; the default is at rest.
 struct Motion {
   Vec3d velocity_mps;            // world axes
   Vec3d angular_velocity_radps;  // body axes
@@ -22,8 +22,8 @@ struct Moment {
   Motion moves;
 };
 
-/// Poses in the order of time, with velocities where the file had them. `times` count from the start of the file, which may
-/// lie before the first pose of this body, as its end may lie after the last one: bodies of one file share both.
+/// Poses in the order of time, with velocities if the file has them. `times` count from the start of the file. All bodies of a
+/// file have the same start and end, so that the first pose of a body may be later, and its last one earlier.
 struct Points {
   std::vector<Ns> times;                        // times, not negative, in increasing order
   std::vector<Pose> poses;                      // as many poses as times
@@ -35,18 +35,18 @@ struct Points {
 
 class Trajectory {
  public:
-  /// Needs at least one point. `duration` is that of the whole file, at least the last time.
+  /// Needs at least one point. `duration` is that of the whole file, not less than the last time.
   explicit Trajectory(Points points, Ns duration = Ns{0});
 
-  /// Between points the pose moves in a straight line (lerp) and turns evenly (slerp); outside of them it is held.
-  /// The motion is what the file says, interpolated, else that of the way between the two points; at a point that of what
-  /// follows, at the last one of what went before. Where the pose is held it is rest.
+  /// Between points the pose moves in a straight line (lerp) and turns at constant rate (slerp); outside of them it does not
+  /// change, and the motion is at rest. The motion is interpolated from the file's velocities, else it is that between the two
+  /// points. At a point it is that of the next interval, at the last point that of the interval before.
   Moment at(Ns time) const;
 
   Ns duration() const { return duration_; }
   std::size_t size() const { return points_.times.size(); }
   const Points& points() const { return points_; }
-  /// The same points to the last bit.
+  /// Whether all points are exactly equal.
   bool operator==(const Trajectory&) const = default;
 
  private:

@@ -21,29 +21,29 @@ std::string_view name_of(Frame frame);
 
 struct ReadOptions {
   Format format = Format::automatic;   // found from the first line with numbers or names
-  std::optional<Frame> frame = {};     // needed when the file does not name it; a file that names another is refused
-  std::optional<double> rate_hz = {};  // lines a second; of KITTI files, which have no times, and of no others
+  std::optional<Frame> frame = {};     // needed if the file does not state it; it is an error if the file states another
+  std::optional<double> rate_hz = {};  // lines per second; for KITTI files only, which have no times
   bool operator==(const ReadOptions&) const = default;
 };
 
 struct TrajectoryFile {
   struct Body {
-    std::string name;  // empty when the file names none
+    std::string name;  // empty if the file has no names
     std::shared_ptr<const Trajectory> trajectory;
   };
   std::vector<Body> bodies;  // bodies in the order of the file; at least one
   Format format = Format::csv;
   Frame frame = Frame::enu_flu;
-  Ns begins_at{0};                    // the earliest stamp: what the trajectories call 0
-  Ns duration{0};                     // time to the latest stamp
-  std::size_t replaced = 0;           // poses that a later line of the same stamp took the place of
+  Ns begins_at{0};                    // the earliest stamp, which is time 0 in the trajectories
+  Ns duration{0};                     // time from the earliest to the latest stamp
+  std::size_t replaced = 0;           // poses that were replaced by a later line with the same stamp
   std::string_view unit = "seconds";  // of the stamps in the file
 };
 
-/// A comment of the file says its frame: `# frame: NED_FRD`. Errors: name:line: what.
+/// A comment in the file can state the frame: `# frame: NED_FRD`. Errors: "name:line: reason".
 Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::string& name, const ReadOptions& options);
 Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options);
-/// Trajectory of the body of that name; with an empty name, of the only one. Errors name the bodies there are.
+/// Trajectory of the body with this name; for an empty name, of the only body. Errors list the names of bodies.
 Result<std::shared_ptr<const Trajectory>> trajectory_of(const TrajectoryFile& file, const std::string& name,
                                                         const std::string& body);
 

@@ -1,12 +1,12 @@
-// Rotations from one orientation to another, and interpolation between the two. Trajectories use them, and so does
-// daemon/emulator/world/pose_history.
+// Rotations from one orientation to another, and interpolation between the two. Trajectories and
+// daemon/emulator/world/pose_history use them.
 #pragma once
 
 #include "core/base/geometry.hpp"
 
 namespace sonar::motion {
 
-/// The rotation vector [rad] that turns a into b, in a's own axes; shortest way.
+/// The shortest rotation from a to b, as a vector [rad] in the axes of a.
 inline Vec3d rotation_between(Quatd a, Quatd b) {
   Quatd d = conjugate(a) * b;
   if (d.w < 0) d = {-d.w, -d.x, -d.y, -d.z};
@@ -16,7 +16,7 @@ inline Vec3d rotation_between(Quatd a, Quatd b) {
   return {factor * d.x, factor * d.y, factor * d.z};
 }
 
-/// Shortest way from a (u = 0) to b (u = 1) at constant turn rate.
+/// Orientation on the shortest rotation from a (u = 0) to b (u = 1), at constant rate.
 inline Quatd slerp(Quatd a, Quatd b, double u) { return normalized(a * turned_by(u * rotation_between(a, b))); }
 
 }  // namespace sonar::motion
