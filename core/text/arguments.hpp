@@ -21,16 +21,16 @@ CLI::Validator number(double low = std::numeric_limits<double>::lowest(), double
 /// For transform(): ENU becomes enu.
 CLI::Validator in_small_letters();
 
-/// As CLI::App::parse. Since 2.4 CLI11 passes over a value from an environment variable that fails its option's check; here it is
-/// an error with every CLI11.
+/// Like CLI::App::parse. CLI11 2.4 and later ignores a value of an environment variable that fails the option's check; here it is
+/// an error with every version.
 void parse(CLI::App& app, int argc, const char* const* argv);
 
-/// One line that describes the error of a command line, and ends with where_help_is(): `unknown command "veiw"; did you mean
+/// The error of a command line as one line that ends with where_help_is(): `unknown command "veiw"; did you mean
 /// "view"?` (an option likewise), else the parser's text. A value from an environment variable is reported under the variable's
 /// name. Empty for --help and --version without an unknown word. `words`: as typed, without the program.
 std::string complaint_about(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& words);
 
-/// " (sonarctl pose circle --help)": of the innermost command that the parser has recognised.
+/// " (sonarctl pose circle --help)": the help option of the innermost command that the parser has recognised.
 std::string where_help_is(const CLI::App& app);
 
 }  // namespace sonar::text

@@ -1,15 +1,15 @@
-// Names what a file is instead of what was expected, by its first bytes: archives, web pages and other results of a download
-// that went wrong. Used by readers of meshes, grids and trajectories, before a reader complains of single words.
+// Recognises files of unexpected kinds by their first bytes: archives, web pages and other results of failed downloads. Readers
+// of meshes, grids and trajectories use it, so that the error names the kind of file and not a single wrong word.
 #pragma once
 
 #include <string_view>
 
 namespace sonar::text {
 
-/// How many bytes of a file it looks at.
+/// Number of bytes that unusable_kind() needs.
 inline constexpr std::size_t kind_bytes = 64;
 
-/// "is compressed with gzip; unpack it": follows "FILE: ". Empty for all else.
+/// "is compressed with gzip; unpack it": follows "FILE: ". Empty for other files.
 std::string_view unusable_kind(std::string_view begin);
 
 }  // namespace sonar::text

@@ -1,11 +1,11 @@
-// Texts with numbers, formatted by printf. Used for output to users: banner, status, doctor, tables.
+// Formats texts with numbers by printf. Output to users has them: banner, status, doctor, tables.
 #pragma once
 
 #include <string>
 
 namespace sonar::text {
 
-/// Formats as std::printf does, with any length.
+/// Formats like std::printf; the text may have any length.
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
 
 /// Three significant digits: "750 kHz", "2.1 MHz".

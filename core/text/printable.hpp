@@ -1,5 +1,5 @@
-// Makes text from outside printable on a terminal: bytes that would move the cursor, change the terminal's state or are no UTF-8
-// are shown as \xNN.
+// Makes text from outside printable on a terminal: bytes that move the cursor, change the terminal's state or are not
+// UTF-8 become \xNN.
 #pragma once
 
 #include <string>

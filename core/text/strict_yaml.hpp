@@ -1,5 +1,5 @@
-// Strict YAML: cursors over a parsed file that know the position of every value and reject unknown keys.
-// Floor 0: configuration and scenes read through it; yaml-cpp is included by strict_yaml.cpp and nowhere else.
+// Strict YAML: cursors over a parsed file that have the position of every value and reject unknown keys.
+// Configuration files and scenes are read by it. Only strict_yaml.cpp may include yaml-cpp.
 //
 //   auto document = text::parse_yaml_file(path, {.error_kind = ErrorKind::config});
 //   if (!document) return tl::make_unexpected(document.error());
@@ -9,7 +9,7 @@
 //   for (text::Node sonar : root.required("sonars").items(1, 16)) read_sonar(sonar.map());
 //   if (auto error = document->finish()) return tl::make_unexpected(*error);
 //
-// Readers never stop at an error: wrong values read as the fallback (or zero, or empty), and finish() returns the first error,
+// Readers never stop at an error: a wrong value is read as the fallback (or zero, or empty), and finish() gives the first error,
 // an unknown key before a missing one. Subset: one document, no anchors, aliases, tags or merge keys; keys are plain words.
 #pragma once
 
@@ -34,7 +34,7 @@ struct YamlNode;
 struct YamlTree;
 class Map;
 
-/// Accepted numbers. Infinity only where `infinity` says so; NaN never.
+/// The accepted numbers. Infinity is accepted only if `infinity` is true; NaN is never accepted.
 struct Range {
   double min = -std::numeric_limits<double>::max();
   double max = std::numeric_limits<double>::max();
@@ -46,7 +46,7 @@ struct Range {
   static constexpr Range between(double lo, double hi) { return {.min = lo, .max = hi}; }
 };
 
-/// A cursor on one value, or on the absence of one. Cheap to copy; valid while its Document lives.
+/// A cursor on a value, or on a missing value. It is cheap to copy, and valid while its Document lives.
 class Node {
  public:
   bool present() const { return node_ != nullptr; }
@@ -56,7 +56,7 @@ class Node {
   bool is_sequence() const;
   bool is_map() const;
 
-  /// Any scalar as written; not empty unless allowed. `max_length` in bytes.
+  /// The text of a scalar; must not be empty unless that is allowed. `max_length` is in bytes.
   std::string text(std::size_t max_length = 4096, bool allow_empty = false) const;
   std::string text_or(std::string fallback, std::size_t max_length = 4096) const;
   /// Decimal only: no hexadecimal, no leading zeros (012), no digits grouped by _, not quoted.
@@ -69,7 +69,7 @@ class Node {
   bool boolean() const;
   bool boolean_or(bool fallback) const;
 
-  /// One of the names; the error names the nearest.
+  /// Index of one of the names; the error suggests the nearest name.
   std::size_t choice_index(std::vector<std::string_view> names) const;
   template <class T>
   T choice(std::initializer_list<std::pair<std::string_view, T>> choices) const {
@@ -120,10 +120,10 @@ class Node {
   std::string key_;
 };
 
-/// A cursor on a map. Every key asked for becomes a valid key; the others are refused by Document::finish().
+/// A cursor on a map. Keys that a reader requests are valid; Document::finish() rejects all others.
 class Map {
  public:
-  bool has(std::string_view key) const;  // asks for nothing
+  bool has(std::string_view key) const;  // does not make the key valid
   Node required(std::string_view key);
   Node optional(std::string_view key);
   /// All keys with their values, for maps whose keys are names chosen by the user.
@@ -136,10 +136,10 @@ class Map {
   friend class Document;
   Map(YamlTree* tree, YamlNode* node) : tree_(tree), node_(node) {}
   YamlTree* tree_ = nullptr;
-  YamlNode* node_ = nullptr;  // null = a map that is not there
+  YamlNode* node_ = nullptr;  // null = the map is missing
 };
 
-/// A parsed file. Owns what its cursors look at; can be moved.
+/// A parsed file. It owns the values of its cursors, and can be moved.
 class Document {
  public:
   explicit Document(std::unique_ptr<YamlTree> tree);
@@ -148,9 +148,9 @@ class Document {
   ~Document();
 
   Map root() const;
-  /// The first error of this reading: wrong values, then unknown keys and missing keys of every map that was opened.
+  /// The first error: wrong values first, then unknown keys and missing keys of every map that was opened.
   std::optional<Error> finish() const;
-  /// The first wrong value so far; does not look for unknown keys.
+  /// The first wrong value so far; unknown keys are not checked.
   std::optional<Error> error() const;
 
  private:

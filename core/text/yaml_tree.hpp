@@ -1,5 +1,5 @@
-// The parsed text behind Node and Map: our own small tree, so that yaml-cpp stays inside strict_yaml.cpp.
-// Internal to core/text; readers use strict_yaml.hpp.
+// The tree of a parsed text, which Node and Map refer to. With it, only strict_yaml.cpp needs yaml-cpp.
+// It is internal to core/text; readers use strict_yaml.hpp.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ struct YamlNode {
   std::string scalar;
   std::vector<YamlNode*> children;
 
-  // Filled while a reader reads this map.
+  // Set while a reader reads this map.
   bool opened = false;
   bool any_key = false;  // its keys are names chosen by the user
   std::vector<std::string> asked, missing;
