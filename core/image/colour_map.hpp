@@ -1,5 +1,5 @@
-// Colours for sample values: each map is a few anchor colours with straight lines between them.
-// Used by draw_fan; the names are what users type.
+// Colours for sample values. A map has a few anchor colours and is linear between them.
+// draw_fan uses them; users choose a map by its name.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ struct ColourMap {
 
 std::span<const ColourMap> colour_maps();
 std::string colour_map_names();  // "gray, copper, ..."
-/// The colour map of that name; the error lists the names there are.
+/// The colour map of this name; the error lists the valid names.
 Result<ColourMap> find_colour_map(std::string_view name);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// Turns a ping's rows and beams into the fan an operator knows: sonar at the bottom, range upwards, port on the left.
-// Uses the beams' own directions, and averages over each pixel's footprint, so that nothing flickers or is skipped.
+// Draws the rows and beams of a ping as a fan: the sonar is at the bottom, range increases upwards, port is on the left.
+// It uses the direction of each beam, and averages over the footprint of each pixel, so that no sample is skipped.
 #pragma once
 
 #include <string>
@@ -17,29 +17,29 @@ inline constexpr Rgb outside_colour{13, 17, 23}, ring_colour{150, 160, 170}, lab
 struct FanStyle {
   int width_px = 1000;  // 64..8000
   ColourMap colours;
-  bool rings = true;  // range rings with their metres
+  bool rings = true;  // range rings and their ranges in metres
 };
 
-/// Where the picture's metres lie among its pixels: the sonar is at (apex_x, apex_y), y grows downwards.
+/// Relation of metres to pixels in the picture: the sonar is at (apex_x, apex_y), y increases downwards.
 struct FanLayout {
   int width = 0, height = 0;
   double apex_x = 0, apex_y = 0, metres_per_pixel = 1;
 };
-/// Layout of the fan of an image that draw_fan does not refuse.
+/// Layout of the fan of an image that draw_fan accepts.
 FanLayout fan_layout(const PolarImage& image, const FanStyle& style);
 
-/// Refuses an image without rows or beams, or with a bearing table that does not run from port to starboard within a circle.
+/// Error for an image without rows or beams, or with bearings that do not fall from port to starboard within a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 
-/// Draws one ping after another as draw_fan does, in a third of the time: where the footprint of each pixel lies is kept until
-/// rows, beams or bearings change. 32 bytes a pixel.
+/// Draws one ping after another, like draw_fan, but in a third of the time: it keeps the footprint of each pixel until rows,
+/// beams or bearings change. It needs 32 bytes per pixel.
 class FanPainter {
  public:
   explicit FanPainter(FanStyle style) : style_(std::move(style)) {}
   Result<Raster> draw(const PolarImage& image);
 
  private:
-  /// Units are rows and beams; cell i is [i, i + 1).
+  /// The area of a pixel in units of rows and beams; row or beam i is [i, i + 1).
   struct Footprint {
     double row_low = 0, row_high = -1, beam_low = 0, beam_high = 0;
     bool is_outside() const { return row_high < row_low; }

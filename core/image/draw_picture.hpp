@@ -1,4 +1,4 @@
-// Draws the picture of a sonar for people (sonar_picture.hpp), of any kind.
+// Draws pictures of sonars for people (sonar_picture.hpp), for every kind of picture.
 #pragma once
 
 #include <utility>
@@ -8,14 +8,14 @@
 
 namespace sonar {
 
-/// Pixels that the picture is high when drawn so wide. Of one that PicturePainter does not refuse.
+/// Height of the picture in pixels, for the width in `style`. PicturePainter must accept the picture.
 int picture_height(const SonarPicture& picture, const FanStyle& style);
 
-/// Draws one picture after another. With rings also the head of a sweep and the axes of what is no fan.
+/// Draws one picture after another. With rings it also draws the head of a sweep, or axes in pictures that are no fans.
 class PicturePainter {
  public:
   explicit PicturePainter(FanStyle style) : style_(style), fan_(std::move(style)) {}
-  /// Refuses what draw_fan refuses.
+  /// The errors are those of draw_fan.
   Result<Raster> draw(const SonarPicture& picture);
 
  private:

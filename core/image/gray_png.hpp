@@ -1,4 +1,4 @@
-// Grey PNG files of integers of 8 or 16 bits: samples and labels as they are, without a colour map.
+// Grey PNG files of integers of 8 or 16 bits: samples and labels without a colour map.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace sonar {
 
-/// Little-endian values, `bits` / 8 bytes each, [height][width]; 8 or 16 bits. The same bytes for the same values.
+/// Little-endian values, `bits` / 8 bytes each, [height][width]; 8 or 16 bits. Equal values give equal bytes.
 Result<std::vector<std::byte>> encode_gray_png(std::span<const std::byte> values, int width, int height, int bits);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// A ping as a picture before it is drawn as a fan: samples by range row and beam, with the direction of each beam. Made from any
-// vendor's decoded ping; drawn by draw_fan, measured by image_statistics.
+// A ping as a picture before it is drawn as a fan: samples by range row and beam, with the direction of each beam. It is
+// made of a decoded ping of any vendor; draw_fan draws it, and image_statistics measures it.
 #pragma once
 
 #include <algorithm>
@@ -14,10 +14,10 @@ struct PolarImage {
   std::vector<double> azimuth_rad;  // [beams], positive to port, strictly falling
   std::vector<float> samples;       // [rows][beams], codes as sent
   float full_scale = 255;           // the code drawn brightest
-  double start_m = 0;               // nothing is known nearer than that
+  double start_m = 0;               // there are no samples nearer than this
 
   float at(std::size_t row, std::size_t beam) const { return samples[row * beams + beam]; }
-  /// The code that so many samples of a thousand do not exceed, at least 1.
+  /// The code that `per_mille` of a thousand samples do not exceed, at least 1.
   float brightest(std::size_t per_mille) const {
     std::vector<float> codes = samples;
     const auto place = codes.begin() + static_cast<std::ptrdiff_t>((codes.size() - 1) * per_mille / 1000);

@@ -1,5 +1,5 @@
-// A picture in memory: RGB pixels, row 0 at the top, and the drawing that a fan image needs on top of its samples. Filled by
-// draw_fan; write_png writes a whole file or none.
+// A picture in memory: RGB pixels, row 0 at the top, and functions that draw lines and texts on it. draw_fan
+// fills it; write_png writes a whole file or none.
 #pragma once
 
 #include <cstddef>
@@ -29,18 +29,18 @@ struct Raster {
 /// Mixes `colour` over a pixel; places outside the picture are ignored.
 void blend(Raster& raster, int x, int y, Rgb colour, float opacity);
 
-/// Digits, '.', '-', ' ' and 'm' in a 3 x 5 face, `scale` pixels a dot; other characters leave a gap.
+/// Digits, '.', '-', ' ' and 'm' in a 3 x 5 face, with dots of `scale` pixels; other characters are blank.
 void draw_text(Raster& raster, int left, int top, std::string_view text, Rgb colour, int scale);
 int text_width(std::string_view text, int scale);
 
 /// The bytes of a PNG file.
 Result<std::vector<std::byte>> encode_png(const Raster& raster);
 
-/// One part after the other into a file that is written beside its final name and renamed: what has the name is whole. io: the
-/// file and the system's reason; of a file that cannot be written nothing is left.
+/// Writes the parts to a temporary file and renames it, so that `file` is always complete. Error io: the file and the system's
+/// reason; the temporary file is then removed.
 Result<void> write_whole_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts);
 
-/// Into a whole file; makes the folder.
+/// Writes a PNG file by write_whole_file(). Makes its folder if needed.
 Result<void> write_png(const Raster& raster, const std::filesystem::path& file);
 
 }  // namespace sonar

@@ -1,6 +1,6 @@
-// The picture of a sonar for people: for most products a fan of the last ping, for others a picture that several pings add up to.
-// Made by protocol/<vendor>/host.cpp, drawn by PicturePainter (draw_picture.hpp) for `sonarctl view`, the page and other viewers
-// alike.
+// The picture of a sonar for people: for most products a fan of the last ping, for others a picture made of several pings.
+// protocol/<vendor>/host.cpp makes it; PicturePainter (draw_picture.hpp) draws it for `sonarctl view`, the live view and other
+// viewers.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace sonar {
 
 enum class PictureKind {
   fan,          // the last ping, by bearing and range
-  points,       // places by bearing and range, over a fan
+  points,       // places by bearing and range, drawn on a fan
   sweep,        // a fan or a full circle, scanned beam by beam by a head that turns
   range_image,  // a pixel for each azimuth and elevation: near is bright
   waterfall,    // one beam: a row for each ping, the newest on top, by range
@@ -28,19 +28,19 @@ struct SonarPicture {
   /// A range image has a row for each elevation, the highest first. A waterfall has a row for each ping and a column for each
   /// range: `row_spacing_m` apart from `start_m` on, without bearings.
   PolarImage image;
-  double head_rad = 0;                                 // sweep: where the head looks, positive to port
-  double elevation_rad = 0;                            // range image: of its highest row; its lowest looks as far down
+  double head_rad = 0;       // sweep: direction of the head, positive to port
+  double elevation_rad = 0;  // range image: elevation of the highest row; that of the lowest is its negative
   std::vector<std::pair<double, double>> points = {};  // points: azimuth, range
 
   bool is_polar() const { return kind == PictureKind::fan || kind == PictureKind::points || kind == PictureKind::sweep; }
-  /// Far end of the ranges shown.
+  /// Far end of the shown ranges [m].
   double range_m() const {
     return kind == PictureKind::waterfall ? image.start_m + static_cast<double>(image.beams) * image.row_spacing_m
                                           : image.range_m();
   }
 };
 
-/// Rows of a waterfall: what is older is not shown. One of fewer pings leaves the rest empty.
+/// Most rows of a waterfall, and least rows of its picture; rows without a ping are empty.
 inline constexpr std::size_t waterfall_rows = 300, waterfall_fewest_rows = 100;
 
 }  // namespace sonar

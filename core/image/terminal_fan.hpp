@@ -1,5 +1,5 @@
-// A sonar's picture as lines of text for a terminal: half blocks in colour, two picture points a character cell, or letters where
-// there are no colours. Built on PicturePainter; sonarctl view --term prints it.
+// A sonar's picture as lines of text for a terminal: coloured half blocks, with two picture points per character, or letters if
+// there are no colours. It uses PicturePainter; sonarctl view --term prints it.
 #pragma once
 
 #include <string>
@@ -18,17 +18,17 @@ enum class TerminalColours {
 };
 
 struct TerminalStyle {
-  int columns = 80, lines = 24;  // room for the picture; it keeps its shape and may take less
+  int columns = 80, lines = 24;  // room for the picture, which keeps its shape and may be smaller
   TerminalColours colours = TerminalColours::none;
   ColourMap map;       // unused without colours
   bool labels = true;  // metres at the starboard edge
 };
 
-/// Lines without their newline, each leaving the terminal's colours as they were. Refuses what draw_fan refuses, and room for
-/// less than 24 columns and 8 lines.
+/// Lines without newline characters; each restores the terminal's colours. Errors: those of draw_fan, and room for less than 24
+/// columns and 8 lines.
 Result<std::vector<std::string>> draw_terminal_picture(const SonarPicture& picture, const TerminalStyle& style);
 
-/// The nearest of xterm's colours 16 to 255.
+/// Index of the nearest of xterm's colours 16 to 255.
 int palette_index(Rgb colour);
 
 }  // namespace sonar
