@@ -12,19 +12,19 @@
 
 namespace sonar::paper {
 
-/// Rays a column where the request names none: the paper's model, and what its raster run was left with.
+/// Rays per column if the request does not state them: those of the paper's model, and those left in its raster run.
 inline constexpr int default_rays = 300, default_raster_rows = 11;
 
-/// Directions of the rays, one column a beam. Fan (paper): uniform in azimuth and elevation. Grid (raster): uniform on an image
-/// plane ahead of the sonar, like the pixels of a camera.
+/// Directions of the rays, with one column per beam. Fan (paper): uniform in azimuth and elevation. Grid (raster): uniform on an
+/// image plane ahead of the sonar, like the pixels of a camera.
 struct PaperFan {
   bool perspective = false;
-  std::vector<double> azimuth_rad;     // [columns] falling from port to starboard: what the beams are taken to look at
+  std::vector<double> azimuth_rad;     // [columns] falling from port to starboard: directions of the beams
   std::vector<double> column_width;    // [columns] of azimuth [rad]; perspective: of the tangent
   double first_row = 0, row_step = 0;  // elevation [rad] of row 0; perspective: its tangent over the horizontal x axis
   int rows = 0;
-  std::vector<Vec3d> ahead;         // [columns] per column, and
-  std::vector<double> level, rise;  // [rows] per row: what directions are put together of
+  std::vector<Vec3d> ahead;         // [columns]: part of the direction that depends on the column
+  std::vector<double> level, rise;  // [rows]: parts of the direction that depend on the row
 
   int columns() const { return static_cast<int>(azimuth_rad.size()); }
   /// Unit vector in the sonar's frame.
@@ -32,12 +32,12 @@ struct PaperFan {
   double elevation_rad(int column, int row) const {
     return perspective ? std::asin(direction(column, row).z) : first_row + row * row_step;
   }
-  /// Solid angle a ray stands for [sr]. Fan: dtheta dphi as printed in eq. (2), without cos(phi).
+  /// Solid angle of a ray [sr]. Fan: dtheta dphi as printed in eq. (2), without cos(phi).
   double solid_angle_sr(int column, int row) const;
 };
 
-/// `mode` is paper or raster; `rays` a column, 0 = the default. The fan spans twice the quoted vertical width (P900: 40 degrees
-/// for 20), as the paper's own model does.
+/// `mode` is paper or raster; `rays` per column, 0 = the default. The fan spans twice the quoted vertical width (P900: 40 degrees
+/// for 20), like the paper's model.
 PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays);
 
 /// The surface that a ray hit.
@@ -45,7 +45,7 @@ struct PaperHit {
   int column = 0, row = 0;
   double range_m = 0;
   double elevation_rad = 0;
-  double cosine = 0;  // cosine of the incidence, with the triangle's own normal
+  double cosine = 0;  // cosine of the incidence, with the normal of the triangle
   double solid_angle_sr = 0;
   std::uint32_t object = 0, triangle = 0;
 };

@@ -1,5 +1,5 @@
-// The table of contents of a ping in paper or raster mode: rays, eq. (2), the frequency sum, the beam correction, the inverse
-// transform, samples. Called by the engine of core/paper; a pure function of request and scene.
+// Computes a ping in paper or raster mode: rays, eq. (2), the frequency sum, the beam correction, the inverse transform, samples.
+// The engine of core/paper calls it. The result depends only on request and scene.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@
 
 namespace sonar::paper {
 
-/// Values that one model with one set of settings keeps from ping to ping.
+/// Values of one model with one set of settings, kept from ping to ping.
 struct Prepared {
   Prepared(const PingRequest& request, FrequencySum sum);
   bool serves(const PingRequest& request) const;
@@ -33,12 +33,12 @@ struct Prepared {
 /// D(phi) at an elevation.
 double elevation_pattern(const Prepared& prepared, double elevation_rad);
 
-/// Adds the echo of a scatterer of a known cross-section; false when it lies outside the record.
+/// Adds the echo of a scatterer with a known cross-section; false if it lies outside the record.
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& prepared,
               const PingScalars& scalars, PaperEchoes& echoes);
 
-/// Makes echoes of one column's hits by eq. (2) and eq. (1), without the sum. `mu` per material. Hits outside the record are
-/// dropped, as the reference code does.
+/// Makes echoes of one column's hits by eq. (2) and eq. (1), without the sum. `mu`: by material. Hits outside the record are
+/// dropped, as in the reference code.
 void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene, const Prepared& prepared,
                const PingScalars& scalars, const PingRequest& request, const simd::Kernels& kernels, PaperEchoes& echoes);
 

@@ -1,5 +1,5 @@
-// Computes beams from hits as Choi 2025 (Sensors 25(5):1516, "P25") prints it: eq. (1)-(4) per column, the reference code's beam
-// beamforming, an inverse transform. Second stage of core/paper; what differs from the canonical model: docs/acoustics.md,
+// Computes beams from hits as printed in Choi 2025 (Sensors 25(5):1516, "P25"): eq. (1)-(4) per column, the beamforming of the
+// reference code, an inverse transform. Second stage of core/paper; what differs from the canonical model: docs/acoustics.md,
 // section 8.
 #pragma once
 
@@ -25,7 +25,7 @@ inline double printed_cross_section_m2(double mu, double cosine, double range_m,
   return mu * cosine * cosine * range_m * range_m * solid_angle_sr;
 }
 
-/// A scatterer on the record of one column. The record is one period long: `turns` = delay / record length.
+/// A scatterer in the record of one column. The record is one period long: `turns` = delay / record length.
 struct PaperEcho {
   double turns = 0;
   spectral::Complex amplitude;  // [uPa] e^{-i 2 pi f_c tau} included; in expected power the power [uPa^2]
@@ -38,13 +38,13 @@ struct PaperEchoes {
   PaperEcho operator[](std::size_t i) const { return {turns[i], {re[i], im[i]}}; }
   void push_back(const PaperEcho& e);
 };
-/// Buffers of sum_frequencies, one set a worker.
+/// Buffers of sum_frequencies, one set per worker.
 struct SumScratch {
   std::vector<spectral::Complex> grid, sums;
 };
 
 /// The frequencies of eq. (4), f_m = f_min + m df with df = 1 / T and M = b T, and the spectrum of eq. (3) at them. S_0 is set so
-/// that a lone echo on a sample peaks at its own amplitude.
+/// that the peak of a single echo on a sample has the echo's amplitude.
 struct PaperSpectrum {
   int samples = 0;             // samples in the record T
   int count = 0;               // M
@@ -62,10 +62,10 @@ void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, c
 /// sum of all V^2. `squared` for expected power. [beams][columns]
 std::vector<float> make_correction(std::span<const double> azimuth_rad, double spacing_rad, bool squared);
 
-/// The same where the azimuths are even, so that V depends on how far apart two of them are: not squared; null where they are
-/// not.
+/// The same for uniform azimuths, where V depends only on the distance of two azimuths; not squared. Null if azimuths are not
+/// uniform.
 std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad);
-/// out[j][...] = sum_k V_jk in[k][...] by those tables; `values` floats a row, a multiple of 32.
+/// out[j][...] = sum_k V_jk in[k][...] by these tables; rows have `values` floats, a multiple of 32.
 void correct(const BeamTransformTables& even, std::span<const float> in, int values, const simd::Kernels& kernels, Parallel& pool,
              std::span<float> out);
 
@@ -79,7 +79,7 @@ void correct(std::span<const float> panels, int beams, int columns, std::span<co
 class InverseTransform {
  public:
   explicit InverseTransform(const PaperSpectrum& spectrum);
-  /// `spectrum`: [M]; `out`: [samples], interleaved complex. Thread-safe, `work` is the caller's.
+  /// `spectrum`: [M]; `out`: [samples], interleaved complex. Thread-safe, the caller owns `work`.
   void run(std::span<const std::complex<float>> spectrum, std::vector<spectral::Complex>& work, float* out) const;
 
  private:
@@ -90,7 +90,7 @@ class InverseTransform {
   std::vector<spectral::Complex> baseband_;   // [samples] e^{i 2 pi f_1 t_n}
 };
 
-/// |p|^2 of a lone echo on the record, tabulated: expected power is a sum of these.
+/// Table of |p|^2 of a single echo in the record, of which expected power is a sum.
 class PulsePower {
  public:
   PulsePower(const PaperSpectrum& spectrum, const InverseTransform& inverse);
