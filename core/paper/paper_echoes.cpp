@@ -10,7 +10,7 @@ namespace sonar::paper {
 
 namespace {
 
-/// Delay over the record's length; the record begins where the picture does.
+/// Delay divided by the record's length; the record begins at the near edge of the picture.
 double turns_of(double range_m, const Prepared& p, const PingScalars& s) {
   // The delay in periods of the record, because the sum over frequencies of P25 (its eq. 4) repeats after T.
   return (range_m * s.samples_per_m - p.plan.start_samples) / p.plan.samples;
@@ -26,12 +26,12 @@ double elevation_pattern(const Prepared& p, double elevation_rad) {
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& p, const PingScalars& s,
               PaperEchoes& echoes) {
   const double turns = turns_of(range_m, p, s);
-  // Outside of the record the sum would fold an echo back into it.
+  // The sum would fold an echo outside of the record back into it.
   if (!(turns >= 0 && turns < 1)) return false;
   // Choi 2025, eq. 1: sqrt(cross-section) D(phi) e^{-2 a r} / r^2 times the source.
   const double amplitude =
       s.source_upa * std::sqrt(cross_section_m2) * pattern * two_way_transmission(range_m, s.absorption_np_per_m);
-  // (39) in expected power; else xi and the phase (12).
+  // (39) in expected power; else the factor xi and the phase (12).
   if (p.plan.expected_power)
     echoes.push_back({turns, {amplitude * amplitude, 0}});
   else

@@ -20,7 +20,7 @@ class ComparisonEngine {
       : rays_(scene, pool.threads()), scene_(std::move(scene)), pool_(pool), options_(options), sum_(sum) {}
 
   Ping run(const PingRequest& asked) {
-    // At the sea surface the ping is computed elsewhere than asked for, and states where it was asked for.
+    // At the sea surface a ping is computed at another pose than requested, but states the requested one.
     std::vector<PingRequest> room;
     const PingRequest& request = in_water({&asked, 1}, *scene_, room).front();
     if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
@@ -57,7 +57,7 @@ class ModeRouter final : public PingEngine {
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
     std::vector<Ping> pings;
     pings.reserve(requests.size());
-    std::vector<PingStatistics> each;  // a ping run in between has its own
+    std::vector<PingStatistics> each;  // pings run in between have their own statistics
     while (!requests.empty()) {
       if (!is_canonical(requests.front())) {
         if (!comparison_) comparison_ = make_comparison_();
@@ -67,7 +67,7 @@ class ModeRouter final : public PingEngine {
         requests = requests.subspan(1);
         continue;
       }
-      std::size_t n = 1;  // the longest run of canonical requests, for engines that compute batches
+      std::size_t n = 1;  // number of successive canonical requests, for engines that compute batches
       while (n < requests.size() && is_canonical(requests[n])) ++n;
       for (Ping& ping : canonical_->run(requests.first(n))) pings.push_back(std::move(ping));
       for (const PingStatistics& s : canonical_->statistics_of_each()) each.push_back(s);

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double widest_half_angle_rad = 1.48;  // 85 degrees: an image plane has no pixels at 90
 
-/// Half the distance to either neighbour; the outermost are as wide as those beside them.
+/// Widths: half the distance to either neighbour; the outermost have the width of their neighbours.
 std::vector<double> widths_of(const std::vector<double>& centres, double lone) {
   const std::size_t n = centres.size();
   if (n < 2) return std::vector<double>(n, lone);
@@ -21,7 +21,7 @@ std::vector<double> widths_of(const std::vector<double>& centres, double lone) {
 }
 
 void tabulate(PaperFan& fan) {
-  // A direction is made of values of its column alone and of its row alone.
+  // A direction is computed from values of its column and values of its row.
   for (const double azimuth : fan.azimuth_rad)
     fan.ahead.push_back(fan.perspective ? Vec3d{1, std::tan(azimuth), 0} : Vec3d{std::cos(azimuth), std::sin(azimuth), 0});
   for (int row = 0; row < fan.rows; ++row) {
@@ -42,7 +42,7 @@ PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
   const double vertical = std::min(static_cast<double>(plan.mode.pattern.elevation_width_rad), widest_half_angle_rad);
   const double top = fan.perspective ? std::tan(vertical) : vertical;
   fan.row_step = 2 * top / fan.rows;
-  // Rows at the middles of even steps.
+  // Rows lie at the middles of equal steps.
   fan.first_row = -top + 0.5 * fan.row_step;
 
   const double aperture = static_cast<double>(plan.mode.horizontal_aperture_rad);
@@ -53,7 +53,7 @@ PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
     tabulate(fan);
     return fan;
   }
-  // Pixels are even in the tangent of azimuth.
+  // Pixels are uniform in the tangent of azimuth.
   const double side = std::tan(std::min(0.5 * aperture, widest_half_angle_rad));
   const int columns = plan.settings.beam_count;
   for (int i = 0; i < columns; ++i) fan.azimuth_rad.push_back(std::atan(side * (1 - (2.0 * i + 1) / columns)));
@@ -74,7 +74,7 @@ double PaperFan::solid_angle_sr(int column, int row) const {
   const double cell = column_width[static_cast<std::size_t>(column)] * row_step;
   // As P25's (2) is printed, dtheta dphi, without cos(phi) [sr].
   if (!perspective) return cell;
-  const double x = direction(column, row).x;  // a pixel of the plane x = 1 is seen under dy dz x^3
+  const double x = direction(column, row).x;  // a pixel of the plane x = 1 has the solid angle dy dz x^3
   return cell * x * x * x;
 }
 

@@ -23,7 +23,7 @@ PingScalars still_scalars(const PingPlan& plan, PingRequest request, Vec3d origi
 
 std::vector<double> coefficients(const Scene& scene) {
   std::vector<double> mu;
-  // mu [1/sr] by material: P25 has Lambert's law alone.
+  // mu [1/sr] by material: P25 has only Lambert's law.
   for (const Material& m : scene.materials) mu.push_back(lambert_coefficient(static_cast<double>(m.lambert_db)));
   return mu;
 }
@@ -33,7 +33,7 @@ struct PointInView {
   double range_m = 0, elevation_rad = 0, cross_section_m2 = 0;
 };
 
-/// P25 has no points; here they are scatterers of their column, like a ray's, if nothing hides them.
+/// P25 has no point targets. Here, visible ones are scatterers of their column, like hits of rays.
 std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p, const PingScalars& s,
                                         const PingRequest& request) {
   const std::vector<Pose>& bodies = request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world;
@@ -48,7 +48,7 @@ std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p
     for (int k = 1; k < p.fan.columns(); ++k) {
       if (off(k) < off(nearest)) nearest = k;
     }
-    // The row whose ray passes nearest: beside the fan the point is not seen.
+    // The row whose ray passes nearest. Points outside the fan are not visible.
     const double row = ((p.fan.perspective ? at.z / at.x : elevation) - p.fan.first_row) / p.fan.row_step;
     if (at.x <= 0 || off(nearest) > p.fan.column_width[static_cast<std::size_t>(nearest)] || row < -0.5 || row > p.fan.rows - 0.5)
       continue;
@@ -68,7 +68,7 @@ BeamTruth truth_of(std::span<const PaperHit> hits, double half_width_rad) {
   return truth;
 }
 
-/// One ping under way, stage by stage.
+/// The stages of one ping, and their data.
 class PaperPing {
  public:
   PaperPing(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
@@ -83,7 +83,7 @@ class PaperPing {
         now_s_(now_s),
         statistics_(statistics),
         work_(static_cast<std::size_t>(pool.threads())) {
-    // Floats: in expected power one a sample, else two a frequency. The beam kernels take multiples of 32.
+    // Number of floats: one per sample in expected power, else two per frequency. Beam kernels need multiples of 32.
     values_ = static_cast<std::size_t>((p_.plan.expected_power ? p_.plan.samples : 2 * p_.spectrum.count) + 31) / 32 * 32;
     columns_.resize(values_ * static_cast<std::size_t>(p_.fan.columns()));
     if (request.switches.keep_truth) truth_.resize(static_cast<std::size_t>(p_.fan.columns()));
@@ -96,7 +96,7 @@ class PaperPing {
  private:
   void receive_rows(const BeamSignals& signals, Ping& ping);
   double now() const { return now_s_ ? now_s_() : 0; }
-  /// One worker's.
+  /// Buffers of one worker.
   struct Work {
     std::vector<PaperHit> hits;
     PaperEchoes echoes;
@@ -116,7 +116,7 @@ class PaperPing {
   PingStatistics& statistics_;
   std::vector<Work> work_;  // per worker
   std::vector<PointInView> points_;
-  std::size_t values_ = 0;  // floats a column, whole vectors of them: spectrum, or in expected power samples
+  std::size_t values_ = 0;  // floats per column, a multiple of a vector: the spectrum, or samples in expected power
   std::vector<float> columns_, beams_;
   std::vector<BeamTruth> truth_;
 };
@@ -217,7 +217,7 @@ Ping PaperPing::image() {
 
 /// Envelope, gain and codes, a window of rows at a time.
 void PaperPing::receive_rows(const BeamSignals& signals, Ping& ping) {
-  // Rows a task: from envelope to codes they stay in cache.
+  // Rows per task, few enough to stay in cache from envelope to codes.
   constexpr int rows_at_once = 64;
   struct Scratch {
     BeamSignals window;
@@ -251,7 +251,7 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
   if (sum == FrequencySum::fast && spectral::have_transform)
     fast = std::make_unique<spectral::FrequencySums>(spectrum.count, sum_width);
   if (plan.expected_power) pulse_power = std::make_unique<PulsePower>(spectrum, inverse);
-  // Even azimuths make the correction a convolution, which a transform computes.
+  // With uniform azimuths the correction is a convolution, which a transform computes.
   const double spacing = static_cast<double>(plan.mode.horizontal_aperture_rad) / plan.settings.beam_count;
   if (!plan.expected_power) even = even_correction(fan.azimuth_rad, spacing);
   if (!even)

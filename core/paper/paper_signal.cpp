@@ -23,7 +23,7 @@ PaperSpectrum make_spectrum(const PingPlan& plan) {
   const double record_s = plan.samples * 2 * plan.sample_spacing_m / static_cast<double>(plan.settings.device_sound_speed_mps);
   // Choi 2025, eq. 4: df = 1 / T, M = b T frequencies about the carrier.
   const double band = plan.envelope_hz * record_s;                  // b T, in units of df
-  s.count = std::max(1, static_cast<int>(std::ceil(band - 1e-3)));  // b T meant whole may not come out whole
+  s.count = std::max(1, static_cast<int>(std::ceil(band - 1e-3)));  // rounding may make b T slightly larger than a whole number
   s.first_frequency = 1 - 0.5 * band;                               // f_min = f_c - b / 2, m from 1
   double sum = 0;
   for (int m = 0; m < s.count; ++m) {
@@ -80,13 +80,13 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
 std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad) {
   const std::size_t n = azimuth_rad.size();
   if (n < 2) return nullptr;
-  // Even to 1e-9 rad, or the correction is no convolution.
+  // Azimuths must be uniform to 1e-9 rad, or the correction is no convolution.
   const double step = (azimuth_rad.back() - azimuth_rad.front()) / static_cast<double>(n - 1);
   std::vector<double> v;
   double energy = 0;
   for (std::size_t d = 0; d < n; ++d) {
     if (std::abs(azimuth_rad[d] - azimuth_rad[0] - static_cast<double>(d) * step) > 1e-9) return nullptr;
-    // The weight of make_correction; of n azimuths n - d pairs are d apart, either way.
+    // The weight of make_correction(). Of n azimuths, n - d pairs are d apart in each direction.
     const double y = pi * 0.884 / spacing_rad * std::sin(static_cast<double>(d) * step);
     v.push_back(d == 0 ? 1.0 : std::abs(std::sin(y) / y));
     energy += v.back() * v.back() * static_cast<double>(n - d) * (d == 0 ? 1 : 2);
@@ -99,7 +99,7 @@ void correct(const BeamTransformTables& even, std::span<const float> in, int val
              std::span<float> out) {
   constexpr int block = 32;
   std::vector<AlignedFloats> work(static_cast<std::size_t>(pool.threads()), AlignedFloats(even.work_floats()));
-  // Every value is corrected for itself: the sums do not depend on the number of threads.
+  // Each value is corrected separately, so that sums do not depend on the number of threads.
   pool.for_each(static_cast<std::size_t>(values / block), [&](std::size_t b, int worker) {
     kernels.transform_beams(even.tables(), in.data() + b * block, values, block, work[static_cast<std::size_t>(worker)].data(),
                             out.data() + b * block, values);
@@ -146,7 +146,7 @@ InverseTransform::InverseTransform(const PaperSpectrum& spectrum) : grid_(spectr
 }
 
 void InverseTransform::run(std::span<const std::complex<float>> spectrum, std::vector<Complex>& work, float* out) const {
-  // Frequencies a whole sample rate apart look the same on the samples: they share a slot.
+  // Frequencies that differ by a multiple of the sample rate have the same samples, so that they share an element.
   const auto n = static_cast<std::size_t>(grid_.samples);
   work.assign(n, {});
   for (std::size_t m = 0; m < spectrum.size(); ++m) work[m % n] += Complex(spectrum[m]) * half_turn_[m];
@@ -173,7 +173,7 @@ PulsePower::PulsePower(const PaperSpectrum& spectrum, const InverseTransform& in
   std::vector<Complex> work;
   std::vector<float> signal(2 * n);
   SumScratch scratch;
-  for (int step = 0; step <= steps_; ++step) {  // an echo that falls step / steps of a sample after sample 0
+  for (int step = 0; step <= steps_; ++step) {  // an echo step / steps of a sample after sample 0
     PaperEchoes echo;
     echo.push_back({(offset_ + static_cast<double>(step) / steps_) / samples_, {1, 0}});
     sum_frequencies(echo, spectrum, nullptr, simd::kernels_for(SimdLevel::automatic), scratch, lone);
@@ -188,7 +188,7 @@ void PulsePower::add(const PaperEcho& echo, std::span<float> power) const {
   const float* pulse = table_.data() + step * static_cast<std::size_t>(samples_);
   const auto scale = static_cast<float>(echo.amplitude.real());
   const auto shift = static_cast<std::size_t>(((static_cast<int>(whole) % samples_) + samples_) % samples_);
-  const std::size_t n = power.size();  // the record is periodic: what leaves at its end comes in at its beginning
+  const std::size_t n = power.size();  // the record is periodic: a pulse that extends beyond its end continues at its beginning
   for (std::size_t i = shift; i < n; ++i) power[i] += scale * pulse[i - shift];
   for (std::size_t i = 0; i < shift; ++i) power[i] += scale * pulse[n - shift + i];
 }
