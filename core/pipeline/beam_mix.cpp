@@ -1,4 +1,4 @@
-// How neighbouring beams are mixed: class BeamMix of core/pipeline/plan_tables.hpp.
+// Mixes neighbouring beams: class BeamMix of core/pipeline/plan_tables.hpp.
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -9,12 +9,12 @@
 namespace sonar {
 namespace {
 
-constexpr double set_rad = 0.5;  // between neighbouring sets of taps: at most half of it off, at the ends of the aperture
-constexpr double most_rad = 16;  // nearer, the error is held
+constexpr double set_rad = 0.5;  // phase step at the aperture's ends between sets of taps; the error is at most half of it
+constexpr double most_rad = 16;  // largest phase error; it does not grow at shorter ranges
 constexpr int aperture_points = 512;
-constexpr double neighbour_in_beams = 0.56;  // how far a neighbour is, in -3 dB widths: 1 of 256 beams of the M1200d
+constexpr double neighbour_in_beams = 0.56;  // distance of a neighbour in -3 dB widths: one of 256 beams of the M1200d
 
-/// The first sample from `n` on that is served by another set of taps than `n`: they change as 1 / range.
+/// The first sample from `n` on with another set of taps than `n`. Sets change with 1 / range.
 int end_of_set(const BeamMixView& v, int j, int first_sample, int n, std::int32_t set, int samples) {
   const float until_m = v.turn_m[j] * v.sets_per_rad / (static_cast<float>(set) - 0.5f);
   const float guess = std::clamp((until_m - v.first_range_m) / v.sample_m - static_cast<float>(first_sample),
@@ -25,7 +25,7 @@ int end_of_set(const BeamMixView& v, int j, int first_sample, int n, std::int32_
   return end;
 }
 
-/// blended() of all beams in place: what a beam was before waits in `before`, a ring, for the one `step` further on.
+/// Applies blended() to all beams in place. The ring `before` stores the old values of a beam for the beam `step` after it.
 void blend_in_place(const BeamMixView& v, BeamSignals& beams, std::vector<float>& before) {
   const int floats = 2 * beams.samples;
   before.assign(static_cast<std::size_t>(v.step + 1) * static_cast<std::size_t>(floats), 0.0f);
@@ -79,8 +79,8 @@ void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
   };
   widest_ = reach_of(sets - 1);
   taps_.assign(2 * static_cast<std::size_t>(sets * (2 * widest_ + 1)), 0.0f);
-  // Sums over one period of what beams of this spacing tell apart; beyond the aperture, where nothing is, the phase stays. The
-  // points lie on either side of the middle, in odd steps of 1 / circle.
+  // Sums over one period of positions that beams of this spacing can distinguish. Beyond the aperture, which has no signal, the
+  // phase is constant. The points lie on both sides of the middle, at odd multiples of 1 / circle.
   constexpr int half = aperture_points / 2, circle = 2 * aperture_points;
   std::vector<double> cosine, place2;
   for (int i = 0; i < circle; ++i) cosine.push_back(std::cos(2 * pi * i / circle));
@@ -99,7 +99,7 @@ void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
     float* to = taps_.data() + 2 * (set * (2 * widest_ + 1) + widest_ - reach_.back());
     for (int d = -reach_.back(); d <= reach_.back(); ++d) {
       const std::complex<double> tap = taps[static_cast<std::size_t>(std::abs(d))];
-      // Diffuse power stays as it is.
+      // The power of a diffuse field must not change.
       const std::complex<double> t = plan.expected_power ? std::norm(tap) / energy : tap / std::sqrt(energy);
       *to++ = static_cast<float>(t.real());
       *to++ = static_cast<float>(t.imag());
@@ -111,7 +111,7 @@ void BeamMix::lay_out_blend(const PingPlan& plan, double spacing) {
   const ReceivePattern& pattern = plan.beam_pattern[0];
   const double width = 2 * std::sin(static_cast<double>(plan.mode.pattern.azimuth_width_rad) / 2);
   step_ = std::max(1, static_cast<std::int32_t>(std::lround(neighbour_in_beams * width / spacing)));
-  // gamma: how much of a diffuse field beams so far apart have in common.
+  // gamma: correlation of a diffuse field between beams so far apart.
   const auto common = [&](int apart) {
     double product = 0, power = 0;
     for (int k = -plan.columns.count; k <= plan.columns.count; ++k) {
@@ -123,7 +123,7 @@ void BeamMix::lay_out_blend(const PingPlan& plan, double spacing) {
   };
   const double one = common(step_), two = common(2 * step_), top = plan.beam_sine.front();
   for (const double u : plan.beam_sine) {
-    // Eq. 45: diffuse power stays as it is.
+    // Eq. 45: the power of a diffuse field does not change.
     const double b = at_sine(plan.mode.receiver.profile.blend, u, top);
     const double own = plan.expected_power ? 1 / (1 + 2 * b * b) : 1 / std::sqrt(1 + 2 * b * b * (1 + two) + 4 * b * one);
     own_.push_back(static_cast<float>(own));
@@ -157,11 +157,11 @@ void BeamMix::blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector
   const BeamMixView v = view();
   const float nearest_m = std::max(v.first_range_m + v.sample_m * static_cast<float>(beams.first_sample), v.sample_m);
   if (!blurs() || largest_turn_m_ * v.sets_per_rad < 0.5f * nearest_m) return;
-  constexpr std::size_t vector = 16;  // kernels read whole ones
+  constexpr std::size_t vector = 16;  // kernels read whole vectors
   scratch.resize(beams.data.size() + vector);
   std::copy(beams.data.begin(), beams.data.end(), scratch.begin());
   for (int j = 0; j < beams.beams; ++j)
-    // Samples that share their taps, side by side; with the range the set falls to 0 and stays.
+    // Processes neighbouring samples with the same taps together. The set falls with the range to 0 and stays there.
     for (int n = 0; n < beams.samples;) {
       const std::int32_t set = focus_set(v, j, beams.first_sample + n);
       if (set == 0) break;

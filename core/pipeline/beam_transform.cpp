@@ -1,4 +1,4 @@
-// How beams are made of all columns at once: class BeamTransformTables of core/pipeline/plan_tables.hpp.
+// Forms beams of all columns at once: class BeamTransformTables of core/pipeline/plan_tables.hpp.
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-// The convolution s_j = sum_k W(u_j - u_k) g_k over even columns is a product of discrete Fourier transforms, across a line
+// The convolution s_j = sum_k W(u_j - u_k) g_k over uniform columns is a product of discrete Fourier transforms, across a line
 // padded to twice its length so that it does not wrap around. The passes themselves are in simd/transform.inl.
 /// The smallest size of at least n whose only prime factors are 2 and 3.
 int smooth_size(int n) {
@@ -47,10 +47,10 @@ std::vector<double> solve(std::vector<double> a, std::vector<double> b) {
   return b;
 }
 
-/// Weights of `taps` values at 0, 1, ... that give the value at `place` of anything whose spectrum lies within +-band / 2 cycles
-/// a step, in the least squares.
+/// Weights of `taps` values at 0, 1, ... for the value at `place` of any signal with a spectrum within +-band / 2 cycles per
+/// step, by least squares.
 std::vector<double> weights_between(int taps, double place, double band) {
-  constexpr double ridge = 1e-13;  // the matrix is nearly singular: that is why few taps do
+  constexpr double ridge = 1e-13;  // the matrix is nearly singular, which is also why few taps are enough
   std::vector<double> matrix, right;
   for (int a = 0; a < taps; ++a) {
     for (int b = 0; b < taps; ++b) matrix.push_back(sinc(band * (a - b)) + (a == b ? ridge : 0));
@@ -98,8 +98,8 @@ void BeamTransformTables::point_at_tables() {
 
 void BeamTransformTables::plan_passes() {
   append_turns(4 * tables_.quarter, tables_.quarter, 3, split_);
-  // The last pass has no turns and is one with the first pass back. Radix 4 where possible: the fewest operations a value; 6 in
-  // place of 2 and 3: every pass is bound by its loads and stores.
+  // The last pass has no factors and is combined with the first pass back. Radix 4 needs the fewest operations per value; radix 6
+  // replaces passes of 2 and 3, because loads and stores limit the speed of every pass.
   const auto largest = [](int size, std::initializer_list<int> radices) {
     return *std::find_if(radices.begin(), radices.end(), [&](int radix) { return size % radix == 0; });
   };
@@ -113,7 +113,7 @@ void BeamTransformTables::plan_passes() {
   for (int l = 0; l < tables_.levels; ++l) tables_.level[l].turns = turns_[static_cast<std::size_t>(l)].data();
 }
 
-/// The transform of the weights, which are even: real. Distances as long as the line of columns are not needed.
+/// Computes the transform of the weights, which is real because the weights are symmetric. Larger distances are not needed.
 void BeamTransformTables::weigh(const std::vector<double>& of_distance) {
   const int size = 4 * tables_.quarter;
   std::vector<double> cosine, weight;
@@ -143,7 +143,7 @@ void BeamTransformTables::read_between(double aperture_in_spacings, const Column
   const auto place_of = [&](double sine) { return (columns.first_sine - sine) / columns.spacing; };
   const bool on_columns = std::all_of(beam_sines.begin(), beam_sines.end(),
                                       [&](double sine) { return std::abs(place_of(sine) - std::round(place_of(sine))) < 1e-6; });
-  // Beams between columns: interpolation by the fewest taps that reach the accuracy promised in the header.
+  // Beams between columns: interpolation by the fewest taps with the accuracy stated in the header.
   tables_.taps = on_columns ? 1 : aperture_in_spacings < 0.25 ? 8 : 10;
   for (const double sine : beam_sines) {
     const double place = place_of(sine);

@@ -1,4 +1,4 @@
-// How beams are made of columns: by a band of weights, or by a transform where that is cheaper.
+// Makes the weights of beams over columns: a band of weights, or tables of a transform if that is faster.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -16,13 +16,13 @@ std::vector<ReceivePattern> receive_patterns(const FrequencyMode& mode, std::siz
 
 namespace {
 
-/// The smallest band of columns whose dropped energy is below the share.
+/// The smallest band of columns that drops less than the given part of the energy.
 struct Band {
   int half = 0;
   double energy = 0, total = 0;  // sum_k W_jk^2 over the band, and over all columns
 };
 Band band_of(const ReceivePattern& weight, const Columns& columns, double dropped_energy) {
-  // W at whole columns apart; its square is the energy that a column adds to a beam.
+  // W at distances of whole columns; its square is the energy that a column adds to a beam.
   std::vector<double> energy(static_cast<std::size_t>(columns.count));
   Band band;
   for (int h = 0; h < columns.count; ++h) {
@@ -49,10 +49,10 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
     if (p.aperture_wavelengths < widest.aperture_wavelengths) widest = p;
   BeamWeights c;
   const Band band = band_of(nominal, columns, options.dropped_energy);
-  // Beams with widths of their own share the band that the widest needs.
+  // Beams with different widths have the same band, that of the widest beam.
   c.half_band = alike ? band.half : band_of(widest, columns, options.dropped_energy).half;
   c.weight_energy = band.energy;
-  // Powers are summed without cancelling: there a transform's rounding, relative to the loudest, would show in the shadows.
+  // Sums of powers do not cancel. The rounding of a transform, relative to the largest value, would be visible in shadows.
   if (options.transform && !squared && alike && !nominal.unit && beam_sines.size() > 1) {
     auto tables = std::make_shared<const BeamTransformTables>(nominal, columns, beam_sines);
     const double band_cost = static_cast<double>(beam_sines.size()) * std::min(2 * c.half_band + 1, columns.count);

@@ -11,20 +11,20 @@ namespace sonar {
 namespace {
 
 constexpr double longest_pulse_in_samples = 1000;
-constexpr double shortest_exact_pulse_in_samples = 0.25;  // by way of the spectrum; tabulated ones may be as short as they like
-constexpr double most_column_samples = 1 << 29;           // limit for all columns, 4 GiB
-constexpr double most_frequencies = 1 << 20;              // limit for a column by way of the spectrum
+constexpr double shortest_exact_pulse_in_samples = 0.25;              // via the spectrum; tabulated pulses may be shorter
+constexpr double most_column_samples = 1 << 29;                       // limit for all columns, 4 GiB
+constexpr double most_frequencies = 1 << 20;                          // limit for a column via the spectrum
 constexpr double tone_band_in_pulses = 20, other_band_in_pulses = 3;  // in 1 / width, at least Pulse::band_hz
 constexpr int most_fixed_rays = 100000, most_interleaved_pings = 64;
 constexpr double sector_slack_rad = 1e-6;  // slack between azimuths in double and an aperture in float
 constexpr double widest_beam_rad = 1.5, narrowest_width_rad = 1e-4;
 constexpr float widest_level_db = 300;
 
-/// Limits of pulses and buffers. No picture needs more, and memory could not hold more.
+/// Checks limits of pulses and buffers. No picture needs more, and memory would not suffice for more.
 std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings& s) {
   const double samples = static_cast<double>(s.range_bin_count) * s.samples_per_row;
   const double pulse = static_cast<double>(s.pulse_width_m) / (s.range_bin_m / s.samples_per_row);  // in samples
-  const bool measured = mode.waveform.shape == Waveform::Shape::measured;  // has a width, and limits, of its own
+  const bool measured = mode.waveform.shape == Waveform::Shape::measured;  // its width and limits are checked elsewhere
   if (!measured && pulse > longest_pulse_in_samples)
     return "the pulse is longer than 1000 samples of the picture: choose longer rows or a shorter pulse";
   if (!measured && mode.waveform.exact && pulse < shortest_exact_pulse_in_samples)

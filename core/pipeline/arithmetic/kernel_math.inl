@@ -1,6 +1,6 @@
-// Formulas that every form of the hot loops shares: scalar, on a device, and in vectors. Included inside a namespace, once per
-// instruction set, because inline functions compiled for different sets must not meet at the linker. It uses bits_of and float_of
-// of that namespace, and in vectors its overloads of larger and smaller. V is a float or a vector of floats.
+// Formulas of the hot loops that scalar, device and vector code share. It is included inside a namespace, once per instruction
+// set, because the linker must not merge inline functions compiled for different sets. It uses bits_of and float_of of that
+// namespace, and with vectors its overloads of larger and smaller. V is a float or a vector of floats.
 
 SONAR_HD inline float larger(float a, float b) { return a > b ? a : b; }
 SONAR_HD inline float smaller(float a, float b) { return a < b ? a : b; }
@@ -60,7 +60,7 @@ SONAR_HD inline float law_root(const float* table, float cosine) {
   return a + (at - static_cast<float>(step)) * (b - a);
 }
 
-/// Weight of a level's cells where its ramps stand at `in` and `out`: min(in, out), held within [0, 1].
+/// Weight of a level's cells from its ramps `in` and `out`: min(in, out), clamped to [0, 1].
 template <class V>
 SONAR_HD inline V cross_fade(V in, V out) {
   return larger(smaller(smaller(in, out), V{} + 1.0f), V{});

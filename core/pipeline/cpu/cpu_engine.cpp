@@ -1,4 +1,5 @@
-// The CPU's ping engine: owns the rays' scene, the surface cells and the buffers, and runs simulate() for each request.
+// The ping engine of the CPU: it owns the scene for rays, the surface cells and the buffers, and calls simulate() for each
+// request.
 #include <array>
 #include <stdexcept>
 
@@ -13,7 +14,7 @@
 namespace sonar {
 namespace {
 
-/// Runs pings between the parts of another ping. Each ping has buffers of its own, and finds scene and cells as it needs them.
+/// Runs pings between the parts of another ping. Each ping has its own buffers; scene and cells are set before each of them.
 class CpuEngine final : public ChangingEngine, private Interruption {
  public:
   CpuEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options)
@@ -99,7 +100,7 @@ class CpuEngine final : public ChangingEngine, private Interruption {
     under_way_.cells->keep_since(under_way_.view);
     interruption_->run_other();
     under_way_.cells->keep_since(0);
-    place_bodies(*under_way_.request);  // where the ping under way has them
+    place_bodies(*under_way_.request);  // the poses of the ping under way
   }
 
   RayScene rays_;
@@ -113,8 +114,8 @@ class CpuEngine final : public ChangingEngine, private Interruption {
   Interruption* interruption_ = nullptr;
   struct UnderWay {
     const PingRequest* request = nullptr;
-    std::shared_ptr<SurfaceCells> cells;  // a ping let in may need others
-    std::uint64_t view = 0;               // the one whose tiles it uses
+    std::shared_ptr<SurfaceCells> cells;  // a ping run in between may need other cells
+    std::uint64_t view = 0;               // the view whose tiles it uses
   } under_way_;
 };
 

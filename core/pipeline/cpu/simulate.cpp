@@ -24,7 +24,7 @@ namespace sonar {
 struct Workspace::Buffers {
   SettingsCache prepared;
   SpecularEchoes specular_echoes;
-  std::vector<LawTable> laws;  // the tiles point into it
+  std::vector<LawTable> laws;  // tiles have pointers into it
   std::vector<float> turned_away;
   std::vector<PreparedTile> tiles;
   std::vector<std::vector<std::uint32_t>> tiles_by_group;
@@ -66,9 +66,9 @@ namespace {
 
 constexpr int most_traced_columns = 48;  // columns whose rays are refined together
 constexpr std::size_t group_bytes =
-    640 << 10;                            // signals and depth maps one worker carries from rays to sums: in the second cache
-constexpr int least_groups_a_worker = 3;  // so that all are done at about the same time
-constexpr int window_samples = 64;        // samples one worker carries from beamforming to codes
+    640 << 10;  // signals and depth maps of a worker from rays to sums, which stay in the second-level cache
+constexpr int least_groups_a_worker = 3;  // so that all workers end at about the same time
+constexpr int window_samples = 64;        // samples that a worker processes from beamforming to codes
 constexpr int echo_room = 16384;
 
 /// Adds the time since its construction, or the last lap, to a stage.
@@ -91,7 +91,7 @@ class Stopwatch {
 
 }  // namespace
 
-/// The stages of one ping, and the data that they hand on.
+/// The stages of one ping, and the data that they pass on.
 class PingSimulation {
  public:
   PingSimulation(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
@@ -131,7 +131,7 @@ class PingSimulation {
 
  private:
   bool ray_is_scatterer() const { return plan_.fixed_fan > 0; }
-  /// Parts are as even as possible, so that no small group remains.
+  /// Columns that are traced together. Parts have nearly equal sizes, so that no small one remains.
   int traced_columns() const {
     const int parts = (plan_.columns.count + most_traced_columns - 1) / most_traced_columns;
     return (plan_.columns.count + parts - 1) / parts;
@@ -165,11 +165,11 @@ class PingSimulation {
   std::vector<float> shared_noise_;  // noise that the channels share in this ping
 };
 
-/// The number of columns that a worker takes at once. Each group looks at the tiles that reach into it, so larger groups are
-/// better, as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
+/// The number of columns in a worker's group. Each group processes the tiles that overlap it, so that larger groups need less
+/// work, as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
 int PingSimulation::group_columns() const {
   const int traced = traced_columns();
-  // Small groups: the other sonar's ping runs between them.
+  // Small groups, because a ping of another sonar is to run between them.
   if (w_.between && w_.between->expected()) return traced;
   const int bins = ray_is_scatterer() ? 0 : plan_.fan.bins;
   // Signals and depth maps of a group should fit a worker's share of the second-level cache.
@@ -181,7 +181,7 @@ int PingSimulation::group_columns() const {
   return std::max(1, std::min(in_cache / traced, (for_all + traced - 1) / traced)) * traced;
 }
 
-/// Surface cells that may be in view, sorted by the columns they reach; analytic points that are.
+/// Finds surface cells that may be in view, sorted by their columns, and visible point echoes.
 void PingSimulation::find_echo_sources() {
   if (request_.blank) return;
   // Echoes without surface: point targets, other sonars, specular points (eq. 7).
@@ -214,14 +214,14 @@ void PingSimulation::find_echo_sources() {
   for (const TileInView& t : in_view) w_.statistics.cells += static_cast<std::size_t>(t.tile->count);
 }
 
-/// Echoes by way of flat mirrors wait in columns of their own.
+/// Computes echoes via flat mirrors, in separate columns.
 void PingSimulation::find_multipath_echoes() {
   const MultipathCounts counts = simulate_multipath(context_, w_.multipath, points_);
   w_.statistics.rays += counts.rays;
   w_.statistics.echoes += counts.echoes;
 }
 
-/// Rays, echoes, pulses and noise, a group of columns at a time.
+/// Computes rays, echoes, pulses and noise, one group of columns at a time.
 void PingSimulation::simulate_columns() {
   // All groups at once, or when an interruption is likely, as many as there are threads between two yield points.
   const auto all = static_cast<std::size_t>(groups());
@@ -237,7 +237,7 @@ void PingSimulation::simulate_columns() {
 
 void PingSimulation::simulate_group(int first, int last, Workspace::Buffers::PerWorker& mine) {
   Stopwatch watch(w_.now_s, mine.statistics);
-  // Draws depend on (seed, sonar, ping, column) alone: equal on every thread count.
+  // Draws depend only on (seed, sonar, ping, column), so that they are equal for every number of threads.
   const PingNoise draws{prepared_.one_table() ? &prepared_.noise : &prepared_.grains, request_.sonar_id,
                         static_cast<std::uint32_t>(request_.number)};
   const PingNoise noise{request_.switches.noise ? &prepared_.noise : nullptr, draws.sonar, draws.ping};
@@ -284,7 +284,7 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
   for (int from = first; from < last; from += traced_columns()) {
     // Rays draw the depth map of these columns (section 2).
     const int to = std::min(from + traced_columns(), last);
-    mine.statistics.rays += trace(from, to);  // those beside are counted where they belong
+    mine.statistics.rays += trace(from, to);  // rays of columns beside the group count in their own group
     if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, from, to, w_.first_hits);
     if (labels_) w_.labels.note_shadows(mine.fan, from, to);
   }
@@ -308,7 +308,7 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
   if (labels_) w_.labels.finish_group(group, mine.echoes);
 }
 
-/// Computed in time if the pulse is real-valued and tabulated, otherwise by way of the spectrum.
+/// Sums pulses in time if the pulse is real-valued and tabulated, otherwise via the spectrum.
 void PingSimulation::sum_pulses(int first, Workspace::Buffers::PerWorker& mine) {
   if (plan_.spectral)
     plan_.spectral->add(mine.echoes, first, mine.spectral);
@@ -316,7 +316,7 @@ void PingSimulation::sum_pulses(int first, Workspace::Buffers::PerWorker& mine) 
     synthesize(mine.echoes, plan_.pulse(), kernels_, w_.columns);
 }
 
-/// Beams, envelope, gain and codes, a window of rows at a time.
+/// Computes beams, envelope, gain and codes, one window of rows at a time.
 Ping PingSimulation::image() {
   Ping ping;
   ping.request = request_;
