@@ -26,7 +26,7 @@ struct Actions {
 
 Result<MemoryFile> MemoryFile::make(const char* name) {
   const int any = ::memfd_create(name, MFD_CLOEXEC);
-  // The number is above those of the standard streams, which may be closed here. The child gets it as one of them.
+  // The descriptor is above those of the standard streams, which may be closed here. In the child it becomes one of them.
   const int descriptor = any < 0 ? -1 : ::fcntl(any, F_DUPFD_CLOEXEC, 3);
   const int error = errno;
   if (any >= 0) ::close(any);
@@ -52,7 +52,7 @@ Result<ChildEnd> run_child(const std::filesystem::path& program, const std::vect
   sigfillset(&all);
   posix_spawnattr_setsigmask(&child.attributes, &none);
   posix_spawnattr_setsigdefault(&child.attributes, &all);
-  posix_spawnattr_setpgroup(&child.attributes, 0);  // Ctrl-C is for this process, which may go on
+  posix_spawnattr_setpgroup(&child.attributes, 0);  // Ctrl-C must not end the child, because this process handles it
   posix_spawnattr_setflags(&child.attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
 
   std::string name = program.string();

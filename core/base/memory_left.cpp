@@ -11,14 +11,14 @@ namespace {
 
 using std::filesystem::path;
 
-/// The number of a file that holds nothing else. The word "max" is no number.
+/// The number in a file that contains nothing else; nullopt for the word "max".
 std::optional<std::uint64_t> number_in(const path& file) {
   std::ifstream in(file);
   std::uint64_t number = 0;
   return in >> number ? std::optional(number) : std::nullopt;
 }
 
-/// The number that follows a word at the beginning of a line; 0 when there is none.
+/// The number that follows a word at the beginning of a line; 0 if there is no such line.
 std::uint64_t number_after(const path& file, const std::string& word) {
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {
@@ -35,7 +35,7 @@ struct Names {  // names of the files of one version
 constexpr Names version_1{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file "};
 constexpr Names version_2{"memory.max", "memory.current", "inactive_file "};
 
-/// Memory left to a control group and those above it, as far as they can be seen from here.
+/// Memory left to a control group and to those above it that are visible to this process.
 std::optional<std::uint64_t> left_of_groups(const path& mount, path group, const Names& names) {
   std::optional<std::uint64_t> least;
   for (group = group.relative_path();; group = group.parent_path()) {

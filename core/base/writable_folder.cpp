@@ -12,7 +12,7 @@
 namespace sonar {
 namespace {
 
-/// The kernel makes the files of these file systems. The superuser may write everywhere, but cannot make a file there.
+/// File systems whose files the kernel makes. Even the superuser cannot make a file there.
 constexpr std::array<unsigned long, 10> kernels_own{PROC_SUPER_MAGIC, SYSFS_MAGIC,   CGROUP_SUPER_MAGIC, CGROUP2_SUPER_MAGIC,
                                                     DEBUGFS_MAGIC,    TRACEFS_MAGIC, SECURITYFS_MAGIC,   DEVPTS_SUPER_MAGIC,
                                                     BPF_FS_MAGIC,     PSTOREFS_MAGIC};

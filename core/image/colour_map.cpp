@@ -11,13 +11,13 @@ std::uint8_t byte_from(float unit) { return static_cast<std::uint8_t>(std::lroun
 const std::vector<ColourMap>& all_maps() {
   static const std::vector<ColourMap> maps{
       {"gray", {{0, 0, 0, 0}, {1, 1, 1, 1}}},
-      // Red runs ahead and saturates at four fifths, as light on metal.
+      // Red rises first and saturates at four fifths, like the colour of light on metal.
       {"copper", {{0, 0, 0, 0}, {0.8f, 1, 0.62f, 0.4f}, {1, 1, 0.78f, 0.5f}}},
-      // Black body: red, then green, then blue come up.
+      // Colours of a black body: red rises first, then green, then blue.
       {"hot", {{0, 0, 0, 0}, {0.375f, 1, 0, 0}, {0.75f, 1, 1, 0}, {1, 1, 1, 1}}},
       {"amber", {{0, 0, 0, 0}, {0.3f, 0.35f, 0.16f, 0.02f}, {0.7f, 0.95f, 0.6f, 0.12f}, {1, 1, 0.97f, 0.8f}}},
       {"ocean", {{0, 0, 0.01f, 0.05f}, {0.3f, 0, 0.14f, 0.35f}, {0.65f, 0.05f, 0.55f, 0.65f}, {1, 0.95f, 1, 0.95f}}},
-      // Perceptually even from dark violet to yellow, sampled in tenths (the viridis map, CC0).
+      // Perceptually uniform from dark violet to yellow, sampled in tenths (the viridis map, CC0).
       {"viridis",
        {{0.0f, 0.267f, 0.005f, 0.329f},
         {0.1f, 0.283f, 0.141f, 0.458f},
@@ -30,7 +30,7 @@ const std::vector<ColourMap>& all_maps() {
         {0.8f, 0.478f, 0.821f, 0.318f},
         {0.9f, 0.741f, 0.873f, 0.150f},
         {1.0f, 0.993f, 0.906f, 0.144f}}},
-      // Reads the same for the colour-blind, from dark blue to yellow (the cividis map, CC0).
+      // Looks the same to colour-blind people, from dark blue to yellow (the cividis map, CC0).
       {"cividis",
        {{0.0f, 0.000f, 0.133f, 0.306f},
         {0.111f, 0.071f, 0.208f, 0.439f},

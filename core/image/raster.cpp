@@ -106,7 +106,7 @@ Result<void> write_whole_file(const std::filesystem::path& file, std::initialize
   int why = 0;
   for (const auto part : parts)
     if (why == 0 && std::fwrite(part.data(), 1, part.size(), out) != part.size()) why = errno;
-  if (std::fclose(out) != 0 && why == 0) why = errno;  // the bytes that waited in memory did not fit on the disk
+  if (std::fclose(out) != 0 && why == 0) why = errno;  // the buffered bytes did not fit on the disk
   std::error_code error;
   if (why == 0) std::filesystem::rename(unfinished, file, error);
   if (why != 0 || error) return failed(why != 0 ? why : error.value());

@@ -12,7 +12,7 @@
 namespace sonar::motion {
 namespace {
 
-// Allowed error of the norm of a quaternion or of a row of a matrix; a smaller error is rounding, which is repaired.
+// Largest error of the norm of a quaternion or of a row of a matrix. Smaller errors are rounding, and are corrected.
 constexpr double norm_allowed = 0.01;
 constexpr double farthest = 1e8;  // m, m/s, rad/s
 constexpr std::array<std::pair<int, std::string_view>, 4> units{
@@ -92,7 +92,7 @@ const std::array<std::string_view, Columns::columns> Columns::short_names{
 
 std::string in_quotes(std::string_view word) {
   std::string out = "\"";
-  // Bytes of a broken file must not reach a terminal.
+  // Replaces bytes of a broken file that could change a terminal.
   for (const char c : word.substr(0, longest_quoted)) out += c >= 0x20 && c < 0x7f ? c : '?';
   return out + (word.size() > longest_quoted ? "...\"" : "\"");
 }
@@ -151,7 +151,7 @@ Complaint Columns::refuse_set() const {
   if (has(t) && has(t_ns)) return "give the time once: t_s or t_ns";
   for (const Column c : {x, y, z})
     if (!has(c)) return "column " + std::string(long_names[c]) + " is missing";
-  // Parts of a vector or a quaternion are given together or not at all.
+  // A file must have all parts of a vector or quaternion, or none.
   const auto of = [this](std::initializer_list<Column> group) {
     return std::count_if(group.begin(), group.end(), [this](Column c) { return has(c); });
   };
@@ -180,7 +180,7 @@ void Columns::guess_unit(const Words& words) {
   if (!has(t) || says_unit_) return;
   const std::string_view text = word(words, t);
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return;
-  // From 1973 on; seconds of that many digits are beyond every stamp.
+  // True for times after 1973; seconds with so many digits are beyond every stamp.
   if (text.size() >= 12) power_ = text.size() <= 14 ? 6 : text.size() <= 17 ? 3 : 0;
 }
 
@@ -218,7 +218,7 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
   }
   if (auto wrong = fill({qw, qx, qy, qz})) return wrong;
   const Quatd q{v[0], v[1], v[2], v[3]};
-  // A norm off by rounding is repaired, a larger error means that the columns are something else.
+  // Corrects a rounding error of the norm. A larger error means that the columns are not a quaternion.
   const double norm = std::sqrt(norm_squared(q));
   if (norm == 0) return "the quaternion is zero";
   if (!(std::abs(norm - 1) <= norm_allowed)) return "the quaternion's norm is " + std::to_string(norm) + ", it must be 1";
@@ -253,7 +253,7 @@ Complaint Columns::refuse(const Words& words, Row& out) const {
     if (auto wrong = refuse_vector(words, wx, "the angular velocity", out.angular_velocity_radps)) return wrong;
   if (!has(body)) return std::nullopt;
   out.body = word(words, body);
-  // Names may be UTF-8: control characters alone are refused.
+  // Names may be UTF-8; only control characters are errors.
   const bool printable = std::none_of(out.body.begin(), out.body.end(), [](char c) { return (c >= 0 && c < 0x20) || c == 0x7f; });
   if (out.body.empty() || out.body.size() > longest_name || !printable)
     return "a body's name must have 1 to 64 printable characters";

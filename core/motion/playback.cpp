@@ -13,7 +13,7 @@ constexpr std::int64_t one = 1'000'000;  // in millionths
 }  // namespace
 
 std::optional<Speed> Speed::from(double factor) {
-  // Written so that NaN is refused, too. In whole millionths a product with nanoseconds is exact.
+  // The condition rejects NaN, too. With whole millionths, a product with nanoseconds is exact.
   if (!(factor >= slowest && factor <= fastest)) return std::nullopt;
   return Speed{std::llround(factor * static_cast<double>(one))};
 }
@@ -28,7 +28,7 @@ Ns Playback::line(Time clock) const {
   // 64 bits overflow after 2.5 hours at speed 1: nanoseconds times millionths.
   const Wide product = static_cast<Wide>((clock - clock_at_).count()) * rules_.speed.millionths;
   Wide passed = product / one;
-  if (product % one < 0) --passed;  // downwards, also before clock_at_
+  if (product % one < 0) --passed;  // rounds downwards, also before clock_at_
   constexpr auto last_ns = static_cast<Wide>(std::numeric_limits<std::int64_t>::max());
   // Limited to 292 years, which is more than stamps of a file may have.
   return Ns(static_cast<std::int64_t>(std::clamp(place_at_.count() + passed, -last_ns, last_ns)));
@@ -37,7 +37,7 @@ Ns Playback::line(Time clock) const {
 Playback::Place Playback::place(Time clock) const {
   const Ns reached = line(clock);
   const double rate = paused_ ? 0 : rules_.speed.factor();
-  // Before the start the first pose is held, at rest.
+  // Before the start the body rests at the first pose.
   if (reached < Ns{0}) return {Ns{0}, 0};
   if (duration_ == Ns{0}) return {Ns{0}, 0};
   // The end of a round is the beginning of the next one.

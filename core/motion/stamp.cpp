@@ -5,7 +5,7 @@
 namespace sonar::motion {
 namespace {
 
-constexpr int most_digits = 18;  // every number of so many decimal digits fits a signed 64-bit integer
+constexpr int most_digits = 18;  // every number with so many decimal digits fits in a signed 64-bit integer
 constexpr int second = 9;        // a second is 10^9 ns
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -17,13 +17,13 @@ std::uint64_t power_of_ten(int n) {
   return v;
 }
 
-/// A number and the power of ten that goes with it. Digits after the nineteenth do not matter here.
+/// A number and its power of ten. Digits after the nineteenth do not matter here.
 struct Digits {
   std::uint64_t number = 0;
   int exponent = 0, count = 0;
 
   void take(char digit, bool fraction) {
-    // Leading zeros move the decimal point only: they take none of the nineteen digits.
+    // Leading zeros only move the decimal point; they do not count among the nineteen digits.
     if (count == 0 && digit == '0') {
       exponent -= fraction;
       return;
@@ -47,12 +47,12 @@ struct Digits {
     if (by < 0) {
       // 10^19 fits 64 bits unsigned, 10^20 does not.
       const std::uint64_t unit = by < -most_digits ? power_of_ten(most_digits) * 10 : power_of_ten(-by);
-      // Half up, without a sum that could overflow.
+      // Rounds half up, without a sum that could overflow.
       const std::uint64_t rounded = number / unit + (number % unit >= unit - number % unit ? 1 : 0);
       return rounded > farthest_stamp_ns ? std::nullopt : std::optional(static_cast<std::int64_t>(rounded));
     }
     const std::uint64_t unit = power_of_ten(by);
-    // Compared by division: the product could overflow.
+    // Compares by division, because the product could overflow.
     if (number > static_cast<std::uint64_t>(farthest_stamp_ns) / unit) return std::nullopt;
     return static_cast<std::int64_t>(number * unit);
   }
@@ -68,7 +68,7 @@ std::optional<std::int64_t> scaled_number(std::string_view text, int shift) {
     for (++i; i < text.size() && is_digit(text[i]); ++i, ++seen) digits.take(text[i], true);
   if (seen == 0) return std::nullopt;
   if (i < text.size() && (text[i] == 'e' || text[i] == 'E')) {
-    // from_chars takes a minus sign, but no plus, and "+-" is no sign.
+    // from_chars accepts a minus sign, but no plus sign; "+-" is not a sign.
     if (++i < text.size() && text[i] == '+' && ++i < text.size() && text[i] == '-') return std::nullopt;
     int exponent = 0;
     const auto end = std::from_chars(text.data() + i, text.data() + text.size(), exponent);
