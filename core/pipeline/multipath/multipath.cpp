@@ -5,12 +5,12 @@
 namespace sonar {
 namespace {
 
-// A batch is a task's work, a round bounds the memory for echoes. Neither changes a sum.
+// A batch is the work of one task; a round limits the memory for echoes. Neither changes a sum.
 constexpr std::size_t tiles_a_batch = 16;
-constexpr std::size_t batches_a_round = 64;  // echoes of one round wait in memory, then are summed
+constexpr std::size_t batches_a_round = 64;  // echoes of one round are stored and then summed
 
 std::vector<Path> paths_in_view(const std::vector<FlatMirror>& mirrors, const BounceMap& map) {
-  // Direct, over one mirror, over two different mirrors: those that the traced map contains.
+  // The direct path, and those via one or two different mirrors that the traced map contains.
   std::vector<Path> paths{path_by(mirrors, -1)};
   const int n = static_cast<int>(mirrors.size());
   for (int a = 0; a < n; ++a)
@@ -19,8 +19,8 @@ std::vector<Path> paths_in_view(const std::vector<FlatMirror>& mirrors, const Bo
   return paths;
 }
 
-/// Selects cells wherever a path over mirrors may reach. Their sizes follow the lengths of the paths; reach[0] is the straight
-/// path.
+/// Selects cells at all places that a path via mirrors may reach. Their sizes follow the lengths of the paths; reach[0] is the
+/// straight path.
 CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pose> bodies, const std::vector<PathReach>& reach) {
   CellView view;
   view.sonar_in_world = s.seen_from;
@@ -37,7 +37,7 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
       all->nearest_m = std::min(all->nearest_m, one->nearest_m);
       all->farthest_m = std::max(all->farthest_m, one->farthest_m);
     };
-    // The span of distances over all paths; the direct one counts only where another reaches.
+    // The span of distances over all paths. The direct path is included only if another one reaches the place.
     for (std::size_t l = 1; l < reach.size(); ++l) join(reach[l]);
     if (all) join(reach[0]);
     return all;
@@ -45,8 +45,8 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
   return view;
 }
 
-/// Works in rounds. Batches of tiles become echoes, sorted by column group; then groups sum them, batch by batch. So the order of
-/// each sum is the order of the tiles, whichever thread does the work.
+/// Works in rounds. Batches of tiles become echoes, sorted by column group; then groups sum them, batch by batch. So each
+/// sum has the order of the tiles, for any assignment of threads.
 class Rounds {
  public:
   Rounds(MultipathWork& work, const PingPlan& plan, const simd::Kernels& kernels, Parallel& pool)
@@ -123,7 +123,7 @@ MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& wo
   counts.rays = trace_bounces(context, work.faces, image_paths.mirrors, image_paths.map);
   image_paths.paths = paths_in_view(image_paths.mirrors, image_paths.map);
   multipath_of_points(context, work.faces, image_paths, points);
-  // Only the straight path is left: no mirror is in sight.
+  // Only the straight path is left, because no mirror is visible.
   if (image_paths.paths.size() == 1) return counts;
 
   std::vector<PathReach> reach;
@@ -132,11 +132,11 @@ MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& wo
   const std::vector<TileInView>& tiles = context.cells.in_view(view, context.pool);
   // gamma of eq. 21: needed for the cross term of a pair ij, ji in expected power only.
   const std::vector<float> correlation = plan.expected_power ? beam_correlation_over_columns(plan) : std::vector<float>{};
-  // A scatterer keeps the arrivals of the cell it is at: one a worker.
+  // One scatterer per worker, because it stores the arrivals of its current cell.
   std::vector<MultipathScatterer> scatterers;
   for (int worker = 0; worker < context.pool.threads(); ++worker)
     scatterers.emplace_back(context, image_paths, reach, correlation);
-  // Columns of their own, summed before the transmitter's pattern and the noise are applied.
+  // Separate columns, which are added before the transmitter's pattern and the noise.
   work.columns.shape(plan.columns.count, plan.samples, plan.taps);
   clear_columns(work.columns, 0, plan.columns.count);
   counts.echoes = Rounds(work, plan, context.kernels, context.pool).run(scatterers, tiles);

@@ -6,9 +6,9 @@
 namespace sonar {
 namespace {
 
-constexpr double most_grazing_cosine = 0.17;  // faces that do not mirror at 10 degrees grazing are left out
+constexpr double most_grazing_cosine = 0.17;  // faces that do not reflect at a grazing angle of 10 degrees are left out
 
-/// Mirroring of places: p - 2 (n . p + height) n.
+/// Reflects places: p - 2 (n . p + height) n.
 struct Image {
   Rotation turn;
   Vec3d shift_m;
@@ -44,13 +44,13 @@ std::vector<FlatMirror> mirrors_of(const PingContext& context, const FlatFaces& 
     const double kh = wave_number * static_cast<double>(material.roughness_m);
     m.twice_kh_squared = 2 * kh * kh;
     if (std::abs(m.reflectance(most_grazing_cosine)) <= least_reflectance) continue;
-    // Planes in the axes of seen_from [m]. The normal is turned to the sonar: heights are positive on its side.
+    // Planes in the axes of seen_from [m]. The normal points towards the sonar, so that heights are positive on its side.
     const Pose in_sonar = compose(inverse(s.seen_from),
                                   scene.in_world(scene.objects[static_cast<std::size_t>(face.object)], context.bodies_in_world));
     m.normal = rotate(in_sonar.orientation, face.normal);
     m.height_m = -(face.offset_m + dot(m.normal, in_sonar.position_m));
     if (m.height_m < 0) m.normal = -1.0 * m.normal, m.height_m = -m.height_m;
-    // A sonar in the plane has no image; an image farther than the record is long [m] returns nothing.
+    // A sonar in the plane has no image; an image beyond the length of the record [m] has no echo.
     if (m.height_m < touching_m || m.height_m > 2 * s.max_range_m) continue;
     mirrors.push_back(m);
   }
@@ -82,7 +82,7 @@ double reflectance_of(const Path& path, const std::vector<FlatMirror>& mirrors, 
 
 bool is_lit(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place) {
   if (path.first < 0) return true;
-  // On the lit side, and off the mirror by touching_m: its own surface is no target.
+  // On the lit side, and at least touching_m from the mirror, whose own surface is not a target.
   const double height = at(mirrors, path.second < 0 ? path.first : path.second).height_of(place);
   return (path.beyond_front ? height : -height) > touching_m;
 }
@@ -99,13 +99,13 @@ double bubble_factor(const BubbleLayer& bubbles, const Path& path, const std::ve
     const Vec3d source = two_left ? image_in(at(mirrors, path.second)).of(image_in(at(mirrors, path.first)).of({}))
                                   : image_in(at(mirrors, path.first)).of({});
     const double from = at(mirrors, mirror).height_of(source), to = at(mirrors, mirror).height_of(end);
-    // A place on the dark side has no such line. Tiles that reach through the mirror may have their middle there.
+    // A place on the dark side has no such line. The middle of a tile that extends through the mirror may lie there.
     const double part = from == to ? 0.5 : std::clamp(from / (from - to), 0.0, 1.0);
     bends.push_back(source + part * (end - source));
   }
   bends.push_back({});
   double factor = 1;
-  // World z [m], which decides the layer in (16).
+  // World z [m], which decides whether a place is in the layer of (16).
   const auto height = [&s](Vec3d p) { return s.seen_from.position_m.z + (s.world_from_sonar * p).z; };
   // two_way() is e^{-2 b l}: its root is the loss of one way.
   for (std::size_t i = 0; i + 1 < bends.size(); ++i)

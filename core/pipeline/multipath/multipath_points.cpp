@@ -23,7 +23,7 @@ class PointMultipath {
         plan_(context.plan),
         s_(context.scalars),
         pattern_(plan_.mode.pattern) {
-    // All pairs of mirrors, not only those that own a part of the sampled map: a point's paths are traced one by one.
+    // All pairs of mirrors, not only those in the sampled map, because each path of a point is traced.
     const int n = static_cast<int>(image_paths.mirrors.size());
     paths_.push_back(path_by(image_paths.mirrors, -1));
     for (int a = 0; a < n; ++a) paths_.push_back(path_by(image_paths.mirrors, a));
@@ -45,7 +45,7 @@ class PointMultipath {
     }
     for (std::size_t i = 0; i < arrivals.size(); ++i)
       for (std::size_t j = 0; j < arrivals.size(); ++j) {
-        // DD is the direct echo of scatter_points.
+        // The direct pair is the echo of scatter_points.
         if (direct && i == 0 && j == 0) continue;
         const PointArrival &out = arrivals[i], &back = arrivals[j];
         // (10): at the range (r_i + r_j) / 2 [m]; the bearing is that of the path back.
@@ -58,7 +58,7 @@ class PointMultipath {
  private:
   std::optional<PointArrival> arrive(const Path& path, Vec3d place) const {
     if (!is_lit(path, image_paths_.mirrors, place)) return {};
-    // The path leaves in the direction of the image, so (29) applies to the image as to any place.
+    // The path leaves in the direction of the image, so that (29) applies to the image.
     const Vec3d image = path.image_of(place);
     const Vec3d p = s_.echo_geometry(image).from_sonar_m;
     const double r = length(p);
@@ -66,7 +66,7 @@ class PointMultipath {
     const ConicalDirection direction = plan_.direction_of(p);
     const std::optional<std::size_t> column = plan_.column_of(direction, image_paths_.map.fan.half_angle_rad);
     if (!column) return {};
-    // Traced last: it costs the most.
+    // This comes last, because it takes the most time.
     if (!reaches(scene_, s_, faces_, image_paths_.mirrors, path, place)) return {};
     // m / r D(psi) e^{-a r}, and the carrier's phase of one way, -2 pi (f / c) r.
     const double size = reflectance_of(path, image_paths_.mirrors, (1 / r) * p) * std::exp(-s_.absorption_np_per_m * r) / r *

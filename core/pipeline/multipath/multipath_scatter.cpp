@@ -11,7 +11,7 @@
 namespace sonar {
 namespace {
 
-constexpr float least_transmit = 1e-3f;  // columns lit by less are not received from
+constexpr float least_transmit = 1e-3f;  // columns with a lower amplitude of the transmitter receive nothing
 
 void store(Vec3d v, float (&to)[3]) {
   to[0] = static_cast<float>(v.x), to[1] = static_cast<float>(v.y), to[2] = static_cast<float>(v.z);
@@ -37,19 +37,19 @@ PathReach::PathReach(const Path& path, const ImagePaths& image_paths, const Ping
     return std::atan(
         static_cast<double>(image_paths.map.fan.first_tangent + static_cast<float>(bin) / image_paths.map.fan.bins_per_tangent));
   };
-  // One bin more on either side: cells between two nodes count, too.
+  // Adds one bin on either side, because cells between two nodes count, too.
   for (std::size_t block = 0; block < image_paths.map.windows.size(); ++block) {
     const PathWindow& w = image_paths.map.window(block, path);
     spans_.push_back(w.empty() ? Span{} : Span{angle(w.first_bin - 1), angle(w.last_bin + 1)});
   }
 }
 
-/// A ball is in reach when its image lies within the record, on the lit side of the last mirror, and within the columns and
-/// elevations that the path owns in the traced map.
+/// A ball is in reach if its image lies within the record, on the lit side of the last mirror, and within the path's columns and
+/// elevations in the traced map.
 std::optional<DistanceSpan> PathReach::seen_between(Vec3d place, double radius) const {
   const Vec3d image = path_.image_of(place);
   const double r = length(image);
-  // The shortest pair with this path has the straight one for the other way; the ball may be a radius nearer on each.
+  // The shortest pair has this path one way and the straight one the other way; the ball may be nearer by a radius on each.
   if (r + length(place) - 2 * radius > longest_m_) return {};
   if (path_.first >= 0) {
     const FlatMirror& last = image_paths_.mirrors[static_cast<std::size_t>(path_.second < 0 ? path_.first : path_.second)];
@@ -70,7 +70,7 @@ std::optional<DistanceSpan> PathReach::seen_between(Vec3d place, double radius) 
   }
   const double across = conical ? std::sqrt(image.x * image.x + image.z * image.z) : r;
   const bool anywhere = across <= radius;
-  // psi of the image, and half the angle about the array axis that the ball takes [rad].
+  // psi of the image, and half the angle of the ball about the array axis [rad].
   const double angle = std::atan2(image.z, conical ? image.x : flat), spread = anywhere ? pi : std::asin(radius / across);
   for (double b = first_block; b <= last_block; ++b) {
     const Span& span = spans_[static_cast<std::size_t>(b)];
@@ -118,7 +118,7 @@ MultipathScatterer::TilePath MultipathScatterer::look_at(const TileInView& tile,
   tile_path.path = &path;
   const Rotation& sonar_from_object = cells_.sonar_from_object(tile.object);
   const EchoGeometry at = s_.echo_geometry(path.image_of(tile.from_sonar_m));
-  // The image of a tile is the tile mirrored: the axes turn with it, and may become left-handed.
+  // The image of a tile is its reflection. The axes are reflected with it, and may become left-handed.
   const Rotation turn = (s_.moves ? at.turn * path.turn : path.turn) * sonar_from_object;
   const double range = length(at.from_sonar_m);
   store(at.from_sonar_m, tile_path.from_sonar);
@@ -208,7 +208,7 @@ void MultipathScatterer::scatter_cell(const Cell& cell, const LawTable& law, con
   const float offset = offset_of(tile_paths_[0], range_m);
   direct_ = arrive(tile_paths_[0], cell, range_m, offset, law, arrival);
   if (direct_) arrivals_.insert(arrivals_.begin(), arrival);
-  // All paths share the cells that the shortest calls for: their echoes must be of the same scatterers.
+  // All paths use the cell level of the shortest path, because their echoes must come from the same scatterers.
   float shortest_m = arrivals_[0].range_m;
   for (const Arrival& a : arrivals_) shortest_m = std::min(shortest_m, a.range_m);
   const float fade = level_weight(level, shortest_m);
@@ -253,7 +253,7 @@ bool MultipathScatterer::arrive(const TilePath& w, const Cell& cell, float r, fl
   if (!is_visible(*w.path, out.column, bin, (1 + tolerance_m_ * inverse_r) / h)) return false;
 
   const float* q = w.from_sonar_object;
-  // cos(alpha) at the cell from the image's direction; its sign names the side of the surface.
+  // cos(alpha) at the cell from the image's direction; its sign gives the side of the surface.
   const float along = cell.normal[0] * (q[0] + cell.x) + cell.normal[1] * (q[1] + cell.y) + cell.normal[2] * (q[2] + cell.z);
   if (along * away_ > 0) return false;
   // One-way factor m_i / r_i D(psi_i) e^{-a r_i} (sigma_b)^(1/4): the product of two is the geometric mean of eq. 10.
@@ -281,20 +281,21 @@ void MultipathScatterer::pair_up(const Cell& cell, float fade, std::vector<Echoe
   for (std::size_t i = 0; i < arrivals_.size(); ++i)
     for (std::size_t j = 0; j <= i; ++j) {
       const Arrival &a = arrivals_[i], &b = arrivals_[j];
-      if (i == 0 && direct_) continue;  // straight out and back is no ghost
+      if (i == 0 && direct_) continue;  // the direct pair is not a ghost
       // A surface scatters to one side only.
       if (a.front != b.front) continue;
       // Shown at the range (r_i + r_j) / 2 and the bearing of the path back.
       const float sample = 0.5f * (a.range_m + b.range_m) * per_m - from + 0.5f * (a.sample_shift + b.sample_shift);
       if (sample <= first || sample >= last) continue;
       const auto add_arrival = [&](const Arrival& out, const Arrival& back, std::complex<float> amplitude) {
-        // finish_columns lights a column by the direct path to the scatterer. Here that path is another.
+        // finish_columns() multiplies by the transmitter's amplitude of the receiving column. Here the transmit path has another
+        // column.
         if (back.transmit < least_transmit || out.transmit == 0) return;
         const float lit = out.transmit / back.transmit;
         add(sample, amplitude * (plan_.expected_power ? lit * lit : lit), back.column, by_group);
       };
       if (!plan_.expected_power) {
-        // Levels fade in power: the root here.
+        // Levels cross-fade in power, so that amplitudes have the root.
         const std::complex<float> amplitude = times(times(std::sqrt(fade) * cell.weight, a.carried), b.carried);
         add_arrival(a, b, amplitude);
         if (i != j) add_arrival(b, a, amplitude);

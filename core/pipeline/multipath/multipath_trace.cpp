@@ -11,9 +11,9 @@ namespace sonar {
 namespace {
 
 constexpr double fan_edge_two_way = 0.01;  // 0.1 of one pattern
-constexpr float lift_m = 1e-4f;            // rays start so far off the mirror they come from
+constexpr float lift_m = 1e-4f;            // distance from the mirror at which reflected rays start
 
-/// Sixteen rays that mirrors send on.
+/// Traces sixteen rays via mirrors.
 class ChainTracer {
  public:
   ChainTracer(const RayScene& scene, const PingScalars& scalars, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors)
@@ -50,7 +50,7 @@ class ChainTracer {
     }
   }
 
-  /// The mirror that a ray has just met, or no_mirror; and turns the ray round on it.
+  /// Returns the mirror that a ray has just hit, or no_mirror, and reflects the ray.
   std::uint8_t bounce(std::size_t i) {
     if (packet.object[i] == RayPacket::miss) return BounceMap::no_mirror;
     const int face = faces_.face_of(packet.object[i], packet.triangle[i]);
@@ -70,7 +70,7 @@ class ChainTracer {
     packet.direction_x[i] = d.x - 2 * along * n.x;
     packet.direction_y[i] = d.y - 2 * along * n.y;
     packet.direction_z[i] = d.z - 2 * along * n.z;
-    // The length of the unfolded path is bounded, not that of a leg [m].
+    // The limit applies to the length of the unfolded path, not to that of a leg [m].
     packet.far[i] = far_[i] - travelled[i];
     return packet.far[i] > 0 ? mirror : BounceMap::no_mirror;
   }
@@ -90,7 +90,7 @@ class ChainTracer {
   int count_ = 0;
 };
 
-/// A direction's chain of surfaces.
+/// The sequence of surfaces in one direction.
 struct Chain : FanSample {
   SurfaceHit surface[3];
   std::uint8_t mirror[2] = {BounceMap::no_mirror, BounceMap::no_mirror};
@@ -131,7 +131,7 @@ class ColumnsTracer {
   /// Follows the packet; its lanes are the samples `index`.
   void follow(const std::array<std::int32_t, RayPacket::size>& index) {
     std::uint32_t active = rays_.all();
-    // Up to two bounces: stage s is the surface met after s mirrors.
+    // Up to two bounces: stage s is the surface hit after s mirrors.
     for (std::size_t stage = 0; stage < 3 && active; ++stage) {
       rays_.go(active, stage == 0);
       for (std::size_t i = 0; i < RayPacket::size; ++i) {
@@ -147,7 +147,7 @@ class ColumnsTracer {
   void trace_base() {
     const std::int32_t n = elevations();
     samples_.assign(static_cast<std::size_t>(columns()) * static_cast<std::size_t>(n), {});
-    // Lanes are columns: at one elevation neighbours mostly meet the same mirror.
+    // Lanes are columns, because neighbours at one elevation mostly hit the same mirror.
     std::array<std::int32_t, RayPacket::size> index{};
     for (std::int32_t e = 0; e < n; ++e) {
       rays_.clear();
@@ -180,7 +180,7 @@ class ColumnsTracer {
 
   void draw(int k) {
     const BounceFan& fan = map_.fan;
-    // Nodes at even tangents of elevation between consecutive samples.
+    // Nodes are uniform in the tangent of elevation, between consecutive samples.
     int bin = 0;
     for (std::int32_t i = k * elevations(); at(i).next >= 0; i = at(i).next) {
       const Chain &a = at(i), &b = at(at(i).next);
@@ -197,7 +197,7 @@ class ColumnsTracer {
     const std::size_t node =
         static_cast<std::size_t>(column) * static_cast<std::size_t>(map_.fan.bins + 1) + static_cast<std::size_t>(bin);
     const Chain& nearer = part < 0.5f ? a : b;
-    // Different mirrors at a stage: what follows has nothing in common and is taken from the nearer sample.
+    // If the mirrors at a stage differ, later stages are taken from the nearer sample.
     bool same_mirrors = true;
     for (std::size_t stage = 0; stage < 3; ++stage) {
       float seen = nearer.surface[stage].inverse_x;
@@ -222,11 +222,11 @@ class ColumnsTracer {
   std::vector<FanInterval> open_, halves_;
 };
 
-/// The part of a block of columns that each path owns.
+/// Finds the part of a block of columns that belongs to each path.
 void find_windows(std::size_t block, BounceMap& map) {
   auto& windows = map.windows[block];
   windows.fill({});
-  windows[BounceMap::index_of(-1, -1)] = {0, map.fan.bins};  // the direct path has no mirror to keep within
+  windows[BounceMap::index_of(-1, -1)] = {0, map.fan.bins};  // the direct path has no mirror that limits it
   // Bounds over a block of columns let whole tiles be skipped (PathReach).
   const int row = map.fan.bins + 1, first = static_cast<int>(block) * BounceMap::block_columns;
   const auto number = [](std::uint8_t mirror) { return mirror == BounceMap::no_mirror ? -1 : static_cast<int>(mirror); };
@@ -249,7 +249,7 @@ BounceFan make_bounce_fan(const PingPlan& plan) {
   fan.half_angle_rad = plan.fan.half_angle_rad;
   if (plan.mode.pattern.elevation_taper != Taper::unit)
     fan.half_angle_rad = std::max(fan.half_angle_rad, std::min(elevation_reach_rad(plan.mode.pattern, fan_edge_two_way), 1.4));
-  // The same bins a tangent as the direct fan, over its own wider angle.
+  // The same bins per tangent as the direct fan, over a wider angle.
   const double tangent = std::tan(fan.half_angle_rad);
   fan.bins_per_tangent = plan.fan.axis.bins_per_tangent;
   fan.bins = static_cast<int>(std::ceil(2 * tangent * static_cast<double>(fan.bins_per_tangent)));
@@ -274,7 +274,7 @@ std::size_t trace_bounces(const PingContext& context, const FlatFaces& faces, co
   map.nodes.resize(nodes);
   const auto blocks = static_cast<std::size_t>((map.columns + BounceMap::block_columns - 1) / BounceMap::block_columns);
   map.windows.resize(blocks);
-  // A packet of columns a task; each writes its own part of the map.
+  // One packet of columns per task; each task writes its own part of the map.
   std::vector<std::size_t> traced(blocks);
   context.pool.for_each(blocks, [&](std::size_t block, int) {
     ChainTracer rays(context.rays, context.scalars, faces, mirrors);
@@ -298,7 +298,7 @@ bool reaches(const RayScene& scene, const PingScalars& scalars, const FlatFaces&
   const Vec3d image = path.image_of(place);
   const double range = length(image);
   ChainTracer ray(scene, scalars, faces, mirrors);
-  // Toward the image, and almost as far: the place itself must not hide the ray.
+  // Toward the image, and slightly shorter, so that the surface at the place does not block the ray.
   ray.add(to_float((1 / range) * image), static_cast<float>(range * 0.9999));
   for (const int wanted : {path.first, path.second}) {
     ray.go(1u, false);
