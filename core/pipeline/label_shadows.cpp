@@ -1,4 +1,4 @@
-// The shadows of LabelWork: the gaps that the rays found in a column, and the parts of them without echoes.
+// Shadows in LabelWork: gaps that rays found in a column, and their parts without echoes.
 #include <algorithm>
 #include <cmath>
 
@@ -7,10 +7,10 @@
 namespace sonar {
 namespace {
 
-/// Samples of a column that hit something, upwards.
+/// Samples of a column with a hit, from bottom to top.
 using Upwards = std::vector<const FanScratch::Sample*>;
 
-/// The straight line, 1 / x over the tangent, that stands for the surface which the object at sample `of` hides. It goes from the
+/// The straight line, 1 / x over the tangent, that approximates the surface hidden by the object at sample `of`. It goes from the
 /// last sample below the object to the first one above. If there is none above, the line continues from the lowest samples.
 /// Without a line low and high are equal.
 struct HiddenLine {
@@ -37,7 +37,7 @@ struct HiddenLine {
       high = slope < 0 ? up.size() : low;
     }
   }
-  /// Range at which the line passes the direction of a sample; infinite behind the horizon.
+  /// Range at which the line crosses the direction of a sample; infinite beyond the horizon.
   float range_m(const FanScratch::Sample& s) const {
     const float inverse = inverse_x + slope * (s.tangent - tangent);
     return inverse > 0 ? 1 / (inverse * s.forward) : HUGE_VALF;
@@ -52,7 +52,7 @@ struct HiddenLine {
 };
 
 /// Calls f(from_m, to_m, object) for the parts of a range behind sample `of`. Each part is in the shadow of the nearest object
-/// that hides it, which is the one seen in its direction.
+/// that hides it, which is the visible one in its direction.
 template <class F>
 void for_each_caster(const Upwards& up, std::size_t of, float from_m, float to_m, F f) {
   const HiddenLine line(up, of);
@@ -83,17 +83,17 @@ void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
   const auto end = static_cast<float>(plan.samples);
   struct Behind {
     std::uint32_t object;
-    float from_m;  // range from which it hides what is beyond it; 0: from the object on
-    bool goes_on;  // whether there is something beyond it
+    float from_m;  // range from which the shadow extends; 0: from the object on
+    bool goes_on;  // whether a surface lies beyond it
   };
   std::vector<Behind> behind;
   Upwards up;
   for (int k = first; k < last; ++k) {
     std::vector<Gap>& gaps = gaps_[static_cast<std::size_t>(k)];
     const std::int32_t lowest = (k - first) * elevations;
-    // Goes upwards. An object hides surfaces beyond it. The hidden part is from where such a surface is last seen, below the
-    // lower edge, to where it is seen again, above the upper edge. If the object stands on something, it is from the object
-    // itself.
+    // Goes from bottom to top. An object hides surfaces beyond it. The hidden part begins where such a surface is last visible,
+    // below the lower edge, and ends where it is visible again, above the upper edge. If the object stands on a surface, it
+    // begins at the object.
     behind.clear();
     up.clear();
     for (std::int32_t i = lowest; i >= 0; i = at(i).next)

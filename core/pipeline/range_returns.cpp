@@ -11,23 +11,24 @@
 namespace sonar {
 namespace {
 
-constexpr double speckle_cell_m = 0.02;  // surfaces keep their speckle as long as a beam's centre stays within such a cell
+constexpr double speckle_cell_m = 0.02;  // a surface keeps its speckle while a beam's centre stays within a cell of this size
 constexpr std::uint32_t draws = 4096;    // number of draws, which the range cells of all returns share
-constexpr double least_blur = 0.5;       // least blur as a share of a range cell: half the length of the shortest echo
+constexpr double least_blur = 0.5;       // least half length of an echo, in range cells
 
-// Rays around the middle of a cell. An object that the middle ray misses counts by the share of the cell that it fills.
+// Rays around the middle of a cell. An object that the middle ray misses is weighted by the part of the cell that it fills.
 constexpr int rays_across = 2, rays_up = 2, rays_around = rays_across * rays_up;
 constexpr int cells_a_packet = RayPacket::size / rays_around;
-// Things that fill less than this of the rays in a cell and its eight neighbours are thin. They are followed from cell to cell,
-// and the cells that they cross get as many rays as `most_close_rays` for all of them allow: the share of a cell that a pole
-// fills is as exact as its rays are close.
+// Objects hit by a smaller part than this of the rays in a cell and its eight neighbours are thin. They are followed from cell to
+// cell, and the cells that they cross get as many rays as `most_close_rays` allows for all of these cells, because the accuracy
+// of the part of a cell that a pole fills depends on the distance of rays.
 constexpr double thin_share = 0.4;
 constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15;
-constexpr std::size_t most_thin_cells = 512, most_probed_cells = 2048;  // when a net covers the view, the few usual rays must do
+constexpr std::size_t most_thin_cells = 512,
+                      most_probed_cells = 2048;  // if a net covers the view, only the usual few rays are traced
 
-/// The place of a ray in a cell, -0.5 to 0.5, along an axis in one of `of` strata: multiples of the golden ratio shift it from
-/// line to line through the grid, so that level and upright edges meet every part of a cell; where the lines begin is random, so
-/// that no oblique edge stays between the rays.
+/// The place of a ray in a cell, -0.5 to 0.5, along an axis in one of `of` strata. Multiples of the golden ratio shift it from
+/// line to line of the grid, so that horizontal and vertical edges cross rays at all places of cells. The start of each line is
+/// random, so that no oblique edge stays between rays.
 float place_in_cell(int stratum, int of, int line, int across_lines) {
   const auto n = static_cast<std::uint32_t>(across_lines),
              shift = static_cast<std::uint32_t>(line) * 0x9E3779B9u + n * n * 0x85EBCA6Bu;
@@ -138,7 +139,7 @@ void RangeReturns::trace_middles(int row, std::vector<RangeReturn>& middles) con
 
 /// Aims rays of a cell's lattice, from `first_ray` on, by lanes of a packet.
 void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ray, int rays, RayPacket& p, int first_lane) const {
-  // Computed in the plane across the middle ray, which is good enough for a few tenths of a degree.
+  // Computed in the plane across the middle ray, which is accurate enough for a few tenths of a degree.
   const auto [ca, sa] = azimuth_[static_cast<std::size_t>(column)];
   const Vec3d ahead = direction(column, row), to_port{-sa, ca, 0};
   const double width = column_step_rad_ * elevation_[static_cast<std::size_t>(row)].cosine;
@@ -154,11 +155,11 @@ void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ra
   }
 }
 
-/// Appends the returns of the rays of a cell. Rays that met the same as the middle ray give one return, with the range of the
-/// middle ray.
+/// Appends the returns of the rays of a cell. Rays that hit the same surface as the middle ray give one return, with the range of
+/// the middle ray.
 void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int first_lane, std::vector<RangeReturn>& to) const {
   const std::size_t first = to.size();
-  const double about_m = 1.25 * middle.spread_m + 2 * cell_m_;  // a patch is not quite even
+  const double about_m = 1.25 * middle.spread_m + 2 * cell_m_;  // a patch is not exactly flat
   const double of_one = middle.power / rays_around;
   double power = 0;
   for (int lane = first_lane; lane < first_lane + rays_around; ++lane) {
@@ -211,7 +212,7 @@ RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) con
   return r;
 }
 
-/// The speckle of the place that a ray met.
+/// Sets the speckle of the place that a ray hit.
 void RangeReturns::draw_speckle(const RayPacket& p, int lane, RangeReturn& r) const {
   const auto i = static_cast<std::size_t>(lane);
   const auto cell = [](float origin, float direction, float far) {
@@ -225,7 +226,7 @@ void RangeReturns::draw_speckle(const RayPacket& p, int lane, RangeReturn& r) co
   r.draw = bits.v[2];
 }
 
-/// Adds a return to those of one cell, which begin at `first`. Rays that met the same object at about the same range give one
+/// Adds a return to those of one cell, which begin at `first`. Rays that hit the same object at about the same range give one
 /// return.
 void RangeReturns::add(const RangeReturn& r, const RayPacket& p, int lane, std::vector<RangeReturn>& to,
                        std::size_t first) const {
@@ -251,7 +252,7 @@ void RangeReturns::for_each_neighbour(Cell cell, F f) const {  // and for the ce
       f(Cell{column, row});
 }
 
-/// Cells in which something thin has been met, and what: objects that are thin in most of their cells.
+/// Cells in which rays hit a thin object, which is one that is thin in most of its cells.
 std::vector<RangeReturns::Cell> RangeReturns::thin_cells(std::vector<std::uint8_t>& is_thin) const {
   struct Found {
     Cell cell;
@@ -292,7 +293,7 @@ void RangeReturns::for_each_hit(Cell cell, Lattice lattice, F f) const {
   }
 }
 
-/// Thin things are followed from the cells where rays met them to those where they passed between the rays.
+/// Follows thin objects from the cells in which rays hit them to cells in which they lie between rays.
 std::vector<RangeReturns::Cell> RangeReturns::crossed_cells(Parallel& pool) const {
   std::vector<std::uint8_t> is_thin(scene_.scene().objects.size());
   std::vector<Cell> edge = thin_cells(is_thin), crossed = edge;
@@ -322,7 +323,7 @@ std::vector<RangeReturns::Cell> RangeReturns::crossed_cells(Parallel& pool) cons
   return crossed;
 }
 
-/// Sees the cells that thin things cross again, through many rays.
+/// Traces the cells that thin objects cross again, with many rays.
 void RangeReturns::look_closer(Parallel& pool) {
   const std::vector<Cell> cells = crossed_cells(pool);
   if (cells.empty() || cells.size() > most_thin_cells) return;

@@ -20,7 +20,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   PreparedTile out;
   simd::TileSeen& seen = out.seen;
   const CellTile& tile = *t.tile;
-  // The tile's place at the moment it scatters, and the axes of reception; all its cells share them.
+  // The tile's place at the time of scattering, and the axes of reception, are the same for all its cells.
   const EchoGeometry at = s.echo_geometry(t.from_sonar_m);
   const Rotation sonar_from_object = s.moves ? at.turn * seen_from_object : seen_from_object;
   const Vec3d from_sonar_object_m =
@@ -35,7 +35,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   seen.range_m = static_cast<float>(range);
   // (12): phase of the tile's centre in [0, 1) turns.
   seen.phase_turns = static_cast<float>(fraction_of_turn(range * s.turns_per_m));
-  // (27) for the tile's middle: later by so many samples.
+  // (27) for the tile's middle: delay in samples.
   seen.sample_shift = static_cast<float>(s.doppler_samples(at.from_sonar_m));
   const LawTable& law = context.laws[static_cast<std::size_t>(tile.material)];
   seen.law = law.table();
@@ -67,7 +67,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   seen.mark = surface_mark(static_cast<std::uint32_t>(t.object));
   seen.moves = s.moves;
   if (s.moves) {
-    // Back from the axes of reception to those that the rays were traced in.
+    // From the axes of reception back to those in which rays were traced.
     const Rotation back = transposed(at.turn);
     for (int i = 0; i < 9; ++i) seen.seen_turn[i] = static_cast<float>(back.m[i / 3][i % 3]);
     const Vec3 moved = to_float(at.moved_m);
@@ -77,7 +77,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   return out;
 }
 
-/// Prefetches a tile's cells: tiles lie anywhere in memory, which defeats the hardware prefetcher.
+/// Prefetches a tile's cells: tiles lie anywhere in memory, which the hardware prefetcher cannot predict.
 void fetch_cells(const CellTile& tile) {
   constexpr std::size_t cache_line = 64;
   const auto* at = reinterpret_cast<const char*>(tile.data.get());
@@ -88,7 +88,7 @@ void fetch_cells(const CellTile& tile) {
 
 std::vector<float> turned_away_of(const Scene& scene, std::span<const Skin> skins, std::span<const Pose> bodies_in_world,
                                   Vec3d sonar_m) {
-  constexpr std::size_t most_triangles = 5000;  // beyond, a sonar within an object's box is taken to be within the object
+  constexpr std::size_t most_triangles = 5000;  // with more, a sonar in the box of an object counts as inside the object
   std::vector<float> away;
   for (std::size_t o = 0; o < scene.objects.size(); ++o) {
     const Skin& skin = skins[o];
@@ -103,7 +103,7 @@ std::vector<float> turned_away_of(const Scene& scene, std::span<const Skin> skin
   return away;
 }
 
-/// One table a material, at this ping's frequency and sound speed.
+/// One table per material, at this ping's frequency and sound speed.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& s) {
   std::vector<LawTable> laws;
   for (const Material& m : scene.materials)
@@ -115,7 +115,7 @@ void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles) {
   const BubbleLayer bubbles(context.scene().sea_surface);
   tiles.resize(in_view.size());
-  // Tiles per task. Each task writes its own places, so the order of the tiles, and of each sum, is the same as with one thread.
+  // Tiles per task. Each task writes its own elements, so that the order of tiles, and of each sum, does not depend on threads.
   constexpr std::size_t batch = 256;
   context.pool.for_each((in_view.size() + batch - 1) / batch, [&](std::size_t b, int) {
     const std::size_t end = std::min(in_view.size(), (b + 1) * batch);
@@ -145,7 +145,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   g.depth_tolerance_m = plan.depth_tolerance_m();
   g.turns_per_m = static_cast<float>(s.turns_per_m);
   g.decay_per_m = static_cast<float>(2 * s.absorption_np_per_m);
-  // Echoes whose pulse reaches no sample of the record are dropped: half the taps beyond either end.
+  // Echoes whose pulse has no sample in the record are dropped: those more than half the taps beyond its ends.
   g.samples_per_m = static_cast<float>(s.samples_per_m);
   g.sample_offset = static_cast<float>(s.sample_offset);
   g.first_sample = static_cast<float>(-plan.taps / 2);
@@ -159,7 +159,7 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
 void sort_tiles(const std::vector<PreparedTile>& tiles, int group_columns, int groups,
                 std::vector<std::vector<std::uint32_t>>& by_group) {
   by_group.resize(static_cast<std::size_t>(groups));
-  // A tile that reaches into several groups is looked at by each of them; within a group the tiles keep their order.
+  // A tile that overlaps several groups is in the list of each; tiles keep their order.
   for (auto& wanted : by_group) wanted.clear();
   for (std::size_t i = 0; i < tiles.size(); ++i)
     for (int g = tiles[i].first_column / group_columns; g * group_columns < tiles[i].last_column && g < groups; ++g)
@@ -172,7 +172,7 @@ std::size_t scatter(const std::vector<PreparedTile>& tiles, std::span<const std:
     if (from + 2 < wanted.size()) __builtin_prefetch(tiles[wanted[from + 2]].seen.tile);
     if (from + 1 < wanted.size()) fetch_cells(*tiles[wanted[from + 1]].seen.tile);
     const simd::TileSeen& seen = tiles[wanted[from]].seen;
-    // The kernels write a tile's echoes without bounds checks; a full buffer is summed first.
+    // Kernels write the echoes of a tile without bounds checks, so that a full buffer must be summed before.
     if (echoes.count + seen.tile->count > echoes.capacity()) {
       if (echoes.count > 0) break;
       echoes.reserve(seen.tile->count);
@@ -194,7 +194,7 @@ std::vector<PointEcho> scatter_points(const PingContext& context) {
     const Vec3d in_world = scene.scene().in_world(target, context.bodies_in_world);
     const Vec3d seen = transform(world_in_sonar, in_world);
     ++instance;
-    // Within the housing 1 / r^2 has no meaning; behind the array nothing is received.
+    // Inside the housing 1 / r^2 has no meaning; the array receives nothing from behind.
     if (length(seen) < nearest_scatterer_m || seen.x <= 0) continue;
     const double strength = amplitude_from_db(static_cast<double>(target.target_strength_db));
     std::optional<PointEcho> echo = point_echo(seen, strength, context.plan, s);

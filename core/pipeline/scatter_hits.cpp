@@ -15,9 +15,9 @@ Vec3d direction_of_hit(const FanHit& hit, double sine, bool conical) {
   return conical ? sonar_from_conical(d) : sonar_from_flat(d);
 }
 
-// Eq. 6 with one scatterer a ray: sigma = sigma_b r^2 dOmega / cos(alpha), since a ray's footprint has the area
+// Eq. 6 with one scatterer per ray: sigma = sigma_b r^2 dOmega / cos(alpha), since a ray's footprint has the area
 // r^2 dOmega / cos(alpha). Hence sqrt(sigma) / r^2 = sqrt(sigma_b dOmega / cos(alpha)) / r.
-/// Hits on their way to echoes, as many at a time as the kernels take.
+/// Converts hits to echoes, as many at a time as the kernels accept.
 class HitBatch {
  public:
   HitBatch(const PingContext& context, Seed seed, Echoes& echoes)
@@ -42,13 +42,13 @@ class HitBatch {
     double at_sample = s_.sample_of(r);
     if (s_.doppler_m_per_mps != 0)
       at_sample += s_.doppler_samples(direction_of_hit(hit, plan_.columns.sine(hit.column), plan_.switches.conical));
-    // Said so that what is not a number is left out, too.
+    // The condition drops NaN, too.
     if (!(at_sample > -plan_.taps / 2 && at_sample < plan_.samples + plan_.taps / 2 - 1)) return;
     if (!(r >= nearest_scatterer_m && hit.cosine >= 0 && hit.cosine < 1.001f)) return;
     const Object& object = scene_.objects[hit.object];
     // sqrt(sigma) / r^2, sigma = strength * footprint_area_m2; the solid angle of a ray is in its weight.
     const float strength = laws_[object.mesh->material[hit.triangle]].root_strength(hit.cosine);
-    // cosine_floor: the footprint of a facet seen edge-on would be infinite.
+    // cosine_floor limits the footprint of a facet that is seen edge-on.
     const float slant = std::sqrt(std::max(hit.cosine, static_cast<float>(cosine_floor)));
     const float weight = static_cast<float>(s_.source_upa) * strength *
                          plan_.fixed_fan_rays[static_cast<std::size_t>(hit.ray)].weight / (slant * hit.range_m) *

@@ -45,7 +45,7 @@ double scattering_strength(const Material& m, double cosine, double centre_hz, d
   const double law = m.law == ScatteringLaw::gsab ? gsab(m.gsab, cosine) : lambert_per_area(lambert_mu(m), cosine);
   const double kh = phase_roughness(m, centre_hz, sound_speed_mps);
   const bool smooth = specular && kh < smooth_below_kh;
-  // The share that the specular echo has lost: 1 - e^{-4 k^2 h^2 cos^2 a} (eq. 14).
+  // The part that is not in the specular echo: 1 - e^{-4 k^2 h^2 cos^2 a} (eq. 14).
   const double scattered = smooth ? 1 - std::exp(-4 * kh * kh * cosine * cosine) : 1;
   return law * scattered * trend(m, centre_hz);
 }
@@ -57,7 +57,7 @@ LawTable make_law(const Material& m, double centre_hz, double sound_speed_mps, b
   law.mu = lambert_mu(m) * trend(m, centre_hz);
   const bool smooth = specular && phase_roughness(m, centre_hz, sound_speed_mps) < smooth_below_kh;
   if (m.law == ScatteringLaw::lambert && !smooth) return law;
-  // x = sqrt(1 - cosine): even steps in x follow a peak at normal incidence closely.
+  // x = sqrt(1 - cosine): uniform steps in x resolve a peak at normal incidence.
   for (int i = 0; i < law_steps + 2; ++i) {
     const double x = std::min(1.0, static_cast<double>(i) / law_steps);
     const double sigma = scattering_strength(m, 1 - x * x, centre_hz, sound_speed_mps, specular);

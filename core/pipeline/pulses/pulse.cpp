@@ -14,13 +14,13 @@ using Shape = Waveform::Shape;
 
 constexpr double gaussian_reach_widths = 3.99;  // p falls to 2e-10 at this many -3 dB widths
 constexpr double gaussian_band_over_b = 2.5;    // P falls to 2e-7 at half of this
-constexpr double band_of_tone = 32;             // in 1 / length: what is cut off holds 4e-4 of P's peak, 1e-3 of p in L2
-constexpr double band_of_sweep = 1.5;           // in bandwidths: its fade lets a trace out
+constexpr double band_of_tone = 32;             // in 1 / length: P beyond it is at most 4e-4 of the peak, 1e-3 of p in L2
+constexpr double band_of_sweep = 1.5;           // in bandwidths: the fade of p leaves a small part outside
 constexpr std::size_t most_samples = 65536;
-constexpr double worth_keeping = 1e-4;       // least share of a measured pulse's peak, in time and in frequency
-constexpr double finest_rate_per_row = 256;  // samples of a measured pulse to a sample of the grid
-constexpr double longest_in_rows = 8192;     // sample times of the grid that a measured pulse may last
-constexpr int neighbours = 32;               // samples of a measured pulse that give a value between them
+constexpr double worth_keeping = 1e-4;       // least fraction of a measured pulse's peak, in time and in frequency
+constexpr double finest_rate_per_row = 256;  // samples of a measured pulse per sample of the grid
+constexpr double longest_in_rows = 8192;     // longest duration of a measured pulse in sample times of the grid
+constexpr int neighbours = 32;               // samples of a measured pulse used for interpolation
 constexpr double window_sharpness = 8.6;     // ripple 1e-4 up to 0.8 of the band
 
 double interpolation_weight(double x) {  // x in samples
@@ -119,7 +119,7 @@ std::vector<std::complex<double>> Pulse::spectrum_s(const spectral::FrequencyGri
     }
     return values;
   }
-  // From samples, which contain no frequencies beyond half their rate.
+  // Uses samples, which contain no frequencies beyond half their rate.
   const double rate = shape_ == Shape::lfm ? 4 * scale_hz_ : scale_hz_;
   std::vector<spectral::Arrival> arrivals;
   if (shape_ == Shape::lfm)
@@ -170,7 +170,7 @@ std::complex<double> Pulse::correlation(double time_s) const {
     for (int k = -reach; k <= reach; ++k) sum += at(k / rate) * std::conj(at(k / rate - time_s));
     return sum / rate / energy_width_s_;
   }
-  // Every sample is as far from its neighbours in the shifted pulse: one set of weights does.
+  // All samples have the same distance to their neighbours in the shifted pulse, so that one set of weights is enough.
   const double shift = time_s * scale_hz_;
   const int whole = static_cast<int>(std::floor(std::clamp(shift, -1e6, 1e6))), count = static_cast<int>(samples_.size());
   for (int j = -neighbours / 2 + 1; j <= neighbours / 2; ++j) {
@@ -203,7 +203,7 @@ std::string why_invalid(const Waveform& w, double sample_time_s) {
 }
 
 int taps_of(const Pulse& pulse, double sample_time_s) {
-  // A Gaussian is over long before the last tap: a twentieth of eight taps does not matter.
+  // A Gaussian ends long before the last tap, so that a twentieth of eight taps does not matter.
   const double slack = pulse.shape() == Shape::gaussian ? 0.05 : 0;
   return 8 * std::max(1, static_cast<int>(std::ceil(2 * pulse.reach_s() / sample_time_s / 8 - slack)));
 }
@@ -238,7 +238,7 @@ std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s) {
     const double window = wanted > longest ? parzen(static_cast<double>(k) / (order + 1)) : 1.0;
     r[static_cast<std::size_t>(k)] = window * pulse.correlation(k * sample_time_s).real();
   }
-  r[0] += 1e-5;  // keeps the factorisation definite on fine grids, where the spectrum falls to nothing
+  r[0] += 1e-5;  // keeps the factorisation definite on fine grids, whose spectrum falls to 0
   // Bauer's method: the rows of the Cholesky factor of the long banded Toeplitz matrix tend to the minimum-phase factor.
   const int n = 12 * order + 64;
   std::vector<std::vector<double>> band(static_cast<std::size_t>(n), std::vector<double>(static_cast<std::size_t>(order) + 1));

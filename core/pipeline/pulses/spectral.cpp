@@ -14,7 +14,7 @@ constexpr int oversampling = 2;
 constexpr double sharpness_per_width = 2.3;
 constexpr int small_padding = 8, large_padding = 16;  // widths are padded, so that loops over them are whole vectors
 constexpr int extra_terms = 4;                        // terms of the polynomials beyond the width
-constexpr int restart_every = 256;                    // a phase turned on step by step forgets itself slowly
+constexpr int restart_every = 256;                    // steps after which a phase is computed anew, because rounding accumulates
 
 double kernel(double x) {  // |x| <= 1 over its half width, times the width: see sharpness_per_width
   // max(0): |x| may exceed 1 by rounding.
@@ -43,7 +43,7 @@ std::vector<double> fit(const Function& f, int terms) {
     node[i] = std::cos(pi * (static_cast<double>(i) + 0.5) / static_cast<double>(n));
     divided[i] = f(node[i]);
   }
-  // Newton's divided differences, then expanded to powers.
+  // Newton's divided differences, which are then expanded to powers.
   for (std::size_t order = 1; order < n; ++order)
     for (std::size_t i = n - 1; i >= order; --i) divided[i] = (divided[i] - divided[i - 1]) / (node[i] - node[i - order]);
   for (std::size_t i = n; i-- > 0;) {  // power = power * (t - node_i) + divided_i
@@ -58,7 +58,7 @@ std::vector<double> fit(const Function& f, int terms) {
 std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid) {
   std::vector<Complex> sums(static_cast<std::size_t>(grid.count));
   for (const Arrival& a : arrivals) {
-    // (25) from one frequency to the next is one turn e^{-i 2 pi df tau}.
+    // In (25) the factor from one frequency to the next is e^{-i 2 pi df tau}.
     const Complex step = turned(-grid.step_hz * a.delay_s);
     Complex now;
     for (int m = 0; m < grid.count; ++m) {
@@ -73,7 +73,7 @@ std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const Frequen
 std::vector<Complex> fast_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid, int width) {
   const FrequencySums fast(grid.count, width);
   std::vector<Complex> fine(static_cast<std::size_t>(fast.grid_points())), sums(static_cast<std::size_t>(grid.count));
-  // FrequencySums counts frequencies from the middle: an echo brings the phase of the middle one along.
+  // FrequencySums counts frequencies from the middle: so that each amplitude includes the phase of the middle one.
   const double middle_hz = grid.first_hz + (grid.count / 2) * grid.step_hz;
   for (const Arrival& a : arrivals) fast.add(grid.step_hz * a.delay_s, a.amplitude * turned(-middle_hz * a.delay_s), fine.data());
   fast.transform(fine.data(), sums.data());
@@ -87,7 +87,7 @@ FrequencySums::FrequencySums(int count, int width)
       padded_(width <= small_padding ? small_padding : large_padding),
       forward_(points_, Fft::Direction::forward),
       terms_(width + extra_terms) {
-  // For point k of the kernel a polynomial in t in [-1, 1], which says where the echo lies between two points.
+  // A polynomial for point k of the kernel in t in [-1, 1], the place of the echo between two points.
   polynomial_.assign(static_cast<std::size_t>(terms_ * padded_), 0.0);
   for (int k = 0; k < width; ++k) {
     const std::vector<double> fitted =
@@ -95,7 +95,7 @@ FrequencySums::FrequencySums(int count, int width)
     for (int term = 0; term < terms_; ++term)
       polynomial_[static_cast<std::size_t>(term * padded_ + k)] = fitted[static_cast<std::size_t>(terms_ - 1 - term)];
   }
-  // The grid is the echoes convolved with the kernel; in frequency the kernel's transform divides out.
+  // The grid is the echoes convolved with the kernel; in frequency, the kernel's transform is divided out.
   for (int m = 0; m < count; ++m)
     correction_.push_back(1 / kernel_transform(width, static_cast<double>(m - count / 2) / points_));
 }
@@ -141,7 +141,7 @@ void FrequencySums::add(std::span<const double> turns, std::span<const double> r
 void FrequencySums::transform(Complex* grid, Complex* sums) const {
   forward_.run(grid);
   for (int m = 0; m < count_; ++m) {
-    // Frequencies below the middle stand in the upper half of the transform.
+    // Frequencies below the middle are in the upper half of the transform.
     const int frequency = m - count_ / 2;
     sums[m] = correction_[static_cast<std::size_t>(m)] * grid[frequency < 0 ? frequency + points_ : frequency];
   }

@@ -29,7 +29,7 @@ const bool have_transform = true;
 struct Fft::Plan {
   Plan(int size, int sign) {
     const std::lock_guard<std::mutex> alone(planner());
-    // Estimated plans leave the array alone and are the same in every run; unaligned ones serve any array.
+    // Estimated plans do not change the array and are the same in every run; unaligned ones can be used with any array.
     Complex nothing;
     plan = fftw_plan_dft_1d(size, as_fftw(&nothing), as_fftw(&nothing), sign, FFTW_ESTIMATE | FFTW_UNALIGNED);
     assert(plan != nullptr);
@@ -52,7 +52,7 @@ void Fft::run(Complex* values) const { fftw_execute_dft(plan_->plan, as_fftw(val
 
 const bool have_transform = false;
 
-// why_invalid(Waveform) refuses the pulses that would come here.
+// why_invalid(Waveform) rejects pulses that need a transform.
 struct Fft::Plan {};
 
 Fft::Fft(int size, Direction) : size_(size) { assert(have_transform); }
