@@ -11,22 +11,22 @@ namespace sonar {
 
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
                 BeamSignals& out) {
-  // A window of samples of all columns, complex: two floats a sample.
+  // A window of complex samples of all columns: two floats per sample.
   const int floats = static_cast<int>(out.stride), first_sample = out.first_sample;
-  // Eq. 9 for all beams at once: a convolution over columns that are even in u = sin(azimuth) (beam_transform.hpp).
+  // Eq. 9 for all beams at once: a convolution over columns that are uniform in u = sin(azimuth) (beam_transform.hpp).
   if (beam_weights.transform) {
     scratch.transform.resize(beam_weights.transform->work_floats());
     kernels.transform_beams(beam_weights.transform->tables(), columns.first_sample(0) + 2 * first_sample, columns.stride, floats,
                             scratch.transform.data(), out.data.data(), floats);
     return;
   }
-  // Side by side, because the columns' records are too far apart to stay in cache together.
+  // Copies samples side by side, because the records of columns are too far apart to stay in cache together.
   scratch.window.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>(columns.columns));
   for (int k = 0; k < columns.columns; ++k) {
     const float* from = columns.first_sample(k) + 2 * first_sample;
     std::copy(from, from + floats, scratch.window.data() + static_cast<std::ptrdiff_t>(k) * floats);
   }
-  // Eq. 9 as a banded product: four beams a panel, over the columns within half_band of them.
+  // Eq. 9 as a banded product: four beams per panel, over the columns within half_band of them.
   for (const BeamPanel& panel : beam_weights.panels)
     kernels.form_beam_panel(scratch.window.data() + static_cast<std::ptrdiff_t>(panel.first_column) * floats, floats,
                             beam_weights.weights.data() + panel.weights, panel.count, out.beam(panel.first_beam), floats);
@@ -38,7 +38,7 @@ SampledPulse place_pulse(const PointEcho& point, const PingPlan& plan, int from,
   // Only the samples within half the pulse's taps of the echo are not 0.
   pulse.first_sample = std::max(middle - plan.taps / 2 + 1, from);
   const int end = std::min(middle + plan.taps / 2 + 1, to);
-  // (8) for one echo, in double, at its exact delay: no table.
+  // (8) for one echo, in double, at its exact delay, without a table.
   for (int n = pulse.first_sample; n < end; ++n)
     pulse.values.push_back(point.amplitude * plan.pulse_shape.at(plan.sample_time_s * (n - point.sample)));
   return pulse;
@@ -69,7 +69,7 @@ void add_points(std::span<const PointEcho> points, const PingPlan& plan, BeamSig
     }
     float* beam = out.beam(j);
     for (int n = 0; n < out.samples; ++n) {
-      // In expected power the points still add coherently among themselves; the power of their sum is added.
+      // In expected power, too, points add coherently with each other; the power of their sum is added.
       const std::complex<double> s = sum[static_cast<std::size_t>(n)];
       beam[2 * n] += static_cast<float>(plan.expected_power ? std::norm(s) : s.real());
       if (!plan.expected_power) beam[2 * n + 1] += static_cast<float>(s.imag());

@@ -22,7 +22,7 @@ Span root_of_squares(Span a, Span b, Span c = {0, 0}) {
 }
 Span within(Span a, Span b) { return {std::max(a.low, b.low), std::min(a.high, b.high)}; }
 
-/// The box round a tile's cells, in the axes of a sonar. Cells are placed in single precision, hence the slack.
+/// The box around a tile's cells, in the axes of a sonar. It has a margin, because cells are placed in single precision.
 struct Box {
   Vec3d middle, half;
   double slack;
@@ -40,7 +40,7 @@ struct Box {
   Span z() const { return {middle.z - half.z, middle.z + half.z}; }
 };
 
-/// Directions u = y / r (y / h for flat beams) over the box, where it is small compared with its distance: nearly linear.
+/// Directions u = y / r (y / h for flat beams) over a box that is small compared with its distance, where u is nearly linear.
 Span sines_by_slope(const CellTile& tile, const Box& box, const Rotation& turn, bool conical) {
   constexpr Span any{-2, 2};
   const Vec3d half = to_double(tile.box_half_m), c = box.middle;
@@ -57,7 +57,7 @@ Span sines_by_slope(const CellTile& tile, const Box& box, const Rotation& turn, 
   return {sine - spread, sine + spread};
 }
 
-/// Column k spans u = first_sine - (k -+ 1/2) spacing: rounded outwards, a column too many costs little.
+/// Column k spans u = first_sine - (k -+ 1/2) spacing: rounded outwards, because one column too many takes little time.
 void find_columns(Span sine, const Columns& columns, PreparedTile& tile) {
   const double from = (columns.first_sine - sine.high) / columns.spacing + 0.5;
   const double to = (columns.first_sine - sine.low) / columns.spacing + 1.5;
@@ -65,7 +65,7 @@ void find_columns(Span sine, const Columns& columns, PreparedTile& tile) {
   tile.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(columns.count)));
 }
 
-/// No cell counts at these ranges, by its level and by the record, or at these tangents.
+/// Whether no cell is used at these ranges, by its level and the record, or at these tangents.
 bool out_of_view(const PingContext& context, const simd::TileSeen& seen, Span range, Span tangent) {
   const PingPlan& plan = context.plan;
   const PingScalars& s = context.scalars;
@@ -83,7 +83,7 @@ bool out_of_view(const PingContext& context, const simd::TileSeen& seen, Span ra
 
 void find_reach(const PingContext& context, const Rotation& sonar_from_object, Vec3d from_sonar_m,
                 const Rotation& seen_from_object, Vec3d seen_from_sonar_m, PreparedTile& out) {
-  constexpr double nearest_m = 0.05;  // nearer than this a box says nothing about directions
+  constexpr double nearest_m = 0.05;  // boxes nearer than this have no limits of directions
   const PingPlan& plan = context.plan;
   const simd::TileSeen& seen = out.seen;
   const CellTile& tile = *seen.tile;
@@ -96,7 +96,7 @@ void find_reach(const PingContext& context, const Rotation& sonar_from_object, V
   out.nearest = std::numeric_limits<float>::infinity();
 
   const auto beside_axis = [conical](const Box& box) { return conical ? box.x() : root_of_squares(box.x(), box.y()); };
-  // In object axes, where the box is tight.
+  // Computes in object axes, in which the box is smallest.
   const Vec3 m = tile.box_middle_m, h = tile.box_half_m;
   const auto edges = [&](float from, float middle, float half) {
     const double c = static_cast<double>(from) + static_cast<double>(middle), reach = static_cast<double>(half) + here.slack;

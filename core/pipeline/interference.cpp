@@ -16,7 +16,7 @@ namespace {
 constexpr double no_crosstalk_db = -150;
 constexpr int most_pulses = 64;        // limit for one other sonar in one ping
 constexpr double edge_widths = 3;      // erf is 1 to 2e-5 there
-constexpr double widest_offset = 0.2;  // how far off our carrier another sonar's tone may be and still pass, as a share of b
+constexpr double widest_offset = 0.2;  // largest offset of another sonar's tone from our carrier, as a fraction of b
 
 double unit_uniform(std::uint32_t bits) { return static_cast<double>(bits) / 4294967296.0; }
 
@@ -32,8 +32,8 @@ double Leak::reach_m(const ReceiverModel& law) {
   return forgotten_db / static_cast<double>(law.leak_decay_db_per_m);
 }
 
-/// docs/acoustics.md, eq. 31: rms(r) = leak_upa 10^(-decay r / 20), or by a table, at a beam's output; per column over sqrt(sum_k
-/// W_jk^2), as for the noise.
+/// docs/acoustics.md, eq. 31: rms(r) = leak_upa 10^(-decay r / 20), or from a table, at a beam's output. That of a column is
+/// divided by sqrt(sum_k W_jk^2), like the noise.
 Leak::Leak(const PingPlan& plan, const Switches& switches) {
   const ReceiverModel& law = plan.mode.receiver;
   if (!switches.leak || !(law.leak_upa > 0)) return;
@@ -97,13 +97,13 @@ std::vector<ReceivedPulse> receive_other_sonars(const PingContext& context, cons
     if (is_occluded(context.rays, request.sonar_in_world.position_m, other.position_m)) continue;
     const Random4 draw = philox(static_cast<std::uint32_t>(i), request.sonar_id, 0, key);
     const double rate_hz = static_cast<double>(other.rate_hz), travel_s = range_m / s.sound_speed_mps;
-    // Pulse number n of all time arrives at (n + phase) / rate + travel; the first that may reach into the record:
+    // Pulse number n, counted from time 0, arrives at (n + phase) / rate + travel; the first that may reach into the record:
     const double phase = unit_uniform(draw.v[0]), pulse_s = static_cast<double>(other.pulse_s);
     const double edge_samples = edge_widths / per_sample;
     const double earliest_s = (plan.start_samples - edge_samples) / samples_per_s - pulse_s;
     const double first = std::ceil((fired_s + earliest_s - travel_s) * rate_hz - phase);
     for (int p = 0; p < most_pulses; ++p) {
-      const double at_s = (first + p + phase) / rate_hz + travel_s - fired_s;  // after we fired
+      const double at_s = (first + p + phase) / rate_hz + travel_s - fired_s;  // time after our firing
       ReceivedPulse pulse;
       pulse.from_sample = at_s * samples_per_s - s.sample_offset;
       if (pulse.from_sample - edge_samples > plan.samples) break;
@@ -112,7 +112,8 @@ std::vector<ReceivedPulse> receive_other_sonars(const PingContext& context, cons
       const Vec3d seen = transform(inverse(now), other.position_m);
       if (seen.x <= 0) continue;
       const ConicalDirection from = plan.direction_of(seen);
-      const double both_ways = elevation_two_way(plan.mode.pattern, from.psi_rad);  // two equal patterns; we only receive
+      const double both_ways =
+          elevation_two_way(plan.mode.pattern, from.psi_rad);  // two equal patterns, of which we use one: we only receive
       pulse.sine = from.u;
       pulse.amplitude_upa = static_cast<double>(other.level_upa) / range_m * std::exp(-s.absorption_np_per_m * range_m) *
                             std::sqrt(std::max(both_ways, 0.0));
@@ -165,8 +166,8 @@ Crosstalk::Crosstalk(const PingPlan& plan, const Switches& switches) {
   const double level_db = static_cast<double>(plan.mode.receiver.crosstalk_db);
   if (!switches.crosstalk || level_db < no_crosstalk_db) return;
   amplitude_ = amplitude_from_db(level_db);
-  // Eq. 35: beam j becomes own s_j + e share sum_i s_i. For a lone echo the sum over beams is its amplitude over `share`.
-  // What all beams together make of a lone echo amid the sector: sum_j W_j, or in power sum_j W_j^2.
+  // Eq. 35: beam j becomes own s_j + e share sum_i s_i. For a single echo the sum over beams is its amplitude divided by `share`.
+  // The sum over all beams of a single echo in the middle of the sector: sum_j W_j, or in power sum_j W_j^2.
   const double middle = plan.beam_sine[plan.beam_sine.size() / 2];
   double sum = 0, squares = 0;
   for (std::size_t j = 0; j < plan.beam_sine.size(); ++j) {
@@ -186,7 +187,7 @@ Crosstalk::Mix Crosstalk::mix(bool expected_power) const {
 
 void Crosstalk::add(const PingPlan& plan, BeamSignals& beams) const {
   const auto floats = static_cast<std::size_t>(2 * beams.samples);
-  // The sum over all beams, sample by sample, then added to each.
+  // Computes the sum over all beams for each sample, and then adds it to each beam.
   std::vector<float> sum(floats, 0.0f);
   for (int j = 0; j < beams.beams; ++j) {
     const float* from = beams.beam(j);

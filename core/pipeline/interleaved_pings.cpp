@@ -10,7 +10,7 @@
 namespace sonar {
 namespace {
 
-/// Takes from [rows][beams] values of `size` elements those of the beams `first`, `first + step`, .. of another ping.
+/// Copies the values of beams `first`, `first + step`, ... from another ping; values are [rows][beams] with `size` elements each.
 template <class Values>
 void take_beams(const Values& from, std::size_t beams, std::size_t first, std::size_t step, std::size_t size, Values& to) {
   if (from.size() != to.size()) return;

@@ -30,7 +30,8 @@ void add_scaled(float by, const float* __restrict from, std::size_t count, float
   for (std::size_t i = 0; i < count; ++i) to[i] += by * from[i];
 }
 
-/// n[i] = sum_m h[m] w[i - m], h of unit energy (make_noise_filter): the variance stays 1. Circular, so that reading may wrap.
+/// n[i] = sum_m h[m] w[i - m], h of unit energy (make_noise_filter): the variance stays 1. The filter is circular, so that
+/// reading may wrap around.
 std::vector<float> filtered(const std::vector<float>& white, const std::vector<float>& filter) {
   const std::size_t n = white.size();
   std::vector<float> shaped(n, 0.0f);
@@ -45,7 +46,7 @@ std::vector<float> filtered(const std::vector<float>& white, const std::vector<f
 }  // namespace
 
 void NoiseTable::prepare(Seed seed, const std::vector<float>& filter, std::span<const NoiseTable* const> others) {
-  // Kept while seed and filter stay: a ping only reads the table.
+  // The table is kept while seed and filter do not change.
   const bool same_seed = white_ && seed == seed_;
   if (same_seed && filter == filter_) return;
   if (!same_seed) white_.reset();
@@ -84,7 +85,7 @@ void NoiseTable::read(std::uint32_t sonar, std::uint32_t ping, int column_index,
   std::size_t at = place.first;
   // The table from a hashed start, turned by one of four quarter turns: a function of (seed, sonar, ping, column).
   const float sign = place.negative ? -rms : rms;
-  // The table is periodic: reading goes on at its beginning.
+  // The table is periodic: after its end, reading continues at its beginning.
   for (int done = 0; done < samples;) {
     const int run = static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(samples - done), table_samples - at));
     const float* __restrict from = shaped_->data() + 2 * at;

@@ -15,16 +15,16 @@ namespace sonar {
 namespace {
 
 constexpr double widest_column_in_beams = 0.35;  // docs/acoustics.md, section 2
-constexpr double margin_in_beams = 3.0;          // columns beyond the sector, or its edge beams would be dim
-constexpr double flat_margin_in_beams = 1.5;     // part of it that the transmitter lights fully
+constexpr double margin_in_beams = 3.0;          // columns beyond the sector, without which beams at its edges would be too weak
+constexpr double flat_margin_in_beams = 1.5;     // part of the margin with full transmitter amplitude
 constexpr int base_elevations = 48;              // docs/acoustics.md, section 2
 constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
 constexpr double side_lobe_two_way = 5.62e-3;    // -45 dB: lower side lobes are left out
-constexpr double side_step_rad = 0.19;           // between rays in them; a plane is exact between any two
+constexpr double side_step_rad = 0.19;           // between rays in side lobes; planes are exact between rays
 constexpr int side_bins = 32;                    // bins of the depth map on either side
 // Least cells in the area that a beam and a pulse cover in side lobes; cells of a power of two have up to four times as many.
 constexpr double side_cells_of_speckle = 0.22, side_cells_of_expected_power = 16;
-constexpr double unit_fan_over_width = 2.3;  // where there is no pattern to end it
+constexpr double unit_fan_over_width = 2.3;  // width of the fan without a pattern
 constexpr double widest_fan_rad = 1.4;
 
 double half_aperture_sine(const FrequencyMode& mode) { return std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2); }
@@ -48,8 +48,8 @@ double narrowest_beam_rad(const FrequencyMode& mode) {
   return mode.has_own_widths() ? beam_width_sines(mode).narrowest : static_cast<double>(mode.pattern.azimuth_width_rad);
 }
 
-/// The angle at which the peaks of the two-way pattern, 1 / (pi x)^2 at x = L_v / lambda sin psi, have fallen below what is
-/// audible.
+/// The angle at which the peaks of the two-way pattern, 1 / (pi x)^2 at x = L_v / lambda sin psi, have fallen below
+/// side_lobe_two_way.
 double side_lobe_reach_rad(const BeamPattern& pattern) {
   const double sine = 1 / (pi * std::sqrt(side_lobe_two_way) * elevation_aperture_in_wavelengths(pattern));
   return sine < 1 ? std::min(std::asin(sine), widest_fan_rad) : widest_fan_rad;
@@ -79,7 +79,7 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pul
   fan.axis.middle_bin = static_cast<float>(fan.bins) / 2;
   for (int bin = 0; bin <= fan.bins; ++bin) fan.tangent.push_back(tangent_of_bin(fan.axis, static_cast<float>(bin)));
   for (int e = -fan.side_elevations; e < base_elevations + fan.side_elevations; ++e) {
-    // Nudged off round angles: a ray that lies exactly on the edge between two triangles can slip through.
+    // Moves rays off round angles, because a ray exactly on the edge between two triangles can miss both.
     const double nudge = e == 0 || e == base_elevations - 1 ? 0 : 0.0137;
     double angle = fan.half_angle_rad * (2 * (std::clamp(e, 0, base_elevations - 1) + nudge) / (base_elevations - 1) - 1);
     const double step = side_rad / std::max(fan.side_elevations, 1);
@@ -89,7 +89,7 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pul
   return fan;
 }
 
-/// Least squares over the fan through Chebyshev points: the pattern is entire in w = sin^2, so few terms do.
+/// Fits the pattern at Chebyshev points of the fan. It is an entire function of w = sin^2, so that few terms are enough.
 std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_rad) {
   constexpr int n = elevation_terms;
   if (mode.pattern.elevation_taper == Taper::unit) {
@@ -129,7 +129,7 @@ std::vector<float> rounded(std::vector<float> filter) {
   return filter;
 }
 
-/// The sample grid, and the pulse on it.
+/// Sets the sample grid, and the pulse on it.
 void lay_out_samples(PingPlan& p) {
   const PingSettings& s = p.settings;
   // Sample n lies at device range (n + sample_offset) spacing, at time 2 r / c_dev.
@@ -200,7 +200,8 @@ void lay_out_noise_profile(PingPlan& p) {
   }
 }
 
-/// Delays made for another sound speed steer the beams to other sines, in proportion. Columns, lit as before, go with them.
+/// Delays for another sound speed steer beams to proportionally different sines. Columns move with the beams; their transmit
+/// amplitudes do not change.
 void look_elsewhere(PingPlan& p) {
   p.columns.first_sine *= p.bearing_scale, p.columns.spacing *= p.bearing_scale;
   for (double& u : p.beam_sine) u = std::clamp(u * p.bearing_scale, -1.0, 1.0);
@@ -243,7 +244,7 @@ std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count) {
 Columns make_columns(const FrequencyMode& mode, int beam_count) {
   const double top = half_aperture_sine(mode);
   const auto [narrowest, width] = beam_width_sines(mode);
-  // Beams lie on column centres where they are uniform in the sine, so that one row of weights serves them all.
+  // Beams lie on column centres where they are uniform in the sine, so that one row of weights is enough for all.
   // The column spacing divides the beam spacing, and is at most 0.35 of a beam width (docs/acoustics.md, section 2).
   const double beam_spacing = 2 * top / std::max(beam_count - 1, 1);
   const double per_beam = std::ceil(beam_spacing / (widest_column_in_beams * narrowest) - 1e-9);
@@ -282,7 +283,7 @@ void PingPlan::aim(CellView& view) const {
   if (fan.side_elevations == 0) return;
   view.main_elevation_rad = static_cast<float>(widest_about_axis_rad(fan.half_angle_rad));
   view.side_from_rad = static_cast<float>(fan.half_angle_rad);
-  // Few cells a sample of the beams will do, except where no speckle hides the places of the cells.
+  // Few cells per sample are enough, except if no speckle hides the places of the cells.
   const double cells_a_sample = expected_power ? side_cells_of_expected_power : side_cells_of_speckle;
   view.side_area_per_range_m = static_cast<float>(narrowest_beam_rad(mode) * pulse_width_m / cells_a_sample);
   view.side_coarser = expected_power ? 0 : 2;

@@ -14,7 +14,7 @@ Pose propagate(const Pose& pose, const Twist& twist, double seconds) {
 
 EchoGeometry PingScalars::echo_geometry(Vec3d from_sonar_m) const {
   if (!moves) return {from_sonar_m, {}, {}};
-  // Eq. 29: scattered at r / c, received at 2 r / c after firing; seen_at_s is the moment of `seen_from`.
+  // Eq. 29: scattered at r / c, received at 2 r / c after firing; seen_at_s is the time of `seen_from`.
   const double one_way_s = length(from_sonar_m) / sound_speed_mps;
   const Vec3d moved = (one_way_s - seen_at_s) * rotate(conjugate(seen_from.orientation), twist.velocity_mps);
   const Rotation turn = rotation_from(conjugate(turned_by((2 * one_way_s - seen_at_s) * twist.angular_rate_radps)));
@@ -23,8 +23,8 @@ EchoGeometry PingScalars::echo_geometry(Vec3d from_sonar_m) const {
 
 int PingScalars::columns_turned(const PingPlan& plan) const {
   if (!moves) return 0;
-  // Echoes return at 2 r / c, up to as long after `seen_from` as it is after firing; they scatter within half of that time. u
-  // changes at most as fast as the angle; nearer than 1 m there is little to be hidden.
+  // Echoes return at 2 r / c. The time from `seen_from` to the last echo equals that from firing to `seen_from`; scattering
+  // happens within half of it. u changes at most as fast as the angle. Nearer than 1 m little can be hidden.
   constexpr double nearest_m = 1, most = 64;
   const double late_s = std::max(seen_at_s, 2 * max_range_m / sound_speed_mps - seen_at_s);
   const double sine = late_s * (length(twist.angular_rate_radps) + length(twist.velocity_mps) / nearest_m);
@@ -40,10 +40,11 @@ double PingScalars::doppler_samples(Vec3d from_sonar_m) const {
 
 namespace {
 
-/// A sweep's echo that closes in at v is higher by df = 2 v f / c and lines up earlier by df T / B, nearer by (f / B) T v.
+/// The echo of a sweep that approaches at v has a frequency higher by df = 2 v f / c, so that its peak is earlier by df T / B,
+/// which is a range shorter by (f / B) T v.
 double doppler_metres_per_mps(const PingPlan& plan) {
   const Waveform& w = plan.mode.waveform;
-  if (w.shape != Waveform::Shape::lfm) return 0;  // other pulses only turn their phase
+  if (w.shape != Waveform::Shape::lfm) return 0;  // the Doppler effect only changes the phase of other pulses
   const double shift =
       static_cast<double>(plan.mode.centre_hz) / sweep_bandwidth_hz(plan.pulse_shape.width_s()) * static_cast<double>(w.sweep_s);
   return w.falling ? shift : -shift;

@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-/// Mean power of each row, beam after beam, turned so that a row's beams lie side by side.
+/// Computes the mean power of each row, and transposes it so that the beams of a row are neighbours.
 void detect(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels& kernels, int rows, int width,
             std::vector<float>& power) {
   const int per_row = plan.settings.samples_per_row;
@@ -19,7 +19,7 @@ void detect(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels&
     kernels.detect(beams.data.data(), beams.stride, beams.beams, rows, power.data(), width);
     return;
   }
-  constexpr int block = 16;  // beams at a time: their rows stay in the first cache while they are turned
+  constexpr int block = 16;  // beams at a time, whose rows stay in the first-level cache during the transposition
   for (int from = 0; from < beams.beams; from += block) {
     const int to = std::min(from + block, beams.beams);
     for (int row = 0; row < rows; ++row)
@@ -34,19 +34,19 @@ void detect(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels&
   }
 }
 
-/// The window's part of [samples][beams].
+/// Copies the window's part of [samples][beams].
 void keep_signal(const BeamSignals& beams, std::vector<std::complex<float>>& kept) {
   for (int j = 0; j < beams.beams; ++j) {
     const float* s = beams.beam(j);
     for (int n = 0; n < beams.samples; ++n) {
-      // Windows are parts of their own of the same array: workers write without locks.
+      // Windows are separate parts of the array, so that workers need no locks.
       const std::size_t at = static_cast<std::size_t>(beams.first_sample + n) * static_cast<std::size_t>(beams.beams);
       kept[at + static_cast<std::size_t>(j)] = {s[2 * n], s[2 * n + 1]};
     }
   }
 }
 
-/// Little-endian.
+/// Stores a code, little-endian.
 void put(std::uint32_t code, int bytes, std::byte* at) {
   for (int b = 0; b < bytes; ++b) at[b] = static_cast<std::byte>(code >> (8 * b) & 0xFFu);
 }
@@ -80,7 +80,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
   const bool logarithmic = s.format.scale == SampleFormat::Scale::logarithmic;
   const LevelLine line = level_line(s.format);
   const auto per_octave = static_cast<float>(line.per_octave), at_full_scale = static_cast<float>(line.at_full_scale);
-  // The gain depends on the row in the picture, (36), whatever the window.
+  // The gain depends on the row in the picture, (36), not on the window.
   for (int row = 0; row < rows; ++row) {
     float* power = scratch.power.data() + static_cast<std::ptrdiff_t>(row) * width;
     const std::size_t at = static_cast<std::size_t>(first_row + row) * static_cast<std::size_t>(s.beam_count);
@@ -108,7 +108,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
       continue;
     }
     for (int j = 0; j < s.beam_count; ++j) {
-      // 2^32 - 1 is no float: compare before the conversion can overflow.
+      // 2^32 - 1 is not a float, so the comparison comes before the conversion, which could overflow.
       const float code = scratch.codes[static_cast<std::size_t>(j)];
       put(code >= max_code ? s.format.max_code : static_cast<std::uint32_t>(code), bytes,
           out + static_cast<std::ptrdiff_t>(j) * bytes);

@@ -23,8 +23,8 @@ constexpr double none_db = -150;
 /// m to there its bed hides it.
 constexpr double margin = 3, fades_from = 2;
 
-/// A beam's blocks of samples of a part are left out if nowhere louder than this share of the channels' own noise (30),
-/// over the number of parts.
+/// A block of a part in a beam is left out if it is nowhere above this fraction of the channels' own noise (30), divided by the
+/// number of parts.
 constexpr double silent = 0.03;
 constexpr std::size_t block_samples = SharedNoiseTable::block_samples;
 
@@ -32,8 +32,8 @@ constexpr int most_groups = 32;  // each has a table
 // Limits of a table's complex values, 1 GiB, and of its sums: some 10 s.
 constexpr double most_values = 1 << 27, most_steps = 1e9;
 
-/// Mean over the beams of what they receive of the leak, re the sum of the channels' powers: where it is less, the beams point
-/// at its nulls, and are not given the level of (31) nonetheless.
+/// Least mean power of the leak in the beams, re the sum of the channels' powers, for which the level of (31) is applied. Below
+/// it the beams point at nulls of the leak.
 constexpr double faint = 1e-3;
 
 bool has_noise(const SharedNoise& law) { return static_cast<double>(law.level_db) > none_db; }
@@ -48,7 +48,7 @@ struct Reach {
   double end_m = 0, fade_m = 1;
   double share(double range_m) const { return std::clamp((end_m - range_m) / fade_m, 0.0, 1.0); }  // share of its power
 };
-/// In a sector of beams of sines up to `widest`. Where the whole array's part never leaves it, the noise has no end.
+/// Reach in a sector of beams with sines up to `widest`. If the part of the whole array never leaves it, the noise does not end.
 Reach reach_of(const FrequencyMode& mode, const PingSettings& settings, double widest) {
   const SharedNoise& law = mode.receiver.shared_noise;
   const double sine = static_cast<double>(law.sine), outside = sine - widest;
@@ -58,11 +58,11 @@ Reach reach_of(const FrequencyMode& mode, const PingSettings& settings, double w
   return {margin * leaves_m + std::max(0.0, -focus_m(law, settings)), (margin - fades_from) * leaves_m};
 }
 
-/// Responses of a block of samples, or of fewer focal ranges that stand for theirs: Chebyshev's points in the inverse range, in
-/// which the phases are nearly straight.
+/// Responses of a block of samples, or of fewer focal ranges from which they are interpolated: Chebyshev points in the inverse
+/// range, in which phases are nearly linear.
 class Responses {
  public:
-  /// `focal`: of the samples, in wavelengths.
+  /// `focal`: focal ranges of the samples, in wavelengths.
   void fill(FocusedArray& array, const std::vector<double>& focal) {
     beams_ = array.beams();
     samples_ = focal.size();
@@ -84,7 +84,7 @@ class Responses {
       }
     }
   }
-  /// No sample of it has more power.
+  /// Upper limit of the power in all samples.
   float most_power(std::size_t part, std::size_t beam) const { return most_[part * beams_ + beam] * most_weight_ * most_weight_; }
   void of(std::size_t part, std::size_t beam, float* re, float* im) const {
     for (std::size_t k = 0; k < ranges_; ++k) {
@@ -222,7 +222,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
         responses.of(parts_ - 1, j, re, im);
         for (std::size_t n = 0; n < to - from; ++n) power[n] += static_cast<double>(re[n] * re[n] + im[n] * im[n]);
       }
-      // (31) at the beams' outputs, as a mean over them.
+      // Level (31) as a mean over the outputs of beams.
       for (std::size_t n = from; n < std::min(to, leak_samples); ++n) {
         const double per_channel =
             std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams_) / std::max(power[n - from], least));
@@ -250,7 +250,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
   gather(blocks);
 }
 
-/// The table is the same for any number of threads.
+/// The table does not depend on the number of threads.
 void SharedNoiseTable::gather(std::vector<Block>& blocks) {
   std::size_t floats = 0;
   for (const Block& block : blocks) floats += block.heard.size();

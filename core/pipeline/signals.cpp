@@ -5,7 +5,7 @@
 namespace sonar {
 
 void Echoes::reserve(int capacity) {
-  // One vector more: kernels store whole vectors.
+  // One vector more, because kernels store whole vectors.
   const auto n = static_cast<std::size_t>(capacity) + 16;
   sample.resize(n);
   re.resize(n);
