@@ -9,15 +9,15 @@ namespace {
 // w of (26): relative L2 error 8e-6.
 constexpr int kernel_width = 6;
 
-/// Frequencies to a sample of the period: as many as the pulse's band needs.
+/// Number of frequencies per sample of the period, as many as the pulse's band needs.
 int per_sample(const Pulse& pulse, double sample_time_s) {
   return std::max(1, static_cast<int>(std::ceil(pulse.band_hz() * sample_time_s)));
 }
 
 }  // namespace
 
-// An echo half a pulse before the record rings in from there; one half a pulse beyond its end rings out of it as far again. A
-// pulse's length of padding keeps the two apart.
+// The pulse of an echo up to half a pulse before the record extends into it, and that of one near its end extends half a pulse
+// beyond it. Padding of one pulse length separates the two.
 SpectralColumns::SpectralColumns(const Pulse& pulse, double sample_time_s, int samples, int taps)
     : samples_(samples),
       period_(spectral::quick_size(samples + taps + 2)),
@@ -31,7 +31,7 @@ SpectralColumns::SpectralColumns(const Pulse& pulse, double sample_time_s, int s
 }
 
 void SpectralColumns::begin(int columns, SpectralScratch& scratch) const {
-  // The grids of a group of columns take echoes until finish() transforms them.
+  // The grids of a group of columns collect echoes until finish() transforms them.
   scratch.grids.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(sums_.grid_points()), 0.0);
   scratch.sums.resize(static_cast<std::size_t>(sums_.count()));
 }
@@ -40,7 +40,7 @@ void SpectralColumns::add(Echoes& echoes, int first_column, SpectralScratch& scr
   for (std::size_t i = 0; i < static_cast<std::size_t>(echoes.count); ++i) {
     const auto column = static_cast<std::size_t>(echoes.column[i] - first_column);
     const spectral::Complex amplitude(static_cast<double>(echoes.re[i]), static_cast<double>(echoes.im[i]));
-    // The delay in periods.
+    // The delay is in periods.
     sums_.add(static_cast<double>(echoes.sample[i]) / period_, amplitude,
               scratch.grids.data() + column * static_cast<std::size_t>(sums_.grid_points()));
   }
@@ -51,10 +51,10 @@ void SpectralColumns::finish(int first, int last, SpectralScratch& scratch, Colu
   const int count = sums_.count();
   for (int k = first; k < last; ++k) {
     spectral::Complex* grid = scratch.grids.data() + static_cast<std::ptrdiff_t>(k - first) * sums_.grid_points();
-    // docs/acoustics.md, eq. 25: F(nu_m) P(nu_m), folded to one value a sample and transformed back.
+    // docs/acoustics.md, eq. 25: F(nu_m) P(nu_m), folded to one value per sample and transformed back.
     sums_.transform(grid, scratch.sums.data());
     scratch.folded.assign(static_cast<std::size_t>(period_), 0.0);
-    // count is a whole number of periods: frequency m - count / 2 falls on the place of its rest.
+    // Frequency m - count / 2 is folded to its remainder after division by the period.
     int place = (period_ - count / 2 % period_) % period_;
     for (int m = 0; m < count; ++m) {
       const auto i = static_cast<std::size_t>(m);

@@ -18,7 +18,7 @@ void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernel
 
 namespace {
 
-/// Where T(u) is 1 the order of noise and T(u) does not matter.
+/// Whether the column's T(u) is 1: then noise can be added before T(u) is applied.
 bool begins_with_noise(const PingPlan& plan, const PingNoise& noise, int column) {
   return noise.table && !plan.expected_power && plan.columns.transmit[static_cast<std::size_t>(column)] == 1.0f;
 }
@@ -27,7 +27,7 @@ bool begins_with_noise(const PingPlan& plan, const PingNoise& noise, int column)
 
 namespace {
 
-/// Column `k`'s noise times the root of its profile, (46).
+/// Multiplies the noise of column `k` by the root of its profile, (46).
 void level_noise(const NoiseProfile& profile, int k, int count, float* noise) {
   if (profile.is_even()) return;
   const float far = profile.far[static_cast<std::size_t>(k)], more = profile.near_less_far[static_cast<std::size_t>(k)];
@@ -67,7 +67,7 @@ void finish_columns(const PingPlan& plan, const PingNoise& noise, int first, int
     if (begins_with_noise(plan, noise, k)) continue;
     float* at = signals.column(k);
     const float amplitude = plan.columns.transmit[static_cast<std::size_t>(k)];
-    // T(u) of eq. 6: 1 over the sector, soft beyond. Noise is added after it.
+    // T(u) of eq. 6 is 1 in the sector and falls beyond it. Noise is added after it.
     if (amplitude != 1.0f) {
       const float factor = plan.expected_power ? amplitude * amplitude : amplitude;
       for (std::ptrdiff_t i = 0; i < signals.stride; ++i) at[i] *= factor;

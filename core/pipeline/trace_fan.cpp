@@ -10,7 +10,7 @@
 namespace sonar {
 namespace {
 
-/// An elevation about the array axis, with what is derived from it once.
+/// An elevation about the array axis, and values computed from it once.
 struct Elevation {
   float angle_rad, cosine, sine;
 };
@@ -30,7 +30,7 @@ std::vector<ColumnSine> column_sines(const Columns& columns, int first, int last
   return sines;
 }
 
-/// Sixteen rays on their path: fills a packet lane by lane. Rays decide shadows only, so float directions do.
+/// Fills a packet of sixteen rays lane by lane. Rays decide shadows only, so that float directions are accurate enough.
 class PacketFiller {
  public:
   PacketFiller(const PingPlan& plan, const PingScalars& scalars, float far_m)
@@ -45,11 +45,11 @@ class PacketFiller {
     packet.direction_x[i] = m_[0] * x + m_[1] * y + m_[2] * z;
     packet.direction_y[i] = m_[3] * x + m_[4] * y + m_[5] * z;
     packet.direction_z[i] = m_[6] * x + m_[7] * y + m_[8] * z;
-    // Places relative to RayScene::origin() [m]: floats stay small far from the world's origin.
+    // Places are relative to RayScene::origin() [m], so that floats are small even far from the world's origin.
     packet.origin_x[i] = origin_.x;
     packet.origin_y[i] = origin_.y;
     packet.origin_z[i] = origin_.z;
-    // True range of the last sample that can still receive [m].
+    // True range from which echoes still reach the last sample [m].
     packet.far[i] = far_m_;
   }
   void trace(const RayScene& scene, bool coherent = true) {
@@ -84,7 +84,7 @@ class FanTracer {
       ahead_[i] = static_cast<float>(scalars.world_from_sonar.m[i][0]);
       port_[i] = static_cast<float>(scalars.world_from_sonar.m[i][1]);
     }
-    // One pulse width [m]: the depth map need not follow a surface any closer (section 2).
+    // One pulse width [m]; the depth map needs no smaller errors (section 2).
     tolerance_m_ = static_cast<float>(plan.pulse_width_m);
     columns_ = column_sines(plan.columns, first, last);
     base_.reserve(plan.fan.elevation_rad.size());
@@ -115,10 +115,10 @@ class FanTracer {
     sample.surface = SurfaceHit::by(filler_.packet, i, filler_.packet.far[i], sample.forward);
   }
 
-  /// Elevation by elevation, sixteen neighbouring columns a packet: neighbours in a packet lie a fraction of a degree apart.
+  /// Traces elevation by elevation, with packets of sixteen neighbouring columns, which are a fraction of a degree apart.
   void trace_base() {
     const int n = elevations();
-    // [columns][elevations] in front; refine() appends middles behind them and links them by `next`.
+    // [columns][elevations] come first; refine() appends middles and links them by `next`.
     s_.samples.resize(static_cast<std::size_t>(last_ - first_) * static_cast<std::size_t>(n));
     for (int e = 0; e < n; ++e) {
       const Elevation elevation = base_[static_cast<std::size_t>(e)];
@@ -141,7 +141,7 @@ class FanTracer {
     }
   }
 
-  /// Traces few columns, all elevations from `e` on: several elevations a packet.
+  /// Traces few columns at all elevations from `e` on, with several elevations per packet.
   void trace_few(int e) {
     const int n = elevations(), end = n - plan_.fan.side_elevations, columns = last_ - first_;
     for (const int rows = RayPacket::size / columns; e < end; e += rows) {
@@ -162,7 +162,7 @@ class FanTracer {
     at(index).edge_above = false;
   }
 
-  /// In the side lobes a few columns share a ray, also across groups. The result counts for all of them.
+  /// Traces the side lobes, where a few columns share a ray, also across groups. All of them get the result.
   void trace_side(int e, Elevation elevation) {
     const int n = elevations(), step = PingPlan::side_columns;
     for (int from = first_; from < last_;) {
@@ -175,7 +175,7 @@ class FanTracer {
         filler_.add(sines[lanes], elevation);
       }
       filler_.trace(scene_);
-      // Counted once, by the group of the first of its columns.
+      // A ray counts once, in the group of the first of its columns.
       if (from % step != 0) --filler_.traced;
       for (int k = from; k < std::min(to, last_); ++k) {
         const int lane = k / step - from / step;
@@ -190,7 +190,7 @@ class FanTracer {
 
   void refine() {
     FanRefinement<Sample> refinement(s_.samples, s_.open, s_.halves, tolerance_m_, first_);
-    // Elevation by elevation over all columns: a packet of middles holds neighbouring directions, too.
+    // Goes elevation by elevation over all columns, so that packets of middles have neighbouring directions, too.
     const int n = elevations();
     for (int e = 0; e + 1 < n; ++e)
       for (int k = 0; k < last_ - first_; ++k) {
@@ -200,12 +200,12 @@ class FanTracer {
         else
           refinement.consider_base(below, below + 1, k);
       }
-    // Rays of neighbouring columns that end farther apart than this share too few triangles to be traced as one bundle.
+    // If rays of neighbouring columns end farther apart than this, they share too few triangles to be traced as one bundle.
     constexpr double bundled_m = 0.06;
     const bool bundled = plan_.columns.spacing * static_cast<double>(filler_.far_m()) < bundled_m;
     std::array<Elevation, RayPacket::size> middle;
     const auto trace = [&](std::span<const FanInterval> intervals) {
-      // FanRefinement expects the samples of the middles behind all others, in the order of the intervals.
+      // FanRefinement expects the samples of the middles after all others, in the order of the intervals.
       filler_.clear();
       for (std::size_t i = 0; i < intervals.size(); ++i) {
         middle[i] = elevation_at(refinement.middle_rad(intervals[i]));
@@ -230,7 +230,7 @@ class FanTracer {
     return -spacing * (to_port - forward * column.along / column.across) / hit.offset;
   }
 
-  /// Linear between hits of one surface, the farther value across edges.
+  /// Draws the map: linear between hits of one surface, the farther value across edges.
   void draw(DepthMap& seen) {
     const Fan& fan = plan_.fan;
     const int n = elevations();
@@ -240,7 +240,7 @@ class FanTracer {
       int bin = 0;
       for (std::int32_t i = k * n; at(i).next >= 0; i = at(i).next) {
         const Sample &a = at(i), &b = at(at(i).next);
-        // Bins up to `end` lie between a and b; the last interval takes what rounding left over.
+        // Bins up to `end` lie between a and b; the last interval gets bins that rounding left over.
         const float top = bin_of_tangent(fan.axis, b.tangent);
         const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
         // 1 / x is linear in tan psi along a plane (section 2); 0 is infinitely far, so the smaller value is the farther surface.
@@ -284,7 +284,7 @@ std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingSca
 void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                      std::vector<FanHit>& hits) {
   PacketFiller filler(plan, scalars, static_cast<float>(scalars.max_range_m));
-  // Every ray is a scatterer, as P25 samples (section 8): even elevations, the same in every column.
+  // Every ray is a scatterer, as in P25 (section 8). Elevations are uniform and the same in every column.
   const int rays = plan.fixed_fan;
   const std::vector<ColumnSine> sines = column_sines(plan.columns, first, last);
   for (int column = first; column < last; ++column) {

@@ -18,7 +18,7 @@ void note(float range_m, std::uint32_t object, BeamTruth& nearest) {
 
 float truth_half_width_rad(const PingPlan& plan) {
   const BeamPattern& pattern = plan.mode.pattern;
-  // Without a pattern the quoted width is the whole of it.
+  // Without a pattern, the data sheet's width is the whole beam.
   if (pattern.elevation_taper == Taper::unit) return pattern.elevation_width_rad / 2;
   // D_v of (34) falls to sqrt(1/2) in amplitude, -3 dB, at this |psi| [rad].
   return static_cast<float>(elevation_reach_rad(pattern, std::sqrt(0.5)));
@@ -29,7 +29,7 @@ void note_first_hits(const FanScratch& fan, const PingPlan& plan, int first, int
   const auto elevations = static_cast<std::int32_t>(plan.fan.elevation_rad.size());
   for (int k = first; k < last; ++k) {
     BeamTruth& nearest = by_column[static_cast<std::size_t>(k)];
-    // Samples are linked from below to above; the first of a column is its lowest base ray.
+    // Samples are linked from bottom to top; the first of a column is its lowest base ray.
     for (std::int32_t i = (k - first) * elevations; i >= 0; i = fan.samples[static_cast<std::size_t>(i)].next) {
       const FanScratch::Sample& s = fan.samples[static_cast<std::size_t>(i)];
       if (s.surface.object != RayPacket::miss && std::abs(s.elevation_rad) <= widest)

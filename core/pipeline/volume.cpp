@@ -12,7 +12,7 @@
 namespace sonar {
 namespace {
 
-// Bound on the slices that stand for the integral over psi in (17): every column visits each of them for its shadows.
+// Largest number of slices for the integral over psi in (17). Every column processes all of them for its shadows.
 constexpr int most_slices = 256;
 
 }  // namespace
@@ -27,7 +27,7 @@ double volume_column_width(const PingPlan& plan, int column) {
 Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars) : plan_(plan), scalars_(scalars) {
   if (!plan.switches.volume || !water.has_volume()) return;
   const Fan& fan = plan.fan;
-  // D_v of (34); without a pattern all of the fan counts with 1.
+  // D_v of (34); without a pattern the factor is 1 in the whole fan.
   const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
   const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
   const int bins_a_slice = std::max(1, fan.bins / most_slices);
@@ -45,7 +45,7 @@ Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars
   // docs/acoustics.md, eq. 17: sigma = 10^(S_v / 10) Psi r^2 (c / 2) tau_eff, its echo falls as r^-4.
   const double at_1_m = scalars.source_upa * scalars.source_upa * power_from_db(static_cast<double>(water.volume_db)) * 0.5 *
                         scalars.sound_speed_mps * plan.pulse_shape.energy_width_s();
-  // [uPa^2] for Psi = 1: source^2 times sigma of (17), times e^{-4 a r} / r^4 for its way out and back.
+  // [uPa^2] for Psi = 1: source^2 times sigma of (17), times e^{-4 a r} / r^4 for the way out and back.
   for (int n = 0; n < plan.samples; ++n) {
     const double r = (n + scalars.sample_offset) / scalars.samples_per_m;
     open_power_.push_back(at_1_m * std::pow(r * two_way_transmission(r, scalars.absorption_np_per_m), 2));
@@ -57,11 +57,11 @@ void Volume::find_blocked(const DepthMap& seen, int column, std::vector<double>&
   const float* map = seen.inverse_x.data() + static_cast<std::ptrdiff_t>(column - seen.first_column) * (seen.bins + 1);
   const double u = plan_.columns.sine(column);
   const double per_x = plan_.switches.conical ? 1 / std::sqrt(std::max(1 - u * u, 1e-12)) : 1;  // r / x = per_x / cos(psi)
-  // A slice of the fan ends at the surface that the rays saw: from that sample on its weight is missing.
+  // A slice of the fan ends at the surface that rays hit: from that sample on its weight is subtracted.
   for (const Slice& slice : slices_) {
     const auto inverse_x = static_cast<double>(map[slice.bin]);
     if (!(inverse_x > 0)) continue;
-    // Surfaces before the record block it from its first sample on.
+    // Surfaces nearer than the record block the slice from the first sample on.
     const double sample = scalars_.sample_of(per_x * slice.range_per_x / inverse_x);
     if (sample < static_cast<double>(blocked.size())) blocked[static_cast<std::size_t>(std::max(sample, 0.0))] += slice.weight;
   }

@@ -5,14 +5,14 @@
 namespace sonar {
 namespace {
 
-/// The height [m] by which the sonar rises until the moment at which the scene is computed, PingScalars::seen_at_s.
+/// The height [m] by which the sonar rises until the time at which the scene is computed, PingScalars::seen_at_s.
 double rise_m(const PingRequest& r) {
   // Vertical speed times range / c, the time until half of the ping.
   return std::max(0.0, r.sonar_moves.velocity_mps.z) * r.settings.range_m /
          static_cast<double>(r.settings.device_sound_speed_mps);
 }
 
-/// Above z = 0 by more than the depth at which a floating sonar is computed.
+/// Whether the sonar is higher above z = 0 than least_depth_m.
 bool is_above(const Pose& sonar_in_world) { return sonar_in_world.position_m.z > least_depth_m; }
 bool is_to_change(const PingRequest& r) {
   return is_above(r.sonar_in_world) ? !r.blank : r.sonar_in_world.position_m.z + rise_m(r) > -least_depth_m;
@@ -25,9 +25,9 @@ void change(PingRequest& r) {
   }
   double& z = r.sonar_in_world.position_m.z;
   double& climbs_mps = r.sonar_moves.velocity_mps.z;
-  // A sonar at the surface is computed 1 mm below it (section 3).
+  // Moves a sonar at the surface to 1 mm below it (section 3).
   z = std::min(z, -least_depth_m);
-  // A rising sonar is slowed, so that it is just below the surface at that moment. Others keep their speed.
+  // Reduces the speed of a rising sonar, so that it is just below the surface at that time. Others keep their speed.
   if (const double rise = rise_m(r); rise > 0) climbs_mps *= std::clamp((-least_depth_m - z) / rise, 0.0, 1.0);
 }
 
@@ -45,7 +45,7 @@ std::span<const PingRequest> in_water(std::span<const PingRequest> requests, con
 }
 
 void restore_requested_pose(std::span<const PingRequest> requests, std::span<Ping> pings) {
-  // The ping states the pose that was asked for, not the one it was computed with.
+  // The ping states the requested pose, not the one with which it was computed.
   for (std::size_t i = 0; i < pings.size(); ++i) {
     pings[i].request.sonar_in_world = requests[i].sonar_in_world;
     pings[i].request.sonar_moves = requests[i].sonar_moves;

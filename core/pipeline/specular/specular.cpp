@@ -12,7 +12,7 @@ namespace {
 
 constexpr double least_reflection = 0.01;
 constexpr double least_factor = 0.01;   // least K_vis in eq. 7
-constexpr double sight_slack_m = 5e-3;  // facets stand off the true surface, touching things overlap
+constexpr double sight_slack_m = 5e-3;  // distance of facets from the true surface, and overlap of touching objects
 constexpr double bent_slack = 0.1;      // the same, in radii of curvature
 constexpr double most_bent_slack_m = 0.2;
 constexpr std::size_t most_surfaces_of_a_mesh = 4;
@@ -23,16 +23,16 @@ class Sight {
   Sight(const RayScene& scene, const PingScalars& s, std::uint32_t object, const Pose& object_in_world)
       : scene_(scene), s_(s), object_(object), object_in_world_(object_in_world) {}
 
-  /// Bit i: place i of the point's surface is the first thing that a ray toward it meets. At most 16 places.
+  /// Bit i: place i of the point's surface is the first hit of a ray toward it. At most 16 places.
   std::uint32_t seen(const SpecularPoint& point, std::span<const std::array<double, 2>> places) const {
-    // Facets stand off the true surface by an amount that grows with its curvature.
+    // The distance of facets from the true surface grows with its curvature.
     double slack = sight_slack_m;
     const double sharpest = std::max(std::abs(point.curvature[0]), std::abs(point.curvature[1]));
     if (sharpest > 0) slack += std::min(bent_slack / sharpest, most_bent_slack_m);
     RayPacket rays{};
     float expected[RayPacket::size] = {};
     for (std::size_t i = 0; i < places.size(); ++i) {
-      // A ray to each place; it is seen when the first hit is this object at this range.
+      // A place is visible if the first hit of a ray to it is this object at this range.
       const Vec3d there = transform(object_in_world_, point.place(places[i][0], places[i][1])) - s_.seen_from.position_m;
       const double r = length(there);
       const Vec3 d = to_float((1 / r) * there);
@@ -56,14 +56,14 @@ class Sight {
   Pose object_in_world_;
 };
 
-/// A cell's middle, a little off: a ray along an edge between two triangles can slip through.
+/// A place near a cell's middle, because a ray along an edge between two triangles can miss both.
 double middle_of(const std::array<double, SpecularWindow::cells + 1>& edge, double cell) {
   const auto c = static_cast<std::size_t>(cell);
   const double part = cell - static_cast<double>(c) + 0.5137;
   return edge[c] + part * (edge[c + 1] - edge[c]);
 }
 
-/// Looks along the two principal directions and over the quarters between: whether all, a part or nothing is in sight.
+/// Whether all, a part or none of the surface is visible, from rays along the two principal directions and between them.
 enum class Part { none, some, all };
 Part glance(const SpecularPoint& point, const SpecularWindow& w, const Sight& sight) {
   constexpr std::size_t n = SpecularWindow::cells;
@@ -104,7 +104,7 @@ void hide(const SpecularPoint& point, SpecularWindow& w, const Sight& sight) {
     for (std::size_t c = 0; c < n; ++c) {
       const std::array<double, 2> at{middle_of(w.edge[0], static_cast<double>(c)),
                                      middle_of(w.edge[1], static_cast<double>(row))};
-      // Cells beside the surface need no ray.
+      // Cells outside the surface need no ray.
       if (!on_surface(point, at[0], at[1])) continue;
       cell[count] = row * n + c;
       places[count++] = at;
@@ -116,7 +116,7 @@ void hide(const SpecularPoint& point, SpecularWindow& w, const Sight& sight) {
   }
 }
 
-/// K_vis with its phase, as far as the surface is in sight.
+/// K_vis with its phase, for the visible part of the surface.
 std::complex<double> visible_factor(const SpecularPoint& point, double wavelength_m, const Sight& sight) {
   // K_1 K_2 of eq. 7 and 19 over the whole extent; hidden cells are left out only where some are hidden.
   const std::complex<double> whole = specular_factor(point, wavelength_m);
@@ -129,9 +129,9 @@ std::complex<double> visible_factor(const SpecularPoint& point, double wavelengt
   return specular_factor(point, wavelength_m, window);
 }
 
-/// Largest angle from straight ahead that the columns cover; more when the sonar turns while the ping is under way.
+/// Largest angle of columns from straight ahead; it is larger if the sonar turns during the ping.
 double widest_direction_rad(const PingPlan& plan) {
-  // Bearings are measured at reception, (29): a turning sonar reaches farther, by this much at most [rad].
+  // Bearings are measured at reception, (29): a turning sonar receives echoes from farther aside, by at most this [rad].
   constexpr double while_turning_rad = 0.05;
   const double sine = std::min(1.0, plan.columns.first_sine + plan.columns.spacing);
   return std::acos(std::sqrt(1 - sine * sine) * std::cos(std::min(plan.widest_about_axis_rad(plan.fan.reach_rad), pi / 2))) +
@@ -166,7 +166,7 @@ SpecularEchoes::PreparedMesh& SpecularEchoes::prepared(std::size_t object, const
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  // A ball about the mesh: objects out of range are skipped without a search.
+  // A ball around the mesh, by which objects out of range are skipped without a search.
   made.centre_m = 0.5 * (low + high);
   made.radius_m = 0.5 * length(high - low);
   return meshes_.emplace_back(std::move(made));
@@ -186,7 +186,7 @@ void SpecularEchoes::candidates(const Object& object, PreparedMesh& mesh, const 
   }
   mirrors_.assign(reflection_.size(), false);
   for (const std::uint16_t m : mesh.materials) mirrors_[m] = reflection_[m] != 0;
-  // Surfaces are kept by the set of materials that mirror, which depends on the frequency. So a ping does not depend on those
+  // Surfaces are kept by their set of reflecting materials, which depends on the frequency. So a ping does not depend on those
   // before it.
   auto at = std::find_if(mesh.surfaces.begin(), mesh.surfaces.end(),
                          [this](const PreparedMesh::Surface& s) { return s.mirrors == mirrors_; });
@@ -233,11 +233,11 @@ void SpecularEchoes::find(const PingContext& context, std::vector<PointEcho>& ec
       // range): strength = Rc r^2 / (2 r sqrt((1 + r / R1) (1 + r / R2))), times K_1 K_2 (visible_factor).
       const double bends = bending(point.range_m, point.curvature[0]) * bending(point.range_m, point.curvature[1]);
       const double strength = reflection * r * r / (2 * point.range_m * std::sqrt(std::abs(bends)));
-      // point_echo turns the phase by r; (7) has that of the foot's range, and K the rest.
+      // point_echo() applies the phase of range r; (7) has that of the foot's range, and K the rest.
       const double beside_turns = (r - point.range_m) * s.turns_per_m;
       std::optional<PointEcho> echo = point_echo(from_sonar, std::polar(1.0, 2 * pi * fraction_of_turn(beside_turns)), plan, s);
       if (!echo) continue;
-      // The most expensive step last: occlusion and the Fresnel integrals.
+      // Occlusion and the Fresnel integrals come last, because they take the most time.
       const std::complex<double> factor = visible_factor(point, query.wavelength_m, sight);
       if (std::abs(factor) < least_factor) continue;
       echo->amplitude *= strength * factor;

@@ -10,7 +10,7 @@ namespace sonar {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double window_in_units = 5.7;  // four Fresnel radii: beyond, only edges matter, and little
+constexpr double window_in_units = 5.7;  // four Fresnel radii; beyond it only edges contribute, and little
 constexpr double window_in_radii = 0.5;
 constexpr int strips_per_cell = 4;
 
@@ -31,7 +31,7 @@ Direction direction_of(const SpecularPoint& p, std::size_t k, double wavelength_
   return {1 / fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]), bending(p.range_m, p.curvature[k]) < 0};
 }
 
-/// Pairs of places where the surface begins and ends along a line of constant y.
+/// Finds pairs of places at which the surface begins and ends along a line of constant y.
 void crossings(const SpecularPoint& p, double y, std::vector<double>& x) {
   x.clear();
   if (p.outline.empty()) {
@@ -44,7 +44,7 @@ void crossings(const SpecularPoint& p, double y, std::vector<double>& x) {
   std::sort(x.begin(), x.end());
 }
 
-/// The integral along one strip, hidden cells of its row left out.
+/// The integral along one strip without the hidden cells of its row.
 Complex along_strip(const Direction& d, const std::vector<double>& x, const SpecularWindow& w, std::size_t row) {
   Complex sum;
   const bool some_hidden = w.hidden.any();
@@ -68,7 +68,7 @@ Complex along_strip(const Direction& d, const std::vector<double>& x, const Spec
 SpecularWindow make_window(const SpecularPoint& p, double wavelength_m) {
   SpecularWindow w;
   for (std::size_t k = 0; k < 2; ++k) {
-    // Four Fresnel radii about the foot, or about the nearest place of the surface.
+    // Four Fresnel radii around the foot, or around the nearest place of the surface.
     double reach = window_in_units * fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]);
     // Beyond half a radius of curvature [m] the surface is not a parabola, as (19) assumes.
     if (p.curvature[k] != 0) reach = std::min(reach, window_in_radii / std::abs(p.curvature[k]));
@@ -92,7 +92,7 @@ Complex specular_factor(const SpecularPoint& p, double wavelength_m, const Specu
   // K_1 K_2 as a sum over strips: the integral over y of one strip times the integral over its intervals in x.
   const auto strip = [&](double from, double to, std::size_t row) {
     if (!(to > from)) return;
-    // An infinite strip has no middle: its extent is taken at the foot.
+    // An infinite strip has no middle, so that its extent is that at the foot.
     const double middle = std::isinf(from) || std::isinf(to) ? 0 : 0.5 * (from + to);
     crossings(p, middle, x);
     sum += up.part(from, to) * along_strip(across, x, w, row);
