@@ -47,7 +47,7 @@ bool edges_match(const Mesh& mesh, const std::vector<Index>& joined) {
   return true;
 }
 
-/// The sign of the volumes that the connected parts enclose; 0 where they differ.
+/// The sign of the volumes that the connected parts enclose; 0 if they differ.
 int sign_of_volumes(const Mesh& mesh, std::vector<Index> root, Vec3d middle) {
   const auto find = [&](Index i) {
     while (root[i] != i) i = root[i] = root[root[i]];
@@ -72,7 +72,8 @@ Skin skin_of(const Mesh& mesh) {
   Skin skin;
   if (mesh.triangles.empty()) return skin;
   skin.low = skin.high = to_double(mesh.vertices[mesh.triangles[0][0]]);
-  Vec3d twice_area;  // twice the area as a vector; 0 for a closed mesh and not for terrain, whose edges then need no sorting
+  Vec3d
+      twice_area;  // sum of twice the areas as vectors; 0 for a closed mesh. Edges of meshes such as terrain thus need no sorting
   for (const auto& t : mesh.triangles) {
     const Vec3d a = to_double(mesh.vertices[t[0]]), b = to_double(mesh.vertices[t[1]]), c = to_double(mesh.vertices[t[2]]);
     const Vec3d twice = cross(b - a, c - a);

@@ -16,7 +16,7 @@ namespace {
 
 using namespace embree;
 
-// One query of 4, 8 or 16 rays; what `coherent` becomes differs between the versions.
+// One query of 4, 8 or 16 rays. The meaning of `coherent` is expressed differently in the two versions.
 #if SONAR_EMBREE_MAJOR >= 4
 struct Query : RTCIntersectArguments {
   explicit Query(bool coherent) {
@@ -39,7 +39,7 @@ void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit8& rays)
 void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit16& rays) { rtcIntersect16(valid, scene, &query, &rays); }
 #endif
 
-// One acceleration structure, all static objects or one body, and which objects its geometries are.
+// One acceleration structure, for all static objects or one body, and the objects of its geometries.
 struct Group {
   SceneHandle scene;
   std::vector<std::uint32_t> objects;
@@ -47,7 +47,7 @@ struct Group {
 };
 
 RTCSceneFlags flags_for(std::size_t triangles) {
-  const int robust = RTC_SCENE_FLAG_ROBUST;  // a ray along the edge of two triangles must not slip through
+  const int robust = RTC_SCENE_FLAG_ROBUST;  // a ray along the edge of two triangles must hit one of them
   const bool compact = triangles >= RayScene::compact_from_triangles;
   return static_cast<RTCSceneFlags>(compact ? robust | RTC_SCENE_FLAG_COMPACT : robust);
 }
@@ -86,7 +86,7 @@ struct RayScene::Impl {
   std::vector<Group> groups;  // [0] everything static, [1 + b] body b
   SceneHandle top;            // instances of the groups; null when nothing moves
   std::vector<RTCGeometry> instances;
-  std::vector<Pose> placed;      // the bodies, as last placed
+  std::vector<Pose> placed;      // the last poses of bodies
   std::vector<Rotation> turned;  // their rotations, for normals
   RTCScene traced = nullptr;
   std::vector<std::unique_ptr<ChangingGroup>> changing;  // groups made by change(); the last used comes first
@@ -118,7 +118,7 @@ struct RayScene::Impl {
 
   /// Changes the scene; neither the previous nor the new scene has bodies.
   void change(std::shared_ptr<const Scene> to) {
-    constexpr std::size_t most_kept = 16, most_kept_triangles = 1'250'000;  // kinds of scenes that take turns
+    constexpr std::size_t most_kept = 16, most_kept_triangles = 1'250'000;  // for scenes that alternate
     scene = std::move(to);
     origin = ray_origin_of(*scene);
     std::vector<ChangingGroup::Wanted> wanted;
@@ -128,7 +128,7 @@ struct RayScene::Impl {
       if (!object.visible || object.mesh->triangles.empty()) continue;
       Pose placed_in_group = object.in_world;
       placed_in_group.position_m = placed_in_group.position_m - origin;
-      // Three numbers per corner, and one more, because Embree may read behind the last.
+      // Three numbers per corner, and one more, because Embree may read beyond the last.
       auto vertices = std::make_shared<std::vector<float>>(3 * object.mesh->vertices.size() + 1);
       place_vertices(*object.mesh, placed_in_group, vertices->data());
       wanted.push_back({object.mesh, std::move(vertices), static_cast<std::uint32_t>(i)});
@@ -158,7 +158,7 @@ struct RayScene::Impl {
     double all = 1;
     for (const Group& group : groups) all += static_cast<double>(group.triangles);
     struct {
-      double before, share;  // for the finished groups, for the group in progress
+      double before, share;  // fraction of finished groups, and of the current group
     } parts{0, 0};
     const auto tell = [](void* of, double part) {
       const auto& p = *static_cast<decltype(parts)*>(of);
@@ -175,7 +175,7 @@ struct RayScene::Impl {
       device.check();
     }
   }
-  // The static group becomes an instance too. Then a moved body only rebuilds a few boxes.
+  // The static group becomes an instance, too, so that a moved body only changes a few boxes.
   void make_top() {
     top = SceneHandle(device);
     rtcSetSceneBuildQuality(top.handle, RTC_BUILD_QUALITY_LOW);
@@ -245,7 +245,7 @@ struct RayScene::Impl {
     std::memset(q.ray.mask, 0xFF, sizeof q.ray.mask);
     std::memset(q.hit.geomID, 0xFF, sizeof q.hit.geomID);
     std::memset(q.hit.instID, 0xFF, sizeof q.hit.instID);
-    // An inactive lane gets a ray that ends before it begins, so that Embree does not use values that a caller left there.
+    // An inactive lane gets a ray that ends before it begins, so that Embree does not use its undefined values.
     for (int i = 0; i < lanes; ++i) {
       if (valid[i] != 0) continue;
       q.ray.org_x[i] = q.ray.org_y[i] = q.ray.org_z[i] = q.ray.dir_y[i] = q.ray.dir_z[i] = 0;
@@ -268,7 +268,7 @@ struct RayScene::Impl {
     const std::size_t group = instance == RTC_INVALID_GEOMETRY_ID ? 0 : instance;
     rays.object[lane] = groups[group].objects[geometry];
     if (group == 0) return;
-    const auto& m = turned[group].m;  // a body's normals come in the body's axes
+    const auto& m = turned[group].m;  // Embree returns normals of bodies in the axes of the body
     const double n[3] = {rays.normal_x[lane], rays.normal_y[lane], rays.normal_z[lane]};
     rays.normal_x[lane] = static_cast<float>(m[0][0] * n[0] + m[0][1] * n[1] + m[0][2] * n[2]);
     rays.normal_y[lane] = static_cast<float>(m[1][0] * n[0] + m[1][1] * n[1] + m[1][2] * n[2]);

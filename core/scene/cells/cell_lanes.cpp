@@ -6,8 +6,8 @@
 
 #include "core/base/random.hpp"
 
-// Compiled for three instruction sets, and chosen when the program starts. This file is built without contraction into fused
-// operations, so that all round alike.
+// The loops are compiled for three instruction sets, one of which is chosen when the program starts. This file is built without
+// fused operations, so that rounding is the same in all of them.
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
 #define SONAR_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
@@ -20,7 +20,7 @@ namespace {
 
 constexpr int across = 4;  // blocks along a tile, and cells along a block
 
-/// Which quarter of its cell a point lies in, across a 4 x 4 block, from where the cell lies along it: two binary digits, each
+/// The quarter of its cell in which a point of a 4 x 4 block lies, from the cell's index along the block: two binary digits, each
 /// flipped by random bits that depend on the digits before it (nested scrambling).
 constexpr double quarter_of(int along, unsigned scramble) {
   const auto bit = [&](int i) { return static_cast<int>(scramble >> i & 1u); };
@@ -34,7 +34,7 @@ constexpr auto quarters = [] {
   return all;
 }();
 
-/// Sixteen draws of philox (core/base/random.hpp) side by side.
+/// Sixteen draws of philox (core/base/random.hpp), computed together.
 struct Draws {
   alignas(64) std::uint32_t v[4][block];
 };
@@ -59,7 +59,7 @@ inline void draw(const DrawKey& key, const std::uint32_t* i, const std::uint32_t
   }
 }
 
-/// (0, 1), as uniform_open; the bits are taken as a signed number, which vectors convert.
+/// A number in (0, 1), like uniform_open(); the bits are a signed number, which vectors can convert.
 inline float uniform(std::uint32_t bits) {
   return (static_cast<float>(static_cast<std::int32_t>(bits >> 9)) + 0.5f) * (1.0f / 8388608.0f);
 }
@@ -85,7 +85,7 @@ inline float minus_log(float x) {
   return -(f + y + 0.693359375f * e);
 }
 
-/// Rounds half away from zero, as lround does; |x| below 2^23.
+/// Rounds half away from zero, like lround; |x| must be below 2^23.
 inline std::int32_t rounded(float x) { return static_cast<std::int32_t>(x + std::copysign(0x1.fffffep-2f, x)); }
 inline std::int32_t rounded(double x) { return static_cast<std::int32_t>(x + std::copysign(0x1.fffffffffffffp-2, x)); }
 
@@ -161,7 +161,7 @@ SONAR_CLONES float speckle(const std::uint32_t* a, const std::uint32_t* b, const
   for (int at = 0; at < n; at += block)
     for (int l = 0; l < block; ++l) {
       const float radius = std::sqrt(minus_log(uniform(a[at + l])));
-      // The angle in quarters of a turn and what is left of it, exactly.
+      // The angle in quarters of a turn, and the exact remainder.
       const float turns = uniform(b[at + l]);
       const auto quarter = static_cast<std::int32_t>(4.0f * turns + 0.5f);
       const float x = (turns - 0.25f * static_cast<float>(quarter)) * 6.28318530717958647692f, z = x * x;

@@ -16,7 +16,7 @@ namespace {
 
 using cell_lanes::side;
 
-/// Values that the cells of one facet share.
+/// Values that are the same for all cells of one facet.
 struct FacetOfCells {
   std::int16_t normal[3];  // x, y, z, in CellTile::normal_unit
   double root_area;
@@ -35,7 +35,7 @@ struct Ownership {
   std::vector<FacetOfCells> facets;
 };
 
-/// Lattice columns (or rows) of this tile that an interval of the plane can reach.
+/// Lattice columns (or rows) of this tile that an interval of the plane overlaps.
 struct CellRange {
   int from, to;
 };
@@ -61,7 +61,7 @@ cell_lanes::FacetTest test_of(const lattice::Facet& f, const TileAddress& a, Cel
     const double sign = forward ? turn : -turn;
     const double du = turn * (f.u[j] - f.u[i]), dv = turn * (f.v[j] - f.v[i]);
     const bool with_its_points = dv < 0 || (dv == 0 && du > 0);
-    // Areas are zero or far from the least normal number: coordinates are single precision.
+    // Areas are zero or far above the least normal number, because coordinates are single precision.
     t.edge[i] = {f.u[p], f.v[p], sign * (f.u[q] - f.u[p]), sign * (f.v[q] - f.v[p]),
                  with_its_points ? 0.0 : std::numeric_limits<double>::min()};
   }
@@ -103,7 +103,7 @@ void own(const lattice::Facet& f, const TileAddress& a, Ownership& all) {
     }
 }
 
-/// The cells of a tile in their order, padded to whole blocks: the last is repeated, with zero root.
+/// The cells of a tile in their order, padded to whole blocks with copies of the last cell that have a root of 0.
 struct CellList {
   explicit CellList(std::size_t most)
       : doubles(std::make_unique_for_overwrite<double[]>(4 * most)),

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double fewest_cells = 3000;  // least number for an object, with CellView::exact_small
 
-/// For the tiles of side lobes, of which one cube has all cells of a place.
+/// The level of tiles for side lobes, where all cells of a place are in one cube.
 constexpr CellLevel at_all_ranges{.full_to_m = 1e9f, .fade_out_to_m = 1e9f};
 
 bool is_empty(const TileInView& t) { return t.tile->count == 0; }
@@ -89,7 +89,7 @@ void SurfaceCells::lay_out() {
       if (!root->alone) roots_.push_back({patch.get(), root.get()});
 }
 
-/// Takes over the patches that an object had in earlier scenes: their cubes and, if the material is the same, their tiles. False:
+/// Reuses the patches that an object had in earlier scenes: their cubes and, if the material is the same, their tiles. False if
 /// there are none.
 bool SurfaceCells::take_known(std::size_t o) {
   const Object& object = scene_->objects[o];
@@ -130,10 +130,10 @@ void SurfaceCells::plant(std::size_t o) {
   }
 }
 
-/// Forgets earlier scenes, the oldest first.
+/// Drops earlier scenes, the oldest first.
 void SurfaceCells::forget_known() {
   std::size_t n = 0;
-  const auto is_of_the_last = [&] {  // an object's patches come and go together
+  const auto is_of_the_last = [&] {  // the patches of an object are added and dropped together
     const SurfacePatch &last = *known_->patches[n - 1].patch, &next = *known_->patches[n].patch;
     return next.object == last.object && next.mesh == last.mesh;
   };
@@ -215,8 +215,8 @@ void SurfaceCells::visit(SurfacePatch& patch, CellNode& node, const Look& look, 
     if (child) visit(patch, *child, look, found);
 }
 
-/// Cells of long pulses may be coarser than the planted roots. Level by level, so that the order of the roots does not depend on
-/// what was looked at before.
+/// Adds coarser roots level by level, because cells for long pulses may be coarser than the first roots. With whole levels, the
+/// order of roots does not depend on earlier views.
 void SurfaceCells::raise_roots(const CellView& view) {
   for (; raised_ > coarsest_wanted(view); --raised_)
     for (auto& patch : patches_) {
@@ -327,7 +327,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
   pool.for_each(missing.empty() ? 0 : views.size(), [&](std::size_t v, int) { std::erase_if(found[v].tiles, is_empty); });
 }
 
-/// Forgets the tiles that were not used for the longest time. They are made again identically when needed.
+/// Drops the tiles that were not used for the longest time. If they are needed again, the new ones are identical.
 void SurfaceCells::keep_within_budget() {
   if (cached_bytes_ > cache_bytes_) forget_known();
   for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {

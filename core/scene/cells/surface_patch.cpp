@@ -10,8 +10,8 @@ namespace sonar {
 namespace {
 
 constexpr int most_roots_along_an_axis = 16;
-constexpr double most_steep = 4;      // a steep surface's cells have at most so many times the area of a grazed one's
-constexpr int few_in_side_lobes = 2;  // levels: an object has at least a sixteenth of fewest_cells in side lobes
+constexpr double most_steep = 4;      // largest ratio of cell areas at steep and at grazing incidence
+constexpr int few_in_side_lobes = 2;  // in levels: an object has at least a sixteenth of fewest_cells in side lobes
 
 /// The finest level at which few enough cubes cover the triangles.
 int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles, int finest) {
@@ -92,7 +92,7 @@ std::size_t SurfacePatch::divide(CellNode& node) const {
     a.k = a.k * 2 + (c >> 2 & 1);
     cubes[static_cast<std::size_t>(c)] = cube_of(a);
   }
-  std::vector<std::uint8_t> touched(node.triangles.size());  // cubes that it touches, as bits
+  std::vector<std::uint8_t> touched(node.triangles.size());  // cubes that each triangle touches, as bits
   std::array<std::size_t, 8> how_many{};
   for (std::size_t n = 0; n < touched.size(); ++n) {
     const lattice::FacetBounds f = lattice::bounds_of(lattice::facet_of(*mesh, node.triangles[n], axis));
@@ -123,7 +123,8 @@ int SurfacePatch::side_level(const TileAddress& address, Vec3d sonar_m, const Ce
   const Cube cube = cube_of(address);
   const Vec3d q = lattice::from_permuted(cube.u, cube.v, cube.w, axis) - sonar_m;
   const double along = axis == 0 ? q.x : axis == 1 ? q.y : q.z, range = length(q);
-  // A surface across the patch's axis is met at the grazing angle whose cosine is the distance from that axis over the range.
+  // A surface at right angles to the patch's axis has the grazing angle whose cosine is the distance from the axis over the
+  // range.
   const double aside = std::sqrt(std::max(range * range - along * along, 0.0));
   const double steep = range < most_steep * aside ? range / aside : most_steep;
   const double area = static_cast<double>(view.side_area_per_range_m) * steep * std::max(range - cube.radius() / 2, 0.0);

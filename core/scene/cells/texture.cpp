@@ -9,7 +9,7 @@ namespace {
 
 constexpr int quantiles = 256;
 constexpr double widest_normal = 5;
-constexpr double weakest = 1e-4;  // -40 dB; nearer to zero a cell would look like an empty one
+constexpr double weakest = 1e-4;  // -40 dB; with lower values a cell could not be distinguished from an empty one
 constexpr int remembered_along = 16, remembered_up = 8;
 
 struct IncompleteGamma {
@@ -39,7 +39,7 @@ IncompleteGamma incomplete_gamma(double a, double x, double log_gamma_a) {
   return {1 - front * h, front * h};
 }
 
-/// The Gamma variable of shape nu and mean 1 that as much lies below as lies below a standard normal.
+/// The Gamma variable of shape nu and mean 1 at the same quantile as a standard normal.
 double gamma_at_normal(double nu, double log_gamma_nu, double normal) {
   const double below = 0.5 * std::erfc(-normal / std::sqrt(2.0)), above = 0.5 * std::erfc(normal / std::sqrt(2.0));
   // Bisection in log x: after 48 halvings the error is far below the rounding of the float results.
@@ -76,7 +76,7 @@ TextureField::TextureField(const Texture& texture, std::uint32_t texture_seed, S
   const double nu = static_cast<double>(texture.shape), log_gamma_nu = std::lgamma(nu);
   double mean = 0, weight = 0;
   std::vector<double> values;
-  // x = P^-1(nu, Phi(z)) / nu at even z; the mean over the normal density is divided out.
+  // x = P^-1(nu, Phi(z)) / nu at uniform z, divided by the mean over the normal density.
   for (int i = 0; i <= quantiles; ++i) {
     const double normal = widest_normal * (2.0 * i / quantiles - 1), density = std::exp(-0.5 * normal * normal);
     values.push_back(gamma_at_normal(nu, log_gamma_nu, normal));
@@ -95,7 +95,7 @@ float TextureField::normal_at(int object, std::int32_t i, std::int32_t j, std::i
 
 float TextureField::root_of(float normal) const {
   constexpr float per_normal = static_cast<float>(quantiles / (2 * widest_normal));
-  // Linear between the tabulated quantiles.
+  // Interpolates linearly between the tabulated quantiles.
   const float at = std::clamp((normal + static_cast<float>(widest_normal)) * per_normal, 0.0f, static_cast<float>(quantiles));
   const auto i = static_cast<std::size_t>(at);
   return roots_[i] + (at - static_cast<float>(i)) * (roots_[i + 1] - roots_[i]);
@@ -114,7 +114,7 @@ float TexturePatch::normal_at(std::int32_t i, std::int32_t j, std::int32_t k) {
   return p.normal;
 }
 
-/// Neighbouring cells have the same 27 points.
+/// Loads the 27 points around a place, if they have changed; neighbouring cells have the same points.
 void TexturePatch::stand_at(std::int32_t i, std::int32_t j, std::int32_t k) {
   if (i == near_i_ && j == near_j_ && k == near_k_ && stands_) return;
   near_i_ = i, near_j_ = j, near_k_ = k;
