@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-// A triangle counts when its height over its longest side is more than rounding.
+// A triangle has an area if its height over its longest side exceeds rounding errors.
 bool has_area(Vec3 a, Vec3 b, Vec3 c) {
   const Vec3d ab = to_double(b) - to_double(a), ac = to_double(c) - to_double(a), bc = ac - ab;
   const double longest = std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)});
@@ -44,7 +44,7 @@ Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t mo
 
   CentredMesh out;
   out.centre_m = 0.5 * (low + high);
-  VertexTable vertices(out.mesh.vertices, count / 2);  // as a closed surface has
+  VertexTable vertices(out.mesh.vertices, count / 2);  // number of vertices of a closed surface
   out.mesh.triangles.reserve(count);
   out.mesh.material.reserve(count);
   // A file may change between the passes.

@@ -52,7 +52,7 @@ std::optional<UtmZone> utm_of_name(std::string name) {
 
 bool is_unit(double v) { return v > 1e-4 && v < 1e5; }
 
-/// "Projection UTM", "Units FEET": a word and its value a line.
+/// Parses lines with a word and its value, such as "Projection UTM" and "Units FEET".
 CoordinateSystem system_of_lines(const std::string& text) {
   CoordinateSystem system;
   const auto unit_of = [](const std::string& value) {
@@ -122,7 +122,7 @@ class WktReader {
 
   void begin(std::string word) {
     const bool degrees = is_one_of(word, in_degrees), lengths = is_one_of(word, in_lengths);
-    // A projected system contains a geographic one, behind its own name.
+    // A projected system contains a geographic one after its own name.
     if (!system_.geographic && (degrees || lengths)) {
       system_.geographic = degrees;
       is_projected_ = word.starts_with("PROJ");

@@ -101,7 +101,7 @@ Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const He
   const auto header = read_header(words);
   if (!header) return bad(header.error().text);
   const std::size_t columns = header->columns, rows = header->rows;
-  RawHeights raw{.system = system_by_prj(file)};  // grows with what is there, not with what the header promises
+  RawHeights raw{.system = system_by_prj(file)};  // grows with the contents of the file, not with the sizes in its header
   HeightValues values(header->no_data);
   for (std::size_t i = 0; i < rows * columns; ++i) {
     const std::string_view word = words.next();

@@ -32,7 +32,7 @@ constexpr std::uint16_t projected = 1, geographic = 2, geocentric = 3, degree = 
 constexpr std::uint16_t web_mercator = 3857, old_web_mercator = 3785, transverse_mercator = 1;
 constexpr std::uint16_t numbers_tag = 34736, texts_tag = 34737;
 
-/// 1 of metres and degrees.
+/// Metres per unit; 1 for metres and for degrees.
 Result<double> length_unit(std::optional<std::uint16_t> key) {
   switch (key.value_or(unit_metre)) {
     case unit_metre:
@@ -50,7 +50,7 @@ Result<double> length_unit(std::optional<std::uint16_t> key) {
   }
 }
 
-/// The code of the unit of systems of heights that are not in metres, of the EPSG data set 10.0.
+/// The code of the unit of height systems that are not in metres, from the EPSG data set 10.0.
 std::optional<std::uint16_t> unit_of_height_system(std::uint16_t system) {
   static const std::set<std::uint16_t> in_feet{5614, 6130, 6131, 6132, 8050, 8051, 8228},
       in_us_survey_feet{5702, 6358, 6359, 6360, 8052, 8053};
@@ -64,14 +64,14 @@ std::optional<std::uint16_t> code_of(const GeoKeys& keys, std::uint16_t key) {
   return code == user_defined || code == 0 ? std::nullopt : code;
 }
 
-/// "EPSG:27700", or what the file calls it.
+/// "EPSG:27700", or the name in the file.
 std::string name_by(std::optional<std::uint16_t> code, const GeoKeys& keys, std::uint16_t own_citation) {
   if (code) return "EPSG:" + std::to_string(*code);
   const std::string own = keys.text_of(own_citation), of_all = keys.text_of(citation);
   return !own.empty() ? own : !of_all.empty() ? of_all : "a system of its own";
 }
 
-/// Nothing if the keys say neither the datum nor the ellipsoid.
+/// nullopt if the keys state neither the datum nor the ellipsoid.
 std::optional<bool> has_modern_datum(const GeoKeys& keys) {
   if (const auto code = code_of(keys, geographic_system)) return agrees_with_wgs84(*code);
   if (const auto code = code_of(keys, ellipsoid)) return *code == 7019 || *code == 7030;

@@ -39,7 +39,7 @@ struct CloseTiff {
 };
 using Tiff = std::unique_ptr<TIFF, CloseTiff>;
 
-// The library's sentence, of the file that this thread reads.
+// The library's error text for the file that this thread reads.
 thread_local std::string last_error;
 void on_error(const char*, const char* pattern, va_list arguments) {
   std::array<char, 200> text{};
@@ -56,11 +56,11 @@ Tiff open(const std::filesystem::path& file) {
   TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), static_cast<tmsize_t>(4 * most_block_bytes));
   return Tiff(TIFFOpenExt(file.c_str(), "rm", options.get()));
 #else
-  return Tiff(TIFFOpen(file.c_str(), "rm"));  // m: the file is not mapped, so that it may shrink
+  return Tiff(TIFFOpen(file.c_str(), "rm"));  // m: do not map the file, which could shrink
 #endif
 }
 
-/// The values of a tag that the library has no description of; empty without it, or with other types.
+/// The values of a tag that the library does not know; empty if the tag is missing or has another type.
 template <class T>
 std::vector<T> values_of(TIFF* tiff, std::uint32_t tag, TIFFDataType type) {
   const TIFFField* field = TIFFFindField(tiff, tag, TIFF_ANY);
@@ -87,7 +87,7 @@ struct Georeference {
   double x = 0, y = 0, step_x = 0, step_y = 0;
 };
 
-/// GDAL's unit of a band. Other words, such as a sensor's, are no units of length.
+/// GDAL's unit of a band. Other units, such as those of a sensor, are ignored.
 std::optional<std::uint16_t> unit_of_band(std::string_view metadata) {
   const std::string_view begin = "role=\"unittype\">";
   const std::size_t at = metadata.find(begin);
@@ -156,7 +156,7 @@ class GeoTiffReader {
     return mask;
   }
 
-  /// The six numbers of a world file beside it, about the middle of the first cell.
+  /// The six numbers of a world file beside the grid, relative to the middle of the first cell.
   std::optional<Georeference> world_file() const {
     for (const char* extension : {".tfw", ".tifw", ".TFW", ".wld"}) {
       std::filesystem::path beside = file_;
@@ -210,7 +210,7 @@ class GeoTiffReader {
   Result<Georeference> read_georeference() {
     const auto more = values_of<char>(tiff_, gdal_metadata, TIFF_ASCII);
     const std::string_view metadata(more.data(), more.size());
-    // Heights that are not what the cells hold would be wrong by a factor without a word.
+    // With a scale or an offset, the values of cells are not heights. Without this error they would be silently wrong.
     if (has_other(metadata, "role=\"scale\">", 1) || has_other(metadata, "role=\"offset\">", 0))
       return bad("stores heights with a scale or an offset; write the heights themselves: gdal_translate -unscale -ot Float32");
     const auto texts = values_of<char>(tiff_, key_texts, TIFF_ASCII);
@@ -278,7 +278,7 @@ class GeoTiffReader {
 
   tl::unexpected<Error> unreadable() const { return bad("cannot be read: " + (last_error.empty() ? "damaged" : last_error)); }
 
-  /// Sparse files leave blocks out that have no data.
+  /// Sparse files do not contain blocks without data.
   bool is_left_out(std::uint32_t block) { return TIFFGetStrileByteCount(tiff_, block) == 0; }
 
   Result<void> read_strips() {
@@ -298,7 +298,7 @@ class GeoTiffReader {
     const std::uint64_t row_bytes = TIFFTileRowSize64(tiff_);
     std::vector<std::byte> tile(static_cast<std::size_t>(TIFFTileSize64(tiff_)));
     if (width == 0 || height == 0 || row_bytes == 0 || row_bytes * height > tile.size()) return unreadable();
-    // Every tile is unpacked whole, however few of its cells lie in the picture.
+    // Every tile is unpacked as a whole, even if few of its cells lie in the picture.
     if (TIFFNumberOfTiles(tiff_) * std::uint64_t{tile.size()} >
         most_block_bytes + 4 * std::uint64_t{raw_.z.size()} * (picture_.bits / 8u))
       return bad("its tiles are much larger than the picture; write it without: gdal_translate -co TILED=NO");

@@ -16,10 +16,10 @@ namespace {
 constexpr double highest_m = 1e7, least_fill = 1e20;
 constexpr double farthest_deg = 5, nearest_pole_deg = 89;
 constexpr float none = std::numeric_limits<float>::quiet_NaN();
-/// Fill values of programs that write grids, besides those that no height can be.
+/// Usual fill values that could be heights.
 constexpr std::array<float, 14> usual_fills{-9999, -32768, -32767, 32767,  -99999,   99999,  -999999,
                                             65535, -999,   9999,   -10000, -9999999, 999999, 9999999};
-/// The ends of whole numbers of 32 bits, which no height reaches.
+/// Limits of 32-bit integers, which no height reaches.
 constexpr std::array<double, 4> ends_of_32_bits{-2147483648.0, -2147483647.0, 2147483647.0, 4294967295.0};
 
 /// The value of one unit in the last digit of a number as it is written.
@@ -62,14 +62,14 @@ bool could_be_degrees(const RawHeights& raw) {
   return raw.x.front() >= -180 && raw.x.back() <= 360 && raw.y.front() >= -90 && raw.y.back() <= 90;
 }
 
-/// Cells of an arc second, its ninth, or several of them, as 0.000277777778, which no one chooses for metres.
+/// Cells of an arc second, its ninth, or several of them, such as 0.000277777778, which is unlikely in metres.
 bool are_arc_seconds(double cell) {
   const auto is_whole = [](double v) { return v > 0.5 && std::abs(v - std::round(v)) < 1e-3; };
   constexpr double ninths_in_a_degree = 9 * 3600;
   return is_whole(cell * ninths_in_a_degree) && !is_whole(cell * 1e5);
 }
 
-/// Degrees read as metres make ground absurdly steep: 1 m up in 100 m becomes 1000 to 1.
+/// Whether the ground would be absurdly steep if coordinates were metres: in degrees, 1 m up in 100 m becomes 1000 to 1.
 bool shows_degrees(const RawHeights& raw) {
   const std::size_t columns = raw.x.size();
   const double cell = (raw.x.back() - raw.x.front()) / static_cast<double>(columns - 1);
@@ -114,7 +114,7 @@ void take_off_zone(RawHeights& raw, UtmZone zone, std::vector<std::string>& note
   notes.push_back(text::format("its eastings begin with %d, the number of their zone, which is taken off", zone.number));
 }
 
-/// For a system whose latitudes and longitudes are not known here, or only roughly.
+/// A note about a system whose latitudes and longitudes are unknown here, or only roughly known.
 std::string note_of_system(const CoordinateSystem& system) {
   const std::string name = text::printable(system.name);
   return system.other_datum
@@ -200,7 +200,7 @@ Result<void> set_origin_of_zone(HeightGrid& grid, const HeightOptions& options, 
   return {};
 }
 
-/// For metres of a zone that is not known: whether they are near the world's origin in the zone in which that lies.
+/// Adds a note if coordinates in metres of an unknown zone lie near the world's origin in the zone of this origin.
 void hint_at_zone(HeightGrid& grid, const Geodetic& world_origin) {
   constexpr double near_m = 50'000, least_northing_m = 10'000;
   const double x = 0.5 * (grid.x.front() + grid.x.back()), y = 0.5 * (grid.y.front() + grid.y.back());
@@ -216,7 +216,7 @@ void hint_at_zone(HeightGrid& grid, const Geodetic& world_origin) {
 }  // namespace
 
 bool is_nan_word(std::string_view word) {
-  // printf's, those of Microsoft's C, of R, of databases, of Python, of numpy's masked arrays
+  // words of printf, Microsoft's C, R, databases, Python, and numpy's masked arrays
   static constexpr std::array<std::string_view, 16> words{"nan", "NaN",  "NAN",  "nan(ind)", "1.#QNAN", "1.#IND",
                                                           "NA",  "null", "NULL", "None",     "none",    "--",
                                                           "inf", "Inf",  "INF",  "Infinity"};

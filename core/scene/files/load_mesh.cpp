@@ -21,7 +21,7 @@
 namespace sonar {
 namespace {
 
-/// Beside the programs as they are installed or built, so that an unpacked or moved installation finds its own.
+/// The path of the importer, relative to the programs as installed or built, so that an unpacked or moved installation works.
 std::filesystem::path importer() {
   if (const char* given = std::getenv("SONARD_IMPORT_MESH"); given && *given) return given;
   std::error_code error;
@@ -33,7 +33,7 @@ std::filesystem::path importer() {
   return SONARD_IMPORTER_INSTALLED;
 }
 
-/// The first line that the program wrote before it failed, such as the loader's.
+/// The first line of the failed program's error output, such as that of the dynamic loader.
 std::string last_words(int descriptor) {
   std::array<char, 300> text{};
   const ssize_t n = ::pread(descriptor, text.data(), text.size() - 1, 0);

@@ -17,7 +17,7 @@ float read_number(text::Map& keys, const char* key, float fallback, Range range)
 }
 float read_angle_rad(text::Map& keys, const char* key, float fallback_rad) {
   const text::Node node = keys.optional(key);
-  // Below 2 degrees the kernels' table would be too coarse.
+  // Below 2 degrees the table of the kernels would be too coarse.
   return node.present() ? static_cast<float>(rad_from_deg(node.number(Range::between(2, 90)))) : fallback_rad;
 }
 
@@ -51,7 +51,7 @@ Texture read_texture(const text::Node& node, Texture texture, double shortest_m)
 
 MaterialTable::MaterialTable(Scene& scene) : scene_(scene), definitions_(library()) {}
 
-/// Parsed once: scenes are read by the thousand.
+/// The library, parsed once, because data sets read thousands of scenes.
 const std::vector<Material>& MaterialTable::library() {
   static const std::vector<Material> materials = [] {
     auto document = text::parse_yaml(material_library_yaml, "materials.yaml", {.error_kind = ErrorKind::bug});

@@ -37,7 +37,7 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
   png_read_update_info(png, info);
   const bool wide = png_get_bit_depth(png, info) == 16;
   const std::size_t sample = wide ? 2 : 1, pixel = grey ? sample : 3 * sample;
-  // Interlaced, every row is whole only after the last pass, which completes what the passes before it left there.
+  // If the image is interlaced, rows are complete only after the last pass, which adds to the values of earlier passes.
   const std::size_t row_bytes = png_get_rowbytes(png, info);
   rows_read.resize(passes > 1 ? row_bytes * rows : row_bytes);
   for (int pass = 1; pass < passes; ++pass)
@@ -59,7 +59,7 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
   png_read_end(png, nullptr);
 }
 
-// libpng leaves by longjmp: everything with a destructor belongs to the caller.
+// libpng leaves by longjmp, so that all objects with a destructor must be in the caller.
 bool read_picture(std::FILE* file, Picture& picture, std::vector<png_byte>& row) {
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &picture, on_error, on_warning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;

@@ -25,7 +25,7 @@ Pose pose_from(Map keys) {
   return pose;
 }
 
-// One pass over the list; keeps the names in use and which of them move.
+// Reads the list in one pass; it stores the names in use, and which of them are bodies.
 class ObjectsReader {
  public:
   explicit ObjectsReader(ShapeReader& shapes) : shapes_(shapes), scene_(shapes.scene) {}
@@ -41,7 +41,7 @@ class ObjectsReader {
     std::vector<std::string_view> types = ShapeReader::types();
     types.push_back("point");
     const std::string_view type = types[type_node.choice_index(types)];
-    if (type_node.text() != type) return;  // said already
+    if (type_node.text() != type) return;  // there is an error already
     const std::string name = name_node.text_or(std::string(type) + " " + std::to_string(++unnamed_), 64);
     if (!names_.insert(name).second) name_node.fail("name is used twice; object names must be unique");
     if (moving && attached.present()) attached.fail("give moving: true or attached_to, not both");
@@ -83,7 +83,7 @@ class ObjectsReader {
     return static_cast<int>(scene_.body_names.size()) - 1;
   }
 
-  // `pose` is in the body when there is one, in the world otherwise.
+  // `pose` is relative to the body if there is one, else to the world.
   void place(const Node& node, const Shape& shape, std::string name, const Pose& pose, int body, bool visible) {
     if (!shape.mesh) return;
     if (scene_.objects.size() >= max_objects) return node.fail("more than " + std::to_string(max_objects) + " objects");

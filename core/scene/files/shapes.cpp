@@ -30,7 +30,7 @@ Shape with_material(Mesh mesh, std::uint16_t material, const Primitive& primitiv
   return Shape{std::make_shared<const Mesh>(std::move(mesh)), {}, primitive};
 }
 
-/// Equal for equal shapes: all digits of the numbers.
+/// A key that is equal for equal shapes; it has all digits of the numbers.
 std::string shape_key(std::string_view type, std::uint16_t material, std::initializer_list<double> numbers) {
   std::string key(type);
   key += ' ' + std::to_string(material);
@@ -193,7 +193,7 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
     const SeabedShape shape = read_seabed(keys);
     const Node size = keys.optional("size_m");
     if (shape.size_x_m <= 0 || shape.size_y_m <= 0 || shape.spacing_x_m <= 0 || shape.spacing_y_m <= 0)
-      return {};  // said already
+      return {};  // there is an error already
     if (seabed_triangles(shape) > max_mesh_triangles) {
       return size.fail("makes more than 20 million triangles; raise spacing_m or set fine_size_m"), Shape{};
     }

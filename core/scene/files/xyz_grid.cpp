@@ -1,4 +1,4 @@
-// Text grids of one point a line, "x y z" (GDAL's XYZ): points of an even grid, in any order, of which some may be missing.
+// Reads text grids with one point per line, "x y z" (GDAL's XYZ): points of a uniform grid in any order; some may be missing.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,7 +23,8 @@ struct Point {
 constexpr std::size_t most_columns = 16;
 using Line = std::array<std::string_view, most_columns>;
 
-/// Words between blanks, commas or semicolons, without quotes; how many of them there are, up to those that fit.
+/// Splits a line into words between blanks, commas or semicolons, without quotes. Returns their number, up to the size of
+/// `words`.
 std::size_t split(std::string_view line, Line& words, std::string_view between = " \t,;\r\"") {
   std::size_t count = 0;
   for (std::size_t at = line.find_first_not_of(between); at != std::string_view::npos && count < words.size();) {
@@ -34,7 +35,7 @@ std::size_t split(std::string_view line, Line& words, std::string_view between =
   return count;
 }
 
-/// Evenly spaced coordinates that hold all of the given ones, of which some may be missing; empty when they are not even.
+/// Uniform coordinates that contain all the given ones, of which some may be missing; empty if there are none.
 std::vector<double> even_axis(std::vector<double> given) {
   std::sort(given.begin(), given.end());
   given.erase(std::unique(given.begin(), given.end()), given.end());
@@ -45,7 +46,7 @@ std::vector<double> even_axis(std::vector<double> given) {
   const std::size_t middle = (sorted.size() - 1) / 2;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(middle), sorted.end());
   const double usual = sorted[middle];
-  double sum = 0, count = 0;  // the mean is better than one step, which is rounded
+  double sum = 0, count = 0;  // the mean is more accurate than one step, which is rounded
   for (const double step : steps)
     if (step < 1.5 * usual) sum += step, ++count;
   const double cells = std::round((given.back() - given.front()) / (sum / count));
@@ -67,10 +68,10 @@ std::size_t index_on(const std::vector<double>& axis, double v) {
   return static_cast<std::size_t>(std::clamp(std::round((v - axis.front()) / (axis.back() - axis.front()) * last), 0.0, last));
 }
 
-/// Where a line has east, north and the height.
+/// Indices of the words of a line for east, north and height.
 struct Order {
   std::size_t x = 0, y = 1, z = 2;
-  bool depth = false;  // as the column is called
+  bool depth = false;  // whether the name of the column is depth
   std::size_t last() const { return std::max({x, y, z}); }
 };
 
@@ -96,7 +97,7 @@ Order order_by(const Line& names, std::size_t count) {
   return order;
 }
 
-/// Three numbers as "500000,5 6650000,5 -10,2" and "500000,5;6650000,5;-10,2", which would be six.
+/// Whether a line has three numbers with decimal commas, "500000,5 6650000,5 -10,2" or "500000,5;6650000,5;-10,2".
 bool has_decimal_commas(std::string_view line) {
   Line words;
   const std::size_t count = split(line, words, " \t;\r\"");
