@@ -72,8 +72,8 @@ Skin skin_of(const Mesh& mesh) {
   Skin skin;
   if (mesh.triangles.empty()) return skin;
   skin.low = skin.high = to_double(mesh.vertices[mesh.triangles[0][0]]);
-  Vec3d
-      twice_area;  // sum of twice the areas as vectors; 0 for a closed mesh. Edges of meshes such as terrain thus need no sorting
+  // Twice the sum of the areas as vectors. It is 0 for a closed mesh, so that the edges of terrain need no sorting.
+  Vec3d twice_area;
   for (const auto& t : mesh.triangles) {
     const Vec3d a = to_double(mesh.vertices[t[0]]), b = to_double(mesh.vertices[t[1]]), c = to_double(mesh.vertices[t[2]]);
     const Vec3d twice = cross(b - a, c - a);
