@@ -93,9 +93,7 @@ class SharedNoiseTable {
   SharedNoiseTable(const PingPlan& plan, Parallel& pool);
   bool is_audible() const { return samples_ > 0; }
   bool has_leak() const { return !leak_upa_.empty(); }
-  int samples() const {
-    return samples_;
-  }  // number of samples with shared noise, from the first; at larger ranges it falls outside the sector
+  int samples() const { return samples_; }  // first samples that have it; later, it falls outside the sector
   std::size_t parts() const { return parts_; }
   /// Real and imaginary part, [parts][beams][2][samples], of the response to a signal of amplitude 1 in the channels of a group;
   /// in the last part, in all channels.
