@@ -56,14 +56,14 @@ std::size_t end_of_tag(std::string_view text, std::size_t at) {
   return none;
 }
 
-/// The elements that contain nodes, as the importer finds them: the library by id, else any node by id or name.
+/// The elements that contain nodes, which are found like in the importer: in the library by id, else any node by id or name.
 struct Nodes {
   NodeGraph graph;
   std::vector<std::size_t> scenes;
   std::map<std::string_view, std::size_t> library, others;
   std::vector<std::pair<std::size_t, std::string_view>> instances;  // parent, name of the child
   std::vector<std::pair<std::size_t, std::string_view>> surfaces;   // node, name of a geometry or controller
-  std::string_view scene;                                           // the name of the one that is shown
+  std::string_view scene;                                           // the name of the scene that is shown
 
   std::size_t add(const Element& element, bool in_a_node) {
     const std::size_t node = graph.add(std::string(element.id.empty() ? element.label : element.id));
@@ -88,7 +88,7 @@ std::uint64_t number_in(std::string_view text) {
   return n;
 }
 
-/// Follows the elements of geometries and counts triangles by the numbers that primitives list, not by the counts that they
+/// Reads the elements of geometries and counts triangles by the indices that primitives list, not by the counts that they
 /// state.
 class Geometries {
  public:
@@ -132,7 +132,7 @@ class Geometries {
   }
   std::map<std::string_view, std::uint64_t> triangles_;   // triangles of each geometry
   std::map<std::string_view, std::string_view> skin_of_;  // geometry or controller that a controller moves
-  std::string_view geometry_, controller_, kind_;         // that are being read
+  std::string_view geometry_, controller_, kind_;         // the elements that are being read
   std::uint64_t values_a_corner_ = 1;
   bool has_sides_ = false;
 };

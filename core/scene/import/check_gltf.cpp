@@ -14,13 +14,13 @@ namespace {
 constexpr std::size_t deepest_nesting = 200;
 using Json = nlohmann::json;
 
-/// Follows the text without holding it. Names of nodes are their numbers, in glTF 1 words.
+/// Reads the text without storing it. Names of nodes are numbers, in glTF 1 words.
 class GltfWalk final : public Json::json_sax_t {
  public:
   MeshFault fault;
   std::map<std::string, std::vector<std::string>> children;  // children of each node
-  std::vector<std::vector<std::string>> scenes;              // the nodes of each
-  std::size_t scene = 0;                                     // the one that is shown
+  std::vector<std::vector<std::string>> scenes;              // the nodes of each scene
+  std::size_t scene = 0;                                     // the scene that is shown
   struct Primitive {
     std::string positions, indices;  // accessors
     std::uint64_t mode = 4;          // triangles
@@ -67,7 +67,7 @@ class GltfWalk final : public Json::json_sax_t {
   bool is_at(std::size_t depth, const char* top, const char* last) const {
     return levels_.size() == depth && levels_[0].key == top && !levels_[2].array && levels_[2].key == last;
   }
-  /// The one that is being read.
+  /// The primitive that is being read.
   Primitive* primitive() {
     if (levels_.size() < 5 || levels_[0].key != "meshes" || levels_[2].key != "primitives" || !levels_[3].array) return nullptr;
     auto& all = primitives[levels_[1].name()];
@@ -125,7 +125,7 @@ std::uint64_t triangles_of(const GltfWalk& walk, const GltfWalk::Primitive& prim
   return (primitive.mode == strip || primitive.mode == fan) && corners > 2 ? corners - 2 : 0;
 }
 
-/// Extensions that change where surfaces are, or where their numbers stand. The importer passes over them without a word.
+/// Finds extensions that change surfaces, or the place of their numbers. The importer silently ignores these extensions.
 MeshFault unread_extension(const GltfWalk& walk) {
   const auto unread = [](const std::string& name) {
     return "needs the extension " + name.substr(0, 64) + ", which is not read; export it without";
@@ -146,7 +146,7 @@ MeshFault unread_extension(const GltfWalk& walk) {
   return std::nullopt;
 }
 
-/// Triangles of a file of version 2.
+/// Numbers of triangles of a file of version 2.
 ListedFaces faces_of(const GltfWalk& walk, const NodeGraph& graph, const std::map<std::string, std::size_t>& number,
                      const std::vector<std::size_t>& scenes) {
   std::map<std::string, std::uint64_t> triangles;

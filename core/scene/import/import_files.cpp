@@ -13,17 +13,17 @@
 namespace sonar {
 namespace {
 
-// Assimp 5.2 looks each of them up in a list and copies the list: 8,000 take 0.3 s, 50,000 take minutes.
+// Assimp 5.2 searches a list for each object and copies the list: 8,000 objects take 0.3 s, 50,000 take minutes.
 constexpr std::uint64_t most_objects = 10'000;
 
-bool begins_object(char c) { return c == 'o' || c == 'g'; }  // no other statement of an OBJ file does
+bool begins_object(char c) { return c == 'o' || c == 'g'; }  // no other statements of OBJ files begin so
 
-/// Follows the text of an OBJ file: which lines are faces, and what of them is a vertex. Numbers of texture coordinates and
-/// normals become blanks, so that a face is read whatever they name; a sonar has no use for them.
+/// Reads the text of an OBJ file and finds the faces and the numbers of their vertices. Numbers of texture coordinates and
+/// normals, which are not needed, become blanks, so that invalid ones do not matter.
 class ObjText {
  public:
   struct Step {
-    char c;  // as the importer gets it
+    char c;  // the character that the importer gets
     bool begins_object = false, begins_vertex = false, begins_face = false, begins_corner = false;
     bool is_index = false;  // part of the number of a corner's vertex
   };
@@ -41,7 +41,7 @@ class ObjText {
       line_begins_ = true;
       in_face_ = in_word_ = in_comment_ = false;
     } else if (line_begins_ && is_before_words(c)) {
-      step.c = '\n';  // the importer passes over lines that begin with a blank, and over a first line with a byte order mark
+      step.c = '\n';  // the importer ignores lines that begin with a blank, and a first line with a byte order mark
     } else if (line_begins_) {
       step.begins_object = begins_object(c) && before_ == '\n';
       after_v_ = c == 'v' && before_ == '\n';
@@ -63,7 +63,7 @@ class ObjText {
     faces_ += step.begins_face;
     return step;
   }
-  /// How many faces have begun.
+  /// Number of faces that have begun.
   std::uint64_t faces() const { return faces_; }
 
  private:
@@ -78,17 +78,18 @@ class ObjText {
 
 struct ObjCounts {
   std::uint64_t objects = 0, triangles = 0;
-  std::vector<std::uint64_t> bad_faces;  // the numbers of those that name vertices which the file does not have, rising
+  std::vector<std::uint64_t>
+      bad_faces;  // numbers of the faces that name vertices which the file does not have, in increasing order
 };
 
-/// Counts the parts of an OBJ file and finds the faces at which the importer would refuse the whole file.
+/// Counts the parts of an OBJ file and finds the faces for which the importer would reject the whole file.
 class ObjCounter {
  public:
   void take(char c) {
     const ObjText::Step step = text_.next(c);
     counts_.objects += step.begins_object;
     vertices_ += step.begins_vertex;
-    if (!step.is_index) end_corner();  // before more vertices come: negative numbers count back from here
+    if (!step.is_index) end_corner();  // before the next vertex, because negative numbers count back from here
     if (step.begins_face) {
       end_face();
       face_ = text_.faces();
@@ -144,8 +145,8 @@ ObjCounts counts_of(std::FILE* file) {
   return counter.end();
 }
 
-/// An OBJ file with faces of vertices alone, with bad faces as comments and, if asked, with the lines that begin objects as
-/// comments: the surface and its materials are the same without them.
+/// An OBJ file whose faces have only vertices. Bad faces become comments and, if requested, lines that begin objects, too:
+/// surface and materials do not depend on them.
 class ObjStream final : public Assimp::IOStream {
  public:
   ObjStream(OpenFile file, std::size_t size, bool without_objects, const std::vector<std::uint64_t>& bad_faces)
@@ -162,7 +163,7 @@ class ObjStream final : public Assimp::IOStream {
     }
     return size == 0 ? 0 : n / size;
   }
-  /// Reads from that place on, after following the text up to it. Before each block, the importer also seeks its present place.
+  /// Continues reading at a place, after reading the text before it. The importer also seeks its current place before each block.
   aiReturn Seek(std::size_t offset, aiOrigin origin) override {
     if (origin == aiOrigin_CUR) offset += Tell();
     if (origin == aiOrigin_END) offset = size_ - std::min(offset, size_);
@@ -188,7 +189,7 @@ class ObjStream final : public Assimp::IOStream {
   OpenFile file_;
   std::size_t size_;
   bool without_objects_;
-  const std::vector<std::uint64_t>& bad_faces_;  // of the ImportFiles that opened this
+  const std::vector<std::uint64_t>& bad_faces_;  // belongs to the ImportFiles that opened this stream
   ObjText text_;
 };
 

@@ -10,7 +10,7 @@
 
 #include "core/base/memory_left.hpp"
 
-// The shadow memory of the sanitizers takes terabytes of addresses: there their runtime keeps the limit (main.cpp).
+// The shadow memory of sanitizers uses terabytes of addresses. With them, their runtime applies the limit (main.cpp).
 #ifdef SONAR_SANITIZED
 constexpr bool limits_addresses = false;
 #else
@@ -23,8 +23,8 @@ namespace {
 struct {
   int descriptor = -1;
   ErrorKind memory_kind = ErrorKind::bad_data;
-  std::string name, memory, time;  // sentences, made before they are needed
-  std::uint64_t at_start = 0;      // bytes of addresses
+  std::string name, memory, time;  // error texts, made in advance
+  std::uint64_t at_start = 0;      // address space at the start in bytes
 } limits;
 
 [[noreturn]] void end_for_memory() {
@@ -40,7 +40,7 @@ void limit(__rlimit_resource_t resource, rlim_t soft, rlim_t hard) {
   rlimit now{};
   if (::getrlimit(resource, &now) != 0) return;
   const rlimit wanted{std::min(soft, now.rlim_max), std::min(hard, now.rlim_max)};
-  if (::setrlimit(resource, &wanted) != 0) return;  // the others hold
+  if (::setrlimit(resource, &wanted) != 0) return;  // the other limits apply
 }
 
 }  // namespace

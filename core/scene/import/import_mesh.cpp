@@ -40,7 +40,7 @@ std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint
   return triangles;
 }
 
-// Node transforms are in double, so that vertices far from the origin stay exact to millimetres.
+// Transforms of nodes are in double, so that vertices far from the origin are exact to millimetres.
 // A face with missing vertices is left out.
 void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>& parent, unsigned depth,
                    const TriangleSink& take) {
@@ -136,11 +136,11 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
   std::optional<Error> fault;
   Assimp::Importer importer;
   auto* files = new ImportFiles(request, fault, hooks.opened);
-  importer.SetIOHandler(files);  // is the importer's then
+  importer.SetIOHandler(files);  // the importer owns `files` from then on
   const bool dae = extension == ".dae";
   const bool y_up_by_default = extension == ".gltf" || extension == ".glb" || dae;  // Assimp turns a tagged DAE to y up
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());
-  const aiScene* scene =  // without its post-processing, which asserts on odd files
+  const aiScene* scene =  // without post-processing, whose asserts fail on unusual files
       request.in_memory.empty()
           ? importer.ReadFile(files->mesh(), 0)
           : importer.ReadFileFromMemory(request.in_memory.data(), request.in_memory.size(), 0, extension.c_str() + 1);

@@ -1,5 +1,5 @@
-// sonard-import-mesh: reads one mesh file for sonard and its tools, and ends. If a bad file makes a mesh library crash, only this
-// program ends, not sonard.
+// sonard-import-mesh reads one mesh file for sonard and its tools. If a bad file makes a mesh library crash, only this program
+// ends, not sonard.
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>
@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
     constexpr std::string_view text = "sonard-import-mesh is started by a sonard or sonarctl of the same version, not by hand\n";
     return ::write(STDERR_FILENO, text.data(), text.size()) < 0 ? 74 : 64;
   }
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // this process is of use only to its parent
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // ends this process when its parent ends
   if (::getppid() != request->parent) return 0;
   begin_import_limits(*request, STDOUT_FILENO);
   if (!request->readable.empty()) confine_reads(request->readable);
