@@ -32,7 +32,7 @@ struct ProfilePoint {
   double radius, z;
 };
 
-// Turns a profile, running from bottom to top, about z. Ends of radius 0 become poles; open ends stay open.
+// Revolves a profile, from bottom to top, about z. Ends with radius 0 become poles; other ends stay open.
 Mesh revolve(const std::vector<ProfilePoint>& profile, int segments) {
   Mesh mesh;
   const auto n = static_cast<Index>(segments);

@@ -1,4 +1,5 @@
-// Made ground: octaves of gradient noise plus sand ripples whose crests wander, fork-free, over a grid that widens outwards.
+// Generated ground: octaves of gradient noise, and sand ripples with bent crests that do not fork, on a grid whose spacing grows
+// outwards.
 #include <algorithm>
 #include <cmath>
 
@@ -17,7 +18,7 @@ struct Axis {
 int fine_steps(double fine_half_m, double spacing_m) {
   return static_cast<int>(std::clamp(std::ceil(fine_half_m / spacing_m - 1e-9), 1.0, 1e9));
 }
-// Calls each(distance) for the rows outside the fine part, from `from_m` to `half_m`.
+// Calls each(distance) for rows outside the fine part, between `from_m` and `half_m`.
 template <class Each>
 void widen(double from_m, double half_m, double spacing_m, Each&& each) {
   double step = spacing_m;

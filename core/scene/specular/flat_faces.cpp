@@ -12,7 +12,7 @@ namespace sonar {
 namespace {
 
 constexpr double least_area_m2 = 0.05;
-constexpr double least_width_m = 0.1;        // area / greatest extent: a mirror is many Fresnel zones wide
+constexpr double least_width_m = 0.1;        // area / greatest extent; a mirror is many Fresnel zones wide
 constexpr double same_plane_m = 2e-4;        // an eighth of a wavelength at 1 MHz
 constexpr double same_normal = 1 - 1e-6;     // cosine
 constexpr double most_gentle_border = 0.25;  // share of a face's border
@@ -32,7 +32,7 @@ Vec3d area_vector(const Mesh& mesh, std::uint32_t t) {
   const Vec3d a = corner(mesh, t, 0);
   return cross(corner(mesh, t, 1) - a, corner(mesh, t, 2) - a);
 }
-/// Both sides of a sheet are one mirror: the normal's largest component is made positive.
+/// Makes the normal's largest component positive, because both sides of a sheet are one mirror.
 Vec3d one_sided(Vec3d n) {
   const double x = std::abs(n.x), y = std::abs(n.y), z = std::abs(n.z);
   const double leading = z >= x && z >= y ? n.z : y >= x ? n.y : n.x;
@@ -131,14 +131,14 @@ class Edges {
   std::unordered_map<std::uint64_t, Triangles> sharing_;
 };
 
-/// Whether the face is a facet of a curved surface: much of its border meets neighbours at a slight angle.
+/// Whether the face is a facet of a curved surface: neighbours along much of its border are at a small angle.
 bool curves_on(const Mesh& mesh, const Edges& edges, const Candidate& c) {
   const double gentle_bend = std::cos(smooth_edge_rad);
   double border_m = 0, gentle_m = 0;
   for (const std::uint32_t t : c.triangles)
     for (std::size_t i = 0; i < 3; ++i) {
       const Vec3d from = corner(mesh, t, i), to = corner(mesh, t, (i + 1) % 3);
-      double cosine = -1;  // cosine of the least bend to another triangle at this edge
+      double cosine = -1;  // cosine of the smallest angle to another triangle at this edge
       for (const std::uint32_t other : edges.at(mesh, t, i)) {
         if (other == t) continue;
         const Vec3d n = area_vector(mesh, other);

@@ -6,9 +6,10 @@
 namespace sonar {
 namespace {
 
-constexpr double bary_slack = 1e-6;     // normals are continuous across edges: a point must not fall between two triangles
-constexpr double edge_units = 4;        // how far beside the edge of a curved surface its echo is looked for, in Fresnel units
-constexpr double twins_in_units = 0.5;  // mirror points nearer to each other than this are one
+constexpr double bary_slack = 1e-6;  // normals are continuous across edges: a point must not fall between two triangles
+constexpr double edge_units =
+    4;  // largest distance from the edge of a curved surface at which its echo is searched for, in Fresnel units
+constexpr double twins_in_units = 0.5;  // mirror points nearer to each other than this count as one
 constexpr double walk_units = 16;       // an edge beyond this does not change the echo
 constexpr double trusted_units = 2;     // where the surface leaves its osculating arc farther out than this, no_owner notices
 
@@ -32,7 +33,7 @@ double to_outline(const std::vector<OutlineEdge>& outline, Vec3d foot) {
 
 }  // namespace
 
-/// Flat faces in closed form; curved surfaces by a walk down the tree of balls and normal cones.
+/// Finds points of flat faces in closed form, and of curved surfaces by a search in the tree of balls and normal cones.
 void SpecularMesh::find(const SpecularQuery& query, std::vector<SpecularPoint>& out) const {
   find_on_faces(query, out);
   find_on_curves(query, out);
@@ -75,7 +76,7 @@ void SpecularMesh::find_on_curves(const SpecularQuery& q, std::vector<SpecularPo
     if (distance > radius) {
       const double off = std::acos(std::clamp(-dot(to_sonar, q.ahead) / distance, -1.0, 1.0));
       if (off - std::asin(radius / distance) > q.widest_rad) continue;
-      // Directions to the sonar fill a cone about to_sonar; those of the surface's edges may miss by a little more.
+      // Directions to the sonar fill a cone around to_sonar; those at the surface's edges may differ by a little more.
       const double beside = 2 * edge_units * fresnel_unit_m(q.wavelength_m, distance, 0) / distance;
       const double spread = std::asin(radius / distance) + static_cast<double>(node.angle_rad) + beside;
       const double between = std::acos(std::clamp(std::abs(dot(to_sonar, to_double(node.axis))) / distance, 0.0, 1.0));
@@ -88,7 +89,7 @@ void SpecularMesh::find_on_curves(const SpecularQuery& q, std::vector<SpecularPo
     }
     for (std::uint32_t t = node.first; t < node.first + node.count; ++t) solve(t, q, out);
   }
-  // Two triangles may both claim a point on the edge between them. Where two materials meet, each has its own half of the echo.
+  // Two triangles may both have a point on their common edge. If they have different materials, each has half of the echo.
   for (std::size_t i = first; i < out.size(); ++i) {
     const double apart = twins_in_units * std::min(fresnel_unit_m(q.wavelength_m, out[i].range_m, out[i].curvature[0]),
                                                    fresnel_unit_m(q.wavelength_m, out[i].range_m, out[i].curvature[1]));
@@ -107,7 +108,7 @@ std::optional<SpecularMesh::Foot> SpecularMesh::foot_on(const Triangle& triangle
   double a = 1.0 / 3, b = 1.0 / 3;
   double t = dot(sonar_m - (p0 + a * e1 + b * e2), n0 + a * d1 + b * d2);
   const bool inner = triangle.across[0] >= 0 && triangle.across[1] >= 0 && triangle.across[2] >= 0;
-  const double hopeless = inner ? 3 : 1e3;  // triangle sides; beside an edge the foot may lie far out
+  const double hopeless = inner ? 3 : 1e3;  // in triangle sides; outside an edge the foot may be far away
   for (int i = 0; i < 12; ++i) {
     const Vec3d m = n0 + a * d1 + b * d2;
     const Vec3d miss = sonar_m - (p0 + a * e1 + b * e2 + t * m);
@@ -116,7 +117,7 @@ std::optional<SpecularMesh::Foot> SpecularMesh::foot_on(const Triangle& triangle
     if (!(std::abs(det) > 1e-12 * length(c1) * length(c2) * length(m))) return {};
     const double da = dot(cross(miss, c2), m) / det, db = dot(cross(c1, miss), m) / det, dt = dot(c12, miss) / det;
     a += da, b += db, t += dt;
-    // The problem is nearly linear: what starts far outside does not come back.
+    // The problem is nearly linear, so that a place far outside does not converge to one inside.
     if (!(std::abs(a - 0.5) < hopeless && std::abs(b - 0.5) < hopeless)) return {};
     if (std::abs(da) + std::abs(db) < 1e-9) {
       const Vec3d normal = n0 + a * d1 + b * d2;
@@ -148,7 +149,7 @@ void SpecularMesh::solve(std::uint32_t index, const SpecularQuery& q, std::vecto
   const Triangle& triangle = triangles_[index];
   const std::optional<Foot> foot = foot_on(triangle, q.sonar_m);
   if (!foot) return;
-  // Beside the triangle it only counts where the surface ends there; then its echo comes from the edge.
+  // Outside the triangle the foot counts only if the surface ends there; the echo then comes from the edge.
   std::array<double, 3> held{};
   for (std::size_t k = 0; k < 3; ++k) {
     if (foot->weight[k] < -bary_slack && triangle.across[k] >= 0) return;
@@ -163,7 +164,7 @@ void SpecularMesh::solve(std::uint32_t index, const SpecularQuery& q, std::vecto
   p.normal = side * foot->normal;
   p.foot_m = q.sonar_m - p.range_m * p.normal;
   p.material = triangle.material;
-  // The curve bulges over its facets: half of what the planes at the corners rise above the place, to second order.
+  // The curved surface lies above its facets by half of the height of the corners' planes above the place, to second order.
   double bulge = 0;
   Vec3d entry;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -188,8 +189,8 @@ void SpecularMesh::solve(std::uint32_t index, const SpecularQuery& q, std::vecto
   out.push_back(std::move(p));
 }
 
-// How far the surface reaches from a place on a triangle in a direction: to its edge, or for ever where the edge is too far to
-// matter. Where it bends unlike its osculating arc by a quarter of a wave, what follows adds nothing.
+// Extent of the surface from a place on a triangle in a direction: to its edge, or infinite if the edge is too far to matter.
+// Parts beyond a deviation of a quarter wavelength from the osculating arc contribute nothing.
 double SpecularMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, const SpecularPoint& point, std::size_t axis,
                           double unit_m) const {
   constexpr double for_ever = std::numeric_limits<double>::infinity();
@@ -207,7 +208,7 @@ double SpecularMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, cons
     const Vec3d facing = cross(p[1] - p[0], p[2] - p[0]);
     Vec3d along = unit_vector(cross(cut, facing));
     if (dot(along, direction) < 0) along = -1.0 * along;
-    if (dot(along, direction) < 0.3) return for_ever;  // round the corner, out of sight
+    if (dot(along, direction) < 0.3) return for_ever;  // the surface turns away and is not visible
     const double area2 = dot(facing, facing);
     double leave = HUGE_VAL;
     std::size_t through = 3;

@@ -1,4 +1,4 @@
-// Prepares a mesh for its mirror points: patches, outlines, normals, curvatures, and the tree to find them by.
+// Prepares a mesh for the search of mirror points: patches, outlines, normals, curvatures, and the tree for the search.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -63,7 +63,7 @@ void SpecularMesh::Maker::make() {
   if (!out_.triangles_.empty()) plant();
 }
 
-// Facets that share an edge are neighbours. An edge of more than two facets joins none.
+// Facets that share an edge are neighbours. An edge with more than two facets joins none.
 void SpecularMesh::Maker::join_edges() {
   struct Side {
     std::uint32_t a, b, facet, corner;
@@ -74,7 +74,7 @@ void SpecularMesh::Maker::join_edges() {
       const std::uint32_t p = facets_[f].vertex[(k + 1) % 3], q = facets_[f].vertex[(k + 2) % 3];
       sides.push_back({std::min(p, q), std::max(p, q), f, k});
     }
-  // Equal edges end up side by side.
+  // Makes equal edges neighbours in the order.
   std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) {
     return std::tie(x.a, x.b, x.facet, x.corner) < std::tie(y.a, y.b, y.facet, y.corner);
   });
@@ -89,7 +89,7 @@ void SpecularMesh::Maker::join_edges() {
   }
 }
 
-// Whether the two run round their shared edge in opposite senses, as facets of one side do.
+// Whether the two facets have opposite directions along their shared edge, like facets of one side.
 bool SpecularMesh::Maker::same_side(const Facet& a, std::size_t corner, const Facet& b) const {
   const std::uint32_t p = a.vertex[(corner + 1) % 3], q = a.vertex[(corner + 2) % 3];
   for (std::size_t k = 0; k < 3; ++k)
@@ -97,7 +97,7 @@ bool SpecularMesh::Maker::same_side(const Facet& a, std::size_t corner, const Fa
   return false;
 }
 
-// The smooth surface round a facet; turns facets that are wound the wrong way.
+// Finds the smooth surface around a facet, and reverses facets with the wrong orientation.
 void SpecularMesh::Maker::grow(std::uint32_t seed, std::vector<std::uint32_t>& patch) {
   patch.assign(1, seed);
   facets_[seed].patch = seed;
@@ -108,7 +108,7 @@ void SpecularMesh::Maker::grow(std::uint32_t seed, std::vector<std::uint32_t>& p
       Facet& g = facets_[static_cast<std::size_t>(f.across[k])];
       if (g.patch != no_owner || g.material != f.material) continue;
       const bool same = same_side(f, k, g);
-      // Smooth as long as the facets meet at less than smooth_edge_rad.
+      // An edge is smooth if its facets meet at less than smooth_edge_rad.
       const double cosine = dot(f.normal, g.normal) * (same ? 1 : -1);
       if (cosine < std::cos(smooth_edge_rad)) continue;
       if (!same) {
@@ -205,7 +205,8 @@ void SpecularMesh::Maker::add_curved(const std::vector<std::uint32_t>& patch) {
   set_bends(first_vertex, static_cast<std::uint32_t>(first_triangle));
 }
 
-// Mean of the facets round a vertex, weighted by their angles there: the same for every way of cutting quads in two.
+// Computes the mean of the facets around a vertex, weighted by their angles there, so that it does not depend on the diagonals
+// of quads.
 void SpecularMesh::Maker::set_normals(std::uint32_t first_vertex, std::uint32_t first_triangle) {
   // n_v = sum of angle_f n_f over the facets around the vertex.
   std::vector<Vec3d> sum(out_.vertices_.size() - first_vertex);
@@ -222,7 +223,8 @@ void SpecularMesh::Maker::set_normals(std::uint32_t first_vertex, std::uint32_t 
   for (std::size_t i = 0; i < sum.size(); ++i) out_.vertices_[first_vertex + i].normal = to_float(unit_vector(sum[i]));
 }
 
-// How the normal turns over each triangle, least squares over its edges (Rusinkiewicz 2004), spread to the vertices by area.
+// Computes the change of the normal over each triangle by least squares over its edges (Rusinkiewicz 2004), and its mean at
+// vertices, weighted by area.
 void SpecularMesh::Maker::set_bends(std::uint32_t first_vertex, std::uint32_t first_triangle) {
   const std::size_t vertices = out_.vertices_.size() - first_vertex;
   std::vector<std::array<double, 6>> sum(vertices);
@@ -272,7 +274,7 @@ void SpecularMesh::Maker::plant() {
     const auto corner = [&](std::size_t k) { return out_.vertices_[t.vertex[k]].position; };
     middle_.push_back(corner(0) + corner(1) + corner(2));
   }
-  // A tree over the triangles' centres; triangles then lie in the order of its leaves.
+  // Builds a tree over the triangles' centres; triangles get the order of its leaves.
   branch(order, 0, static_cast<std::uint32_t>(order.size()));
   std::vector<std::int32_t> now(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) now[order[i]] = static_cast<std::int32_t>(i);
@@ -300,7 +302,7 @@ void SpecularMesh::Maker::branch(std::vector<std::uint32_t>& order, std::uint32_
     axis = axis + to_double(v.normal);
   });
   const Vec3d centre = 0.5 * (low + high), size = high - low;
-  // Ball of places and cone of normals: a node can hold a foot only where the direction to the sonar lies in the cone.
+  // Ball of places and cone of normals: a node can have a foot only if the direction to the sonar lies in the cone.
   axis = unit_vector(axis);
   double cosine = length(axis) > 0.5 ? 1 : -1, radius = 0;
   each([&](const SpecularMesh::Vertex& v) {

@@ -15,7 +15,7 @@ double component(Vec3d v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 bool is_audible(const SpecularPoint& p, const SpecularQuery& q) {
   if (p.range_m < nearest_m || p.range_m > q.max_range_m) return false;
-  // Beside the surface the echo comes from its edge, and falls with the distance in Fresnel units.
+  // Outside the surface the echo comes from its edge, and falls with the distance in Fresnel units.
   double gap = 0;
   for (std::size_t k = 0; k < 2; ++k) {
     const double beside = std::max({p.from[k], -p.to[k], 0.0});
@@ -33,7 +33,7 @@ void sphere(const Primitive& shape, const SpecularQuery& q, std::vector<Specular
   const double d = length(q.sonar_m);
   if (d <= shape.radius_m) return;
   SpecularPoint p;
-  // From the centre toward the sonar; both principal radii are the sphere's.
+  // The normal points from the centre to the sonar; both principal radii are that of the sphere.
   p.normal = (1 / d) * q.sonar_m;
   p.foot_m = shape.radius_m * p.normal;
   p.along[0] = std::abs(p.normal.z) < 0.9 ? cross(p.normal, Vec3d{0, 0, 1}) : cross(p.normal, Vec3d{1, 0, 0});
@@ -44,7 +44,7 @@ void sphere(const Primitive& shape, const SpecularQuery& q, std::vector<Specular
   keep(std::move(p), q, out);
 }
 
-/// A flat face across axis k at `place`, half extents along the two axes after it; `side`: the way its outside looks.
+/// A flat face across axis k at `place`, half extents along the two axes after it; `side`: direction of its outer side.
 struct Face {
   int k = 2;
   double place = 0, side = 1;
@@ -102,7 +102,7 @@ void cylinder(const Primitive& shape, const SpecularQuery& q, std::vector<Specul
     p.along = {cross(Vec3d{0, 0, 1}, normal), {0, 0, 1}};
     p.curvature = {curvature, 0};
     p.range_m = range_m;
-    // A hollow wall is a mirror over half its round; the bulging one just curves away.
+    // A concave wall is a mirror over half of its circle; a convex one ends only by curving away.
     p.from = {curvature < 0 ? -pi * a / 2 : -infinite, -half - q.sonar_m.z};
     p.to = {curvature < 0 ? pi * a / 2 : infinite, half - q.sonar_m.z};
     keep(std::move(p), q, out);
@@ -111,7 +111,7 @@ void cylinder(const Primitive& shape, const SpecularQuery& q, std::vector<Specul
   if (d > a) {
     wall(outward, outward, d - a, 1 / a);
   } else if (within || shape.inside) {
-    // From inside there are two mirror points: on the near wall and on the wall across the axis. Both walls are hollow.
+    // From inside there are two mirror points: on the near wall and on the wall across the axis. Both walls are concave.
     wall(outward, -1.0 * outward, a - d, -1 / a);
     wall(-1.0 * outward, outward, a + d, -1 / a);
   }
@@ -131,7 +131,7 @@ void cylinder(const Primitive& shape, const SpecularQuery& q, std::vector<Specul
 
 double bending(double range_m, double curvature_per_m) {
   constexpr double least = 0.05;
-  // 1 + r / R of eq. 7, held off 0 at a focus.
+  // 1 + r / R of eq. 7, kept away from 0 at a focus.
   const double f = 1 + range_m * curvature_per_m;
   return f >= 0 ? std::max(f, least) : std::min(f, -least);
 }
