@@ -52,7 +52,7 @@ class Levels {
   const SampleFormat& format_;
 };
 
-/// The place of the top of a parabola through three levels, relative to the middle one, within half a step.
+/// The place of the maximum of a parabola through three levels, relative to the middle one, within half a step.
 double top_of(double before, double middle, double after) {
   const double curve = before - 2 * middle + after;
   return curve < 0 ? std::clamp(0.5 * (before - after) / curve, -0.5, 0.5) : 0;
@@ -82,7 +82,7 @@ struct Fan {
   }
 };
 
-/// An echo whose direction the row's levels across the beams show.
+/// An echo whose direction follows from the levels of the row across the beams.
 struct Peak {
   double level_db;
   int row, beam;
@@ -105,7 +105,7 @@ std::optional<double> azimuth_of_peak(const Fan& fan, const Levels& level, int r
   return azimuth;
 }
 
-/// Peaks across the beams, the loudest first. Side lobes of a row's loudest are left out.
+/// Peaks across the beams, the loudest first. Side lobes of the loudest peak of a row are left out.
 std::vector<Peak> peaks_in(const Fan& fan, const Levels& level, const std::vector<double>& least_db) {
   std::vector<Peak> peaks;
   for (int row = 0; row < level.rows; ++row) {
@@ -159,7 +159,7 @@ std::vector<std::optional<Found>> loudest_peaks(const Fan& fan, const Levels& le
   return found;
 }
 
-/// The range at which the line through two points meets a direction between them.
+/// The range at which the line through two points crosses a direction between them.
 std::optional<double> range_between(const Detection& a, const Detection& b, double azimuth_rad) {
   const double y = a.range_m * std::sin(a.azimuth_rad), x = a.range_m * std::cos(a.azimuth_rad);
   const double dy = b.range_m * std::sin(b.azimuth_rad) - y, dx = b.range_m * std::cos(b.azimuth_rad) - x;
@@ -168,8 +168,8 @@ std::optional<double> range_between(const Detection& a, const Detection& b, doub
   return std::hypot(y + along * dy, x + along * dx);
 }
 
-/// Under the sonar a floor's echo comes to several directions in one pulse, and a row shows one peak for them: where neighbours
-/// on both sides are on a floor, the amplitude's centroid about the range between them.
+/// Below the sonar the echo of a floor has the same range in several directions, and the row has one peak for all of them. If
+/// neighbours on both sides are on a floor, the point is the centroid of the amplitude near the range between them.
 std::optional<Found> by_amplitude(const Fan& fan, const Levels& level, const std::vector<double>& least_db, int direction,
                                   const Found& before, const Found& after, double reach_m) {
   const PingSettings& settings = fan.ping.request.settings;

@@ -1,5 +1,5 @@
-// Absorption, sound speed, density and pressure of the water, as published formulae with their published digits.
-// Used by the ping once per request, and by vendors for the values that their device assumes.
+// Absorption, sound speed, density and pressure of the water, by published formulae with their published digits.
+// A ping uses them once per request; vendors use them for the values that their devices assume.
 #include "core/sonar/water.hpp"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ double relaxation(double resonance, double f) { return resonance * f * f / (reso
 }  // namespace
 
 // Francois & Garrison 1982, JASA 72(3) and 72(6). f in kHz, z in m, result of the sum in dB/km.
-// Data reach 1 MHz; above, only the viscous f^2 term of pure water matters, which is good to 3 MHz and beyond.
+// Data reach 1 MHz; above, only the viscous f^2 term of pure water matters, which is accurate to 3 MHz and beyond.
 double absorption_db_per_m(const Water& water, double depth_m, double frequency_hz) {
   const double t = water.temperature_c, s = std::max(water.salinity_psu, 0.0), z = std::max(depth_m, 0.0);
   const double f = frequency_hz * 1e-3;

@@ -20,7 +20,7 @@ struct Refused {  // thrown out of yaml-cpp's parser, caught in parse_yaml
   std::string path, what;
 };
 
-// Builds the tree while yaml-cpp parses: limits hold before anything grows, and aliases never expand.
+// Builds the tree while yaml-cpp parses, so that limits apply before memory grows, and aliases never expand.
 class TreeBuilder final : public YAML::EventHandler {
  public:
   TreeBuilder(YamlTree& tree, const YamlLimits& limits) : tree_(tree), limits_(limits) {}
