@@ -5,7 +5,7 @@
 namespace sonar::cuda {
 namespace {
 
-// Bytes: whole lines of the device's memory, and enough for any vector load.
+// In bytes: a multiple of lines of the device's memory, and enough for any vector load.
 constexpr std::size_t slice_alignment = 256;
 
 }  // namespace
@@ -24,11 +24,11 @@ Arena::Place Arena::allocate_bytes(std::size_t bytes) {
   const std::lock_guard lock(allocating_);
   const bool apart = machine_.pieces_apart();
   const std::size_t wanted = apart ? bytes : (bytes + slice_alignment - 1) / slice_alignment * slice_alignment;
-  // The first chunk with room; chunks are few.
+  // Finds the first chunk with room; there are few chunks.
   auto it = std::find_if(chunks_.begin(), chunks_.end(), [&](const Chunk& c) { return c.size - c.used >= wanted; });
   if (it == chunks_.end()) {
     chunks_.push_back({});
-    Chunk& c = chunks_.back();  // from here on ours: what is allocated is released, even if the second half fails
+    Chunk& c = chunks_.back();  // owned from here on, so that it is released even if the second allocation fails
     const std::size_t size = apart ? wanted : std::max(chunk_bytes_, wanted);
     if (where_ != Where::host) c.device = static_cast<std::byte*>(machine_.allocate(size));
     if (where_ != Where::device) c.host = static_cast<std::byte*>(machine_.allocate_host(size));
@@ -45,7 +45,7 @@ Arena::Place Arena::allocate_bytes(std::size_t bytes) {
 }
 
 void Arena::upload(int lane) {
-  // Used parts only: one copy a chunk.
+  // Copies only the used parts, with one copy per chunk.
   for (const Chunk& c : chunks_)
     if (c.used > 0) machine_.upload(lane, c.device, c.host, c.used);
 }
@@ -57,7 +57,7 @@ void Arena::download(int lane) {
 
 void Arena::clear() {
   if (machine_.pieces_apart()) return give_back();
-  // The memory stays: the next batch needs about as much.
+  // Keeps the memory, because the next batch needs about as much.
   for (Chunk& c : chunks_) c.used = 0;
 }
 

@@ -9,11 +9,12 @@
 namespace sonar::cuda {
 namespace {
 
-// Surface area heuristic: boxes are hit in proportion to their area, so a split costs area times triangles on both sides.
+// Surface-area rule: the probability that a ray hits a box is proportional to its area, so that a split costs area times
+// triangles.
 constexpr int bins = 16;
 constexpr std::size_t most_in_leaf = 4;
-constexpr int deepest_by_area = 32;  // deeper down items are halved by number, which ends within another 32 levels
-constexpr float node_cost = 1.2f;    // cost of a step down, in triangle tests
+constexpr int deepest_by_area = 32;  // below this depth, items are halved by number, which ends within another 32 levels
+constexpr float node_cost = 1.2f;    // cost of a node, in triangle tests
 
 void grow(Box& box, const Box& by) {
   for (int k = 0; k < 3; ++k) {
@@ -26,7 +27,7 @@ float half_area(const Box& b) {
   const float x = b.high[0] - b.low[0], y = b.high[1] - b.low[1], z = b.high[2] - b.low[2];
   return x < 0 ? 0 : x * y + y * z + z * x;
 }
-/// Twice, because only the order of centres and their shares matter.
+/// Twice the centre; only the order and the ratios of centres matter.
 float twice_centre(const Box& b, int axis) { return b.low[axis] + b.high[axis]; }
 
 struct Split {
@@ -43,7 +44,7 @@ class Builder {
 
   std::int32_t run() {
     const auto root = static_cast<std::int32_t>(nodes_.size());
-    if (index_.size() <= most_in_leaf) {  // a root is a node: hang the leaf under it, beside nothing
+    if (index_.size() <= most_in_leaf) {  // the root must be a node, so that a single leaf becomes its child
       nodes_.push_back({});
       const Box all = bounds(0, index_.size());
       set_child(root, 0, all, index_.empty() ? 0 : leaf(0, index_.size()));
@@ -72,7 +73,7 @@ class Builder {
     return bvh_link({first, static_cast<std::uint32_t>(to - from)});
   }
 
-  /// Splits [from, to), which is more than a leaf holds. Returns the node.
+  /// Splits [from, to), which has too many items for a leaf. Returns the node.
   std::int32_t split(std::size_t from, std::size_t to, int depth) {
     const auto node = static_cast<std::int32_t>(nodes_.size());
     nodes_.push_back({});
@@ -104,7 +105,7 @@ class Builder {
     if (best.axis < 0) return halve(from, to);
     const auto first = index_.begin() + static_cast<std::ptrdiff_t>(from),
                last = index_.begin() + static_cast<std::ptrdiff_t>(to);
-    // Stable: the order of triangles, and so which of two equal hits counts, is the same in every build.
+    // A stable partition, so that the order of triangles, and the choice between equal hits, is the same in every build.
     const auto middle =
         std::stable_partition(first, last, [&](std::uint32_t i) { return bin_of(items_[i], centres, best.axis) <= best.bin; });
     return static_cast<std::size_t>(middle - index_.begin());
@@ -114,7 +115,7 @@ class Builder {
     return std::clamp(static_cast<int>(part * bins), 0, bins - 1);
   }
   void consider(std::size_t from, std::size_t to, const Box& centres, int axis, Split& best) const {
-    // All centres in one plane: no division by a length of 0.
+    // If all centres lie in one plane, avoids a division by a length of 0.
     if (!(centres.high[axis] > centres.low[axis])) return;
     std::array<Box, bins> box;
     box.fill(no_box);
@@ -125,7 +126,7 @@ class Builder {
       grow(box[b], item);
       ++count[b];
     }
-    // From above: the cost of all bins beyond each plane; then the same from below.
+    // The cost of all bins above each plane, then that of all bins below it.
     std::array<float, bins> above{};
     Box all = no_box;
     std::size_t number = 0;
@@ -139,7 +140,7 @@ class Builder {
     for (std::size_t b = 0; b + 1 < bins; ++b) {
       grow(all, box[b]);
       number += count[b];
-      // A plane with nothing below it divides nothing.
+      // A plane without items below it does not divide them.
       if (number == 0) continue;
       const float cost = node_cost + half_area(all) * static_cast<float>(number) + above[b];
       if (cost < best.cost) best = {axis, static_cast<int>(b), cost};

@@ -46,7 +46,7 @@ CellStore::CellStore(Machine& machine, std::size_t budget_bytes)
 const CellStore::Held* CellStore::held(const CellTile& t) const {
   const Held& h = tiles_.at(t.data.get());
   if (!h.data) return nullptr;
-  // Memory of a dropped tile may have been given to another: its other fields tell them apart.
+  // Another tile may have the memory of a dropped one; the other fields distinguish them.
   const bool same = h.weights_hash == t.weights_hash && h.object == t.object && h.axis == t.axis && h.level == t.level &&
                     h.count == t.count && h.centre_m.x == t.centre_m.x && h.centre_m.y == t.centre_m.y &&
                     h.centre_m.z == t.centre_m.z;
@@ -67,7 +67,7 @@ void CellStore::give_back() {
 bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells,
                      Parallel& pool) {
   cells.assign(tiles.size(), nullptr);
-  // Values of 16 bits that the device lacks; tiles go there once and stay.
+  // Number of 16-bit values that are not on the device. Tiles are sent once.
   const auto missing = [&] {
     std::size_t more = 0;
     for (std::size_t i = 0; i < tiles.size(); ++i)
@@ -75,12 +75,12 @@ bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
     return more;
   };
   {
-    // Looked up in parallel: the map does not change meanwhile.
+    // Look-ups run in parallel, because the map does not change meanwhile.
     const std::shared_lock lock(changing_);
     pool.for_each((tiles.size() + tiles_at_once - 1) / tiles_at_once, [&](std::size_t part, int) {
       const std::size_t end = std::min(tiles.size(), (part + 1) * tiles_at_once);
       for (std::size_t i = part * tiles_at_once; i < end; ++i) {
-        // Tiles and places lie anywhere in memory: asked for before they are needed.
+        // Prefetches tiles and entries, which lie anywhere in memory.
         if (i + 2 * ahead < end) __builtin_prefetch(&tiles[i + 2 * ahead].tile->data);
         if (i + ahead < end) tiles_.prefetch(tiles[i + ahead].tile->data.get());
         if (const Held* h = held(*tiles[i].tile)) cells[i] = h->device;
@@ -91,14 +91,14 @@ bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
   const std::unique_lock lock(changing_);
   for (std::size_t i = 0; i < tiles.size(); ++i)  // another ping may have sent them in between
     if (const Held* h = cells[i] ? nullptr : held(*tiles[i].tile)) cells[i] = h->device;
-  // An empty store takes any ping, over its budget if need be.
+  // An empty store accepts any ping, even beyond its budget.
   if (!tiles_.empty() && bytes() + missing() * sizeof(std::int16_t) > budget_bytes_) return false;
   for (std::size_t i = 0; i < tiles.size();) i = send_from(tiles, i, lane, staging, cells);
   return true;
 }
 
-/// One copy for the next few missing tiles: memory that copies are fast from is slow to get in large pieces. Returns where they
-/// end.
+/// Sends the next few missing tiles in one copy, because allocating large pieces of memory for fast copies is slow. Returns the
+/// index after the last of them.
 std::size_t CellStore::send_from(std::span<const TileInView> tiles, std::size_t from, int lane, Arena& staging,
                                  std::vector<const std::int16_t*>& cells) {
   const std::size_t most = machine_.pieces_apart() ? 1 : most_values_a_copy;
@@ -120,7 +120,7 @@ std::size_t CellStore::send_from(std::span<const TileInView> tiles, std::size_t 
     at += values(t);
   }
   machine_.upload(lane, device.device, host.host, more * sizeof(std::int16_t));
-  for (const std::size_t i : sent) {  // known from here on, when they are on their way
+  for (const std::size_t i : sent) {  // other pings may use them as soon as they are queued
     const CellTile& t = *tiles[i].tile;
     tiles_.put({t.data.get(), t.weights_hash, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]});
   }

@@ -1,4 +1,4 @@
-// The device by way of the module, which is looked for beside the program and where packages put it.
+// A machine that uses the CUDA module, which is searched for beside the program and where packages install it.
 #include <dlfcn.h>
 
 #include <algorithm>
@@ -17,12 +17,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// SONARD_CUDA_MODULE alone where it is set; else beside the program, then in the lib folder of where it is installed.
+/// Only SONARD_CUDA_MODULE if it is set; else beside the program, then in the lib folder of the installation.
 std::vector<fs::path> module_places() {
   if (const char* given = std::getenv("SONARD_CUDA_MODULE")) return {given};
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  // No /proc: the loader's own search path.
+  // Without /proc, uses the search path of the loader.
   if (error) return {module_file};
   const fs::path folder = program.parent_path();
   return {folder / module_file, folder.parent_path() / "lib" / "sonard" / module_file};
@@ -30,20 +30,20 @@ std::vector<fs::path> module_places() {
 
 struct Loaded {
   const CudaModule* module = nullptr;
-  std::string why_not;  // "not installed", or what is wrong with it
+  std::string why_not;  // "not installed", or the fault of the module
 };
 
-/// Every time anew, which costs little where it is loaded already.
+/// Loads the module. If it is loaded already, this takes little time.
 Loaded load() {
   for (const fs::path& place : module_places()) {
     std::error_code error;
     if (!fs::exists(place, error)) continue;
-    // Stays loaded as long as the program: the runtime in it has threads and handlers of its own.
+    // The module is never unloaded, because its runtime has threads and handlers.
     void* library = dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (!library) return {nullptr, std::string("not loadable: ") + dlerror()};
     const auto entry = reinterpret_cast<CudaModuleEntry>(dlsym(library, module_entry));
     const CudaModule* module = entry ? entry() : nullptr;
-    // Structures cross the border as bytes: their sizes must agree, not the version alone.
+    // Structs are passed as bytes, so that their sizes must agree, not only the version.
     if (!module || module->version != module_version || module->view_bytes != sizeof(PingView) ||
         module->tile_bytes != sizeof(TileView) || module->steps != static_cast<std::uint32_t>(Step::steps))
       return {nullptr, place.string() + " belongs to another version of sonard"};
@@ -61,7 +61,7 @@ Found find_device() {
   const Loaded loaded = load();
   const CudaModule* module = loaded.module;
   if (!module) return {nullptr, 0, loaded.why_not};
-  // The name of the device, or of what is missing.
+  // The name of the device, or the reason why there is none.
   std::array<char, 256> name{};
   Found found{module, 0, ""};
   const int code = module->query(&found.devices, name.data(), name.size());
@@ -92,7 +92,7 @@ class CudaMachine final : public Machine {
     check(module_.allocate(at_, &device, bytes));
     return device;
   }
-  // An error here has occurred before, and was reported then.
+  // An error here was reported by the call in which it occurred.
   void release(void* device) override { static_cast<void>(module_.release(at_, device)); }
   void* allocate_host(std::size_t bytes) override {
     void* host = nullptr;

@@ -20,11 +20,11 @@
 namespace sonar::cuda {
 namespace {
 
-// Sets of settings with tables on the device.
+// Largest number of sets of settings with tables on the device.
 constexpr std::size_t most_plans = 8;
-constexpr int keeping_lane = 2;  // lane of what stays on the device: plans and cells; rooms have 0 and 1
+constexpr int keeping_lane = 2;  // lane for data that stay on the device: plans and cells; rooms have lanes 0 and 1
 
-/// Whether neither ping waits long for the other where they are computed together: no ghosts, and of about one size.
+/// Whether neither ping has to wait long for the other in one batch: no multipath, and about the same size.
 bool are_alike(const PingRequest& a, const PingRequest& b) {
   const auto values = [](const PingSettings& s) {
     return static_cast<double>(s.beam_count) * s.range_bin_count * s.samples_per_row;
@@ -33,7 +33,7 @@ bool are_alike(const PingRequest& a, const PingRequest& b) {
   return !a.switches.multipath && !b.switches.multipath && more <= 2 * less;
 }
 
-/// The options, with budgets that the device has room for. The rest is the kernels' own, other programs' and the scene's.
+/// The options, with budgets that fit on the device. The rest of its memory is for kernels, other programs and the scene.
 DeviceEngineOptions fitted(DeviceEngineOptions options, std::size_t free_bytes) {
   options.cell_bytes = std::min(options.cell_bytes, free_bytes / 5 * 2);
   options.work_bytes = std::min(options.work_bytes, free_bytes / 5);
@@ -56,7 +56,7 @@ class DeviceEngine final : public PingEngine {
         rooms_{BatchRoom(*machine_, 0, batch_), BatchRoom(*machine_, 1, batch_)},
         work_(options.now_s) {}
   ~DeviceEngine() override {
-    for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);  // memory goes when nothing uses it any more
+    for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);  // memory may be released only when no work uses it
   }
 
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
@@ -84,7 +84,7 @@ class DeviceEngine final : public PingEngine {
            std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
   }
   std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
-    // As many as are prepared at once: then one waits for the others' steps on the device only.
+    // As many as are prepared at the same time, so that a ping waits only for the others' steps on the device.
     const std::size_t most = std::min(batch_, static_cast<std::size_t>(pool_.threads()));
     return !failed_ && are_alike(a, b) && why_by_cpu(a).empty() && why_by_cpu(b).empty() ? most : 1;
   }
@@ -94,11 +94,11 @@ class DeviceEngine final : public PingEngine {
  private:
   using State = WantedPing::State;
   struct Call {
-    std::vector<PingRequest> pictures, pings;  // as asked for; the pings that they are made of
-    std::string invalid;                       // why; then none of its pings is computed
+    std::vector<PingRequest> pictures, pings;  // the requested pictures; the pings of which they are made
+    std::string invalid;                       // reason, if a request is invalid; then no ping of the call is computed
   };
 
-  /// The pings of the first call or of the last.
+  /// Takes the pings of the first or the last call.
   std::vector<Ping> taken(std::size_t which) {
     const Call call = std::move(calls_[which]);
     calls_.erase(calls_.begin() + static_cast<std::ptrdiff_t>(which));
@@ -115,7 +115,7 @@ class DeviceEngine final : public PingEngine {
         pings.push_back(std::move(it->ping));
         statistics.push_back(it->statistics);
       }
-    } catch (...) {  // nothing is under way: on_device() has seen to it
+    } catch (...) {  // no work is under way, because on_device() has waited for it
       wanted_.erase(begin, end);
       throw;
     }
@@ -136,18 +136,18 @@ class DeviceEngine final : public PingEngine {
   void complete(std::deque<WantedPing>::iterator begin, std::deque<WantedPing>::iterator end) {
     const auto is_open = [&] { return std::any_of(begin, end, [](const WantedPing& w) { return w.state != State::done; }); };
     on_device([&] {
-      begin_open();  // after lack of memory; else it has been done
+      begin_open();  // needed after lack of memory; else all has been launched
       for (const std::size_t older : {which_, 1 - which_})
         if (is_open()) finish(rooms_[older]);
     });
     if (!failed_) return;
-    // After a failure the device is not used again, and the pings of a call are of one engine.
+    // After a failure the device is not used again, and one engine computes all pings of a call.
     if (!device_options_.cpu_after_failure) throw EngineUnavailable(*failed_ + "; use --engine cpu or auto");
     for (auto it = begin; it != end; ++it) compute_by_cpu(*it);
   }
 
-  /// Does the work, again with less where the device's memory is full, unless the device fails. What was under way is open again
-  /// where this did not go well.
+  /// Does the work. If the device's memory is full, it tries again with smaller batches, unless the device fails. After an error,
+  /// pings that were under way are open again.
   template <class Work>
   void on_device(const Work& work) {
     if (!failed_) try {
@@ -157,16 +157,16 @@ class DeviceEngine final : public PingEngine {
         failed_ = std::string("the CUDA engine stopped: ") + e.what();
         for (BatchRoom& room : rooms_) empty(room);
         if (device_options_.cpu_after_failure) say(*failed_ + "; from here on the CPU computes");
-      } catch (...) {  // the computer's memory is full, or a fault of the program: what was begun is forgotten
+      } catch (...) {  // host memory is full, or the program has a fault: drops the work that was begun
         for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);
         for (BatchRoom& room : rooms_) empty(room);
         preparer_.forget_cells();
-        plans_.clear();  // one may have been sent in part
+        plans_.clear();  // a plan may have been sent in part
         throw;
       }
   }
 
-  /// False: the device's memory was full. What it took has been given back, and what is not done may be tried again.
+  /// False: the device's memory was full. The memory has been released, and work that is not done may be tried again.
   template <class Work>
   bool has_room_for(const Work& work) {
     try {
@@ -191,8 +191,8 @@ class DeviceEngine final : public PingEngine {
     }
   }
 
-  /// Launches all that is open. Two rooms take turns: the CPU prepares one batch, or the caller uses the pings of an earlier
-  /// call, while the device computes the other.
+  /// Launches all open pings. Two rooms alternate: while the device computes the batch of one, the CPU prepares the other, or the
+  /// caller uses the pings of an earlier call.
   void begin_open() {
     for (std::size_t i = 0; i < wanted_.size();) {
       if (wanted_[i].state != State::open) {
@@ -219,7 +219,7 @@ class DeviceEngine final : public PingEngine {
         asked = std::move(left);
       }
       work_a_ping_ = room.work.taken_bytes() / room.pings.size();
-      // A batch is full by number, or by memory [bytes].
+      // A batch is full if its number of pings or its memory [bytes] reaches the limit.
       if (room.pings.size() < batch_ && room.work.taken_bytes() < device_options_.work_bytes) continue;
       launch_next();
     }
@@ -232,8 +232,8 @@ class DeviceEngine final : public PingEngine {
     if (!one_room_) which_ = 1 - which_;
   }
 
-  /// The next requests, from `first` on, that can be prepared together, as many as the room has place for: by number, and by
-  /// memory as far as it is known what a ping takes.
+  /// The next requests, from `first` on, that can be prepared together and fit in the room: by number, and by memory if the
+  /// memory of a ping is known.
   std::vector<AskedPing> some_from(std::size_t first, const BatchRoom& room) {
     place(wanted_[first].request);
     std::vector<AskedPing> some{{&wanted_[first], plan_for(wanted_[first].request)}};
@@ -251,18 +251,19 @@ class DeviceEngine final : public PingEngine {
     return some;
   }
 
-  /// Empty when the device does it.
+  /// Why the CPU must compute this ping; empty if the device can.
   std::string why_by_cpu(const PingRequest& request) const {
     if (const std::string why = why_not_on_device(request); !why.empty()) return why + " are computed by the CPU";
     const std::string without = why_not_on_device(request, false);
-    const std::string missing = without.empty() ? "" : machine_->why_no_transforms();  // not asked about without need
+    const std::string missing =
+        without.empty() ? "" : machine_->why_no_transforms();  // called only if needed, since it loads a library
     return missing.empty() ? "" : without + " are computed by the CPU (" + missing + ")";
   }
   static CellFields fields_of(const PingRequest& request) { return {request.switches.texture, request.switches.grain}; }
   /// Places the scene of this request, for device and CPU.
   void place(const PingRequest& request) {
     if (!cells_ || !cells_->serves(request.seed, fields_of(request)))
-      // Weights of cells are drawn from the seed: another seed needs other tiles.
+      // Weights of cells depend on the seed, so that another seed needs other tiles.
       cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, fields_of(request));
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
@@ -280,7 +281,7 @@ class DeviceEngine final : public PingEngine {
       std::rotate(plans_.begin(), it, it + 1);  // newest first
       return plans_.front();
     }
-    // The least recently used goes; batches under way hold their own reference.
+    // Drops the least recently used plan; batches under way have their own reference.
     if (plans_.size() >= most_plans) plans_.pop_back();
     plans_.insert(plans_.begin(), std::make_shared<PlanTables>(*machine_, keeping_lane, request));
     return plans_.front();
@@ -288,13 +289,13 @@ class DeviceEngine final : public PingEngine {
 
   void launch(BatchRoom& room) {
     if (room.pings.empty()) return;
-    // Plans and cells that were sent before are there when this lane begins.
+    // This lane begins after the copies of plans and cells that were sent before.
     machine_->order(room.lane, keeping_lane);
     Launch launch;
     launch.views = room.upload();
     launch.pings = static_cast<std::int32_t>(room.views.size());
     launch.timed = options_.now_s != nullptr ? 1 : 0;
-    // A launch covers the largest ping of the batch; smaller ones leave the rest idle.
+    // A launch covers the largest ping of the batch; for smaller pings the other threads are idle.
     for (int step = 0; step < step_count; ++step)
       for (const PingView& view : room.views)
         launch.largest[step] = std::max(launch.largest[step], step_size(static_cast<Step>(step), view));
@@ -303,7 +304,7 @@ class DeviceEngine final : public PingEngine {
     room.results.download(room.lane);
   }
 
-  /// Runs in one slice, or in three if transforms are between them.
+  /// Launches all steps at once, or in three parts if transforms are between them.
   void run_steps(const BatchRoom& room, Launch launch) {
     const auto run_to = [&](int to) {
       launch.to = to;
@@ -332,7 +333,7 @@ class DeviceEngine final : public PingEngine {
     pool_.for_each(room.pings.size(), [&](std::size_t i, int) { take_results(room.pings[i], room.views[i]); });
     empty(room);
   }
-  /// Arenas keep their memory.
+  /// Empties a room; arenas keep their memory.
   static void empty(BatchRoom& room) {
     for (const BatchRoom::Ping& ping : room.pings)
       if (ping.wanted->state == State::under_way) ping.wanted->state = State::open;
@@ -348,11 +349,11 @@ class DeviceEngine final : public PingEngine {
   void try_to_wait(int lane) const {
     try {
       machine_->wait(lane);
-    } catch (const std::exception&) {  // it has failed, and what it had to do with it
+    } catch (const std::exception&) {  // the device has failed, so that its work does not matter
     }
   }
 
-  std::unique_ptr<Machine> machine_;  // goes last
+  std::unique_ptr<Machine> machine_;  // destroyed last
   DeviceEngineOptions device_options_;
   EngineOptions options_;
   std::shared_ptr<const Scene> scene_;
@@ -363,7 +364,7 @@ class DeviceEngine final : public PingEngine {
   std::vector<std::shared_ptr<PlanTables>> plans_;
   PingPreparer preparer_;
   std::size_t batch_;            // pings that are launched together
-  std::size_t work_a_ping_ = 0;  // bytes, of the last batch
+  std::size_t work_a_ping_ = 0;  // bytes per ping in the last batch
   BatchRoom rooms_[2];
   std::size_t which_ = 0;          // the room that is filled next; if both are launched, the older one
   std::deque<Call> calls_;         // calls that were not collected, in order
@@ -372,9 +373,9 @@ class DeviceEngine final : public PingEngine {
   std::set<std::string> reported_;
   PingStatistics statistics_;
   std::vector<PingStatistics> each_;   // statistics of the last call that was collected
-  bool one_room_ = false;              // for lack of memory: nothing is prepared while the device computes
-  bool all_given_back_ = false;        // since the last run that had memory enough
-  std::optional<std::string> failed_;  // why
+  bool one_room_ = false;              // true after lack of memory: no batch is prepared while the device computes
+  bool all_given_back_ = false;        // whether all memory has been released since the last run that had enough
+  std::optional<std::string> failed_;  // reason of the device's failure
 };
 
 }  // namespace

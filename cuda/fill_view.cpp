@@ -9,11 +9,11 @@
 
 namespace sonar::cuda {
 
-/// Where the rays start and what they and the cells are measured with.
+/// Sets the origin of rays, and the geometry for rays and cells.
 void PingPreparer::place_fan(Making& m) {
   const PingPlan& plan = m.plan;
   const PingScalars& s = m.scalars;
-  // One group of all columns: the CPU divides them for its caches only.
+  // One group of all columns; the CPU divides columns into groups only because of its caches.
   DepthMap all_columns;
   all_columns.columns = plan.columns.count;
   all_columns.bins = plan.fan.bins;
@@ -43,7 +43,7 @@ void PingPreparer::place_fan(Making& m) {
   std::copy(g.elevation, g.elevation + elevation_terms, sea.elevation);
   sea.origin[0] = s.position_in_scene.x, sea.origin[1] = s.position_in_scene.y, sea.origin[2] = s.position_in_scene.z;
   for (int i = 0; i < 9; ++i) sea.world_from_sonar[i] = static_cast<float>(s.world_from_sonar.m[i / 3][i % 3]);
-  // True range [m] of the last sample that can still receive.
+  // True range [m] from which echoes still reach the last sample.
   sea.far_m = static_cast<float>(s.max_range_m);
   // Tolerance of the refinement (section 2) [m].
   sea.pulse_width_m = static_cast<float>(plan.pulse_width_m);
@@ -53,12 +53,12 @@ void PingPreparer::place_fan(Making& m) {
   m.view.has_scene = m.request().blank ? 0 : 1;
   if (m.request().blank) return;
   m.view.tracer = tracer_;
-  // Places relative to the origin of rays; see FlatScene.
+  // Places are relative to the origin of rays; see FlatScene.
   const BodyPlaces places = flat_.place(m.bodies);
   m.view.tracer.top = m.room.tables.put(places.top);
   m.view.tracer.bodies = m.room.tables.put(places.bodies);
   m.view.tracer.body_count = static_cast<std::int32_t>(places.bodies.size());
-  // Base rays of all columns; each interval between two is refined by itself, so it needs no list.
+  // Base rays of all columns; each interval between two is refined separately, so that no list is needed.
   const auto elevations = static_cast<std::size_t>(sea.elevations);
   m.view.fan_rays = m.room.work.allocate<FanRay>(elevations * m.columns()).device;
   m.view.depth_slope = m.room.work.allocate<float>(m.columns() * static_cast<std::size_t>(sea.bins + 1)).device;
@@ -66,7 +66,7 @@ void PingPreparer::place_fan(Making& m) {
   if (m.request().switches.keep_truth) m.view.first_hits = m.room.work.allocate<FirstHit>((elevations - 1) * m.columns()).device;
 }
 
-/// Reverberation of the water itself.
+/// Adds the tables of the water's reverberation.
 void PingPreparer::add_water(Making& m) {
   const Volume volume(scene_->water_column, m.plan, m.scalars);
   if (!volume.is_audible()) return;
@@ -79,14 +79,14 @@ void PingPreparer::add_water(Making& m) {
   m.view.slice_count = static_cast<std::int32_t>(slices.size());
   m.view.open_power = m.room.tables.put(volume.open_power_upa2());
   m.view.column_width = m.room.tables.put(width);
-  // How much of the fan [rad] ends in each column and sample.
+  // Part of the fan [rad] that ends in each column and sample.
   m.view.blocked = m.room.work.allocate<double>(m.samples() * m.columns()).device;
   m.view.open_fan = volume.open_fan();
   m.view.volume_samples_per_m = m.scalars.samples_per_m;
   m.view.volume_sample_offset = m.scalars.sample_offset;
 }
 
-/// Noise, leak, crosstalk and gains.
+/// Adds the tables of noise, leak, crosstalk and gains.
 void PingPreparer::add_receiver(Making& m) {
   PingView& view = m.view;
   // The same draws as on the CPU, from (seed, sonar, ping, column).
@@ -99,7 +99,7 @@ void PingPreparer::add_receiver(Making& m) {
   if (leak.is_audible() && !m.request().blank) {
     view.leak_rms = m.room.tables.put(leak.rms_upa());
     view.leak_samples = static_cast<std::int32_t>(leak.rms_upa().size());
-    // (31): powers of the fixed and the changing part add up to 1. Of a shared leak the fixed part is added to the beams.
+    // (31): powers of the fixed and the changing part add up to 1. If the leak is shared, its fixed part is added to the beams.
     view.leak_steady = leak.steady();
     view.shared_leak_samples = static_cast<std::int64_t>(m.plan.shared_noise.leak_upa().size());
     view.leak_changing = static_cast<float>(Leak::changing_part);
@@ -126,7 +126,7 @@ void PingPreparer::allocate_results(Making& m) {
   Ping& ping = m.ping.ping;
   ping.request = m.request();
   shape_ping(m.plan, m.request().switches, ping);
-  // Results are empty where the request keeps nothing of the kind.
+  // Results that the request does not keep are empty.
   m.ping.codes = m.room.results.allocate<std::uint8_t>(ping.samples.size());
   m.ping.pressure = m.room.results.allocate<float>(ping.pressure_upa.size());
   m.ping.beams = m.room.results.allocate<float>(2 * ping.beam_signal_upa.size());

@@ -33,7 +33,7 @@ void add_object(const Mesh& mesh, const Pose& placed, std::uint32_t object, std:
     std::copy_n(corners[mesh.triangles[t][0]].begin(), 3, flat.a);
     std::copy_n(corners[mesh.triangles[t][1]].begin(), 3, flat.b);
     std::copy_n(corners[mesh.triangles[t][2]].begin(), 3, flat.c);
-    // Object and triangle that a hit names, as in the scene.
+    // Object and triangle of a hit, with the numbers of the scene.
     flat.object = object;
     flat.triangle = static_cast<std::uint32_t>(t);
     triangles.push_back(flat);
@@ -48,7 +48,7 @@ Box box_of(const FlatTriangle& t) {
   return bounds.box;
 }
 
-/// Around a body's box, wherever it is turned to; a little larger, because rays are turned into its axes in float.
+/// The box around a rotated body's box. It is slightly larger, because rays are converted to the body's axes in float.
 Box box_in_world(const Box& own, const PlacedBody& body) {
   Bounds bounds;
   for (int corner = 0; corner < 8; ++corner) {
@@ -60,7 +60,7 @@ Box box_in_world(const Box& own, const PlacedBody& body) {
     bounds.add(at);
   }
   for (int k = 0; k < 3; ++k) {
-    // 1 mm, and the rounding of float at that distance [m]: a ray must not miss the box and hit what is in it.
+    // 1 mm, and the rounding of float at that distance [m]: a ray that hits the body must also hit the box.
     const float slack = 1e-3f + 1e-5f * std::max(std::abs(bounds.box.low[k]), std::abs(bounds.box.high[k]));
     bounds.box.low[k] -= slack;
     bounds.box.high[k] += slack;
@@ -71,7 +71,7 @@ Box box_in_world(const Box& own, const PlacedBody& body) {
 }  // namespace
 
 FlatScene::FlatScene(const Scene& scene) : origin_(ray_origin_of(scene)), bodies_(scene.bodies_in_world) {
-  // Group 0 stands still, in world axes; group b + 1 is body b, in its own axes, so that a moved body needs no new tree.
+  // Group 0 has the fixed objects in world axes; group b + 1 is body b in its own axes, so that a moved body needs no new tree.
   std::vector<std::vector<FlatTriangle>> of_group(scene.bodies_in_world.size() + 1);
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const Object& object = scene.objects[i];
@@ -89,7 +89,7 @@ FlatScene::FlatScene(const Scene& scene) : origin_(ray_origin_of(scene)), bodies
     for (const FlatTriangle& t : own) boxes.push_back(box_of(t));
     const std::size_t first = order.size();
     group.root = build_bvh(boxes, nodes_, order);
-    // In the order of the leaves: a leaf is a stretch of the array.
+    // The order is that of the leaves: a leaf is a range of the array.
     for (std::size_t i = first; i < order.size(); ++i) triangles_.push_back(own[order[i]]);
     Bounds bounds;
     for (const Box& b : boxes) {
@@ -108,7 +108,7 @@ BodyPlaces FlatScene::place(std::span<const Pose> bodies_in_world) const {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const Group& group = groups_[b + 1];
     if (!group.has_triangles) continue;
-    // A request may leave out bodies: they stay where the scene has them.
+    // Bodies without a pose in the request keep the pose of the scene.
     const Pose& pose = b < bodies_in_world.size() ? bodies_in_world[b] : bodies_[b];
     const Rotation turn = rotation_from(pose.orientation);
     const Vec3 at = to_float(pose.position_m - origin_);

@@ -29,7 +29,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   // Elevations about the array axis [rad] (section 2).
   std::vector<BaseElevation> base;
   for (const float angle : p.fan.elevation_rad) base.push_back({angle, std::cos(angle), std::sin(angle)});
-  // (9): bands of weights, four beams a panel. The device has no beam transform.
+  // (9): bands of weights, four beams per panel. The device has no beam transform.
   std::vector<BeamWeightRow> rows;
   for (const BeamPanel& panel : p.beam_weights.panels)
     rows.push_back({panel.first_column, panel.count, static_cast<std::uint32_t>(panel.weights), 0});
@@ -102,7 +102,7 @@ void PlanTables::add_spectrum(const SpectralColumns& s) {
 }
 
 bool PlanTables::serves(const PingRequest& request) const {
-  // The seed belongs to it because of the noise table.
+  // The seed matters because of the noise table.
   return model_ == request.model && seed_ == request.seed && sonar::serves(plan_, request);
 }
 

@@ -9,7 +9,7 @@
 namespace sonar::cuda {
 namespace {
 
-// Bytes that an arena takes at a time: large enough that a batch needs few, and kept from batch to batch.
+// Sizes of the arenas' chunks in bytes, large enough that a batch needs few. Chunks are kept from batch to batch.
 constexpr std::size_t table_chunk = 4u << 20, work_chunk = 16u << 20, result_chunk = 4u << 20, cell_chunk = 8u << 20;
 constexpr std::size_t tiles_per_part = 256;  // tiles that one worker writes
 
@@ -25,7 +25,7 @@ BatchRoom::BatchRoom(Machine& machine, int which_lane, std::size_t most_pings)
       view_table_(view_memory_.allocate<PingView>(most_pings)) {}
 
 const PingView* BatchRoom::upload() {
-  // All pings of a batch in one table: a step is launched once for all of them.
+  // One table for all pings of a batch, because a step is launched once for all of them.
   std::copy(views.begin(), views.end(), view_table_.host);
   view_memory_.upload(lane);
   tables.upload(lane);
@@ -43,7 +43,7 @@ PingPreparer::PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene,
       scene_memory_(machine, Arena::Where::both, 0),
       store_(machine, cell_bytes),
       workers_(static_cast<std::size_t>(pool.threads())) {
-  // The scene goes to the device once; a ping adds the places of its bodies.
+  // The scene is sent to the device once; each ping adds the poses of its bodies.
   tracer_.nodes = scene_memory_.put(flat_.nodes());
   tracer_.triangles = scene_memory_.put(flat_.triangles());
   tracer_.still_root = flat_.still_root();
@@ -56,7 +56,7 @@ bool PingPreparer::may_go_together(const AskedPing& a, const AskedPing& b) {
   const auto same_places = [](const std::vector<Pose>& x, const std::vector<Pose>& y) {
     return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(Pose)) == 0);
   };
-  // Ghosts are made by all threads.
+  // All threads compute multipath echoes together.
   const PingRequest &x = a.wanted->request, &y = b.wanted->request;
   return !x.switches.multipath && !y.switches.multipath && (a.plan != b.plan || x.settings.gain_db == y.settings.gain_db) &&
          same_places(x.bodies_in_world, y.bodies_in_world);
@@ -75,7 +75,7 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
     }
     return {rays_, cells, m.bodies, m.laws, m.turned_away, m.plan, m.scalars, kernels_, pool};
   };
-  // Ghosts look at cells of their own, before these.
+  // Multipath echoes need other cells, whose view comes before this one.
   if (alone) find_points(all[0], context_of(all[0]), workers_[0]);
   look(all, cells);
   pool_.for_each(all.size(), [&](std::size_t i, int thread) {
@@ -99,11 +99,11 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
   return left;
 }
 
-/// Serial part: the plan's gain and noise, and the number of the view.
+/// The part that only one thread may run: the plan's gain and noise, and the number of the view.
 PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, BatchRoom& room) {
   const PingRequest& request = asked.wanted->request;
   PlanTables& plan = *asked.plan;
-  // Leak and volume read a table of shaped noise too: the noise's, or one with the pulse's correlation (section 5).
+  // Leak and volume read a table of shaped noise, too: that of the noise, or one with the pulse's correlation (section 5).
   const bool leak = request.switches.leak && plan.plan().mode.receiver.leak_upa > 0;
   const bool wants_noise = request.switches.noise || leak || (request.switches.volume && scene_->water_column.has_volume());
   set_gain(plan.plan(), request.settings.gain_db);
@@ -115,7 +115,7 @@ PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, Batch
   return m;
 }
 
-/// Cells within range and fan, as PingSimulation::find_echo_sources has them and in the same order, which is that of every sum.
+/// Finds cells within range and fan, the same as PingSimulation::find_echo_sources and in the same order, which is that of sums.
 void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
   const double begin = now();
   std::vector<CellView> views;
@@ -142,7 +142,7 @@ void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
   std::size_t next = 0;
   for (Making& m : all) {
     if (m.request().blank) continue;
-    m.looks_at = std::move(views[next]);  // whose levels the tiles refer to, and which lie where they lay
+    m.looks_at = std::move(views[next]);  // tiles have pointers to its levels, whose addresses do not change
     m.seen = &found[next++];
     m.ping.statistics.cell_bytes = cells.cached_bytes();
     m.seconds(m.seen->built > 0 ? Stage::build_cells : Stage::cull) += took;
@@ -168,11 +168,11 @@ void PingPreparer::complete(Making& m, const PingContext& context, int lane, Wor
   allocate_results(m);
 }
 
-/// Point targets, specular echoes, other sonars; multipath echoes: those of points as points, those of surfaces as columns.
+/// Finds echoes of point targets, specular echoes, pulses of other sonars, and multipath echoes (of points and of surfaces).
 void PingPreparer::find_points(Making& m, const PingContext& context, Worker& worker) {
   if (m.request().blank) return;
   const double begin = now();
-  // On the CPU: few echoes with many branches. The device adds their pulses to the beams.
+  // The CPU computes these few echoes, which need many branches. The device adds their pulses to the beams.
   std::vector<PointEcho> points = scatter_points(context);
   const std::vector<ReceivedPulse> pulses = receive_other_sonars(context, m.request());
   if (m.request().switches.specular) worker.specular_echoes.find(context, points);
@@ -181,7 +181,7 @@ void PingPreparer::find_points(Making& m, const PingContext& context, Worker& wo
     m.ping.statistics.rays += counts.rays;
     m.ping.statistics.echoes += counts.echoes;
     if (multipath_.has_echoes) {
-      // Behind the lead: the device adds from sample 0 on.
+      // After the lead, because the device adds from sample 0 on.
       m.view.multipath = m.room.tables.put(multipath_.columns.data) + 2 * multipath_.columns.lead;
       m.view.multipath_stride = multipath_.columns.stride;
     }
@@ -190,7 +190,7 @@ void PingPreparer::find_points(Making& m, const PingContext& context, Worker& wo
   m.seconds(m.request().switches.multipath ? Stage::multipath : Stage::specular) += now() - begin;
 }
 
-/// Their pulses on the sample grid.
+/// Adds the pulses of points and of other sonars on the sample grid.
 void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std::span<const ReceivedPulse> pulses) {
   const PingPlan& plan = m.plan;
   std::vector<PulseInBeams> in_beams;
@@ -210,7 +210,7 @@ void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std:
   for (const ReceivedPulse& pulse : pulses) add(pulse.sine, tone_of(pulse, 0, plan.samples));
   m.view.pulse_count = static_cast<std::int32_t>(in_beams.size());
   m.view.pulses = m.room.tables.put(in_beams);
-  // W of every beam at every point's exact direction, worked out on the device.
+  // W of every beam at every point's exact direction; the device computes it.
   m.view.point_weights =
       m.room.work.allocate<double>(static_cast<std::size_t>(m.view.point_count + m.view.pulse_count) * m.beams()).device;
 }
@@ -262,7 +262,7 @@ TileView PingPreparer::view_of(const PreparedTile& prepared, const std::int16_t*
   return t;
 }
 
-/// The tiles one after the other, every cell a slot.
+/// Arranges the tiles one after the other; every cell has a slot.
 void PingPreparer::lay_out_tiles(Making& m, const Worker& worker, Parallel& pool) {
   const std::vector<PreparedTile>& prepared = worker.tiles;
   // sqrt(sigma_b / mu) of a material, an empty table for Lambert's cosine.
@@ -277,7 +277,7 @@ void PingPreparer::lay_out_tiles(Making& m, const Worker& worker, Parallel& pool
       tiles.host[i] =
           view_of(prepared[i], worker.tile_cells[i], law_on_device[static_cast<std::size_t>(prepared[i].seen.tile->material)]);
   });
-  // In the order of the tiles: a slot's number fixes the place of its echo in every sum.
+  // Slots have the order of the tiles, because the number of a slot is the place of its echo in sums.
   std::uint32_t slots = 0;
   for (std::size_t i = 0; i < prepared.size(); ++i) {
     first_slot.host[i] = slots;

@@ -9,7 +9,7 @@
 namespace sonar::cuda {
 namespace {
 
-/// Where the benchmark's table has a step.
+/// The row of the benchmark's table for a step.
 constexpr Stage stage_of(Step step) {
   if (step <= Step::first_hits) return Stage::trace;
   if (step <= Step::place) return Stage::scatter;
