@@ -1,14 +1,14 @@
-// Cells of a tile to echoes: where they are, which the rays have seen, how they sound. Included by the instruction sets after
-// kernels.inl. Every value is a vector of cells; those that are not seen are dropped before anything is spent on their sound.
+// Converts the cells of a tile to echoes: their places, their visibility by the depth map, their amplitudes. Instruction sets
+// include it after kernels.inl. Every value is a vector of cells. Hidden cells are dropped before amplitudes are computed.
 
 inline constexpr int chunk = 256;
 
-struct Chunk {  // the cells of one stretch of a tile that are seen, packed
+struct Chunk {  // the visible cells of one part of a tile, packed
   alignas(64) float range[chunk + 16], offset[chunk + 16], cosine[chunk + 16], sine2[chunk + 16], column[chunk + 16],
       weight_re[chunk + 16], weight_im[chunk + 16], area[chunk + 16];
 };
 
-/// Ranges between which a tile's cells count, by its level and by the record.
+/// Range limits of a tile's cells, by its level and by the record.
 struct RangeWindow {
   float from_m, to_m;
 };
@@ -18,14 +18,14 @@ inline RangeWindow range_window(const TileSeen& s, const GroupView& g) {
           smaller(s.fade_out_to_m, (g.last_sample + shift) / g.samples_per_m)};
 }
 
-/// Cells cover more surface than their lattice square on a slope: 1 / |normal along the dominant axis|; 0 for padding.
+/// Area of cells in lattice squares, which is larger on a slope: 1 / |normal along the dominant axis|; 0 for padding.
 inline Lanes area_of(const CellTile& t, int i, Lanes weight_re, Lanes weight_im) {
   const Lanes along = counts(t.column(static_cast<CellTile::Column>(CellTile::normal_x + t.axis)) + i);
   const Lanes weight2 = weight_re * weight_re + weight_im * weight_im;
   return choose(below(all(0), weight2), 1.0f / (magnitude(along) * CellTile::normal_unit), all(0));
 }
 
-/// The weights of the cells that are kept, or their areas, or both.
+/// Which values of visible cells are kept: weights, areas, or both.
 struct Wanted {
   bool weights, areas;
 };
@@ -37,18 +37,18 @@ inline __attribute__((always_inline)) void pack_weights(const CellTile& t, int i
   pack(c.weight_im + m, keep, im);
 }
 
-/// Cells of other objects than the one that was hit in their direction: hidden when behind its facet, which is followed from the
-/// ray's place in the column to the cell's. `at`: of the map; `nearness`: 1 / x of the cells with the tolerance for contact.
+/// Whether cells of other objects than the one hit in their direction are hidden: behind its facet, which is extended from the
+/// ray's place in the column to the cell's. `at`: index of the map; `nearness`: 1 / x of cells with the tolerance for contact.
 inline __attribute__((noinline)) LaneMask hidden(const GroupView& g, LaneNumbers at, Lanes seen, Lanes column, Lanes nearness) {
   const Lanes beside = column - as_floats(whole_part(column)) - 0.5f;
   return below(nearness, seen + beside * gather(g.depth_slope, at));
 }
 
-/// Whether both values of the map beside a cell, with the marks a and b, are of other objects than the tile's.
+/// Whether both values of the map beside a cell, with the marks a and b, belong to other objects than the tile.
 inline LaneMask foreign_marks(std::int32_t mark, Lanes a, Lanes b) {
   return both(bits_differ(a, mark, surface_marks), bits_differ(b, mark, surface_marks));
 }
-/// The same where an object's number does not fit in the marks of 1 / x alone.
+/// The same if an object's number does not fit in the marks of 1 / x.
 inline __attribute__((noinline)) LaneMask foreign_numbers(const GroupView& g, std::int32_t mark, LaneNumbers at, Lanes a,
                                                           Lanes b) {
   Lanes upper_a, upper_b;
@@ -57,8 +57,8 @@ inline __attribute__((noinline)) LaneMask foreign_numbers(const GroupView& g, st
               either(bits_differ(b, mark, surface_marks), bits_differ(upper_b, upper_mark(mark), upper_marks)));
 }
 
-/// Where the cells are: range, column, elevation, cosine of incidence; which lie in the group's window and do not look away; and
-/// which of them the depth map shows: a cell no farther than what the rays saw along its direction. Returns how many there are.
+/// Computes range, column, elevation and cosine of incidence of cells, and keeps those that lie in the group's window, do not
+/// face away, and are no farther than the depth map in their direction. Returns their number.
 template <bool conical, bool moves>
 __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, Wanted what, int from, int n, Chunk& c) {
   const CellTile& t = *s.tile;
@@ -76,7 +76,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
               farthest = all(window.to_m);
   const int row = g.bins + 1;
   const Lanes last_bin = all(static_cast<float>(g.bins) - bin_rounding);
-  // Bounds of the cell's own column, not of the group: what is seen must not depend on how columns are grouped.
+  // Bounds of the cell's own column, not of the group, so that visibility does not depend on the grouping of columns.
   const Lanes map_first = all(static_cast<float>(g.map_first_column)), last_in_fan = all(static_cast<float>(g.fan_columns - 1));
   const float beside = static_cast<float>(g.columns_beside);
   int m = 0;
@@ -92,7 +92,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
     // Reference of elevations.
     const Lanes inverse_h = conical ? reciprocal(larger(x, all(1e-6f))) : inverse_root(larger(x * x + y * y, all(1e-12f)));
     const Lanes column = (g.first_edge_sine - y * (conical ? inverse_r : inverse_h)) * g.columns_per_sine;
-    // Where the rays looked for it: the sonar may have turned since.
+    // Its direction from the place of the rays; the sonar may have turned since.
     Lanes seen_column = column, seen_z = z, seen_inverse_h = inverse_h;
     if (moves) {
       const float *w = s.seen_turn, *o = s.seen_place;
@@ -113,7 +113,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
     if (!any(keep)) continue;
 
     // Depth map between two bins, against the cell's own 1 / x with the tolerances of section 3.
-    // In parentheses: of this instruction set, not found by the type of the axis.
+    // The parentheses choose the function of this instruction set, not the one found by the type of the axis.
     const Lanes bin_here = smaller((bin_of_tangent<Lanes>)(g.axis, choose(keep, tangent, all(0))), last_bin);
     const LaneNumbers bin_below = whole_part(bin_here);
     const Lanes column_here = choose(keep, seen_column, map_first);
@@ -147,7 +147,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
   return m;
 }
 
-/// Replaces the cosines by the root of the material's scattering strength; without a table Lambert's cosine is that already.
+/// Replaces the cosines by the root of the material's scattering strength. Without a table it is the cosine (Lambert's law).
 __attribute__((noinline)) void apply_law(const float* __restrict law, int n, Chunk& c) {
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) c.cosine[i] = law_root(law, c.cosine[i]);
@@ -161,7 +161,7 @@ inline Lanes sine_of_turns(Lanes turns) {
   return y + y * y2 * p;
 }
 
-/// Two-way pattern of cells at the squared sines w; of those in the side lobes as it is, where a polynomial would have many
+/// Two-way pattern of cells at the squared sines w. In side lobes it is computed without a polynomial, which would need many
 /// terms.
 inline Lanes pattern_of(const TileSeen& s, const GroupView& g, Lanes w) {
   if (!s.in_side_lobes) return elevation_pattern(g.elevation, w);
@@ -169,7 +169,7 @@ inline Lanes pattern_of(const TileSeen& s, const GroupView& g, Lanes w) {
   return side_lobe_pattern(x, sine_of_turns(0.5f * x));
 }
 
-/// Amplitude and carrier of every visible cell, times its speckle.
+/// Computes the amplitude and carrier of every visible cell, times its speckle.
 __attribute__((noinline)) void scatter_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
   for (int i = 0; i < n; i += lanes) {
     const Lanes r = load(c.range + i), offset = load(c.offset + i), d = -g.decay_per_m * offset;

@@ -1,7 +1,7 @@
-// Bodies of the hot loops, included once per instruction set inside a namespace of its own. Written as plain loops over short
-// arrays that the compiler turns into vector code; `lanes` is the width it should think in.
-// Loops that must become vector code stand in functions of their own: inlined into each other, compilers lose the thread.
-// The order of every sum is fixed, so a result depends on the instruction set but never on threads.
+// Bodies of the hot loops, included once per instruction set in a separate namespace. They are plain loops over short arrays,
+// which the compiler converts to vector code of the width `lanes`.
+// Loops that must become vector code are in separate functions, because compilers often fail to vectorise them after inlining.
+// The order of every sum is fixed, so that a result depends on the instruction set but never on threads.
 
 #include "core/pipeline/simd/lanes.inl"
 
@@ -12,7 +12,7 @@ inline float float_of(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 template <int taps>
 void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                      int first_column, int lead) {
-  // (8) from the table of rows: the row by the echo's place between samples, linear between rows. Echoes add in their order.
+  // (8) from the table of rows. The row depends on the echo's place between samples, linear between rows. Echoes add in order.
   const float steps = static_cast<float>(pulse.steps);
   const int reach = (taps > 0 ? taps : pulse.taps) / 2 - 1;
   const int n_taps = taps > 0 ? taps : pulse.taps;
@@ -33,13 +33,13 @@ void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, flo
 }
 
 #if defined(__AVX512F__)
-/// Sixteen echoes at a time: where each falls is worked out in vectors. A pulse is added to the two aligned vectors it reaches
-/// into, since the next echo often falls a sample aside: to load what overlaps a store under way only in part stalls, to load
-/// what was stored whole does not.
+/// Processes sixteen echoes at a time, and computes their places in vectors. A pulse is added to the two aligned vectors that it
+/// overlaps. The next echo is often one sample aside: a load that overlaps an unfinished store only in part stalls, while a load
+/// of the same whole vector does not.
 template <>
 void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                         int first_column, int lead) {
-  alignas(64) std::int32_t turned[8][lanes];  // taps, twice each, begun at a sample within the vector and wrapped round
+  alignas(64) std::int32_t turned[8][lanes];  // taps, twice each, starting at a sample within the vector and wrapped around
   for (int begin = 0; begin < 8; ++begin)
     for (int l = 0; l < lanes; ++l) turned[begin][l] = (l / 2 - begin) & 7;
   const float steps = static_cast<float>(pulse.steps);
@@ -47,7 +47,7 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
     alignas(64) float part[lanes];
     alignas(64) std::int32_t row_at[lanes], sample_at[lanes];
     const int n = count - from < lanes ? count - from : lanes;
-    const auto there = static_cast<__mmask16>(0xFFFFu >> (lanes - n));  // what lies behind the last may be any number
+    const auto there = static_cast<__mmask16>(0xFFFFu >> (lanes - n));  // values after the last are undefined
     const Lanes sample = Lanes(_mm512_maskz_loadu_ps(there, e.sample + from)), whole = Lanes(_mm512_floor_ps(native(sample)));
     const Lanes position = (sample - whole) * steps;
     const LaneNumbers step = whole_part(position);
@@ -73,9 +73,9 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
   }
 }
 #elif defined(__AVX2__)
-/// The same for vectors of four samples, of which a pulse reaches into three. There is no quick way to shift a vector by a number
-/// of lanes: the taps, twice each, wait between zeros in memory and are loaded from where they fall. So many echoes at a time
-/// that their stores are done by then.
+/// The same for vectors of four samples, of which a pulse overlaps three. Shifting a vector by a variable number of lanes is
+/// slow. Instead, the taps, twice each, are stored between zeros and loaded from the shifted place, for so many echoes at a time that
+/// the stores have finished before the loads.
 template <>
 void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                         int first_column, int lead) {
@@ -91,7 +91,7 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
     for (int i = 0; i < n; i += lanes) {
       alignas(32) float part[lanes];
       alignas(32) std::int32_t row_at[lanes];
-      // Values behind the last may be any number.
+      // Values after the last are undefined.
       const LaneNumbers there = LaneNumbers{0, 1, 2, 3, 4, 5, 6, 7} < n - i;
       const Lanes sample = choose(there, load(e.sample + from + i), all(0)), whole = Lanes(_mm256_floor_ps(native(sample)));
       const Lanes position = (sample - whole) * steps;
@@ -137,7 +137,7 @@ void accumulate(const EchoArrays& e, int count, const PulseRows& pulse, float* c
 }
 
 void form_beam_panel(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats) {
-  constexpr int width = 2;  // vectors side by side: eight sums in flight hide the latency of the multiply-add
+  constexpr int width = 2;  // vectors at a time: eight independent sums hide the latency of the multiply-add
   for (int f = 0; f < floats; f += width * lanes) {
     // (9): W_jk g_k, the columns of a panel in ascending order.
     Lanes sum[4][width] = {};
@@ -155,7 +155,7 @@ void form_beam_panel(const float* in, std::ptrdiff_t in_stride, const float* pan
   }
 }
 
-/// Real and imaginary parts of the taps are summed apart and meet once at the end. `both`: rows on either side of the middle.
+/// Sums the real and imaginary parts of the taps separately, and combines them once at the end. `both`: rows on either side.
 template <int width>
 inline void refocus_block(const float* from, std::ptrdiff_t stride, const FocusTaps& t, int both, Lanes* out) {
   Lanes re[width], im[width];
@@ -181,7 +181,7 @@ inline void refocus_block(const float* from, std::ptrdiff_t stride, const FocusT
 }
 
 void refocus(const float* from, std::ptrdiff_t stride, const FocusTaps& t, int floats, float* to) {
-  constexpr int width = 2;  // vectors side by side: four sums in flight
+  constexpr int width = 2;  // vectors at a time: four independent sums
   const int both = t.below < t.above ? t.below : t.above;
   Lanes out[width];
   int f = 0;

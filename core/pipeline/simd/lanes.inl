@@ -1,7 +1,7 @@
-// A vector of `lanes` floats as a value, and the operations that loops over cells need; included once per instruction set,
-// first of all.
-// Reciprocals and roots: where an instruction set has quick estimates, those and a step of Newton's, to two units in the last
-// place; divisions in vectors take longer than all else that is done to a cell.
+// A vector of `lanes` floats as a type, and the operations for loops over cells. It is included once per instruction set,
+// before all other files.
+// Reciprocals and roots use the fast estimates of an instruction set, if it has them, and a Newton step, with an error of two
+// units in the last place. Vector divisions would take longer than all other operations on a cell.
 
 typedef float Lanes __attribute__((vector_size(4 * lanes), aligned(4)));
 typedef std::int32_t LaneNumbers __attribute__((vector_size(4 * lanes), aligned(4)));
@@ -63,7 +63,7 @@ inline Lanes inverse_root(Lanes x) {  // x > 0
   const Lanes guess = Lanes(_mm512_rsqrt14_ps(native(x)));
   return guess + 0.5f * guess * (1.0f - x * guess * guess);
 }
-// A Newton step corrects the estimate: as exact as a division, and as a root.
+// A Newton step corrects the estimate, so that the error is that of a division or a root.
 inline Lanes quotient(Lanes a, Lanes b) {
   const Lanes inverse = reciprocal(b), q = a * inverse;
   return q + inverse * (a - q * b);
@@ -115,7 +115,7 @@ inline Lanes counts(const std::int16_t* at) {
 inline Lanes gather(const float* table, LaneNumbers at) {
   return Lanes(_mm256_i32gather_ps(table, reinterpret_cast<__m256i>(at), 4));
 }
-/// table[at] and table[at + 1]: eight loads of both take half as long as two gathers.
+/// table[at] and table[at + 1]. Eight loads of both take half as long as two gathers.
 inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
   alignas(32) std::int32_t place[lanes];
   *reinterpret_cast<LaneNumbers*>(place) = at;
@@ -154,7 +154,7 @@ inline Lanes counts(const std::int16_t* at) { return Lanes(vcvtq_f32_s32(vmovl_s
 inline Lanes gather(const float* table, LaneNumbers at) {
   return Lanes{table[at[0]], table[at[1]], table[at[2]], table[at[3]]};
 }
-/// table[at] and table[at + 1]: both in one load.
+/// table[at] and table[at + 1], in one load.
 inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
   const float32x4_t a = vcombine_f32(vld1_f32(table + at[0]), vld1_f32(table + at[1]));
   const float32x4_t b = vcombine_f32(vld1_f32(table + at[2]), vld1_f32(table + at[3]));

@@ -30,7 +30,7 @@ __attribute__((noinline)) void place_on_grid(const SpreadGrid& g, const SpreadEc
     const double c = sine_of_turns_exact(phase - std::floor(phase) + 0.25), s = sine_of_turns_exact(phase - std::floor(phase));
     re[i] = in_re[i] * c - in_im[i] * s;
     im[i] = in_re[i] * s + in_im[i] * c;
-    // The delay in grid points; from first and between the kernel (26) follows, as in FrequencySums::spread.
+    // The delay in grid points. first and between give the kernel (26), as in FrequencySums::spread.
     const double place = (turns[i] - std::floor(turns[i])) * points;
     first[i] = std::ceil(place - 0.5 * SpreadGrid::width);
     between[i] = 2 * (first[i] - place + 0.5 * SpreadGrid::width) - 1;
@@ -52,7 +52,7 @@ void spread(const SpreadGrid& g, const SpreadEchoes& e, int count, double* grid)
         c += width;
         for (int k = 0; k < width; ++k) value[k] = value[k] * t + c[k];
       }
-      // The grid has room for a kernel beyond its end: no wrap within the loop.
+      // The grid has room for a kernel beyond its end, so that the loop needs no wrap.
       const int begin = static_cast<int>(first[i]);
       double* __restrict at = grid + 2 * (begin < 0 ? begin + g.points : begin);
       for (int k = 0; k < width; ++k) {
@@ -61,7 +61,7 @@ void spread(const SpreadGrid& g, const SpreadEchoes& e, int count, double* grid)
       }
     }
   }
-  for (int k = 0; k < 2 * width; ++k) {  // what ran over the end comes in at the beginning
+  for (int k = 0; k < 2 * width; ++k) {  // adds the part beyond the end to the beginning
     grid[k] += grid[2 * g.points + k];
     grid[2 * g.points + k] = 0;
   }

@@ -1,7 +1,7 @@
-// Columns to beams by way of a Fourier transform across the columns, included by kernels.inl once per instruction set: every
-// value here is a vector of `lanes` samples, so that all of them take the same path. What it computes: beam_transform.hpp.
-// In place and without reordering: forward passes leave the frequencies in the order of their digits, the response is stored in
-// that order, and the inverse passes go the same way back.
+// Makes beams of columns by a Fourier transform across the columns (tables: beam_transform.hpp). kernels.inl includes it once per
+// instruction set. Every value is a vector of `lanes` samples, all of which take the same path.
+// The transform is in place and without reordering: forward passes leave frequencies in digit-reversed order, the response is
+// stored in this order, and inverse passes reverse it.
 
 /// A complex value of one column for each of `lanes` samples.
 struct ComplexLanes {
@@ -9,7 +9,7 @@ struct ComplexLanes {
 };
 inline ComplexLanes operator+(ComplexLanes a, ComplexLanes b) { return {a.re + b.re, a.im + b.im}; }
 inline ComplexLanes operator-(ComplexLanes a, ComplexLanes b) { return {a.re - b.re, a.im - b.im}; }
-// Times a turn w = {re, im} of the tables, or its conjugate: the same for all lanes.
+// Multiplies by a factor w = {re, im} of the tables, or its conjugate, which is the same for all lanes.
 inline ComplexLanes times(ComplexLanes v, const float* w) { return {v.re * w[0] - v.im * w[1], v.re * w[1] + v.im * w[0]}; }
 inline ComplexLanes times_conjugate(ComplexLanes v, const float* w) {
   return {v.re * w[0] + v.im * w[1], v.im * w[0] - v.re * w[1]};
@@ -37,7 +37,7 @@ inline void store_interleaved(ComplexLanes v, const Shuffles& s, float* at) {
   *reinterpret_cast<Lanes*>(at + lanes) = shuffle(v.re, v.im, s.high);
 }
 
-/// The discrete Fourier transform of `radix` values side by side, not scaled; inverse: with conjugate roots of unity.
+/// The discrete Fourier transform of `radix` neighbouring values, not scaled; inverse: with conjugate roots of unity.
 template <int radix, bool forward>
 inline __attribute__((always_inline)) void sums(ComplexLanes* v) {
   constexpr float half_root_3 = 0.8660254037844386f;
@@ -50,11 +50,11 @@ inline __attribute__((always_inline)) void sums(ComplexLanes* v) {
     const ComplexLanes across{half_root_3 * (b.re - c.re), half_root_3 * (b.im - c.im)};
     v[0] = a + sum, v[forward ? 2 : 1] = middle + times_i(across), v[forward ? 1 : 2] = middle - times_i(across);
   } else if constexpr (radix == 4) {
-    // The fourth roots of unity are +-1 and +-i: no multiplication.
+    // The fourth roots of unity are +-1 and +-i, which need no multiplication.
     const ComplexLanes s = v[0] + v[2], t = v[0] - v[2], u = v[1] + v[3], across = times_i(v[1] - v[3]);
     v[0] = s + u, v[forward ? 3 : 1] = t + across, v[2] = s - u, v[forward ? 1 : 3] = t - across;
   } else {
-    // Good and Thomas: 6 = 2 x 3 without turns between, input (3 a + 2 b) mod 6, output (3 a + 4 b) mod 6.
+    // Good and Thomas: 6 = 2 x 3 without factors between, input (3 a + 2 b) mod 6, output (3 a + 4 b) mod 6.
     static_assert(radix == 6);
     ComplexLanes even[3] = {v[0] + v[3], v[2] + v[5], v[4] + v[1]}, odd[3] = {v[0] - v[3], v[2] - v[5], v[4] - v[1]};
     sums<3, forward>(even);
@@ -63,8 +63,8 @@ inline __attribute__((always_inline)) void sums(ComplexLanes* v) {
   }
 }
 
-/// One pass over a block of n: n / radix butterflies, `w` their (radix - 1) turns each. Forward: decimation in frequency, first
-/// the sums, then the turns e^{-i 2 pi i m / n}. Inverse: the same backwards, with conjugate turns.
+/// One pass over a block of n: n / radix butterflies, with (radix - 1) factors `w` each. Forward: decimation in frequency, first
+/// the sums, then the factors e^{-i 2 pi i m / n}. Inverse: the same in reverse order, with conjugate factors.
 template <int radix, bool forward>
 inline void butterflies(ComplexLanes* x, int n, const float* w) {
   const int q = n / radix;
@@ -78,7 +78,7 @@ inline void butterflies(ComplexLanes* x, int n, const float* w) {
   }
 }
 
-/// The last pass forward, whose turns are all 1, the product with the response, and the first pass back.
+/// The last forward pass, whose factors are all 1, the product with the response, and the first inverse pass.
 template <int radix>
 inline void weigh_values(ComplexLanes* x, int n, const float* response) {
   for (int i = 0; i < n; i += radix) {
@@ -93,7 +93,7 @@ inline void weigh_values(ComplexLanes* x, int n, const float* response) {
 
 template <bool forward>
 inline void transform_pass(const BeamTransform& t, int level, ComplexLanes* block) {
-  // A level works on quarter / size blocks, each for itself.
+  // A level processes quarter / size blocks separately.
   const BeamTransform::Level& l = t.level[level];
   for (int from = 0; from < t.quarter; from += l.size) {
     if (l.radix == 6)
@@ -107,7 +107,7 @@ inline void transform_pass(const BeamTransform& t, int level, ComplexLanes* bloc
   }
 }
 
-/// First pass, of a line whose second half is zero: columns [0, count) into four quarters.
+/// First pass: columns [0, count), followed by zeros in the second half of the line, into four quarters.
 __attribute__((noinline)) void take_columns(const BeamTransform& t, const float* columns, std::ptrdiff_t stride, int count,
                                             ComplexLanes* x) {
   const int q = t.quarter;
@@ -125,11 +125,11 @@ __attribute__((noinline)) void take_columns(const BeamTransform& t, const float*
   }
 }
 
-/// A quarter to its frequencies, weighed there, and back.
+/// Transforms a quarter to its frequencies, multiplies them by the response, and transforms back.
 __attribute__((noinline)) void weigh_quarter(const BeamTransform& t, const float* response, ComplexLanes* x) {
   const int last = t.levels - 1;
   for (int level = 0; level < last; ++level) transform_pass<true>(t, level, x);
-  // (9) over frequencies: times the transform of W, which is real since W is even; it includes 1 / size of the inverse.
+  // (9) over frequencies: times the transform of W, which is real because W is symmetric; it includes 1 / size of the inverse.
   if (t.level[last].radix == 4)
     weigh_values<4>(x, t.quarter, response);
   else if (t.level[last].radix == 3)
@@ -139,7 +139,7 @@ __attribute__((noinline)) void weigh_quarter(const BeamTransform& t, const float
   for (int level = last; level-- > 0;) transform_pass<false>(t, level, x);
 }
 
-/// Last pass: only the half of the line that stands for columns is wanted.
+/// Last pass, which computes only the half of the line that belongs to columns.
 __attribute__((noinline)) void join_quarters(const BeamTransform& t, ComplexLanes* x) {
   const int q = t.quarter;
   const float* w = t.split;
@@ -152,7 +152,7 @@ __attribute__((noinline)) void join_quarters(const BeamTransform& t, ComplexLane
   }
 }
 
-/// Beams between the columns' centres, each from the few columns round it.
+/// Computes beams between the centres of columns, each from a few neighbouring columns.
 __attribute__((noinline)) void read_beams(const BeamTransform& t, const ComplexLanes* line, float* out,
                                           std::ptrdiff_t out_stride) {
   const Shuffles s = shuffles();
@@ -169,7 +169,7 @@ __attribute__((noinline)) void read_beams(const BeamTransform& t, const ComplexL
 void transform_beams(const BeamTransform& t, const float* columns, std::ptrdiff_t stride, int floats, float* work, float* out,
                      std::ptrdiff_t out_stride) {
   auto* x = reinterpret_cast<ComplexLanes*>(work);
-  // A vector of samples at a time: its line of 4 q complex values stays in cache through all passes.
+  // Processes a vector of samples at a time, whose line of 4 q complex values stays in cache through all passes.
   for (int f = 0; f < floats; f += 2 * lanes) {
     take_columns(t, columns + f, stride, t.columns, x);
     for (int k = 0; k < 4; ++k) weigh_quarter(t, t.response + k * t.quarter, x + k * t.quarter);
@@ -178,7 +178,7 @@ void transform_beams(const BeamTransform& t, const float* columns, std::ptrdiff_
   }
 }
 
-/// Squares of magnitudes, turned from beams of rows to rows of beams, `lanes` of both at a time.
+/// Computes squared magnitudes, and transposes them from beams of rows to rows of beams, `lanes` of both at a time.
 void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows, float* power, int width) {
   const Shuffles s = shuffles();
   // Transposes a square tile: steps 1, 2, 4 ... exchange blocks of that size across the diagonal.
