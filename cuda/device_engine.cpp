@@ -255,8 +255,7 @@ class DeviceEngine final : public PingEngine {
   std::string why_by_cpu(const PingRequest& request) const {
     if (const std::string why = why_not_on_device(request); !why.empty()) return why + " are computed by the CPU";
     const std::string without = why_not_on_device(request, false);
-    const std::string missing =
-        without.empty() ? "" : machine_->why_no_transforms();  // called only if needed, since it loads a library
+    const std::string missing = without.empty() ? "" : machine_->why_no_transforms();  // only if needed: loads a library
     return missing.empty() ? "" : without + " are computed by the CPU (" + missing + ")";
   }
   static CellFields fields_of(const PingRequest& request) { return {request.switches.texture, request.switches.grain}; }

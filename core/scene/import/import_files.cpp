@@ -78,8 +78,7 @@ class ObjText {
 
 struct ObjCounts {
   std::uint64_t objects = 0, triangles = 0;
-  std::vector<std::uint64_t>
-      bad_faces;  // numbers of the faces that name vertices which the file does not have, in increasing order
+  std::vector<std::uint64_t> bad_faces;  // numbers of faces with vertices that the file does not have, increasing
 };
 
 /// Counts the parts of an OBJ file and finds the faces for which the importer would reject the whole file.

@@ -6,9 +6,8 @@
 namespace sonar {
 namespace {
 
-constexpr double bary_slack = 1e-6;  // normals are continuous across edges: a point must not fall between two triangles
-constexpr double edge_units =
-    4;  // largest distance from the edge of a curved surface at which its echo is searched for, in Fresnel units
+constexpr double bary_slack = 1e-6;     // normals are continuous across edges: a point must not fall between two triangles
+constexpr double edge_units = 4;        // distance beyond the edge of a curved surface that is searched, in Fresnel units
 constexpr double twins_in_units = 0.5;  // mirror points nearer to each other than this count as one
 constexpr double walk_units = 16;       // an edge beyond this does not change the echo
 constexpr double trusted_units = 2;     // where the surface leaves its osculating arc farther out than this, no_owner notices
