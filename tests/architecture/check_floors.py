@@ -118,10 +118,10 @@ FORBIDDEN = [
 ]
 # A make of sonar is its folder and a line of makes.cpp; these files still name one. The list only gets shorter.
 MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|\bs500|surveyor|omniscan|3d-?15|protocol/ping/|\bping::|dvl-a|protocol/dvl/|\bdvl::|\bmicron", re.I)
-MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl|micron)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
+MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl|micron)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|clients/python/sonard_client/judge/makes/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
 NAME_MAKES = {
     "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py",
-    "clients/python/sonard_client/judge/cases.py", "clients/python/sonard_client/judge/truth.py",
+    "clients/python/sonard_client/judge/cases.py",
     "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/oculus.py",
     "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py", "clients/web/src/panels/head.js",
     "daemon/commands/replay/replay_device.cpp", "daemon/commands/replay/replay_device.hpp",

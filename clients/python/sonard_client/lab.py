@@ -239,11 +239,14 @@ def enter(module: str, arguments: Sequence[str]) -> None:
     os.execv(command[0], command)
 
 
-def lab_config(profile: str, address: str = DEVICE, more: Optional[Dict[str, object]] = None) -> str:
-    """Returns a configuration for tests of drivers: a small scene and a cheap model. It is JSON, which is also YAML."""
+def lab_config(profile: str, address: str = DEVICE, more: Optional[Dict[str, object]] = None,
+               sonar: Optional[Mapping[str, object]] = None) -> str:
+    """A configuration for tests of drivers: a small scene and a model that costs little. JSON, which is YAML too. `sonar`: further
+    keys of the sonar."""
     config: Dict[str, object] = {
         "world": {"scene": "tank-rod.yaml", "seed": 1}, "vehicles": [{"name": "rov", "trajectory": "none"}],
-        "sonars": [{"name": "front", "profile": profile, "bind_ip": address}], "engine": {"fixed_fan": 1}}
+        "sonars": [{"name": "front", "profile": profile, "bind_ip": address, **(sonar or {})}],
+        "engine": {"fixed_fan": 1}}
     config.update(more or {})
     return json.dumps(config, indent=1) + "\n"
 

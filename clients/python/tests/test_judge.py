@@ -1,11 +1,10 @@
-"""The judge without a daemon: the truth of a stream, verdicts, cases, captures, reports."""
+"""The judge without a daemon: verdicts, cases, reports."""
 import array
 import contextlib
 import io
 import json
 import pathlib
 import re
-import struct
 import subprocess
 import sys
 import tempfile
@@ -17,76 +16,17 @@ import xml.etree.ElementTree
 import zlib
 from html.parser import HTMLParser
 
-from common import ROOT, made_ping
+from common import ROOT
 
 from sonard_client.judge import __main__ as judge_main
-from sonard_client.judge import cases, driver, report, ros_tap, run_case, wire
+from sonard_client.judge import cases, driver, report, ros_tap, run_case
 from sonard_client.judge.cases import CASES
 from sonard_client.judge.scene import Scene
-from sonard_client.judge.truth import PingProtocolReader, TruePing, TruthReader, reader_for
+from sonard_client.judge.truth import TruePing
 from sonard_client.judge.verdicts import Observation, back_at, colour, judge, sort_published
 from sonard_client.judge.wire import Seen
 
 CRC = 0x1000  # of made pings: CRC + number
-
-
-def set_in(message, at, form, value):
-    changed = bytearray(message)
-    struct.pack_into(form, changed, at, value)
-    return bytes(changed)
-
-
-def numbers(*pieces):
-    reader = TruthReader()
-    return [ping.number for piece in pieces for ping in reader.feed(piece)]
-
-
-class Truth(unittest.TestCase):
-    """What a driver may publish. Offsets of fields: docs/protocols/oculus.md, version 0."""
-
-    def setUp(self):
-        self.a, self.b, self.c = (made_ping(rows=12, beams=16, number=n) for n in (7, 8, 9))
-
-    def test_every_split_gives_the_same_pings(self):
-        stream = self.a + bytes(16) + self.b
-        for size in (1, 7, 16, 701, len(stream)):
-            self.assertEqual(numbers(*(stream[at:at + size] for at in range(0, len(stream), size))), [7, 8])
-
-    def test_samples_and_place(self):
-        for gains in (None, [5] * 3):
-            for version in (0, 2):
-                message = made_ping(version=version, gains=gains)
-                (ping,) = TruthReader().feed(b"?" + message)
-                samples = b"".join(bytes(16 * row + beam for beam in range(4)) for row in range(3))
-                self.assertIn(zlib.crc32(samples), ping.crcs)
-                self.assertEqual((ping.begin, ping.end, ping.rows, ping.beams), (1, 1 + len(message), 3, 4))
-
-    def test_wrong_lengths_do_not_hide_true_samples(self):
-        for at, form, value in ((10, "<I", 0), (10, "<I", 0xFFFFFFF0), (10, "<I", len(self.b) - 100)):
-            self.assertEqual(numbers(self.a, set_in(self.b, at, form, value), self.c), [7, 8, 9])
-
-    def test_impossible_dimensions_are_no_pings(self):
-        rows, beams, offset = 106, 108, 110
-        for at, form, value in ((rows, "<H", 65535), (rows, "<H", 0), (beams, "<H", 1), (offset, "<I", 0),
-                                (offset, "<I", 1 << 31)):
-            self.assertEqual(numbers(self.a, set_in(self.b, at, form, value), self.c), [7, 9])
-
-    def test_a_ping_without_its_last_row_is_not_glued_to_the_next(self):
-        self.assertEqual(numbers(self.a, self.b[:-16], self.c), [7, 9])
-
-    def test_a_missing_row_that_the_lengths_admit_may_be_published(self):
-        short = self.b[:-16]
-        for at, form, value in ((10, "<I", len(short) - 16), (118, "<I", len(short))):
-            short = set_in(short, at, form, value)
-        self.assertEqual(numbers(self.a, short, self.c), [7, 8, 9])
-
-    def test_garbage_and_false_headers(self):
-        for garbage in (b"\0", b"S", b"SO", b"SO" + b"\xff" * 14, b"SO" * 500):
-            self.assertEqual(numbers(self.a, garbage, self.b), [7, 8])
-
-    def test_an_image_may_contain_the_magic(self):
-        samples = [[0x53, 0x4F] * 8] * 12
-        self.assertEqual(numbers(made_ping(rows=12, beams=16, samples=samples, number=5), self.a), [5, 7])
 
 
 def published(*items):
@@ -95,7 +35,7 @@ def published(*items):
 
 
 def true(*items):
-    return [Seen(TruePing(n, frozenset({CRC + n}), 3, 4, 0, 100, 0.0), t, 1) for t, n in items]
+    return [Seen(TruePing(n, frozenset({CRC + n}), 3, 4, 0, 100), t, 1) for t, n in items]
 
 
 TICKS = [(n / 10, n) for n in range(1, 61)]  # six seconds, ten pings a second; the fault is from 2 to 4 s
@@ -109,68 +49,6 @@ def observed(shown=TICKS, wire_pings=TICKS, **more):
 
 def verdict(seen, must=None, should=None, notice=False):
     return judge(seen, must or {}, should or {}, notice)
-
-
-def ping_frame(message, payload):
-    body = b"BR" + struct.pack("<HHBB", len(payload), message, 1, 0) + payload
-    return body + struct.pack("<H", sum(body) & 0xFFFF)
-
-
-class PingProtocol(unittest.TestCase):
-    """Messages of the Ping family, by TCP and by UDP."""
-
-    def setUp(self):
-        self.profiles = [ping_frame(1300, bytes(8) + struct.pack("<I", number) + bytes([number]) * 210) for number in (7, 8)]
-        self.sector = ping_frame(2300, bytes(14) + bytes(range(200)))
-        self.answer = ping_frame(5, bytes(4))
-
-    def numbers(self, *pieces):
-        reader = PingProtocolReader()
-        return [ping.number for piece in pieces for ping in reader.feed(piece)]
-
-    def test_every_split_gives_the_same_pings(self):
-        stream = self.answer + self.profiles[0] + b"noise B" + self.sector + self.sector + self.profiles[1]
-        for size in (1, 7, 64, len(stream)):
-            self.assertEqual(self.numbers(*(stream[at:at + size] for at in range(0, len(stream), size))), [7, -1, -2, 8])
-
-    def test_samples_are_the_payload(self):
-        (ping,) = PingProtocolReader().feed(b"??" + self.sector)
-        self.assertEqual((ping.crcs, ping.begin, ping.end), ({zlib.crc32(self.sector[8:-2])}, 2, 2 + len(self.sector)))
-
-    def test_damage_is_no_ping_and_hides_none(self):
-        damaged = bytearray(self.profiles[0])
-        damaged[40] ^= 1
-        self.assertEqual(self.numbers(bytes(damaged) + self.profiles[1]), [8])
-        self.assertEqual(self.numbers(self.profiles[0][:50] + self.profiles[1]), [8])
-        self.assertEqual(self.numbers(b"BR\xff\xff", self.profiles[0], self.profiles[1]), [7, 8], "a length that is never reached")
-
-    def test_makes_whose_pings_are_known(self):
-        self.assertIs(reader_for("oculus-m1200d"), TruthReader)
-        for profile in ("ping1d", "ping360", "omniscan-450-fs", "surveyor-240-16"):
-            self.assertIs(reader_for(profile), PingProtocolReader, profile)
-        self.assertIsNone(reader_for("aris-explorer-3000"))
-
-    def test_datagrams_whole_and_in_fragments(self):
-        with mock.patch("socket.socket"):
-            capture = wire.Capture("lo", "127.0.0.2", 9090, PingProtocolReader)
-        device, driver = bytes([127, 0, 0, 2]), bytes([127, 0, 0, 1])
-
-        def packets(source, destination, ports, payload, cut=None):
-            datagram = struct.pack(">HHHH", *ports, 8 + len(payload), 0) + payload
-            parts = [(0, datagram)] if cut is None else [(cut, datagram[cut:]), (0, datagram[:cut])]  # the last one comes first
-            for at, part in parts:
-                place = at // 8 | (0x2000 if at + len(part) < len(datagram) else 0)
-                yield bytes(12) + b"\x08\x00" + struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(part), 5, place, 64, 17, 0) + \
-                    source + destination + part
-
-        for packet in (*packets(device, driver, (9090, 4000), self.profiles[0]),  # before the driver has sent anything
-                       *packets(driver, device, (4000, 9090), ping_frame(6, b"\x14\x05")),
-                       *packets(device, driver, (9090, 4000), self.profiles[0]),
-                       *packets(device, driver, (9090, 4000), self.profiles[1], cut=64),
-                       *packets(device, driver, (9999, 4000), self.profiles[1])):
-            capture._packet(1.0, 0, packet)
-        self.assertEqual([s.ping.number for s in capture.delivered()], [7, 8])
-        self.assertEqual([(c.peer, len(c.fires)) for c in capture.connections], [("127.0.0.1:4000", 1)])
 
 
 class Verdicts(unittest.TestCase):
@@ -201,6 +79,18 @@ class Verdicts(unittest.TestCase):
         self.assertFalse(verdict(observed(kept)).should_holds)
         self.assertTrue(verdict(observed(kept)).must_holds)
 
+    def test_pings_that_a_driver_may_leave_out_are_not_lost(self):
+        optional = [seen._replace(ping=seen.ping._replace(needed=seen.ping.number != 25)) for seen in true(*TICKS)]
+        kept = [(t, n) for t, n in TICKS if n not in (25, 26)]
+        self.assertEqual(self.words(kept, true_pings=optional, delivered=optional)[0], "LOST 1")
+        self.assertEqual(self.words(true_pings=optional, delivered=optional)[0], "CLEAN")
+
+    def test_what_the_fault_touched(self):
+        journal = [{"event": "began", "mono_ns": 1}, {"event": "injected", "ping": 90, "mono_ns": 2_410_000_000}]
+        self.assertEqual(run_case.touched_pings(journal, true(*TICKS), True), [90])
+        self.assertEqual(run_case.touched_pings(journal, true(*TICKS), False), [24])
+        self.assertEqual(run_case.touched_pings(journal, true(*TICKS[:20]), False), [])
+
     def test_false_beats_stale_beats_lost(self):
         lost = [(t, n) for t, n in TICKS if n != 25]
         stale = lost + [(5.0, 30)]
@@ -216,7 +106,7 @@ class Verdicts(unittest.TestCase):
         self.assertEqual(len(sort_published(shown, true(*TICKS))[2]), 1)
 
     def test_equal_images_with_other_numbers_are_not_repeated(self):
-        stuck = [Seen(TruePing(n, frozenset({5}), 3, 4, 0, 9, 0.0), n / 10, 1) for n in range(1, 9)]
+        stuck = [Seen(TruePing(n, frozenset({5}), 3, 4, 0, 9), n / 10, 1) for n in range(1, 9)]
         with_number = [driver.Published(n / 10, n, 5, None, None) for n in range(1, 9)]
         without = [driver.Published(n / 10, None, 5, None, None) for n in range(1, 9)]
         for shown in (with_number, without):
@@ -224,7 +114,7 @@ class Verdicts(unittest.TestCase):
         self.assertEqual([len(part) for part in sort_published([*without, without[0]], stuck)], [8, 1, 0])
 
     def test_a_numbers_restart_is_no_repetition(self):
-        again = [Seen(TruePing(n, frozenset({0x2000 + n}), 3, 4, 0, 9, 0.0), 3 + n / 10, 1) for n in range(1, 9)]
+        again = [Seen(TruePing(n, frozenset({0x2000 + n}), 3, 4, 0, 9), 3 + n / 10, 1) for n in range(1, 9)]
         shown = published(*TICKS[:20], *((3 + n / 10, n, 0x2000 + n) for n in range(1, 9)))
         self.assertEqual([len(part) for part in sort_published(shown, true(*TICKS) + again)], [28, 0, 0])
 
@@ -370,59 +260,6 @@ class Table(unittest.TestCase):
         self.assertEqual(cases.torture(1, 25), cases.torture(1, 25))
         self.assertNotEqual(cases.torture(1, 25), cases.torture(2, 25))
         self.assertEqual(len(cases.torture(1, 25)), 25)
-
-
-class Packets(unittest.TestCase):
-    """A connection as packets, with a repeated, an overtaken and an acknowledged one."""
-
-    def setUp(self):
-        self.connection = wire.Connection(1, "10.0.0.1:4000", 0.0)
-        self.connection.from_device(0.1, 999, wire._SYN | wire._ACK, b"")
-
-    def send(self, at, data):
-        self.connection.from_device(1.0, (1000 + at) % (1 << 32), wire._ACK, data)
-
-    def test_order_and_repetition(self):
-        stream = made_ping(number=1) + made_ping(number=2)
-        half = len(stream) // 2
-        self.send(half, stream[half:])
-        self.assertEqual(self.connection.sent, 0)
-        self.send(0, stream[:half])
-        self.send(0, stream[:half])
-        self.send(100, stream[100:half + 50])
-        self.assertEqual(bytes(self.connection.stream), stream)
-        self.assertEqual([s.ping.number for s in self.connection.pings], [1, 2])
-
-    def test_what_was_acknowledged(self):
-        self.send(0, bytes(500))
-        for ack, acked in ((1000, 0), (1300, 300), (1200, 300), (9999, 500)):
-            self.connection.from_driver(1.0, 1, ack, wire._ACK, 100, b"")
-            self.assertEqual(self.connection.acked, acked)
-
-    def test_settings_ends_and_zero_windows(self):
-        fire = b"SO" + bytes(4) + b"\x15\0" + bytes(45)
-        self.connection.from_driver(1.0, 5, 1000, wire._ACK, 100, fire)
-        self.connection.from_driver(1.1, 5, 1000, wire._ACK, 100, fire)  # sent again by TCP, not by the driver
-        self.connection.from_driver(1.2, 58, 1000, wire._ACK, 0, b"")
-        self.connection.from_driver(1.3, 58, 1000, wire._ACK | wire._FIN, 100, b"")
-        self.connection.from_device(1.4, 1000, wire._RST, b"")
-        self.assertEqual((len(self.connection.fires), self.connection.zero_windows), (1, 1))
-        self.assertEqual((self.connection.ended, self.connection.ended_by), (1.3, "driver FIN"))
-
-    def test_pcapng(self):
-        written = wire.pcapng([(1_700_000_000_123_456_789, b"\1" * 61)], "a case")
-        kinds, at = [], 0
-        while at < len(written):
-            kind, size = struct.unpack_from("<II", written, at)
-            self.assertEqual(struct.unpack_from("<I", written, at + size - 4)[0], size)
-            kinds.append(kind)
-            at += size
-        self.assertEqual(kinds, [0x0A0D0D0A, 1, 6])
-
-    def test_hex(self):
-        lines = wire.hex_around(bytes(range(256)), 100)
-        self.assertEqual([line[0] for line in lines].count(">"), 1)
-        self.assertIn("00000060", next(line for line in lines if line[0] == ">"))
 
 
 class Page(HTMLParser):

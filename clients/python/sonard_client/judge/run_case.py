@@ -4,28 +4,30 @@
 """
 from __future__ import annotations
 
+import bisect
 import http.client
 import json
 import pathlib
 import signal
 import sys
 import time
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from .. import lab
 from ..control import Control
 from ..daemon import Daemon, DaemonFailed
 from .cases import Case
 from .driver import Driver, expand
+from .makes import make_of
 from .outcome import result_of
-from .scene import Journal, Scene, StatusWire
-from .truth import TruthReader, reader_for
+from .scene import Journal, Scene, StatusWire, mono
 from .verdicts import BACK_PINGS, Observation, back_at, judge
 from .wire import Capture, DatagramFlow, Seen
 
 NOMINAL_PINGS, NOMINAL_S = 20, 20.0  # a working driver takes so many pings in this time without a fault
 _SETTLE_S = 0.52
-_STILL_S = 20.0          # after such a time without any activity the judge stops waiting for the fault
+_STILL_S = 20.0          # so long nothing happens, and the fault's begin is waited for no more
+_EARLY_S = 0.02          # the journal may be written a little after the ping
 _DEVICE_ID = 7001
 
 
@@ -49,7 +51,8 @@ def config_of(spec: Dict[str, Any], case: Optional[Case], address: str, journal:
         by_sonard = case is not None and case.kind != "N00" and not case.needs_lab
         plan = [fault_record(case, int(spec["ping_bytes"]))] if case is not None and by_sonard else []
         more["faults"] = {"armed": True, "journal": str(journal), "plan": plan}
-    return lab.lab_config(spec["profile"], address, more)
+    make = make_of(spec["profile"])
+    return lab.lab_config(spec["profile"], address, more, make.sonar if make else None)
 
 
 def run(folder: pathlib.Path) -> Dict[str, Any]:
@@ -104,8 +107,7 @@ def _with_driver(spec: Dict[str, Any], case: Optional[Case], folder: pathlib.Pat
     words = expand(spec["driver"], address, port, _DEVICE_ID)
     driver = Driver(words, laboratory.host if laboratory else [], folder / "driver.log", spec["tap"] == "json")
     try:
-        capture: Optional[Capture] = Capture(lab.LINK if laboratory else "lo", address, port,
-                                              reader_for(spec["profile"]) or TruthReader)
+        capture: Optional[Capture] = Capture(lab.LINK if laboratory else "lo", address, port, make_of(spec["profile"]))
     except (PermissionError, OSError):
         capture = None
     scene = Scene(spec, folder, address, sonard, driver, capture, StatusWire(control), Journal(folder / "journal.jsonl"),
@@ -164,11 +166,11 @@ def explanation(scene: Scene) -> str:
     if scene.driver.exited is not None:
         lines.append(f"The driver ended with exit code {scene.driver.exited[1]}.")
     if scene.capture and not connections:
-        lines.append(f"It made no connection to {scene.address}:{scene.spec['port']}. Does its command have {{ip}}?")
-    elif scene.reads_pings and not any(c.fires for c in connections):
+        lines.append(f"It made no connection to {scene.address}:{scene.capture.port}. Does its command have {{ip}}?")
+    elif scene.make and scene.make.needs_request and not any(c.fires for c in connections):
         lines.append("It connected but sent neither settings nor a request: the sonar pings only after one.")
     elif not taken:
-        lines.append("It sent settings, but took no complete ping.")
+        lines.append("It connected, but took no complete ping.")
     elif scene.tapped and not scene.driver.published:
         lines.append(f"It took {taken} pings, but its standard output has no tap line. A line looks like "
                      '{"id": 812, "crc32": "0a1b2c3d"}; without a tap give --tap none.')
@@ -269,6 +271,15 @@ def _restart(scene: Scene) -> bool:
     return scene.wait(lambda: back_at(scene.ping_times(), before) is not None, 8.0, lambda: len(scene.ping_times()))
 
 
+def touched_pings(journal: Sequence[Dict[str, Any]], seen: Sequence[Seen], numbered: bool) -> List[int]:
+    """Numbers of the pings that the fault touched. Where the journal has other numbers than the pings: of the one that was sent next."""
+    injected = [r for r in journal if int(r.get("ping", 0) or 0) > 0 and r.get("event") == "injected"]
+    if numbered:
+        return [int(r["ping"]) for r in injected]
+    sent = sorted((s.mono, s.ping.number) for s in seen)
+    return [number for r in injected for _, number in sent[bisect.bisect(sent, (mono(r) - _EARLY_S,)):][:1]]
+
+
 def _observe(scene: Scene, case: Case, began: float, ended: float, watched_until: float) -> Observation:
     scene.driver.poll()
     published = list(scene.driver.published)
@@ -278,15 +289,16 @@ def _observe(scene: Scene, case: Case, began: float, ended: float, watched_until
     connections: List[Tuple[float, Optional[float], str]] = list(scene.status.connections)
     if scene.capture:
         connections = [(c.opened, c.ended, c.ended_by) for c in scene.capture.connections]
-    touched = [int(r["ping"]) for r in scene.journal.records if int(r.get("ping", 0) or 0) > 0 and r.get("event") == "injected"]
+    seen: List[Seen] = scene.capture.seen() if scene.capture else []
     delivered: List[Seen] = scene.capture.delivered() if scene.capture else []
     if scene.capture and case.needs_lab:  # the capture may see datagrams that the laboratory drops
         flows = {c.number for c in scene.capture.connections if isinstance(c, DatagramFlow)}
         delivered = [s for s in delivered if s.connection not in flows or not began <= s.mono <= ended]
     return Observation(
         began=began, ended=ended, watched_until=watched_until, tapped=scene.tapped, published=published,
-        true_pings=scene.capture.seen() if scene.capture else [], delivered=delivered,
-        wire_times=[] if scene.reads_pings else list(scene.status.ping_times), touched=touched, connections=connections,
+        true_pings=seen, delivered=delivered,
+        wire_times=[] if scene.reads_pings else list(scene.status.ping_times), connections=connections,
+        touched=touched_pings(scene.journal.records, seen, scene.make is None or scene.make.numbered),
         log_times=[t for t in [scene.driver.first_line_after(began)] if t is not None],
         state_times=[s.mono for s in scene.driver.states], log_lines_s=scene.driver.lines_per_s(began),
         samples=list(scene.driver.samples), exit_code=exited[1] if exited else None, exit_time=exited[0] if exited else None,

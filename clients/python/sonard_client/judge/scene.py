@@ -14,7 +14,8 @@ from .. import lab
 from ..control import Control, ControlError
 from ..daemon import Daemon
 from .driver import Driver, Published
-from .truth import reader_for
+from .makes import make_of
+from .truth import Make
 from .verdicts import sort_published
 from .wire import Capture
 
@@ -119,9 +120,13 @@ class Scene:
         return bool(self.spec["tap"] != "none")
 
     @property
+    def make(self) -> Optional[Make]:
+        return make_of(self.spec["profile"])
+
+    @property
     def reads_pings(self) -> bool:
-        """Whether pings can be read from the wire, which needs a capture and a reader for the protocol of the make."""
-        return self.capture is not None and reader_for(self.spec["profile"]) is not None
+        """Whether the truth can be read from the wire: there is a capture, and a reader of the make's protocol."""
+        return self.capture is not None and self.make is not None
 
     def say(self, what: str) -> None:
         self.moments.append((time.monotonic(), what))

@@ -173,7 +173,7 @@ def _judge_data(verdict: Verdict, seen: Observation, good: Sequence[Published], 
     lost = 0
     for one in seen.delivered:
         ping = one.ping
-        if seen.began <= one.mono <= until and ping.number not in touched and not crcs_without_number & ping.crcs and \
+        if ping.needed and seen.began <= one.mono <= until and ping.number not in touched and not crcs_without_number & ping.crcs and \
                 not any((ping.number, crc) in shown for crc in ping.crcs):
             lost += 1
     if false:

@@ -12,8 +12,7 @@ import threading
 import time
 from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Tuple
 
-from .. import layouts
-from .truth import Reader, TruePing, TruthReader
+from .truth import Make, Reader, TruePing
 
 _ALL_PROTOCOLS, _OUTGOING = 0x0003, 4
 _FIN, _SYN, _RST, _PSH, _ACK = 1, 2, 4, 8, 16
@@ -33,7 +32,7 @@ class Seen(NamedTuple):
 class Connection:
     """One TCP connection of the driver."""
 
-    def __init__(self, number: int, peer: str, mono: float, reader: Callable[[], Reader] = TruthReader) -> None:
+    def __init__(self, number: int, peer: str, mono: float, reader: Reader, is_request: Callable[[bytes], bool] = bool) -> None:
         self.number, self.peer, self.opened, self.established = number, peer, mono, False
         self.ended: Optional[float] = None
         self.ended_by = ""            # "driver FIN", "device RST", ...
@@ -45,7 +44,7 @@ class Connection:
         self.stream = bytearray()
         self._first: Optional[int] = None  # sequence number of the device's first byte
         self._waiting: Dict[int, bytes] = {}
-        self._reader = reader()
+        self._reader, self._is_request = reader, is_request
         self._repeat_until: Optional[int] = None
 
     def end(self, mono: float, by: str) -> None:
@@ -95,15 +94,16 @@ class Connection:
         fresh = self._repeat_until is None or (sequence - self._repeat_until) % _WRAP < _WRAP // 2
         if payload and fresh:
             self._repeat_until = (sequence + len(payload)) % _WRAP
-            if payload[:2] == b"BR" or payload[:2] == layouts.MAGIC and payload[6:8] == struct.pack("<H", layouts.FIRE):
+            if self._is_request(payload):
                 self.fires.append(mono)
 
 
 class DatagramFlow(Connection):
-    """Datagrams between the sonar and one port of the driver. The flow begins with the first datagram of the driver and has no end.
-    Every datagram on the wire counts as delivered, because UDP has no acknowledgements."""
+    """Datagrams between the sonar and one port of the driver, or of a group. It begins with the driver's first one, or with the
+    first of a ping that the sonar pushes; nothing says that it ends. What was on the wire counts as delivered: UDP has no
+    acknowledgement."""
 
-    def __init__(self, number: int, peer: str, mono: float, reader: Callable[[], Reader]) -> None:
+    def __init__(self, number: int, peer: str, mono: float, reader: Reader) -> None:
         super().__init__(number, peer, mono, reader)
         self.established = True
 
@@ -115,15 +115,14 @@ class DatagramFlow(Connection):
 class Capture(threading.Thread):
     """Captures packets from start() to stop(). Needs CAP_NET_RAW, which a process has in its own network namespace.
 
-    interface: "lo" or one end of the veth pair. device: the sonar's address. reader: finds the pings of its make in the bytes."""
+    interface: "lo" or the end of the cable. device: the sonar's address. make: None reads no pings."""
 
-    def __init__(self, interface: str, device: str, port: int = layouts.DATA_PORT,
-                 reader: Callable[[], Reader] = TruthReader) -> None:
+    def __init__(self, interface: str, device: str, port: int, make: Optional[Make]) -> None:
         super().__init__(daemon=True)
-        self._reader = reader
+        self._make = make or Make(())
         self._flows: Dict[Tuple[bytes, int], DatagramFlow] = {}
-        self._fragments: Dict[Tuple[bytes, bytes, bytes], Dict[int, bytes]] = {}  # of incomplete datagrams: fragments by offset
-        self._lo, self._device, self._port = interface == "lo", ipaddress.IPv4Address(device).packed, port
+        self._fragments: Dict[Tuple[bytes, bytes, bytes], Dict[int, bytes]] = {}  # of datagrams that are not complete
+        self._lo, self._device, self.port = interface == "lo", ipaddress.IPv4Address(device).packed, port
         self.connections: List[Connection] = []
         self.lost_packets = 0
         self._idle_at = 0.0  # the latest time when no packet was waiting
@@ -239,33 +238,37 @@ class Capture(threading.Thread):
     def _udp(self, mono: float, source: bytes, destination: bytes, datagram: bytes) -> None:
         source_port, destination_port = struct.unpack_from(">HH", datagram)
         payload = datagram[8:]
-        if source == self._device and source_port == self._port:
-            flow = self._flows.get((destination, destination_port))
-            if flow is not None:
-                flow.datagram(mono, payload)
-        elif destination == self._device and destination_port == self._port:
-            key = (source, source_port)
-            if key not in self._flows:
-                peer = f"{ipaddress.IPv4Address(source)}:{source_port}"
-                self._flows[key] = DatagramFlow(len(self.connections) + 1, peer, mono, self._reader)
-                self.connections.append(self._flows[key])
-            self._flows[key].fires.append(mono)
+        if source == self._device:
+            key = (destination, destination_port)
+            is_pushed = self._make.is_pushed is not None and self._make.is_pushed(payload)
+            if is_pushed or source_port == self.port and key in self._flows:
+                self._flow(mono, key).datagram(mono, payload)
+        elif destination == self._device and destination_port == self.port:
+            self._flow(mono, (source, source_port)).fires.append(mono)
+
+    def _flow(self, mono: float, key: Tuple[bytes, int]) -> DatagramFlow:
+        if key not in self._flows:
+            peer = f"{ipaddress.IPv4Address(key[0])}:{key[1]}"
+            self._flows[key] = DatagramFlow(len(self.connections) + 1, peer, mono, self._make.datagrams())
+            self.connections.append(self._flows[key])
+        return self._flows[key]
 
     def _tcp(self, mono: float, source: bytes, destination: bytes, packet: bytes, at: int, end: int) -> bool:
         source_port, destination_port, sequence, ack, offset, flags, window = struct.unpack_from(">HHIIBBH", packet, at)
         payload = packet[at + (offset >> 4) * 4:end]
-        if source == self._device and source_port == self._port:
+        if source == self._device and source_port == self.port:
             connection = self._open.get((destination, destination_port))
             if connection is not None:
                 connection.from_device(mono, sequence, flags, payload)
             return True
-        if destination == self._device and destination_port == self._port:
+        if destination == self._device and destination_port == self.port:
             key = (source, source_port)
             if flags & _SYN:
                 old = self._open.get(key)
                 if old is None or old.established or old.ended is not None:
                     peer = f"{ipaddress.IPv4Address(source)}:{source_port}"
-                    self._open[key] = Connection(len(self.connections) + 1, peer, mono, self._reader)
+                    self._open[key] = Connection(len(self.connections) + 1, peer, mono, self._make.stream(),
+                                                 self._make.is_request)
                     self.connections.append(self._open[key])
                 return True
             connection = self._open.get(key)

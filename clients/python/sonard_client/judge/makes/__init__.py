@@ -1,0 +1,14 @@
+"""The makes of sonar whose pings the judge reads."""
+from __future__ import annotations
+
+from typing import Optional
+
+from ..truth import Make
+from . import oculus, ping
+
+MAKES = (oculus.OCULUS, ping.NUMBERED, ping.UNNUMBERED)
+
+
+def make_of(profile: str) -> Optional[Make]:
+    """The make of such a product; None: its data are not judged."""
+    return next((make for make in MAKES if profile.startswith(make.profiles)), None)

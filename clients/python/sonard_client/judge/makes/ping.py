@@ -1,0 +1,40 @@
+"""The ping protocol: Ping1D, Ping360, S500, Omniscan, Surveyor. The samples are the payload of a whole message."""
+from __future__ import annotations
+
+import struct
+import zlib
+from typing import Dict, Iterator, Optional
+
+from ..truth import Make, TruePing, WholeMessages
+
+# Messages that have what a driver publishes, and where in the payload a number of the ping stands.
+_NUMBER_AT: Dict[int, Optional[int]] = {1300: 8, 1308: 0, 1223: None, 2198: None, 2300: None, 2301: None, 3012: 20}
+_FRAME = struct.Struct("<2sHHBB")  # "BR", length of the payload, message, source, destination; behind the payload a sum of 16 bits
+
+
+class PingReader(WholeMessages):
+    magic = b"BR"
+
+    def length(self, begin: int) -> int:
+        if len(self._data) - begin < _FRAME.size:
+            return -1
+        return _FRAME.size + int.from_bytes(self._data[begin + 2:begin + 4], "little") + 2
+
+    def is_damaged(self, message: bytes) -> bool:
+        return sum(message[:-2]) & 0xFFFF != int.from_bytes(message[-2:], "little")
+
+    def pings(self, message: bytes, begin: int) -> Iterator[TruePing]:
+        kind = int.from_bytes(message[4:6], "little")
+        if kind not in _NUMBER_AT:
+            return
+        payload, at = message[_FRAME.size:-2], _NUMBER_AT[kind]
+        has_number = at is not None and len(payload) >= at + 4
+        number = int.from_bytes(payload[at:at + 4], "little") if at is not None and has_number else self.unnumbered()
+        yield TruePing(number, frozenset({zlib.crc32(payload)}), 1, len(payload), begin, begin + len(message))
+
+
+def _make(*profiles: str, numbered: bool) -> Make:
+    return Make(profiles, PingReader, lambda: PingReader(is_stream=False), lambda sent: sent[:2] == b"BR", numbered=numbered)
+
+
+NUMBERED, UNNUMBERED = _make("ping1d", "s500", "surveyor", numbered=True), _make("ping360", "omniscan", numbered=False)
