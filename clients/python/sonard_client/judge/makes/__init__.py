@@ -4,9 +4,9 @@ from __future__ import annotations
 from typing import Optional
 
 from ..truth import Make
-from . import oculus, ping
+from . import m3, oculus, ping
 
-MAKES = (oculus.OCULUS, ping.NUMBERED, ping.UNNUMBERED)
+MAKES = (oculus.OCULUS, ping.NUMBERED, ping.UNNUMBERED, m3.M3)
 
 
 def make_of(profile: str) -> Optional[Make]:
