@@ -4,9 +4,9 @@ from __future__ import annotations
 from typing import Optional
 
 from ..truth import Make
-from . import m3, oculus, ping
+from . import m3, micron, oculus, ping
 
-MAKES = (oculus.OCULUS, ping.NUMBERED, ping.UNNUMBERED, m3.M3)
+MAKES = (oculus.OCULUS, ping.NUMBERED, ping.UNNUMBERED, m3.M3, micron.MICRON)
 
 
 def make_of(profile: str) -> Optional[Make]:
