@@ -4,9 +4,9 @@ from __future__ import annotations
 from typing import Optional
 
 from ..truth import Make
-from . import blueview, dvl, m3, micron, oculus, ping
+from . import aris, blueview, dvl, m3, micron, oculus, ping
 
-MAKES = (oculus.OCULUS, blueview.BLUEVIEW, ping.NUMBERED, ping.UNNUMBERED, m3.M3, micron.MICRON, dvl.DVL)
+MAKES = (oculus.OCULUS, blueview.BLUEVIEW, ping.NUMBERED, ping.UNNUMBERED, m3.M3, micron.MICRON, dvl.DVL, aris.ARIS)
 
 
 def make_of(profile: str) -> Optional[Make]:
