@@ -4,9 +4,10 @@ from __future__ import annotations
 from typing import Optional
 
 from ..truth import Make
-from . import aris, blueview, dvl, m3, micron, oculus, ping
+from . import aris, blueview, dvl, m3, micron, oculus, ping, waterlinked
 
-MAKES = (oculus.OCULUS, blueview.BLUEVIEW, ping.NUMBERED, ping.UNNUMBERED, m3.M3, micron.MICRON, dvl.DVL, aris.ARIS)
+MAKES = (oculus.OCULUS, blueview.BLUEVIEW, ping.NUMBERED, ping.UNNUMBERED, m3.M3, micron.MICRON, dvl.DVL, aris.ARIS,
+         waterlinked.WATERLINKED)
 
 
 def make_of(profile: str) -> Optional[Make]:
