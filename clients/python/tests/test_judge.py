@@ -185,6 +185,19 @@ class Tap(unittest.TestCase):
         self.assertEqual(run_case.port_of({"listens": "127.0.0.2:1", "addresses": one}), 12345)
         self.assertEqual(run_case.port_of({"listens": "127.0.0.2:14750"}), 14750)
 
+    def test_why_a_driver_takes_no_pings(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene = mock.Mock(folder=pathlib.Path(folder), address="10.77.0.2", make=mock.Mock(needs_request=True))
+            (scene.folder / "driver.log").write_text("last words\n")
+            scene.driver.exited = None
+            scene.capture.configure_mock(connections=[], port=16171)
+            scene.capture.delivered.return_value = []
+            self.assertRegex(run_case.explanation(scene), "no connection to 10.77.0.2:16171(.|\n)*last words")
+            scene.capture.connections = [mock.Mock(fires=[])]
+            self.assertIn("sent neither settings nor a request", run_case.explanation(scene))
+            scene.make.needs_request = False
+            self.assertIn("took no complete ping", run_case.explanation(scene))
+
     def test_why_a_fault_has_no_effect_on_a_make(self):
         judge = mock.Mock(options=mock.Mock(profile="omniscan-450"), lacking="", fault_engine=True, ping_bytes=1)
         judge.kinds = {"G01": {"parameters": [], "without_effect": {"oculus": "sends none", "omniscan450": "has none"}}}

@@ -42,8 +42,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="sonarctl judge", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--driver", metavar="TEXT", help="starts the driver; {ip}, {port} and {id} are filled in")
-    parser.add_argument("--tap", metavar="TEXT", default="none",
-                        help="json: the driver prints a JSON line a ping; ros1:TOPIC or ros2:TOPIC; none (the default)")
+    parser.add_argument("--tap", metavar="TEXT", default="none", type=lambda text: "none" if text == "wire" else text,
+                        help="json: the driver prints a JSON line a ping; ros1:TOPIC or ros2:TOPIC; wire or none (the default): only "
+                             "the packets are looked at")
     parser.add_argument("--profile", metavar="TEXT", default=DEFAULT_PROFILE, help="product")
     parser.add_argument("--case", metavar="TEXT", action="append", default=[],
                         help="number (L05.2), code (L05), family (L) or name; repeatable")
@@ -101,7 +102,7 @@ def _check(options: argparse.Namespace) -> None:
         raise ValueError("--shallow belongs to --torture")
     kind, _, topic = options.tap.partition(":")
     if kind not in ("json", "none", *ROS_MODULES):
-        raise ValueError(f"--tap {options.tap}: it must be json, ros1:TOPIC, ros2:TOPIC or none")
+        raise ValueError(f"--tap {options.tap}: it must be json, ros1:TOPIC, ros2:TOPIC or wire (none)")
     if kind in ROS_MODULES and not topic:
         raise ValueError(f"--tap {kind} needs the topic: --tap {kind}:/sonar/ping")
     if kind in ROS_MODULES and importlib.util.find_spec(ROS_MODULES[kind]) is None:

@@ -18,7 +18,7 @@ _DATA = {"CLEAN": "good", "LOST": "fair", "STALE": "bad", "FALSE": "worst"}
 _RECOVERY = {"NONE NEEDED": "good", "BACK": "good", "OPERATOR": "bad", "NEVER": "bad", "CRASH": "worst"}
 _WORDS = {"CLEAN": "all that arrived whole was published once", "LOST": "pings that arrived whole were not published",
           "STALE": "pings were published a second time as new", "FALSE": "published pings differ from what was measured",
-          "UNSEEN": "not known: the driver has no tap (--tap), or the make's data are not judged",
+          "UNSEEN": "not known: the driver has no tap (--tap), or the packets cannot be read",
           "NONE NEEDED": "pings never stopped",
           "BACK": "time from the fault's end to the first of three pings published in a row",
           "OPERATOR": "came back only after the judge started the driver again",
