@@ -82,8 +82,9 @@ def micron(address, port):
         sonar.until(b"@")
         size = int(sonar.take(4), 16) + 1
         frame = sonar.take(size)
-        if frame[5] == 4 and not frame[8 + 7] & 0x80:  # a head without parameters
-            send(19, head)
+        if frame[5] == 4:  # a head that sends no lines; bit 7: it has parameters
+            if not frame[8 + 7] & 0x80:
+                send(19, head)
             send(25, bytes(4))
         if frame[5] == 2:
             asked = False

@@ -31,7 +31,16 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
         self.assertEqual(ping.rows, 240)
 
     def test_a_line_of_another_size_than_it_says(self):
-        self.assertEqual(self.found(frame(2, line(BINS[0])[:-1]), frame(2, line(BINS[0]) + b"\0"), frame(2, b"")), [])
+        for payload in (line(BINS[0])[:-1], line(BINS[0]) + b"\0", b"", line(b"")):
+            self.assertEqual(self.found(frame(2, payload)), [])
+
+    def test_one_of_the_lengths_must_agree(self):
+        whole = frame(2, line(BINS[0]))
+        for changes, found in (((4,), [False]), ((5,), [False]), ((4, 5), []), ((), [True])):
+            changed = bytearray(whole)
+            for at in changes:
+                changed[at] ^= 1
+            self.assertEqual([ping.needed for ping in self.found(bytes(changed))], found, changes)
 
     def test_requests(self):
         self.assertIs(make_of("micron"), micron.MICRON)

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import zlib
-from typing import Iterator
+from typing import Iterator, Tuple
 
 from ..truth import Make, TruePing, WholeMessages
 
@@ -11,34 +11,41 @@ _HEAD_DATA, _HEAD_COMMAND, _SEND_DATA = 2, 19, 25
 _HEAD, _SIZE_AT = 31, 29  # of the payload before its bins
 
 
+def _lengths(data: "bytes | bytearray", begin: int) -> Tuple[bytes, bytes]:
+    """The two lengths of a frame, as hexadecimal digits."""
+    return bytes(data[begin + 1:begin + 5]), b"%04X" % int.from_bytes(data[begin + 5:begin + 7], "little")
+
+
 class MicronReader(WholeMessages):
+    """The number of bins says how long a line is; one of the frame's two lengths must agree. If only one does, a driver may leave the
+    line out."""
     magic = b"@"
 
     def length(self, begin: int) -> int:
-        return self._length(self._data, begin)
-
-    @staticmethod
-    def _length(data: "bytes | bytearray", begin: int) -> int:
-        head = data[begin:begin + 7]
-        if len(head) < 7:
+        if len(self._data) - begin < _HEADER + _HEAD:
             return -1
-        size = int.from_bytes(head[5:7], "little")
-        return size + _UNCOUNTED if head[1:5] == b"%04X" % size and 8 <= size <= _LONGEST - _UNCOUNTED else 0
+        at = begin + _HEADER + _SIZE_AT
+        size = _HEADER + _HEAD + int.from_bytes(self._data[at:at + 2], "little") + 1
+        is_line = self._data[begin + 10] == _HEAD_DATA and size <= _LONGEST
+        return size if is_line and b"%04X" % (size - _UNCOUNTED) in _lengths(self._data, begin) else 0
 
     def is_damaged(self, message: bytes) -> bool:
         at = 0
         while (at := message.find(self.magic, at + 1)) > 0:
-            if self._length(message, at) > 0:  # another frame inside: this one lacks bytes
+            digits, length = _lengths(message, at)
+            if digits == length:  # another frame inside: this one lacks bytes
                 return True
         return not message.endswith(b"\n")
 
     def pings(self, message: bytes, begin: int) -> Iterator[TruePing]:
         payload = message[_HEADER:-1]
         bins = payload[_HEAD:]
-        if message[10] != _HEAD_DATA or len(payload) <= _HEAD or int.from_bytes(payload[_SIZE_AT:_HEAD], "little") != len(bins):
+        if not bins:
             return
+        digits, length = _lengths(message, 0)
         count = len(bins) if payload[5] & 1 else 2 * len(bins)  # 8 or 4 bits
-        yield TruePing(self.unnumbered(), frozenset({zlib.crc32(payload), zlib.crc32(bins)}), count, 1, begin, begin + len(message))
+        yield TruePing(self.unnumbered(), frozenset({zlib.crc32(payload), zlib.crc32(bins)}), count, 1, begin, begin + len(message),
+                       digits == length)
 
 
 def _is_request(sent: bytes) -> bool:
