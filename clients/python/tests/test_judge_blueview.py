@@ -42,7 +42,9 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
 
     def test_lies_about_sizes(self):
         samples = packed(values(1000))
-        for bad in (ping(7, samples, size=5), ping(7, samples, deflated=True, size=5), ping(7, samples[:-2]), ping(7, samples + b"\0\0"),
+        for lie in (ping(7, samples, size=5), ping(7, samples, deflated=True, size=5)):
+            self.assertEqual(len(self.found(lie)), 1)
+        for bad in (ping(7, samples[:-2]), ping(7, samples + b"\0\0"),
                     ping(7, b""), ping(7, samples, deflated=True)[:-9].replace(b"BVE1", b"XXXX"), frame(0x8004, bytes(20))):
             self.assertEqual(self.found(bad), [])
         broken = bytearray(ping(7, samples, deflated=True))

@@ -30,13 +30,14 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
         (ping,) = self.found(frame(2, line(BINS[0], control=0)))
         self.assertEqual(ping.rows, 240)
 
-    def test_a_line_of_another_size_than_it_says(self):
-        for payload in (line(BINS[0])[:-1], line(BINS[0]) + b"\0", b"", line(b"")):
-            self.assertEqual(self.found(frame(2, payload)), [])
+    def test_lines_without_bins_and_other_messages(self):
+        for message in (frame(2, b""), frame(2, line(b"")), frame(4, line(BINS[0])), frame(2, line(bytes(4096)))):
+            self.assertEqual(self.found(message), [])
 
-    def test_one_of_the_lengths_must_agree(self):
-        whole = frame(2, line(BINS[0]))
-        for changes, found in (((4,), [False]), ((5,), [False]), ((4, 5), []), ((), [True])):
+    def test_two_of_three_lengths_must_agree(self):
+        whole, bins_at = frame(2, line(BINS[0])), 13 + 29
+        for changes, found in (((), [True]), ((4,), [False]), ((5,), [False]), ((bins_at,), [False]), ((4, 5), []), ((4, bins_at), []),
+                               ((5, bins_at), [])):
             changed = bytearray(whole)
             for at in changes:
                 changed[at] ^= 1

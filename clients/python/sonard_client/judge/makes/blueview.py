@@ -15,12 +15,11 @@ _FORM = struct.Struct("<HHBBH")  # beams, bins, format, compression, fields of n
 _NAVIGATION_BYTES = (8, 8, 8, 4, 4, 4, 4, 4, 4, 4)  # of each field; the next one is a text
 
 
-def _samples(payload: bytes, navigation: int, is_deflated: int) -> Optional[bytes]:
-    """The samples of a ping; None: they cannot be read."""
-    at = _NAVIGATION_AT + sum(size for bit, size in enumerate(_NAVIGATION_BYTES) if navigation >> bit & 1)
+def _samples(payload: bytes, navigation: int, is_deflated: int, size: int) -> Optional[bytes]:
+    """So many bytes of samples; None: there are more or fewer. The field that says how many there are may lie."""
+    at = _NAVIGATION_AT + sum(wide for bit, wide in enumerate(_NAVIGATION_BYTES) if navigation >> bit & 1)
     if navigation >> len(_NAVIGATION_BYTES) & 1:
         at += 2 + int.from_bytes(payload[at:at + 2], "little")
-    size = int.from_bytes(payload[at:at + 4], "little")
     samples = payload[at + 4:]
     if is_deflated:
         try:
@@ -47,8 +46,8 @@ class BlueViewReader(WholeMessages):
         if _HEADER.unpack_from(message)[1] != _PING_DATA or len(payload) < _NAVIGATION_AT:
             return
         beams, bins, form, is_deflated, navigation = _FORM.unpack_from(payload, _FORM_AT)
-        samples = _samples(payload, navigation, is_deflated)
-        if form != 1 or samples is None or not samples or len(samples) != 2 * beams * bins:
+        samples = _samples(payload, navigation, is_deflated, 2 * beams * bins)
+        if form != 1 or not samples:
             return
         values, rows = array.array("H", samples), array.array("H")
         for row in range(bins):

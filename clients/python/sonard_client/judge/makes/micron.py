@@ -16,18 +16,26 @@ def _lengths(data: "bytes | bytearray", begin: int) -> Tuple[bytes, bytes]:
     return bytes(data[begin + 1:begin + 5]), b"%04X" % int.from_bytes(data[begin + 5:begin + 7], "little")
 
 
+def _size_by_bins(data: "bytes | bytearray", begin: int) -> int:
+    at = begin + _HEADER + _SIZE_AT
+    return _HEADER + _HEAD + int.from_bytes(data[at:at + 2], "little") + 1
+
+
 class MicronReader(WholeMessages):
-    """The number of bins says how long a line is; one of the frame's two lengths must agree. If only one does, a driver may leave the
-    line out."""
+    """Two of three must agree: the two lengths of a frame, and the number of bins. A driver may leave out a line in which one does
+    not."""
     magic = b"@"
 
     def length(self, begin: int) -> int:
         if len(self._data) - begin < _HEADER + _HEAD:
             return -1
-        at = begin + _HEADER + _SIZE_AT
-        size = _HEADER + _HEAD + int.from_bytes(self._data[at:at + 2], "little") + 1
-        is_line = self._data[begin + 10] == _HEAD_DATA and size <= _LONGEST
-        return size if is_line and b"%04X" % (size - _UNCOUNTED) in _lengths(self._data, begin) else 0
+        digits, length = _lengths(self._data, begin)
+        size = _size_by_bins(self._data, begin)
+        if digits == length:
+            size = int.from_bytes(self._data[begin + 5:begin + 7], "little") + _UNCOUNTED
+        elif b"%04X" % (size - _UNCOUNTED) not in (digits, length):
+            return 0
+        return size if self._data[begin + 10] == _HEAD_DATA and _HEADER + _HEAD + 1 < size <= _LONGEST else 0
 
     def is_damaged(self, message: bytes) -> bool:
         at = 0
@@ -40,12 +48,10 @@ class MicronReader(WholeMessages):
     def pings(self, message: bytes, begin: int) -> Iterator[TruePing]:
         payload = message[_HEADER:-1]
         bins = payload[_HEAD:]
-        if not bins:
-            return
         digits, length = _lengths(message, 0)
         count = len(bins) if payload[5] & 1 else 2 * len(bins)  # 8 or 4 bits
         yield TruePing(self.unnumbered(), frozenset({zlib.crc32(payload), zlib.crc32(bins)}), count, 1, begin, begin + len(message),
-                       digits == length)
+                       digits == length and _size_by_bins(message, 0) == len(message))
 
 
 def _is_request(sent: bytes) -> bool:
