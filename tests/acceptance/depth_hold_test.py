@@ -5,9 +5,10 @@ import socket
 import sys
 import tempfile
 import unittest
+import urllib.request
 
 import mavlink_frames
-from running_sonard import ROOT, Sonard, run
+from running_sonard import ROOT, SONARCTL, Sonard, run
 
 sys.path.insert(0, str(ROOT / "clients/python"))
 from sonard_client import Control  # noqa: E402
@@ -64,12 +65,27 @@ class Autopilot:
         return self.next("COMMAND_ACK")["result"]
 
 
-def sonard(port, folder, distance_sensor="true", **options):
+def sonard(port, folder, distance_sensor="true", link="udpout:127.0.0.1", **options):
     scene = pathlib.Path(folder) / "slope.yaml"
     scene.write_text(BED, encoding="utf-8")
     return Sonard(scene=scene, profile="ping1d", mount=DOWN, pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}",
-                  poses=f", mavlink: [{{endpoint: 'udpout:127.0.0.1:{port}', distance_sensor: {distance_sensor}}}]",
+                  poses=f", mavlink: [{{endpoint: '{link}:{port}', distance_sensor: {distance_sensor}}}]",
                   arguments=["--clock", "lockstep", *options.pop("arguments", ())], **options)
+
+
+def dropped(daemon):
+    """Distances of the only link that were not sent, by reason, which status and metrics count alike."""
+    with urllib.request.urlopen(f"http://{daemon.address}:8088/metrics", timeout=60) as answer:
+        metrics = answer.read().decode()
+    reasons = {reason: int(count) for reason, count in
+               re.findall(r'^sonard_distances_dropped_total\{.*reason="(\w+)"\} (\d+)$', metrics, re.M)}
+    [link] = Control(daemon.address).status()["links"]
+    assert link["distances_dropped"] == sum(reasons.values()), (link, reasons)
+    assert f'sonard_distances_sent_total{{link="{link["endpoint"]}"}} {link["distances_sent"]}\n' in metrics, metrics
+    told = f"{link['endpoint']}  rov  {link['distances_sent']} distances sent, {link['distances_dropped']} dropped\n"
+    status = run(SONARCTL, "status", "--control", f"{daemon.address}:14770").stdout
+    assert told in status, status
+    return reasons
 
 
 class DepthHold(unittest.TestCase):
@@ -109,6 +125,7 @@ class DepthHold(unittest.TestCase):
                 control.step(1)
                 self.assertEqual(list(autopilot.arrived()), [], "the pings are withheld")
             self.assertIn("DISTANCE_SENSOR was not sent: a fault withholds the ping", daemon.log())
+            self.assertEqual(dropped(daemon), {"fault": 10, "no_vehicle": 0, "socket": 0})
             control.step(1)
             self.assertEqual(len(list(autopilot.arrived())), 10)
 
@@ -128,6 +145,14 @@ class DepthHold(unittest.TestCase):
             self.assertEqual(autopilot.command(511, -1), 0)
             control.step(1)
             self.assertEqual(list(autopilot.arrived()), [])
+
+    def test_distances_that_cannot_be_sent_are_counted(self):
+        for link, reason, why in (("udpin:127.0.0.1", "no_vehicle", "no vehicle is known"),
+                                  ("udpout:127.255.255.255", "socket", "Permission denied")):  # broadcast needs an option of the socket
+            with self.subTest(link=link), tempfile.TemporaryDirectory() as folder, sonard(14599, folder, link=link) as daemon:
+                Control(daemon.address).step(1)
+                self.assertEqual(dropped(daemon), {"fault": 0, "no_vehicle": 0, "socket": 0, reason: 10})
+                self.assertIn(f"DISTANCE_SENSOR was not sent: {why}", daemon.log())
 
     def test_two_runs_send_the_same_messages(self):
         def run_once():

@@ -81,7 +81,8 @@ TEST(StatusText, NamesEverything) {
         name: "boat" source: "trajectory way.csv"
         trajectory { file: "way.csv" position_s: 60 duration_s: 60 speed: 1 }
       }
-      objects { name: "wall" material: "concrete" moving: true triangles: 12 })");
+      objects { name: "wall" material: "concrete" moving: true triangles: 12 }
+      links { endpoint: "udpin:127.0.0.1:14551" vehicle: "rov" distances_sent: 7 distances_dropped: 2 })");
   const std::string text = text_from(status);
   for (const char* part :
        {"sonard 0.1.0  up 62 min  120 MB\n", "config    a.yaml\n", "scene     demo:harbour  seed 1  clock realtime\n",
@@ -92,7 +93,8 @@ TEST(StatusText, NamesEverything) {
         "place   -6.00 0.00 -3.00 m, heading 90.0, pitch -10.0, roll 0.0 deg\n",
         "10.0.0.9:4000  12 pings, 1 dropped, 2.5 MB, 2 min\n", "from json 127.0.0.1  stale\n",
         "from trajectory dive.tum  at 12.3 of 60.0 s x2.5 looped paused\n",
-        "from trajectory way.csv  at 60.0 of 60.0 s x1 ended\n", "moving  hidden\n"})
+        "from trajectory way.csv  at 60.0 of 60.0 s x1 ended\n", "moving  hidden\n",
+        "mavlink   udpin:127.0.0.1:14551  rov  7 distances sent, 2 dropped\n"})
     EXPECT_THAT(text, HasSubstr(part));
 }
 

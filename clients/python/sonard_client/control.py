@@ -20,7 +20,8 @@ _FIRST_REPLY_S = 2.0  # sonard replies to /healthz at once; a longer silence mea
 # checks that the list has all of them.
 _WIDE = {"seed", "pings", "refused", "served", "dropped", "skipped_ticks", "clients", "refused_clients", "pings_written",
          "pings_dropped", "bytes_written", "bytes_read", "accepted", "late", "replaced", "over_rate", "fired_at_ns", "now_ns", "unsent", "messages", "bytes",
-         "seq", "utc_ns", "mono_ns", "time_ns", "client_number", "offset", "bytes_before", "bytes_after", "injections"}
+         "seq", "utc_ns", "mono_ns", "time_ns", "client_number", "offset", "bytes_before", "bytes_after", "injections",
+         "distances_sent", "distances_dropped"}
 _LATEST = 2 ** 64 - 1
 
 

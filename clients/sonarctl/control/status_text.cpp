@@ -136,6 +136,10 @@ std::string text_from(const v1::DaemonStatus& s) {
   text += line("poses", format("%llu accepted, %llu refused, %llu late, %llu replaced, %llu over the rate",
                                wide(s.poses().accepted()), wide(s.poses().refused()), wide(s.poses().late()),
                                wide(s.poses().replaced()), wide(s.poses().over_rate())));
+  for (const v1::LinkStatus& l : s.links())
+    text +=
+        line("mavlink", l.endpoint() + "  " + l.vehicle() +
+                            format("  %llu distances sent, %llu dropped", wide(l.distances_sent()), wide(l.distances_dropped())));
   for (const v1::Note& n : s.notes()) text += line("note", n.text() + (n.cure().empty() ? "" : "; " + n.cure()));
   for (const v1::RecordingStatus& r : s.recordings()) text += line("recording", recording_text(r));
   for (const v1::ObjectStatus& o : s.objects()) text += line("object", text_from(o));

@@ -178,6 +178,19 @@ void write_poses(PrometheusText& text, const PoseCounters& poses) {
   text.sample({}, static_cast<double>(poses.stale));
 }
 
+void write_links(PrometheusText& text, const std::vector<LinkFigures>& links) {
+  text.family("sonard_distances_sent_total", Type::counter, "DISTANCE_SENSOR messages sent on each MAVLink link.");
+  for (const LinkFigures& link : links) text.sample({{"link", link.endpoint}}, static_cast<double>(link.sent));
+  text.family(
+      "sonard_distances_dropped_total", Type::counter,
+      "DISTANCE_SENSOR messages that were not sent, because a fault withheld the ping, no vehicle was heard on the link, or "
+      "the socket refused them.");
+  for (const LinkFigures& link : links)
+    for (const auto& [reason, count] :
+         {std::pair("fault", link.withheld), std::pair("no_vehicle", link.unaddressed), std::pair("socket", link.refused)})
+      text.sample({{"link", link.endpoint}, {"reason", reason}}, static_cast<double>(count));
+}
+
 void write_faults(PrometheusText& text, const DaemonFigures& figures) {
   text.family("sonard_faults_active", Type::gauge, "Faults on purpose that act now.");
   for (const auto& [sonar, count] : figures.active_faults) text.sample({{"sonar", sonar}}, static_cast<double>(count));
@@ -219,6 +232,7 @@ std::string metrics_text(const DaemonFigures& figures) {
   PrometheusText text;
   write_sonars(text, figures);
   write_poses(text, figures.poses);
+  write_links(text, figures.links);
   write_faults(text, figures);
   write_process(text, figures);
   return text.take();

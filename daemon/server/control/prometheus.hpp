@@ -9,6 +9,7 @@
 
 #include "daemon/emulator/connections/metrics.hpp"
 #include "daemon/emulator/view/viewer.hpp"
+#include "daemon/server/poses/link_figures.hpp"
 #include "daemon/server/system/process_figures.hpp"
 
 namespace sonar {
@@ -36,6 +37,7 @@ struct DaemonFigures {
   double uptime_s = 0;
   std::vector<std::pair<std::string, DeviceFigures>> sonars;  // by name
   PoseCounters poses;
+  std::vector<LinkFigures> links;                                                      // of MAVLink
   std::uint64_t clients_now = 0, refused_for_places = 0, refused_for_descriptors = 0;  // of all sonars together
   std::vector<ViewerFigures> viewers;                                                  // viewers of the live view
   ProcessFigures process;

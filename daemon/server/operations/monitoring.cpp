@@ -76,6 +76,16 @@ void add_notes(v1::DaemonStatus& out, const std::vector<Note>& notes) {
   }
 }
 
+void add_links(v1::DaemonStatus& out, const std::vector<LinkFigures>& links) {
+  for (const LinkFigures& of : links) {
+    v1::LinkStatus& link = *out.add_links();
+    link.set_endpoint(of.endpoint);
+    link.set_vehicle(of.vehicle);
+    link.set_distances_sent(of.sent);
+    link.set_distances_dropped(of.dropped());
+  }
+}
+
 void add_viewers(v1::DaemonStatus& out, const std::vector<ViewerFigures>& viewers) {
   for (const ViewerFigures& v : viewers) {
     v1::ViewerStatus& viewer = *out.add_viewers();
@@ -117,6 +127,7 @@ std::shared_ptr<const v1::DaemonStatus> Monitoring::status() const {
   s.set_faults_armed(of_.config.faults.armed);
   for (v1::FaultStatus& fault : fault_statuses(of_.fleet, now, false)) *s.add_faults() = std::move(fault);
   add_viewers(s, of_.view.viewers());
+  add_links(s, of_.mavlink.figures());
   return status;
 }
 
@@ -129,6 +140,7 @@ std::string Monitoring::metrics() const {
   f.fault_injections.assign(of_.faults.injections().begin(), of_.faults.injections().end());
   f.fault_entries_lost = of_.faults.lost();
   f.poses = of_.world.counters();
+  f.links = of_.mavlink.figures();
   f.clients_now = of_.admission.now();
   f.refused_for_places = of_.admission.refused_for_places();
   f.refused_for_descriptors = of_.admission.refused_for_descriptors();

@@ -86,6 +86,15 @@ std::vector<std::string> MavlinkServer::endpoints() const {
   for (const Link& l : links_) all.push_back(text_of(l.config));
   return all;
 }
+std::vector<LinkFigures> MavlinkServer::figures() const {
+  std::vector<LinkFigures> all;
+  for (const Link& l : links_) {
+    LinkFigures& figures = all.emplace_back(l.distances);
+    figures.endpoint = text_of(l.config);
+    figures.vehicle = l.config.vehicle;
+  }
+  return all;
+}
 std::vector<Note> MavlinkServer::notes() const {
   std::vector<Note> all;
   for (const Link& l : links_)
@@ -168,16 +177,19 @@ void MavlinkServer::on_distance(const SonarConfig& sonar, const PingQueued& ping
       if (!message) continue;  // the vehicle wants fewer
       if (link.peer) link.socket.send_to(asio::buffer(*message), *link.peer, 0, failed);
     }
-    if (ping.distance && link.peer && !failed) {
-      ++link.distances_sent;
-    } else {
-      ++link.distances_dropped;
-      const char* const why = !ping.distance ? "a fault withholds the ping"
-                              : link.peer    ? "the socket takes none"
-                                             : "no vehicle is known";
+    LinkFigures& counts = link.distances;
+    std::string why;
+    if (!ping.distance)
+      ++counts.withheld, why = "a fault withholds the ping";
+    else if (!link.peer)
+      ++counts.unaddressed, why = "no vehicle is known";
+    else if (failed)
+      ++counts.refused, why = failed.message();
+    else
+      ++counts.sent;
+    if (!why.empty())
       log_limited(log_, link.drops, LogLevel::info, link.name + ": DISTANCE_SENSOR was not sent: " + why,
-                  {{"sonar", sonar.name}, {"dropped", link.distances_dropped}, {"sent", link.distances_sent}});
-    }
+                  {{"sonar", sonar.name}, {"dropped", counts.dropped()}, {"sent", counts.sent}});
     look_at_wants(link);
   }
 }

@@ -12,6 +12,7 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/connections/actions.hpp"
+#include "daemon/server/poses/link_figures.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
@@ -40,6 +41,8 @@ class MavlinkServer {
 
   /// "udpin:127.0.0.1:14551", with the port the system chose for 0.
   std::vector<std::string> endpoints() const;
+  /// Counts of the distances of each link, in the order of the configuration.
+  std::vector<LinkFigures> figures() const;
   /// Notes on links that bring no poses: their missing messages.
   std::vector<Note> notes() const;
   /// Address of a listening link, in the order of the configuration.
@@ -54,7 +57,7 @@ class MavlinkServer {
     std::optional<udp::endpoint> peer;  // whom we answer
     std::string name;                   // "mavlink udpin:127.0.0.1:14551"
     LogLimiter notices = {}, drops = {};
-    std::uint64_t distances_sent = 0, distances_dropped = 0;
+    LinkFigures distances = {};
     bool distances_wanted = false;  // as of the last look
   };
 

@@ -105,6 +105,7 @@ DaemonFigures two_sonars() {
   f.sonars[1].second.dropped_by[static_cast<std::size_t>(DropReason::gone)] = 4;
   f.sonars[1].second.skipped.busy = 5;
   f.poses.late = 6;
+  f.links = {{.endpoint = "udpin:127.0.0.1:14551", .vehicle = "rov", .sent = 9, .unaddressed = 3}};
   f.refused_for_descriptors = 8;
   return f;
 }
@@ -115,6 +116,8 @@ TEST(Prometheus, TellsEverySonarApart) {
   EXPECT_THAT(text, HasSubstr("sonard_pings_dropped_total{sonar=\"side\",reason=\"gone\"} 4\n"));
   EXPECT_THAT(text, HasSubstr("sonard_ticks_skipped_total{sonar=\"side\",reason=\"busy\"} 5\n"));
   EXPECT_THAT(text, HasSubstr("sonard_poses_total{outcome=\"late\"} 6\n"));
+  EXPECT_THAT(text, HasSubstr("sonard_distances_sent_total{link=\"udpin:127.0.0.1:14551\"} 9\n"));
+  EXPECT_THAT(text, HasSubstr("sonard_distances_dropped_total{link=\"udpin:127.0.0.1:14551\",reason=\"no_vehicle\"} 3\n"));
   EXPECT_THAT(text, HasSubstr("sonard_connections_refused_total{reason=\"descriptors\"} 8\n"));
   EXPECT_THAT(text, HasSubstr("sonard_build_info{version=\"1.2.3\"} 1\n"));
 }
