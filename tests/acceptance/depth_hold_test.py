@@ -31,13 +31,13 @@ objects:
 
 
 class Autopilot:
-    """A UDP port that sonard dials."""
+    """A UDP port that sonard dials, or that speaks first to `peer`, a listening link of sonard."""
 
-    def __init__(self):
+    def __init__(self, peer=None):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
         self.socket.settimeout(120)
-        self.port, self.peer, self.speak = self.socket.getsockname()[1], None, mavlink_frames.Speaker()
+        self.port, self.peer, self.speak = self.socket.getsockname()[1], peer, mavlink_frames.Speaker()
 
     def next(self, name):
         """The fields of the next message of that name."""

@@ -1,12 +1,22 @@
-"""In the stepped clock a run is the same to the byte, however many threads compute it."""
+"""In stepped time a run is the same to the byte, however many threads compute it: one sonar, and a vehicle's suite of three makes."""
 import hashlib
+import json
+import math
+import pathlib
 import re
+import socket
+import struct
+import tempfile
+import threading
 import unittest
 
+from depth_hold_test import Autopilot, Control
 from oculus_reader import Client, fire_message
-from running_sonard import Sonard
+from running_sonard import ROOT, SONARD, Daemon, Sonard, eventually
 
 PINGS = 200
+STEPS, STEP_S = 20, 0.1
+PATIENCE_S = 120
 
 
 def run(threads, seed=1):
@@ -38,6 +48,93 @@ class Determinism(unittest.TestCase):
         self.assertEqual(pings, PINGS)
         self.assertEqual(runs[2], runs[1])
         self.assertEqual(runs[4], runs[1])
+
+
+def way():
+    """A dive round the middle of the harbour, facing it: CSV lines a fifth of a second apart."""
+    lines = ["# frame: ENU_FLU", "t_s,x_m,y_m,z_m,yaw_deg"]
+    for step in range(11 + round(5 * STEPS * STEP_S)):
+        turned = math.radians(4 * step / 5)
+        lines.append(f"{step / 5:.1f},{-7 * math.cos(turned):.6f},{-7 * math.sin(turned):.6f},{-3 - 0.02 * step:.3f},{math.degrees(turned):.4f}")
+    return "\n".join(lines) + "\n"
+
+
+def profiles():
+    """Continuous_start (1400) of profiles (1300) of the ping protocol."""
+    body = b"BR" + struct.pack("<HHBBH", 2, 1400, 0, 0, 1300)
+    return body + struct.pack("<H", sum(body) & 0xFFFF)
+
+
+def read_all(link, to):
+    while data := link.recv(65536):
+        to += data
+
+
+class SuiteRun:
+    """What the example's three ports and its link sent along the way, and what sonard recorded of it. Status datagrams and MAVLink's
+    heartbeats go by the wall clock and are not compared."""
+
+    PORTS = {"front": (("127.0.0.2", 52100), fire_message(version=2, rate_hz=10, range_=5)),
+             "dvl": (("127.0.0.3", 16171), b'{"command":"get_config"}'),
+             "altimeter": (("127.0.0.4", 9090), profiles())}
+    RECORDED = {"front.mcap": "front", "front.pcap": "front", "dvl.mcap": "dvl", "altimeter.mcap": "altimeter"}  # four at a time
+
+    def __init__(self, threads):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            (folder / "way.csv").write_text(way(), encoding="utf-8")
+            (folder / "recordings").mkdir()
+            config = (ROOT / "scenes/sonard-suite.yaml").read_text(encoding="utf-8")
+            assert config.count("trajectory: orbit") == 1
+            config = config.replace("trajectory: orbit", "trajectory: way.csv") + "recording: {folder: recordings}\n"
+            (folder / "suite.yaml").write_text(config, encoding="utf-8")
+            with Daemon(folder / "suite.yaml", str(SONARD), ["--clock", "lockstep", "--digest", "--threads", threads]) as daemon:
+                self.fly(daemon, folder / "recordings")
+            self.recordings = {file: (folder / "recordings" / file).read_bytes() for file in self.RECORDED}
+
+    def fly(self, daemon, recordings):
+        control, autopilot = Control("127.0.0.1"), Autopilot(("127.0.0.1", 14551))
+        for file, sonar in self.RECORDED.items():
+            control.start_recording(file, sonar)
+        autopilot.socket.sendto(autopilot.speak("HEARTBEAT", type=12, autopilot=3, mavlink_version=3), autopilot.peer)
+        assert autopilot.command(511, 0) == 0  # each ping's distance
+        self.received, links, readers = {sonar: bytearray() for sonar in self.PORTS}, [], []
+        for sonar, (at, request) in self.PORTS.items():
+            links.append(socket.create_connection(at, PATIENCE_S))
+            links[-1].sendall(request)
+            readers.append(threading.Thread(target=read_all, args=(links[-1], self.received[sonar])))
+            readers[-1].start()
+        eventually(lambda: {sonar["name"]: [client["bytes_read"] for client in sonar["clients"]] for sonar in control.status()["sonars"]}
+                   == {sonar: [len(request)] for sonar, (_, request) in self.PORTS.items()})  # so time may pass
+        self.pings = sum(control.step(STEP_S)["pings"] for _ in range(STEPS))
+        self.distances = [tuple(sorted(message.items())) for message in autopilot.arrived()]
+        control.stop_recording()
+        code = daemon.stop()
+        assert code == 0, daemon.log()
+        for reader in readers:
+            reader.join(PATIENCE_S)
+        for link in links:
+            link.close()
+        self.said = {sonar: digest for digest, sonar in re.findall(r"sha256 ([0-9a-f]{64})  (\w+) client", daemon.log())}
+
+
+class Suite(unittest.TestCase):
+    def test_every_port_and_recording_is_the_same_twice(self):
+        first = SuiteRun(threads=1)
+        self.assertGreater(first.pings, 3 * STEPS / 2)
+        self.assertEqual(first.said, {sonar: hashlib.sha256(data).hexdigest() for sonar, data in first.received.items()})
+        reports = [json.loads(line) for line in first.received["dvl"].splitlines()]
+        self.assertGreater(sum(report.get("velocity_valid", False) for report in reports), 5)
+        self.assertGreater(sum(report["type"] == "position_local" for report in reports), 5)
+        self.assertGreater(len(set(first.distances)), STEPS / 2, "the altitude changes")
+        for threads in (1, 2):
+            with self.subTest(threads=threads):
+                again = SuiteRun(threads)
+                for sonar, data in first.received.items():
+                    self.assertTrue(again.received[sonar] == data, sonar)
+                for file, data in first.recordings.items():
+                    self.assertTrue(again.recordings[file] == data, file)
+                self.assertEqual(again.distances, first.distances)
 
 
 if __name__ == "__main__":

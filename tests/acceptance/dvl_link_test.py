@@ -1,19 +1,11 @@
 """An emulated DVL A50 as its drivers meet it: lines of JSON over TCP."""
 import json
 import math
-import re
 import socket
-import struct
-import sys
-import threading
 import time
 import unittest
 
-from oculus_reader import fire_message
-from running_sonard import ROOT, SONARD, Daemon, Sonard, eventually
-
-sys.path.insert(0, str(ROOT / "clients/python"))
-from sonard_client import Control  # noqa: E402
+from running_sonard import Sonard
 
 PORT, PATIENCE_S = 16171, 120
 DOWN = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}"
@@ -113,66 +105,6 @@ class Velocity(unittest.TestCase):
         while self.driver.velocities < before + 3:
             self.driver.next("velocity")
         self.assertFalse(self.driver.command("get_config")["result"]["acoustic_enabled"])
-
-
-SUITE = """\
-world: {scene: %s, seed: 1}
-vehicles: [{name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}, trajectory: orbit}]
-sonars:
-  - {name: front, profile: oculus-m1200d, bind_ip: ADDRESS, status_to: [ADDRESS]}
-  - {name: dvl, profile: dvl-a50, mount: %s, bind_ip: 127.0.0.12}
-  - {name: altimeter, profile: ping1d, mount: %s, bind_ip: 127.0.0.13}
-control: {stream: "ADDRESS:14770", http: "ADDRESS:8088"}
-"""
-STEPS, STEP_S = 20, 0.1
-
-
-class Suite(unittest.TestCase):
-    """An Oculus, a DVL and a Ping1D on one vehicle, in time that steps."""
-
-    def digests(self, threads):
-        arguments = ["--clock", "lockstep", "--digest", "--threads", threads, "--fixed-fan", 2]
-        with Daemon(SUITE % (ROOT / "scenes/demo.yaml", DOWN, DOWN), str(SONARD), [str(a) for a in arguments]) as daemon:
-            links = []
-            for at, request in (((daemon.address, 52100), fire_message(version=2, rate_hz=10, range_=5)),
-                                (("127.0.0.12", PORT), b'{"command":"get_config"}'), (("127.0.0.13", 9090), profiles())):
-                links.append(socket.create_connection(at, PATIENCE_S))
-                links[-1].sendall(request)
-            received = [bytearray() for _ in links]
-            readers = [threading.Thread(target=read_all, args=pair) for pair in zip(links, received)]
-            for reader in readers:
-                reader.start()
-            control = Control(daemon.address)
-            eventually(lambda: all(sonar["pinging"] for sonar in control.status()["sonars"]) and len(received[1]) > 0)
-            pings = sum(control.step(STEP_S)["pings"] for _ in range(STEPS))
-            daemon.stop()
-            log = daemon.log()
-            for reader in readers:
-                reader.join(PATIENCE_S)
-            for link in links:
-                link.close()
-        found = re.findall(r"sha256 ([0-9a-f]{64})", log)
-        self.assertEqual(len(found), len(links), log)
-        self.assertGreater(pings, 3 * STEPS / 2)
-        return found, received[1]
-
-    def test_equal_bytes_twice(self):
-        (first, lines), (again, _) = self.digests(1), self.digests(2)
-        self.assertEqual(first, again)
-        reports = [json.loads(line) for line in lines.splitlines()]
-        self.assertGreater(sum(report.get("velocity_valid", False) for report in reports), 5)
-        self.assertGreater(sum(report["type"] == "position_local" for report in reports), 5)
-
-
-def read_all(link, to):
-    while data := link.recv(65536):
-        to += data
-
-
-def profiles():
-    """Continuous_start (1400) of profiles (1300) of the ping protocol."""
-    body = b"BR" + struct.pack("<HHBBH", 2, 1400, 0, 0, 1300)
-    return body + struct.pack("<H", sum(body) & 0xFFFF)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ WANTED = {
                DOCUMENTS + "examples/sonard-ping360.yaml", DOCUMENTS + "examples/sonard-surveyor.yaml",
                DOCUMENTS + "examples/sonard-omniscan.yaml", DOCUMENTS + "examples/sonard-ping1d.yaml", DOCUMENTS + "examples/sonard-s500.yaml", DOCUMENTS + "examples/sonard-micron.yaml",
                DOCUMENTS + "examples/sonard-dvl.yaml",
-               DOCUMENTS + "examples/sonard-m3.yaml",
+               DOCUMENTS + "examples/sonard-m3.yaml", DOCUMENTS + "examples/sonard-suite.yaml",
                "usr/share/sonard/python/sonard_client/__init__.py",
                "usr/share/sonard/python/sonard_client/convert/__main__.py",
                "usr/share/sonard/ros2_bridge/package.xml",

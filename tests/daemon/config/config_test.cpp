@@ -329,6 +329,7 @@ TEST(Config, TheShippedExampleIsValid) {
                                       {"sonard-s500.yaml", "s500"},
                                       {"sonard-micron.yaml", "micron"},
                                       {"sonard-dvl.yaml", "dvl-a50"},
+                                      {"sonard-suite.yaml", "oculus-m1200d"},
                                       {"sonard-m3.yaml", "m3"}}) {
     const auto ping = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/" + file);
     ASSERT_TRUE(ping) << ping.error().text;
