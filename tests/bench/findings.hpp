@@ -30,6 +30,10 @@ Result<nlohmann::json> find_device_rates(const ScenePointer& scene, const BenchS
 /// How the time of a ping grows with rays, rows, triangles, beams and sonars.
 nlohmann::json find_curves(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 
+/// P0: the demo of every product through its socket, at the rate that a usual driver requests; that of each make's demo also at
+/// its highest rate. From the moment of a ping's pose to its last byte at the driver, processor time of the daemon, ticks
+/// skipped.
+Result<nlohmann::json> find_demos(const BenchOptions& options);
 /// P5: from a pose and a trigger sent to the last byte received, of a whole daemon on loopback.
 Result<nlohmann::json> find_latency(const ScenePointer& scene, const BenchOptions& options);
 /// P14: from a changed setting sent to the first ping made with it, over a grid of settings. `holds`: no setting takes the

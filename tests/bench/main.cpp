@@ -23,8 +23,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* other_cases[] = {"P3e", "P5",  "P6",  "P7",  "P8", "P9",
-                                       "P10", "P12", "P13", "P14", "P15"};  // beside bench_cases()
+constexpr const char* other_cases[] = {"P0", "P3e", "P5",  "P6",  "P7",  "P8",
+                                       "P9", "P10", "P12", "P13", "P14", "P15"};  // beside bench_cases()
 constexpr int ratios_missed = 1;
 
 template <class Items>
@@ -100,6 +100,11 @@ Result<void> time_pings(const BenchScene& where, const ScenePointer& loaded, con
 Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, const BenchOptions& options, json& report) {
   bool all_hold = true;
   const auto asked = [&](const char* name) { return wanted(options.cases, name); };
+  if (asked("P0")) {
+    auto demos = find_demos(options);
+    if (!demos) return tl::make_unexpected(demos.error());
+    report["demos"] = *std::move(demos);
+  }
   if (asked("P3e")) report["cold"] = find_cold_pings(scene, where, options);
   if (asked("P5")) {
     auto latency = find_latency(scene, options);
@@ -207,7 +212,7 @@ int parse_and_run(int argc, char** argv) {
   EngineOptionsGiven model;
   CLI::App cli{
       "Times whole pings, stage by stage, warm: the cells of the scene are made already. The first ping, which makes them, is\n"
-      "the figure \"cold\" of every case; P3e jumps. P5, P8, P13 and P14 run a daemon on loopback. P6 compares the hot loops "
+      "the figure \"cold\" of every case; P3e jumps. P0, P5, P8, P13 and P14 run a daemon on loopback. P6 compares the hot loops "
       "with\n"
       "the plain ways of doing the same, P14 the first ping after a change of settings with a warm one: exit code 1 when a "
       "ratio\n"

@@ -51,11 +51,11 @@ Times::Times(std::vector<double> ms) {
   if (ms.empty()) return;
   std::sort(ms.begin(), ms.end());
   const auto at = [&](double part) { return ms[static_cast<std::size_t>(part * static_cast<double>(ms.size() - 1) + 0.5)]; };
-  min = ms.front(), median = at(0.5), p90 = at(0.9), p99 = at(0.99), max = ms.back();
+  min = ms.front(), median = at(0.5), p90 = at(0.9), p95 = at(0.95), p99 = at(0.99), max = ms.back();
 }
 
 void to_json(nlohmann::json& j, const Times& t) {
-  j = {{"min_ms", t.min}, {"median_ms", t.median}, {"p90_ms", t.p90}, {"p99_ms", t.p99}, {"max_ms", t.max}};
+  j = {{"min_ms", t.min}, {"median_ms", t.median}, {"p90_ms", t.p90}, {"p95_ms", t.p95}, {"p99_ms", t.p99}, {"max_ms", t.max}};
 }
 
 Bench::Bench(std::shared_ptr<const Scene> scene, int threads, const BenchOptions& options, bool device_steps) : pool(threads) {

@@ -24,7 +24,7 @@ std::string processor();  // its name and number
 /// Sorted at once: what half, nine tenths and all of them were below.
 struct Times {
   explicit Times(std::vector<double> ms);
-  double min = 0, median = 0, p90 = 0, p99 = 0, max = 0;
+  double min = 0, median = 0, p90 = 0, p95 = 0, p99 = 0, max = 0;
 };
 void to_json(nlohmann::json& j, const Times& t);
 

@@ -1,8 +1,5 @@
 // Latency and the cost of clients of a whole daemon: the one that `sonard run` is, in a thread of this process, and clients that
 // talk the Oculus protocol to it over loopback.
-#include <pthread.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -15,12 +12,10 @@
 
 #include "clients/sonarctl/ping_stream.hpp"
 #include "daemon/config/load_config.hpp"
-#include "daemon/server/app.hpp"
-#include "daemon/server/engine/choose_engine.hpp"
-#include "daemon/server/system/real_time.hpp"
 #include "protocol/blueview/link.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "tests/bench/findings.hpp"
+#include "tests/bench/service.hpp"
 
 namespace sonar::bench {
 namespace {
@@ -29,13 +24,6 @@ using nlohmann::json;
 
 constexpr std::uint16_t data_port = 52100;
 constexpr int patience_s = 20;
-
-/// In one of the networks 127.64..127.191, from the number of this process.
-std::string own_address(int sonar = 0) {
-  const auto process = static_cast<unsigned>(::getpid());
-  return "127." + std::to_string(64 + process / 250 % 128) + "." + std::to_string(1 + process % 250) + "." +
-         std::to_string(99 + sonar);
-}
 
 /// `count` sonars of a product side by side on one vehicle, as a configuration lists them.
 std::string sonars_of(const std::string& profile, int count) {
@@ -65,67 +53,22 @@ oculus::FireRequest fire_p3a(bool triggered) {
   return fire;
 }
 
-class Service {
- public:
-  static Result<std::unique_ptr<Service>> start(const ScenePointer& scene, const BenchOptions& options,
-                                                const std::string& sonars = sonars_of("oculus-m1200d", 1),
-                                                bool at_any_rate = false) {
-    const std::string address = own_address();
-    auto config = parse_config(
-        "world: {scene: local-search.yaml}\n"
-        "vehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -8], rpy_deg: [0, 14.3, 0]}}\n"
-        "sonars:\n" +
-            sonars + "poses: {protobuf: '" + address + ":0', json: '" + address + ":0'}\ncontrol: {stream: off, http: off}\n",
-        "bench", options.scene_folder);
-    if (!config) return tl::make_unexpected(config.error());
-    config->engine = options.engine;
-    if (at_any_rate) std::for_each(config->sonars.begin(), config->sonars.end(), lift_rate);
-    auto service = std::unique_ptr<Service>(new Service(*std::move(config), scene, options));
-    if (auto opened = service->app_.open(); !opened) return tl::make_unexpected(opened.error());
-    service->address_ = address;
-    service->thread_ = std::thread([app = &service->app_] { app->run(); });
-    return service;
-  }
-  ~Service() { stop(); }
-  void stop() {
-    app_.request_stop();
-    if (thread_.joinable()) thread_.join();
-  }
-  tcp::endpoint data() const { return {asio::ip::make_address(address_), data_port}; }
-  udp::endpoint poses() const { return {asio::ip::make_address(address_), app_.poses().json().port}; }
-  /// Processor time of the thread that does all sending, while it runs.
-  double sender_s() {
-    clockid_t clock{};
-    timespec t{};
-    if (::pthread_getcpuclockid(thread_.native_handle(), &clock) != 0 || ::clock_gettime(clock, &t) != 0) return 0;
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-  }
-  /// After stop().
-  DeviceFigures figures() const { return app_.devices().front().figures(); }
-
- private:
-  Service(Config config, const ScenePointer& scene, const BenchOptions& options)
-      : pool_(options.threads.back(), compute_niceness),
-        log_(errors_only()),
-        app_(
-            std::move(config), scene,
-            [this, engine = options.engine](ScenePointer s) {
-              return choose_engine(engine.device, std::move(s), pool_, {.simd = engine.simd}, {});
-            },
-            {}, log_) {}
-
-  static LogOptions errors_only() {
-    LogOptions options;
-    options.level = LogLevel::error;
-    return options;
-  }
-
-  Parallel pool_;
-  Log log_;
-  App app_;
-  std::string address_;
-  std::thread thread_;
-};
+Result<std::unique_ptr<Service>> start(const ScenePointer& scene, const BenchOptions& options,
+                                       const std::string& sonars = sonars_of("oculus-m1200d", 1), bool at_any_rate = false) {
+  const std::string address = own_address();
+  auto config = parse_config(
+      "world: {scene: local-search.yaml}\n"
+      "vehicles:\n  - {name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, -8], rpy_deg: [0, 14.3, 0]}}\n"
+      "sonars:\n" +
+          sonars + "poses: {protobuf: '" + address + ":0', json: '" + address + ":0'}\ncontrol: {stream: off, http: off}\n",
+      "bench", options.scene_folder);
+  if (!config) return tl::make_unexpected(config.error());
+  config->engine = options.engine;
+  if (at_any_rate) std::for_each(config->sonars.begin(), config->sonars.end(), lift_rate);
+  return Service::start(*std::move(config), scene, options);
+}
+tcp::endpoint data_of() { return {asio::ip::make_address(own_address()), data_port}; }
+udp::endpoint poses_of(Service& service) { return {asio::ip::make_address(own_address()), service.app().poses().json().port}; }
 
 /// As far as settings of the grid differ; a gain that the device chose is echoed otherwise.
 bool answers(const oculus::FireRequest& fire, const oculus::DecodedPing& ping) {
@@ -177,10 +120,10 @@ Error broken(const char* what) { return {ErrorKind::unavailable, std::string("th
 }  // namespace
 
 Result<json> find_latency(const ScenePointer& scene, const BenchOptions& options) {
-  auto service = Service::start(scene, options);
+  auto service = start(scene, options);
   if (!service) return tl::make_unexpected(service.error());
   asio::io_context io;
-  Client client(io, (*service)->data());
+  Client client(io, data_of());
   udp::socket poses(io, udp::v4());
   std::vector<double> latency_ms;
   const int triggers = std::max(200, 2 * options.pings), warm_up = 10;
@@ -190,7 +133,7 @@ Result<json> find_latency(const ScenePointer& scene, const BenchOptions& options
     const int length = std::snprintf(pose, sizeof pose, "{\"position\":[%.4f,%.4f,8],\"attitude\":[0,-0.25,%.4f]}\n",
                                      0.35 * std::sin(t), 0.9 * t, pi / 2 + 0.3 * std::sin(t));
     const double begin = now_s();
-    poses.send_to(asio::buffer(pose, static_cast<std::size_t>(length)), (*service)->poses());
+    poses.send_to(asio::buffer(pose, static_cast<std::size_t>(length)), poses_of(**service));
     client.fire(fire_p3a(true));
     const double end = client.next_ping();
     if (end == 0) return tl::make_unexpected(broken("sent no ping within 20 s"));
@@ -245,10 +188,10 @@ GridSetting grid_setting(int k) {
 }  // namespace
 
 Result<json> find_first_pings(const ScenePointer& scene, const BenchOptions& options, bool& holds) {
-  auto service = Service::start(scene, options);
+  auto service = start(scene, options);
   if (!service) return tl::make_unexpected(service.error());
   asio::io_context io;
-  Client client(io, (*service)->data());
+  Client client(io, data_of());
   constexpr double allowed_median = 3, allowed_slowest = 5;  // 3.9 and 3 before tables of shared noise were cheap
   constexpr int warm_pings = 3;
   std::vector<double> first_ms, late_ms, first_cpu_ms, warm_cpu_ms;
@@ -297,11 +240,11 @@ Result<json> find_first_pings(const ScenePointer& scene, const BenchOptions& opt
 }
 
 Result<json> find_cost_of_clients(const ScenePointer& scene, int clients, double seconds, const BenchOptions& options) {
-  auto service = Service::start(scene, options);
+  auto service = start(scene, options);
   if (!service) return tl::make_unexpected(service.error());
   asio::io_context io;
   std::list<Client> all;
-  for (int i = 0; i < clients; ++i) all.emplace_back(io, (*service)->data());
+  for (int i = 0; i < clients; ++i) all.emplace_back(io, data_of());
   all.front().fire(fire_p3a(false));
   std::atomic<std::uint64_t> received{0};
   std::vector<std::thread> readers;
@@ -331,7 +274,7 @@ Result<json> find_cost_of_clients(const ScenePointer& scene, int clients, double
 
 Result<json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double seconds, const BenchOptions& options) {
   constexpr std::chrono::seconds patience(patience_s);
-  auto service = Service::start(scene, options, sonars_of("blueview-p900-90", sonars), true);
+  auto service = start(scene, options, sonars_of("blueview-p900-90", sonars), true);
   if (!service) return tl::make_unexpected(service.error());
   std::vector<clients::PingStream> streams;
   for (int i = 0; i < sonars; ++i) {

@@ -96,8 +96,26 @@ def stages(report, scene):
     return lines
 
 
+def demo_of(d):
+    return d["profile"] + ("" if d["on_request"] else f", {d['rate_hz']:.0f} Hz")
+
+
+def ticks_of(d):
+    return f"{d['skipped_ticks']} of {d['pings'] + d['skipped_ticks']} ticks skipped"
+
+
+def demos(report):
+    rows = [[d["profile"], "on request" if d["on_request"] else f"{d['rate_hz']:.0f} Hz", d["beams"], d["rows"], f"{d['range_m']:g}",
+             f"{d['latency']['median_ms']:.1f}", f"{d['latency']['p95_ms']:.1f}", f"{d['processor_ms']:.1f}", ticks_of(d)]
+            for d in report["demos"]]
+    return table(["profile", "rate", "beams", "rows", "range, m", "median, ms", "p95, ms", "processor ms", ""], rows)
+
+
 def service(report):
-    rows = []
+    rows = [["P0", f"{d['make']} ({demo_of(d)}) as `sonard --profile` serves it, from a ping's pose to its last byte at a driver on loopback, "
+             f"{d['threads']} threads", f"median {d['latency']['median_ms']:.1f} ms, p95 {d['latency']['p95_ms']:.1f} ms; {d['processor_ms']:.1f} "
+             f"processor ms; {ticks_of(d)}", "no tick skipped", "", "holds" if d["skipped_ticks"] == 0 else "**missed**"]
+            for d in report.get("demos", []) if d["demo"]]
     if "latency" in report:
         t = report["latency"]
         p99 = t["latency"]["p99_ms"]
@@ -291,7 +309,9 @@ def page(report, scene="local-search", other_rates=()):
               "Choi 2025, Table 3 (512 beams, 10 m; NVIDIA RTX 2080 Ti, Intel i9-9900K): 0.9 s for the rays and 2.31 s for the sum, "
               "0.3 Hz with 300 rays a beam. Its public successor reports about 36 ms a frame. Ours without a GPU: "
               + ("; ".join(times) or "not measured") + ".", "", "![rates](benchmarks-rates.svg)", ""]
-    lines += ["## As a service", ""] + service(report)
+    lines += ["## As a service", "",
+              "P0, the demos: `build/release/tests/own_network/in_own_network build/release/tests/bench/sonard_bench --scene local-search "
+              "--case P0`; the tables have a row for every product.", ""] + service(report)
     if report.get("curves"):
         lines += ["## How times grow", "", "![curves](benchmarks-curves.svg)", ""]
     return "\n".join(lines)
@@ -306,6 +326,9 @@ def tables(report, scene="local-search"):
              for name, r in by_case_and_threads(report, scene)]
     lines += table(["", "pings/s", ""], rows)
     lines += ["## Stages", "", "Thread ms a ping, by the engine's own clock.", ""] + stages(report, scene)
+    if report.get("demos"):
+        lines += ["## Demos (P0)", "", "From a ping's pose to its last byte at a driver on loopback; processor time of the daemon a ping.", ""]
+        lines += demos(report)
     if report.get("empty_bins"):
         lines += ["## Range bins without energy (P12)", "",
                   "On a level bed: 10 dB or more below the closed form, in expected power.", ""] + empty_bins(report)

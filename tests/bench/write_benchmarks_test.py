@@ -14,7 +14,7 @@ def result(case, threads, rate):
             "thread_ms": {"trace": 3.34, "scatter": 3.8, "frame": 0.0}, "switches": {"side_lobes": True}}
 
 
-TIMES = {"min_ms": 1.0, "median_ms": 2.0, "p90_ms": 3.0, "p99_ms": 4.0, "max_ms": 5.0}
+TIMES = {"min_ms": 1.0, "median_ms": 2.0, "p90_ms": 3.0, "p95_ms": 3.5, "p99_ms": 4.0, "max_ms": 5.0}
 
 
 class Page(unittest.TestCase):
@@ -44,6 +44,18 @@ class Page(unittest.TestCase):
             row = next(line for line in write_benchmarks.page(report).splitlines() if line.startswith("| P14"))
             self.assertIn(f"at most {max(late, 0):.0f} ms beyond two periods (30 m)", row)
             self.assertIn(verdict, row)
+
+    def test_the_page_has_the_demos_and_the_tables_all_products(self):
+        fields = {"make": "an ARIS", "threads": 2, "on_request": False, "rate_hz": 12.0, "beams": 128, "rows": 800, "range_m": 3.4, "pings": 36,
+                  "processor_ms": 9.25, "latency": TIMES, "skipped_ticks": 0, "demo": True, "profile": "aris-3000"}
+        report = {"processor": "test", "results": [result("P1", 2, 80)],
+                  "demos": [fields, fields | {"rate_hz": 15.0, "skipped_ticks": 4}, fields | {"profile": "aris-1200", "demo": False}]}
+        page = [line for line in write_benchmarks.page(report).splitlines() if line.startswith("| P0")]
+        self.assertEqual(len(page), 2)
+        self.assertIn("an ARIS (aris-3000, 12 Hz)", page[0])
+        self.assertIn("median 2.0 ms, p95 3.5 ms; 9.2 processor ms; 0 of 36 ticks skipped | no tick skipped |  | holds |", page[0])
+        self.assertIn("4 of 40 ticks skipped | no tick skipped |  | **missed** |", page[1])
+        self.assertIn("| aris-1200 | 12 Hz | 128 | 800 | 3.4 | 2.0 | 3.5 | 9.2 | 0 of 36 ticks skipped |", write_benchmarks.tables(report))
 
     def test_everything_found_is_told(self):
         report = {"processor": "test", "load_average": 5.5, "results": [result("P1", 2, 80)],
