@@ -26,8 +26,8 @@ from .wire import Capture, DatagramFlow, Seen
 
 NOMINAL_PINGS, NOMINAL_S = 20, 20.0  # a working driver takes so many pings in this time without a fault
 _SETTLE_S = 0.52
-_STILL_S = 20.0          # so long nothing happens, and the fault's begin is waited for no more
-_EARLY_S = 0.02          # the journal may be written a little after the ping
+_STILL_S = 20.0          # after such a time without any activity the judge stops waiting for the fault
+_EARLY_S = 0.02          # the journal's entry may follow its ping by this time
 _DEVICE_ID = 7001
 
 
