@@ -22,7 +22,7 @@ void flush(png_structp) {}
 Result<std::vector<std::byte>> encode_gray_png(std::span<const std::byte> values, int width, int height, int bits) {
   const auto row_bytes = static_cast<std::size_t>(width) * static_cast<std::size_t>(bits / 8);
   if ((bits != 8 && bits != 16) || width < 1 || height < 1 || values.size() != row_bytes * static_cast<std::size_t>(height))
-    return failure(ErrorKind::bug, "a grey picture needs 8 or 16 bits a value, and as many values as pixels");
+    return failure(ErrorKind::bug, "a grey picture needs 8 or 16 bits per value, and as many values as pixels");
   std::vector<std::byte> bytes;
   bytes.reserve(values.size() / 2);
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);

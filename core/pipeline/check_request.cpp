@@ -33,7 +33,7 @@ std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings&
   if (!measured && mode.waveform.exact && samples * std::max(1.0, band / pulse) > most_frequencies)
     return "an exact pulse so short on so many samples needs too much memory: choose fewer rows or a longer pulse";
   if (samples * make_columns(mode, s.beam_count).count > most_column_samples)
-    return "so many beams, rows and samples a row need too much memory: choose fewer of them";
+    return "so many beams, rows and samples per row need too much memory: choose fewer of them";
   return {};
 }
 
@@ -48,7 +48,7 @@ std::string why_beams_unlisted(const FrequencyMode& mode, int beam_count) {
   const double edge_rad = static_cast<double>(mode.horizontal_aperture_rad) / 2 + sector_slack_rad;
   for (std::size_t j = 0; j < azimuth.size(); ++j) {
     const std::string beam = "listed beam " + std::to_string(j);
-    if (!(std::abs(azimuth[j]) <= std::min(edge_rad, widest_beam_rad))) return beam + " does not look into the sector";
+    if (!(std::abs(azimuth[j]) <= std::min(edge_rad, widest_beam_rad))) return beam + " does not point into the sector";
     if (j > 0 && !(azimuth[j] < azimuth[j - 1])) return beam + " is not to starboard of the one before";
     if (!width.empty() && !(width[j] >= narrowest_width_rad && width[j] < pi)) return "the width of " + beam + " is impossible";
   }

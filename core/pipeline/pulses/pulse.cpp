@@ -191,10 +191,10 @@ std::string why_invalid(const Waveform& w, double sample_time_s) {
     return "a measured pulse needs its sample rate, positive and finite";
   if (w.sample_rate_hz * sample_time_s > finest_rate_per_row)
     return "the measured pulse has more than " + std::to_string(static_cast<int>(finest_rate_per_row)) +
-           " samples to a sample of the picture: resample it to a few times its bandwidth";
+           " samples per sample of the picture: resample it to a few times its bandwidth";
   if (static_cast<double>(w.samples.size()) / w.sample_rate_hz > longest_in_rows * sample_time_s)
     return "the measured pulse is longer than " + std::to_string(static_cast<int>(longest_in_rows)) +
-           " samples of the picture: cut it where it has rung out";
+           " samples of the picture: cut off the part after its decay";
   const float top = std::abs(w.samples[w.samples.size() / 2]);
   for (const std::complex<float>& s : w.samples)
     if (!std::isfinite(s.real()) || !std::isfinite(s.imag()) || std::abs(s) > top || !(top > 0))

@@ -46,7 +46,7 @@ Result<double> length_unit(std::optional<std::uint16_t> key) {
       return 1000;
     default:
       return failure(ErrorKind::bad_data,
-                     "is in units of length of code " + std::to_string(*key) + "; bring it to metres: gdalwarp -t_srs");
+                     "is in units of length of code " + std::to_string(*key) + "; convert it to metres: gdalwarp -t_srs");
   }
 }
 
@@ -121,11 +121,11 @@ Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::
   CoordinateSystem system;
   const auto model = keys.value_of(model_type);
   if (model == geocentric)
-    return failure(ErrorKind::bad_data, "has geocentric coordinates; bring them to degrees: gdalwarp -t_srs EPSG:4326");
+    return failure(ErrorKind::bad_data, "has geocentric coordinates; convert them to degrees: gdalwarp -t_srs EPSG:4326");
   if (model == geographic) {
     system.geographic = true;
     if (const auto unit = keys.value_of(angular_units); unit.value_or(degree) != degree)
-      return failure(ErrorKind::bad_data, "has angles that are not in degrees; bring it to them: gdalwarp -t_srs EPSG:4326");
+      return failure(ErrorKind::bad_data, "has angles that are not in degrees; convert it to degrees: gdalwarp -t_srs EPSG:4326");
     system.other_datum = !has_modern_datum(keys).value_or(true);
     if (system.other_datum) system.name = name_by(code_of(keys, geographic_system), keys, geographic_citation);
   } else if (model == projected) {

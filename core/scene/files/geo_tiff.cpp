@@ -227,7 +227,7 @@ class GeoTiffReader {
     if (scale.size() >= 2 && tie.size() >= 6) {
       place = {tie[3] - tie[0] * scale[0], tie[4] + tie[1] * scale[1], scale[0], -scale[1]};
     } else if (matrix.size() == 16) {
-      if (matrix[1] != 0 || matrix[4] != 0) return bad("is turned against its axes; straighten it: gdalwarp");
+      if (matrix[1] != 0 || matrix[4] != 0) return bad("is rotated against its axes; straighten it: gdalwarp");
       place = {matrix[3], matrix[7], matrix[0], matrix[5]};
     } else if (const auto beside = world_file()) {
       if (!raw_.system.geographic) raw_.system = system_by_prj(file_);

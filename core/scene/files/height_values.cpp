@@ -111,7 +111,7 @@ void take_off_zone(RawHeights& raw, UtmZone zone, std::vector<std::string>& note
   const auto has_it = [&](double x) { return std::floor(x / a_million_m) == zone.number; };
   if (!has_it(raw.x.front()) || !has_it(raw.x.back())) return;
   for (double& x : raw.x) x -= zone.number * a_million_m;
-  notes.push_back(text::format("its eastings begin with %d, the number of their zone, which is taken off", zone.number));
+  notes.push_back(text::format("its eastings begin with %d, the number of their zone, which is removed", zone.number));
 }
 
 /// A note about a system whose latitudes and longitudes are unknown here, or only roughly known.
@@ -133,10 +133,10 @@ std::string place_text(const Geodetic& place) {
 /// The origin as the scene or the configuration gives it; without both, the middle of the grid.
 void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodetic& middle) {
   grid.origin = options.origin ? options.origin : options.world_origin;
-  if (grid.origin && !options.origin) grid.notes.push_back("its place is counted from world.origin, " + place_text(*grid.origin));
+  if (grid.origin && !options.origin) grid.notes.push_back("its place is relative to world.origin, " + place_text(*grid.origin));
   if (grid.origin && std::abs(grid.origin->altitude_m) >= 1)
     grid.notes.push_back(
-        text::format("its heights are counted from z = 0, which is %.6g m above mean sea level by world.origin; if "
+        text::format("its heights are relative to z = 0, which is %.6g m above mean sea level by world.origin; if "
                      "they are above mean sea level, put %.6g into the z of its pose",
                      grid.origin->altitude_m, -grid.origin->altitude_m));
   if (options.origin && options.world_origin) {
@@ -146,12 +146,13 @@ void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodeti
     if (distance_m > agreeing_m)
       grid.notes.push_back(
           text::format("its origin is %.3g %s from world.origin: latitudes and longitudes of vehicles do not fit this ground; "
-                       "take origin away, and world.origin is used",
+                       "remove origin to use world.origin",
                        distance_m < 1000 ? distance_m : distance_m / 1000, distance_m < 1000 ? "m" : "km"));
   }
   if (grid.origin) return;
   grid.origin = middle;
-  grid.notes.push_back("x and y are about its middle, " + place_text(middle) + "; set origin: {lat, lon} to place it otherwise");
+  grid.notes.push_back("x and y are relative to its middle, " + place_text(middle) +
+                       "; set origin: {lat, lon} to place it otherwise");
 }
 
 Result<void> set_origin_of_degrees(HeightGrid& grid, const HeightOptions& options, bool guessed) {
@@ -181,10 +182,10 @@ Result<void> set_origin_of_zone(HeightGrid& grid, const HeightOptions& options, 
   if (!are_utm(grid.x.front(), grid.y.front()) || !are_utm(grid.x.back(), grid.y.back()))
     return failure(
         ErrorKind::bad_data,
-        text::format("its coordinates (%.7g, %.7g) are no eastings and northings of UTM, zone %s; %s to take them as plain "
+        text::format("its coordinates (%.7g, %.7g) are not eastings and northings of UTM, zone %s; %s to take them as plain "
                      "metres",
                      grid.x.front(), grid.y.front(), text_of(zone).c_str(),
-                     options.utm ? "take utm away" : "write geographic: false"));
+                     options.utm ? "remove utm" : "write geographic: false"));
   grid.zone = zone;
   choose_origin(grid, options, {});
   double far_m = 0;
@@ -284,17 +285,17 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
     return failure(ErrorKind::bad_data, "its coordinates are not longitudes and latitudes in degrees; remove geographic: true");
   const auto zone = options.utm || options.geographic ? options.utm : raw.system.utm;
   if (geographic && zone && options.utm)
-    return failure(ErrorKind::bad_data, "utm is for coordinates in metres, and these are degrees; take it away");
+    return failure(ErrorKind::bad_data, "utm is for coordinates in metres, and these are degrees; remove it");
   if (zone) take_off_zone(raw, *zone, grid.notes);
   if (options.origin && !geographic && !zone && !raw.system.name.empty())
     return failure(ErrorKind::bad_data, "origin is for a grid in degrees or UTM, and this is in " +
                                             text::printable(raw.system.name) +
-                                            "; bring it to degrees (gdalwarp -t_srs EPSG:4326 IN OUT.tif), or take origin away");
+                                            "; convert it to degrees (gdalwarp -t_srs EPSG:4326 IN OUT.tif), or remove origin");
   if (!raw.system.name.empty() && !options.geographic && !options.utm) grid.notes.push_back(note_of_system(raw.system));
   if (options.origin && !geographic && !zone)
     return failure(ErrorKind::bad_data,
                    "origin is for a grid in degrees or UTM; write geographic: true or utm: 33N (its zone) if it is one, else "
-                   "take it away");
+                   "remove it");
   const auto holes = static_cast<std::size_t>(std::count_if(raw.z.begin(), raw.z.end(), [](float z) { return std::isnan(z); }));
   if (holes > 0)
     grid.notes.push_back(text::format("%zu of its %zu heights (%.2g %%) are no data: holes in the ground", holes, raw.z.size(),

@@ -160,7 +160,7 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
   raw.x = axis_of(&Point::x), raw.y = axis_of(&Point::y);
   const char* const way = "; make one of them: gdal_grid, or gmt surface, then gdal_translate -of AAIGrid";
   if (raw.x.size() < 2 || raw.y.size() < 2)
-    return bad(std::string("its ") + std::to_string(points->size()) + " points are no even grid" + way);
+    return bad(std::string("its ") + std::to_string(points->size()) + " points are not a uniform grid" + way);
   if (raw.x.size() * raw.y.size() > max_mesh_triangles / 2)
     return bad(text::format("its points span %zu x %zu cells, more than 10 million: no grid, or too fine a one", raw.x.size(),
                             raw.y.size()) +

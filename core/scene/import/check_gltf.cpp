@@ -85,7 +85,7 @@ class GltfWalk final : public Json::json_sax_t {
     if (is_at(4, "nodes", "children")) children[levels_[1].name()].push_back(v);
     if (is_at(4, "scenes", "nodes")) scenes.back().push_back(v);
     if (is_at(3, "buffers", "uri") && (v.starts_with("/") || v.starts_with("\\") || v.substr(1, 1) == ":"))
-      fault = "names the file " + v.substr(0, 200) + ", an absolute path; put the file beside it and name it by its own name";
+      fault = "names the file " + v.substr(0, 200) + ", an absolute path; put the file beside it and name it without a folder";
     step();
     return !fault;
   }

@@ -120,7 +120,7 @@ TEST_F(UnknownSystem, IsNamedWithTheCommandThatConvertsIt) {
   EXPECT_THAT(said(prj, {}), HasSubstr("of British_National_Grid, are taken as plain metres"));
   EXPECT_THAT(said(prj, {}), HasSubstr("gdalwarp -t_srs EPSG:4326"));
   EXPECT_EQ(said(prj, {.geographic = false}), "");
-  EXPECT_THAT(said(prj, {.origin = Geodetic{1, 0, 0}}), HasSubstr("this is in British_National_Grid; bring it to degrees"));
+  EXPECT_THAT(said(prj, {.origin = Geodetic{1, 0, 0}}), HasSubstr("this is in British_National_Grid; convert it to degrees"));
   EXPECT_THAT(said(wkt("a\x1b[31m", bessel, transverse), {}), HasSubstr("a\\x1b[31m"));
 }
 
@@ -128,7 +128,7 @@ TEST_F(UnknownSystem, EastingsMayBeginWithTheirZone) {
   const HeightOptions options{.utm = UtmZone{32, false}, .origin = Geodetic{rad_from_deg(60), rad_from_deg(7.2), 0}};
   EXPECT_THAT(said("", options, "32400000"), HasSubstr("begin with 32, the number of their zone"));
   EXPECT_EQ(said("", options), "");
-  EXPECT_THAT(said("", options, "33400000"), HasSubstr("no eastings and northings of UTM"));
+  EXPECT_THAT(said("", options, "33400000"), HasSubstr("not eastings and northings of UTM"));
 }
 
 }  // namespace

@@ -217,7 +217,7 @@ TEST(EsriGrid, DegreesBecomeMetresAboutAnOrigin) {
   ASSERT_TRUE(grid) << grid.error().text;
   ASSERT_EQ(grid->notes.size(), 2u);
   EXPECT_THAT(grid->notes[0], HasSubstr("taken as degrees"));
-  EXPECT_THAT(grid->notes[1], HasSubstr("about its middle, latitude 60.005556, longitude 5.005556"));
+  EXPECT_THAT(grid->notes[1], HasSubstr("relative to its middle, latitude 60.005556, longitude 5.005556"));
   const auto mesh = mesh_from_grid(*grid);
   ASSERT_TRUE(mesh);
   expect_sound(mesh->mesh);
@@ -479,13 +479,13 @@ TEST(XyzGrid, WrongFilesAreRefused) {
     const auto grid = read_xyz_heights(files.write("bad.xyz", text), {});
     return grid ? std::string("accepted") : grid.error().text;
   };
-  EXPECT_THAT(refusal(""), HasSubstr("its 0 points are no even grid"));
+  EXPECT_THAT(refusal(""), HasSubstr("its 0 points are not a uniform grid"));
   EXPECT_THAT(refusal("1 2\n"), HasSubstr("line 1: three numbers are needed"));
   EXPECT_THAT(refusal("1 2 3\nx y z\n"), HasSubstr("line 2: three numbers"));
   EXPECT_THAT(refusal("1 2 3\n1e9 2 3\n"), HasSubstr("line 2: the point is farther"));
   EXPECT_THAT(refusal("1 2 3\nnan 2 3\n"), HasSubstr("line 2: the point is farther"));
   EXPECT_THAT(refusal("1 2 3\n2 2 1e9\n"), HasSubstr("line 2: the height 1e9 is beyond"));
-  EXPECT_THAT(refusal("0 0 1\n1 0.3 1\n2.5 1 1\n3.1 2.7 2\n"), HasSubstr("no even grid; make one of them: gdal_grid"));
+  EXPECT_THAT(refusal("0 0 1\n1 0.3 1\n2.5 1 1\n3.1 2.7 2\n"), HasSubstr("not a uniform grid; make one of them: gdal_grid"));
   EXPECT_THAT(refusal("0 0 1\n1 1 1\n99999 99999 1\n"), HasSubstr("more than 10 million"));
 }
 
