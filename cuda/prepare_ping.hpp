@@ -73,7 +73,7 @@ class PingPreparer {
   PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene, const RayScene& rays, const simd::Kernels& kernels,
                Parallel& pool, std::size_t cell_bytes, double (*now_s)());
 
-  /// Adds the pings to the room: one thread a ping where there are several (all of which may_go_together), all threads for one.
+  /// Adds the pings to the room: one thread per ping if there are several (all of which may_go_together()), else all threads.
   /// Bodies must have been placed; `cells` must serve the requests. `lane` is that of the tables and cells that stay on the
   /// device. Returns those for whose tiles there is no room: finish what is under way, forget_cells(), and again.
   std::vector<AskedPing> add(std::span<const AskedPing> pings, SurfaceCells& cells, int lane, BatchRoom& room);

@@ -270,7 +270,7 @@ bool Prepared::serves(const PingRequest& request) const { return request.model =
 Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
               Parallel& pool, double (*now_s)(), PingStatistics& statistics) {
   PaperPing ping(scene, request, prepared, kernels, pool, now_s, statistics);
-  ping.simulate_columns();  // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, a column a beam
+  ping.simulate_columns();  // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, one column per beam
   ping.correct_beams();     // "as coded"
   return ping.image();
 }

@@ -29,7 +29,7 @@ double Leak::reach_m(const ReceiverModel& law) {
   if (!(law.leak_upa > 0)) return 0;
   if (!law.leak_ring_db.empty())
     return static_cast<double>(law.leak_ring_step_m) * static_cast<double>(law.leak_ring_db.size() - 1);
-  return forgotten_db / static_cast<double>(law.leak_decay_db_per_m);
+  return most_leak_decay_db / static_cast<double>(law.leak_decay_db_per_m);
 }
 
 /// docs/acoustics.md, eq. 31: rms(r) = leak_upa 10^(-decay r / 20), or from a table, at a beam's output. That of a column is
@@ -48,7 +48,7 @@ Leak::Leak(const PingPlan& plan, const Switches& switches) {
       if (i + 1 >= law.leak_ring_db.size()) break;
       down_db = -std::lerp(static_cast<double>(law.leak_ring_db[i]), static_cast<double>(law.leak_ring_db[i + 1]),
                            at - static_cast<double>(i));
-    } else if (down_db > forgotten_db) {
+    } else if (down_db > most_leak_decay_db) {
       break;
     }
     rms_upa_.push_back(static_cast<float>(per_column * amplitude_from_db(-down_db)));

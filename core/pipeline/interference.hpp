@@ -21,7 +21,7 @@ namespace sonar {
 class Leak {
  public:
   /// The leak is left out after it has decayed by this much [dB]. A leak with a table ends at the table's last entry instead.
-  static constexpr double forgotten_db = 100;
+  static constexpr double most_leak_decay_db = 100;
   /// unknown: chosen. Share of its power that is new in every ping; in the captured M1200d pings 0.2 % in the first two rows,
   /// about a quarter in the next five.
   static constexpr double changing_share = 0.02;

@@ -202,7 +202,7 @@ void lay_out_noise_profile(PingPlan& p) {
 
 /// Delays for another sound speed steer beams to proportionally different sines. Columns move with the beams; their transmit
 /// amplitudes do not change.
-void look_elsewhere(PingPlan& p) {
+void scale_beam_sines(PingPlan& p) {
   p.columns.first_sine *= p.bearing_scale, p.columns.spacing *= p.bearing_scale;
   for (double& u : p.beam_sine) u = std::clamp(u * p.bearing_scale, -1.0, 1.0);
   for (int k = 0; k < p.columns.count; ++k)
@@ -305,7 +305,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   p.columns = make_columns(mode, settings.beam_count);
   p.beam_sine = make_beam_sines(mode, settings.beam_count);
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
-  if (bearing_scale != 1) look_elsewhere(p);
+  if (bearing_scale != 1) scale_beam_sines(p);
   p.beam_pattern = receive_patterns(mode, p.beam_sine.size());
   p.beam_weights = make_beam_weights(mode, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);

@@ -214,9 +214,9 @@ class RangeImager {
     }
     for (const PointReturn& point : points_) {
       const double weight =
-          pattern(point.azimuth_rad - looks_at_rad(grid_.azimuth_rad(column), scale_),
+          pattern(point.azimuth_rad - true_angle_rad(grid_.azimuth_rad(column), scale_),
                   static_cast<double>(mode_.pattern.azimuth_width_rad)) *
-          pattern(point.elevation_rad - looks_at_rad(grid_.elevation_rad(row), scale_), wanted_.beam_height_rad);
+          pattern(point.elevation_rad - true_angle_rad(grid_.elevation_rad(row), scale_), wanted_.beam_height_rad);
       if (weight > 0 && wanted(point)) f(point, weight);
     }
   }

@@ -75,8 +75,8 @@ RangeReturns::RangeReturns(const RayScene& scene, const PingRequest& request, do
   const auto angle = [](double rad) { return Angle{std::cos(rad), std::sin(rad)}; };
   const double scale = bearing_scale_of(request);
   column_step_rad_ = grid_.column_step_rad() * scale, row_step_rad_ = grid_.row_step_rad() * scale;
-  for (int c = 0; c < grid_.columns; ++c) azimuth_.push_back(angle(looks_at_rad(grid_.azimuth_rad(c), scale)));
-  for (int r = 0; r < grid_.rows; ++r) elevation_.push_back(angle(looks_at_rad(grid_.elevation_rad(r), scale)));
+  for (int c = 0; c < grid_.columns; ++c) azimuth_.push_back(angle(true_angle_rad(grid_.azimuth_rad(c), scale)));
+  for (int r = 0; r < grid_.rows; ++r) elevation_.push_back(angle(true_angle_rad(grid_.elevation_rad(r), scale)));
   rows_.resize(static_cast<std::size_t>(grid_.rows));
 }
 

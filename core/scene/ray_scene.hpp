@@ -49,7 +49,7 @@ class RayScene {
   static std::string version();  // "Embree 3.13.5"
 
   /// From this number of triangles on, the static part, and each body, is kept in a smaller form: indices instead of copies of
-  /// the corners, some 65 bytes a triangle less. The hits are the same.
+  /// the corners, some 65 bytes per triangle less. The hits are the same.
   static constexpr std::size_t compact_from_triangles = 2'000'000;
 
  private:

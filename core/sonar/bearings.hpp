@@ -20,7 +20,7 @@ inline double bearing_scale_of(const PingRequest& r) {
 }
 
 /// The true angle of a beam whose reported angle is given.
-inline double looks_at_rad(double reported_rad, double bearing_scale) {
+inline double true_angle_rad(double reported_rad, double bearing_scale) {
   return bearing_scale == 1 ? reported_rad : std::asin(std::clamp(bearing_scale * std::sin(reported_rad), -1.0, 1.0));
 }
 

@@ -169,7 +169,7 @@ void find_roots(const Ownership& all, const TileAddress& a, const TextureField* 
 }
 
 /// Scales the weights to the magnitude of their roots; returns the largest.
-float make_even(const CellList& cells) {
+float scale_to_one_magnitude(const CellList& cells) {
   double most = 0;
   for (int n = 0; n < cells.size; ++n) {
     const auto re = static_cast<double>(cells.re[n]), im = static_cast<double>(cells.im[n]), size = std::sqrt(re * re + im * im);
@@ -217,7 +217,7 @@ void pack(const Ownership& all, const TileAddress& a, const CellList& cells, Cel
   }
 
   float peak = cell_lanes::speckle(cells.speckle_a, cells.speckle_b, cells.root, n, cells.re, cells.im);
-  if (weights == CellWeights::of_one_magnitude) peak = make_even(cells);
+  if (weights == CellWeights::of_one_magnitude) peak = scale_to_one_magnitude(cells);
   tile.weight_unit = peak > 0 ? peak / 32767.0f : 1.0f;
   cell_lanes::pack_weights(cells.re, n, tile.weight_unit, column(CellTile::weight_re));
   cell_lanes::pack_weights(cells.im, n, tile.weight_unit, column(CellTile::weight_im));

@@ -115,7 +115,7 @@ float TexturePatch::normal_at(std::int32_t i, std::int32_t j, std::int32_t k) {
 }
 
 /// Loads the 27 points around a place, if they have changed; neighbouring cells have the same points.
-void TexturePatch::stand_at(std::int32_t i, std::int32_t j, std::int32_t k) {
+void TexturePatch::load_points(std::int32_t i, std::int32_t j, std::int32_t k) {
   if (i == near_i_ && j == near_j_ && k == near_k_ && stands_) return;
   near_i_ = i, near_j_ = j, near_k_ = k;
   stands_ = true;
@@ -129,7 +129,7 @@ float TexturePatch::root_at(Vec3d place_m) {
   // Blend of 27 lattice normals; the weights' squares add to 1, so the result is again standard normal.
   const double per_m = 1 / field_.lattice_m();
   const Blend x = blend_at(place_m.x * per_m), y = blend_at(place_m.y * per_m), z = blend_at(place_m.z * per_m);
-  stand_at(x.first, y.first, z.first);
+  load_points(x.first, y.first, z.first);
   const auto blend = [](const float* w, float a, float b, float c) { return w[0] * a + w[1] * b + w[2] * c; };
   float plane[3];
   for (int k = 0; k < 3; ++k) {

@@ -45,7 +45,7 @@ class TexturePatch {
     float normal;
   };
   float normal_at(std::int32_t i, std::int32_t j, std::int32_t k);
-  void stand_at(std::int32_t i, std::int32_t j, std::int32_t k);
+  void load_points(std::int32_t i, std::int32_t j, std::int32_t k);
 
   const TextureField& field_;
   int object_;

@@ -84,7 +84,7 @@ bool shows_degrees(const RawHeights& raw) {
 }
 
 /// A metre of Web Mercator is shorter on the ground, by the cosine of the latitude.
-void bring_to_degrees(RawHeights& raw, std::vector<std::string>& notes) {
+void convert_web_mercator(RawHeights& raw, std::vector<std::string>& notes) {
   constexpr double radius_m = 6378137;
   for (double& x : raw.x) x = deg_from_rad(x * raw.system.unit_m / radius_m);
   for (double& y : raw.y) y = deg_from_rad(std::atan(std::sinh(y * raw.system.unit_m / radius_m)));
@@ -94,7 +94,7 @@ void bring_to_degrees(RawHeights& raw, std::vector<std::string>& notes) {
                    1 / std::cos(rad_from_deg(0.5 * (raw.y.front() + raw.y.back())))));
 }
 
-void bring_to_metres(RawHeights& raw, double z_scale, std::vector<std::string>& notes) {
+void convert_to_metres(RawHeights& raw, double z_scale, std::vector<std::string>& notes) {
   const double unit_m = raw.system.unit_m;
   if (unit_m == 1) return;
   for (auto* axis : {&raw.x, &raw.y})
@@ -106,7 +106,7 @@ void bring_to_metres(RawHeights& raw, double z_scale, std::vector<std::string>& 
 }
 
 /// German eastings are often written with the number of their zone before them: 32500000.
-void take_off_zone(RawHeights& raw, UtmZone zone, std::vector<std::string>& notes) {
+void remove_zone_number(RawHeights& raw, UtmZone zone, std::vector<std::string>& notes) {
   constexpr double a_million_m = 1e6;
   const auto has_it = [&](double x) { return std::floor(x / a_million_m) == zone.number; };
   if (!has_it(raw.x.front()) || !has_it(raw.x.back())) return;
@@ -275,10 +275,10 @@ void RawHeights::turn_rows(std::size_t columns) {
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) {
   HeightGrid grid;
   take_out_fills(raw, grid.notes);
-  if (raw.system.web_mercator && options.geographic.value_or(true)) bring_to_degrees(raw, grid.notes);
+  if (raw.system.web_mercator && options.geographic.value_or(true)) convert_web_mercator(raw, grid.notes);
   const bool said = options.geographic.has_value() || raw.system.geographic.has_value();
   const bool geographic = options.geographic.value_or(raw.system.geographic.value_or(!said && shows_degrees(raw)));
-  if (!geographic) bring_to_metres(raw, options.z_scale, grid.notes);
+  if (!geographic) convert_to_metres(raw, options.z_scale, grid.notes);
   if (raw.system.height_unit_m != 1)
     grid.notes.push_back(text::format("its heights, in units of %.6g m, become metres", raw.system.height_unit_m));
   if (geographic && !could_be_degrees(raw))
@@ -286,7 +286,7 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   const auto zone = options.utm || options.geographic ? options.utm : raw.system.utm;
   if (geographic && zone && options.utm)
     return failure(ErrorKind::bad_data, "utm is for coordinates in metres, and these are degrees; remove it");
-  if (zone) take_off_zone(raw, *zone, grid.notes);
+  if (zone) remove_zone_number(raw, *zone, grid.notes);
   if (options.origin && !geographic && !zone && !raw.system.name.empty())
     return failure(ErrorKind::bad_data, "origin is for a grid in degrees or UTM, and this is in " +
                                             text::printable(raw.system.name) +

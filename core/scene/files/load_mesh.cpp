@@ -34,7 +34,7 @@ std::filesystem::path importer() {
 }
 
 /// The first line of the failed program's error output, such as that of the dynamic loader.
-std::string last_words(int descriptor) {
+std::string first_error_line(int descriptor) {
   std::array<char, 300> text{};
   const ssize_t n = ::pread(descriptor, text.data(), text.size() - 1, 0);
   std::string line(text.data(), n > 0 ? static_cast<std::size_t>(n) : 0);
@@ -80,7 +80,7 @@ Result<LoadedMesh> import_in_a_child(const MeshFile& request) {
     return failure(ErrorKind::unavailable, request.file.filename().string() + ": cannot be read: " + end.error().text +
                                                "; it reads meshes for sonard and is installed with it");
   auto answer = read_answer(output->descriptor());
-  if (end->signal != 0 || !answer) return without_answer(request, *end, last_words(errors->descriptor()));
+  if (end->signal != 0 || !answer) return without_answer(request, *end, first_error_line(errors->descriptor()));
   return *std::move(answer);
 }
 

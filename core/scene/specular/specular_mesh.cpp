@@ -107,7 +107,7 @@ std::optional<SpecularMesh::Foot> SpecularMesh::foot_on(const Triangle& triangle
   double a = 1.0 / 3, b = 1.0 / 3;
   double t = dot(sonar_m - (p0 + a * e1 + b * e2), n0 + a * d1 + b * d2);
   const bool inner = triangle.across[0] >= 0 && triangle.across[1] >= 0 && triangle.across[2] >= 0;
-  const double hopeless = inner ? 3 : 1e3;  // in triangle sides; outside an edge the foot may be far away
+  const double most_sides = inner ? 3 : 1e3;  // in triangle sides; outside an edge the foot may be far away
   for (int i = 0; i < 12; ++i) {
     const Vec3d m = n0 + a * d1 + b * d2;
     const Vec3d miss = sonar_m - (p0 + a * e1 + b * e2 + t * m);
@@ -117,7 +117,7 @@ std::optional<SpecularMesh::Foot> SpecularMesh::foot_on(const Triangle& triangle
     const double da = dot(cross(miss, c2), m) / det, db = dot(cross(c1, miss), m) / det, dt = dot(c12, miss) / det;
     a += da, b += db, t += dt;
     // The problem is nearly linear, so that a place far outside does not converge to one inside.
-    if (!(std::abs(a - 0.5) < hopeless && std::abs(b - 0.5) < hopeless)) return {};
+    if (!(std::abs(a - 0.5) < most_sides && std::abs(b - 0.5) < most_sides)) return {};
     if (std::abs(da) + std::abs(db) < 1e-9) {
       const Vec3d normal = n0 + a * d1 + b * d2;
       return Foot{{1 - a - b, a, b}, unit_vector(normal), t * length(normal)};
