@@ -322,7 +322,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
     p.noise_filter = rounded(make_noise_filter(passed, p.sample_time_s));
     bandwidth_hz = passed.noise_bandwidth_hz();
   }
-  // sum_k W_jk^2 column powers make a beam's: NL (eq. 30) at its output.
+  // A beam has sum_k W_jk^2 times the power of a column, which must be NL (eq. 30).
   p.column_noise_upa = noise_rms_upa(mode, bandwidth_hz) / std::sqrt(p.beam_weights.weight_energy);
   lay_out_noise_profile(p);
   p.shared_noise = SharedNoiseTable(p, pool);

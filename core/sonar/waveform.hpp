@@ -15,7 +15,7 @@ struct Waveform {
     measured,  // `samples`
   };
   Shape shape = Shape::gaussian;
-  /// lfm: duration of the sweep, from low to high frequency. Only the Doppler range shift uses it.
+  /// lfm: duration and direction of the sweep. Falling sweeps shift ranges the other way. Only the Doppler range shift uses them.
   float sweep_s = 1e-3f;
   bool falling = false;
   /// measured: complex envelope after the matched filter at sample_rate_hz, the peak in the middle, at most 65536 samples.

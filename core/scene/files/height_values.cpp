@@ -33,7 +33,7 @@ struct Span {
   float low = std::numeric_limits<float>::infinity(), high = -std::numeric_limits<float>::infinity();
 };
 
-/// Undeclared fill values lie far outside of all other heights; a height that happens to be one of them does not.
+/// Removes undeclared fill values. They lie far outside of all other heights, unlike heights that equal a usual fill value.
 void take_out_fills(RawHeights& raw, std::vector<std::string>& notes) {
   const auto is_usual = [](float z) { return std::find(usual_fills.begin(), usual_fills.end(), z) != usual_fills.end(); };
   Span rest;
