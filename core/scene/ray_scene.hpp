@@ -34,7 +34,7 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// Replaces the scene. Objects that stand still, with the same mesh at the same place, keep their trees, also when scenes
+  /// Replaces the scene. Static objects with the same mesh at the same place keep their trees, also when scenes
   /// alternate. The hits are those of a new RayScene.
   void change(std::shared_ptr<const Scene> scene);
   const Scene& scene() const;

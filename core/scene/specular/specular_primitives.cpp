@@ -84,7 +84,7 @@ void box(const Primitive& shape, const SpecularQuery& q, std::vector<SpecularPoi
     for (const double side : {-1.0, 1.0}) {
       if (shape.inside && k == 2 && side > 0) continue;  // open at the top
       const Face face{k, side * half[k], side, half[(k + 1) % 3], half[(k + 2) % 3]};
-      // A sonar outside sees the near faces; a sonar inside sees all faces.
+      // From outside, only the near faces are visible; from inside, all faces.
       const bool outside = side * component(q.sonar_m, k) > half[k];
       if (outside || within || shape.inside) keep(of_face(face, outside ? side : -side, q), q, out);
     }
