@@ -61,7 +61,7 @@ class DeviceEngine final : public PingEngine {
 
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
     submit(requests);
-    return taken(calls_.size() - 1);
+    return take_pings(calls_.size() - 1);
   }
   void submit(std::span<const PingRequest> requests) override {
     Call& call = calls_.emplace_back();
@@ -77,7 +77,7 @@ class DeviceEngine final : public PingEngine {
     } catch (...) {  // collect() tries again, and throws if it has to
     }
   }
-  std::vector<Ping> collect() override { return taken(0); }
+  std::vector<Ping> collect() override { return take_pings(0); }
 
   std::string description() const override {
     return (failed_ ? "cpu, after a failure of " : "cuda, ") + machine_->name() + ", " + kernels_.name + ", " +
@@ -99,7 +99,7 @@ class DeviceEngine final : public PingEngine {
   };
 
   /// Takes the pings of the first or the last call.
-  std::vector<Ping> taken(std::size_t which) {
+  std::vector<Ping> take_pings(std::size_t which) {
     const Call call = std::move(calls_[which]);
     calls_.erase(calls_.begin() + static_cast<std::ptrdiff_t>(which));
     if (!call.invalid.empty()) throw std::invalid_argument(call.invalid);

@@ -7,10 +7,10 @@
 namespace sonar {
 namespace {
 
-constexpr int quantiles = 256;
-constexpr double widest_normal = 5;
-constexpr double weakest = 1e-4;  // -40 dB; with lower values a cell could not be distinguished from an empty one
-constexpr int remembered_along = 16, remembered_up = 8;
+constexpr int quantiles = 256;       // intervals of the table of quantiles
+constexpr double widest_normal = 5;  // the table covers normals from -5 to 5
+constexpr double weakest = 1e-4;     // -40 dB; with lower values a cell could not be distinguished from an empty one
+constexpr int remembered_along = 16, remembered_up = 8;  // size of the cache of lattice points
 
 struct IncompleteGamma {
   double lower, upper;

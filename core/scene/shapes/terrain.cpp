@@ -6,9 +6,9 @@
 namespace sonar {
 namespace {
 
-/// East and north of every vertex of a grid. Coordinates in degrees or UTM give a point of the ellipsoid, which is
-/// projected into the plane that touches the ellipsoid at the origin, whatever the height. Seen from there, a length along the
-/// ground d away is too short by the part (d / R)^2 / 2.
+/// Computes east and north of every vertex of a grid. Coordinates in degrees or UTM give a point of the ellipsoid, which is
+/// projected into the plane that touches the ellipsoid at the origin; heights do not change. At a distance d from the origin,
+/// lengths along the ground become shorter by the fraction (d / R)^2 / 2.
 class PlaneOf {
  public:
   explicit PlaneOf(const HeightGrid& grid) : grid_(grid) {
@@ -33,7 +33,7 @@ class PlaneOf {
 
  private:
   struct Ring {
-    double radius_m, z_m;  // about the earth's axis
+    double radius_m, z_m;  // distance from the earth's axis, and place along it
   };
   static Ring ring_at(double latitude_rad) {
     const Vec3d p = ecef_from({latitude_rad, 0, 0});
