@@ -1,5 +1,5 @@
-// Settings that a client may change between two pings, independent of the vendor. protocol/<vendor>/settings.cpp computes them
-// from the settings of the vendor's protocol.
+// Settings that a client may change between two pings, independent of the vendor. protocol/<vendor>/ computes them from the
+// settings of the vendor's protocol.
 #pragma once
 
 #include <cstdint>
