@@ -1,5 +1,5 @@
-// The settings of an emulated sonar and its pings: when they are due, what each of them requests from the engine, and what the
-// device learns from the result.
+// The settings of an emulated sonar, and its pings: when they are due, what each requests from the engine, and how the result
+// changes the device.
 #pragma once
 
 #include <memory>
@@ -22,9 +22,9 @@ class PingSource {
   // ---- settings
 
   const PingSettings& settings() const { return settings_; }
-  /// The last who changed the settings; empty = they are the initial ones.
+  /// The name of the client that last changed the settings; empty = they are the initial ones.
   const std::string& asked_by() const { return asked_by_; }
-  /// Restores the state in which no client has ever connected, so that the next client finds the device as delivered.
+  /// Restores the initial settings, so that the next client finds the device as delivered.
   void use_initial_settings();
   /// `who` is for the log and for asked_by(); empty = the device itself.
   void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
@@ -36,7 +36,7 @@ class PingSource {
   // ---- when pings are due
 
   bool wants_pings() const;
-  /// Sets whether the sonar pings by itself, at the rate of its settings, while it has no client.
+  /// Sets whether the sonar makes pings by itself while it has no client, at the rate of its settings.
   void run_itself(bool on, Time now);
   /// True while it does so.
   bool runs_itself() const { return runs_itself_ && !audience_.stopping() && !audience_.has_audience(); }
@@ -44,26 +44,27 @@ class PingSource {
   void update_pacer(Time now);
   const Pacer& pacer() const { return pacer_; }
   std::optional<Time> next_ping() const;
-  /// A vehicle without fresh poses: the configuration wants no pings then.
+  /// True if the poses of the vehicle are stale and the configuration forbids pings then.
   bool waits_for_pose(Time at) const;
-  /// One ping now; with `joins`, none if one with these settings is being computed.
+  /// Requests one ping now. With `joins` it makes none if one with these settings is being computed.
   void trigger(const protocol::RequestPing& request, Time now);
   Actions tick(Time now);
   void skip(std::chrono::nanoseconds by) { pacer_.skip(by); }
   void stop() { pacer_.stop(); }
   // Effects of faults.
   void forget_settings(Time now);
-  /// Unless only its clock restarts, the device numbers pings from 1 again and has its initial settings.
+  /// Restarts the clock of the device. Unless `clock_only`, pings are numbered from 1 again and the settings are the initial
+  /// ones.
   void restart(bool clock_only, Time now);
   void override_settings(const protocol::SettingsOverride& wanted, Time now, Actions& actions);
 
   // ---- pings
 
-  /// A ping is being computed.
+  /// True while a ping is being computed.
   bool busy() const { return busy_; }
   /// See Sonar::preview_request.
   std::optional<PingRequest> preview_request(PingNumber number, Time at) const;
-  /// The engine is done. Returns whether the ping goes to clients.
+  /// Takes the result of the engine. Returns whether the ping goes to clients.
   bool on_ping(const PingOutcome& outcome, Time now, Actions& actions);
 
  private:
@@ -89,7 +90,7 @@ class PingSource {
   bool busy_ = false;
   std::shared_ptr<const VendorSettings> busy_settings_;
   bool busy_blank_ = false;     // requested as noise only
-  bool busy_unwanted_ = false;  // its clients have gone
+  bool busy_unwanted_ = false;  // the clients that requested it have gone
 
   std::uint32_t ping_number_ = 0;
   std::uint64_t numbered_skips_ = 0;  // ticks lost to overload, as of the last ping

@@ -1,5 +1,5 @@
-// Finds out whether the computing time keeps a sonar from the requested rate, and reports it once. Pure: figures in, a sentence
-// out; used by Sonar.
+// Detects that a sonar misses the requested rate because pings take too long to compute, and reports it once. It is pure: Sonar
+// passes the figures and gets a sentence.
 #pragma once
 
 #include <cstdint>
@@ -19,11 +19,11 @@ class RateWatch {
   void begin(std::uint64_t ticks, std::uint64_t busy, double rate_hz);
 
   bool said_ = false;
-  int to_pass_over_ = 5;  // the first pings make what later ones find ready: they prove nothing
+  int to_pass_over_ = 5;  // the first pings take longer, because they fill caches; they do not count
   double rate_hz_ = 0;
   std::uint64_t ticks_before_ = 0, busy_before_ = 0;
   int pings_ = 0;
-  double ping_s_ = 0, longest_s_ = 0;  // time that those took: sum and longest
+  double ping_s_ = 0, longest_s_ = 0;  // computing time of the counted pings: sum and longest
 };
 
 }  // namespace sonar

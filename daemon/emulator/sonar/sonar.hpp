@@ -1,5 +1,5 @@
-// One emulated sonar without sockets, threads or a clock. It leads the conversations of its clients and connects three parts: the
-// Audience (who is connected), the PingSource (settings, and when which ping is made) and the Delivery (what is sent).
+// One emulated sonar without sockets, threads or a clock. It runs the conversations with its clients and connects three parts:
+// the Audience (the connections), the PingSource (settings and pings) and the Delivery (messages to clients).
 //
 // Flow: the caller reports what happened (a connection, bytes, a finished ping, time passing) with the time it happened; the
 // sonar changes its state and returns the Actions to carry out. Replies and pings wait in outboxes, from which the caller takes
@@ -40,18 +40,18 @@ class Sonar {
   /// Another host takes over the dialogue at a port of kind udp_dialogue.
   void hand_over(ConnectionId id, Peer to) { audience_.hand_over(id, std::move(to)); }
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
-  /// The next message to write, whole; empty when there is none or one is being written.
+  /// Returns the next message to write; empty if there is none, or while one is being written.
   Outbox::Message next_message(ConnectionId id, Time now) { return delivery_.next_message(id, now); }
   /// Reports `bytes` of it as sent; after the last one on_written() follows.
   void on_sent(ConnectionId id, std::size_t bytes) { delivery_.on_sent(id, bytes); }
   void on_written(ConnectionId id, const Outbox::Message& message, Time now) { delivery_.on_written(id, message, now); }
-  /// The message of a stream that was taken last had no receiver left, or none of its datagrams could be sent.
+  /// Reports that the last message of a stream had no receiver left, or that none of its datagrams could be sent.
   void on_not_sent(ConnectionId id) { delivery_.on_not_sent(id); }
-  /// The caller ends the connection after the message being written.
+  /// Call it when the connection will be ended after the message being written.
   void finish(ConnectionId id) { audience_.finish(id); }
-  /// The connection is closed; also one that waited. `why` is for the log.
+  /// Reports that a connection is closed, also one that waited. `why` is for the log.
   Actions on_closed(ConnectionId id, const std::string& why, Time now, bool by_client = false);
-  /// The caller had no slot for a client that connected.
+  /// Counts a client that the caller refused for lack of a slot.
   void count_refused_client() { ++data_.figures.refused_clients; }
   /// Finishes every connection and requests no more pings; `why` is for the log.
   Actions stop(const std::string& why);
@@ -76,9 +76,9 @@ class Sonar {
 
   // ---- time
 
-  /// Does everything that is due.
+  /// Does everything that is due at this time.
   Actions on_tick(Time now);
-  /// When on_tick() has something to do next.
+  /// The next time at which on_tick() must be called.
   std::optional<Time> next_tick() const;
   // The stepped clock advances to the next of these and performs them one by one.
   std::optional<Time> next_ping() const { return source_.next_ping(); }
@@ -96,7 +96,7 @@ class Sonar {
 
   /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
-  /// The sonar pings by itself while it has no client, such as a range finder whose distances an autopilot gets.
+  /// Lets the sonar make pings by itself while it has no client, as a range finder whose distances an autopilot gets.
   void run_itself(bool on, Time now) { source_.run_itself(on, now); }
   /// Returns whether the setting changed.
   bool set_transmit(bool on) { return source_.set_transmit(on); }
@@ -111,9 +111,9 @@ class Sonar {
 
   /// Why this sonar cannot have these faults; nullopt = it can.
   std::optional<FaultRefusal> why_no_faults(const std::vector<Fault>& faults) const { return faults_.why_not(faults); }
-  /// Those of `faults` that are for this sonar and take effect on it.
+  /// Adds those of `faults` that are for this sonar and take effect on it.
   Actions add_faults(const std::vector<Fault>& faults, bool manual, Time now);
-  /// Empty `name` = all. False: there is none of that name.
+  /// Ends the faults of that name, or all if `name` is empty. Returns false if there is none.
   bool end_faults(const std::string& name, Time now, Actions& actions);
   const Faults& faults() const { return faults_; }
 
@@ -127,7 +127,7 @@ class Sonar {
   bool busy() const { return source_.busy(); }
   bool wants_pings() const { return source_.wants_pings(); }
   DeviceFigures figures() const;
-  /// Pings that at least one client received, and pings that were made.
+  /// Counts of pings that at least one client received, and of pings that were made.
   std::uint64_t served() const { return data_.figures.served; }
   std::uint64_t pings() const { return data_.figures.pings; }
   /// A request for a ping as a client would get it now, but with a number and noise that no client's ping has. The sonar does not

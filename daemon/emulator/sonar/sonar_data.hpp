@@ -17,7 +17,8 @@
 namespace sonar {
 
 struct SonarData {
-  /// All outlive the sonar. Of the configuration it reads what all sonars share: water, seed, switches, rules for stale poses.
+  /// All outlive the sonar, which reads from the configuration what all sonars share: water, seed, switches, rules for stale
+  /// poses.
   struct Surroundings {
     const Config& config;
     const World& world;
@@ -41,9 +42,9 @@ struct SonarData {
   protocol::DeviceState state;
   DeviceFigures figures;
 
-  /// The time of conversations: without what stepped time has jumped over.
+  /// Converts to the time of conversations, which leaves out what stepped time has jumped over.
   Time unskipped(Time now) const { return now - state.skipped; }
-  /// The way back, if nothing more is skipped.
+  /// Converts back to the daemon's time, if nothing more is skipped.
   Time clock_time(Time unskipped) const {
     return unskipped > Time::max() - state.skipped ? Time::max() : unskipped + state.skipped;
   }
@@ -53,7 +54,7 @@ struct SonarData {
   void report(Report::Topic topic, LogLevel level, std::string phrase, std::vector<LogField> fields, Actions& actions) const {
     sonar::report(config.name, topic, level, std::move(phrase), std::move(fields), actions);
   }
-  /// An exception is a mistake in sonard.
+  /// Reports an exception, which is a mistake in sonard.
   void report_fault(const std::exception& e, Actions& actions) const {
     report(Report::Topic::fault, LogLevel::error, std::string("internal fault: ") + e.what(), {}, actions);
   }

@@ -1,5 +1,5 @@
-// The picture of a sonar for viewers: they see what the make's own host (protocol/host.hpp), which sonarctl runs too, decodes.
-// Pure.
+// Makes the picture of a sonar for viewers. The host of the make (protocol/host.hpp), which sonarctl uses too, decodes the
+// messages, so viewers see what a driver sees. Pure.
 #pragma once
 
 #include <functional>

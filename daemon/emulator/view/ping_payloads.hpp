@@ -15,18 +15,18 @@ namespace sonar {
 PolarImage polar_image_of(const Ping& ping);
 
 using PingPointer = std::shared_ptr<const Ping>;
-// Stamped with the ping's firing; `sonar` is its frame.
+// The stamp is the time at which the ping was fired; `sonar` is the frame.
 ViewPayloadPointer image_payload(const std::string& sonar, const PingPointer& ping);
 ViewPayloadPointer geometry_payload(const Ping& ping);
 /// Requires a ping with ground truth.
 ViewPayloadPointer truth_payload(const Ping& ping);
 /// The edges of the volume that the beams cover, to the end of the range.
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);
-/// Gray, without rings.
+/// The style of fan_payload(): gray, without rings.
 FanStyle view_fan_style();
 /// As `painter` of view_fan_style() draws it, 0 outside. Takes long. Null: it cannot be drawn.
 ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPicture& picture, PicturePainter& painter);
-/// How fan_payload lies among its axes: sonar.v1.Picture.
+/// The axes of fan_payload(), as sonar.v1.Picture.
 ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture);
 /// The samples above `threshold` of the full scale in the plane of the fan, the 20,000 brightest. Takes long.
 ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold);

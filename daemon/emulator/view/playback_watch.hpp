@@ -13,8 +13,8 @@ class PlaybackWatch {
  public:
   PlaybackWatch(const motion::Playback& of, Time now);
 
-  /// The state, if it has changed by a step since the last look; a round of a loop is a seek. nullopt: it was played on as
-  /// before. `of`: null = the vehicle follows its trajectory no longer, which is a pause.
+  /// Returns the state if it changed by a step since the last look; nullopt if it was played on. The begin of a new round of a
+  /// loop counts as a seek. `of`: null = the vehicle follows its trajectory no longer, which counts as a pause.
   std::optional<foxglove::PlaybackState> look(const motion::Playback* of, Time now);
   foxglove::PlaybackState state(Time now) const;
   /// The trajectory's time, from 0 to end(). A time before the last seek counts as if it had been played until then.

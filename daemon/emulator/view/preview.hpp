@@ -1,6 +1,6 @@
-// Pings for viewers while no driver is connected: at most 5 a second, of one beam 25, with numbers and noise of their own, so
-// that the first driver gets what it would have got without them. Pure: the caller computes what is due, and asks whether it must
-// end.
+// Pings for viewers while no driver is connected: at most 5 a second, or 25 with one beam. They have numbers and noise of their
+// own, so that the pings of the first driver do not depend on them. Pure: the caller computes the pings that are due, and asks
+// whether the preview must end.
 #pragma once
 
 #include <chrono>
@@ -21,9 +21,9 @@ class Preview {
   bool on() const { return until_.has_value(); }
   /// The time between two previews of this sonar.
   static std::chrono::nanoseconds period(const Sonar& sonar);
-  /// Why it must end now, for the log; empty = it may go on.
+  /// Returns why the preview must end now, for the log; empty if it may go on.
   std::string why_over(const Sonar& sonar, Time now) const;
-  /// The ping that is due. One at a time: done() comes before the next.
+  /// Returns the ping that is due. Call done() when it is computed; until then no other is due.
   std::optional<PingRequest> due(const Sonar& sonar, Time now);
   void done() { busy_ = false; }
 

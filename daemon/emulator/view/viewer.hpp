@@ -1,5 +1,5 @@
-// One viewer of the live view, without its socket: its messages become requests to its host, its subscriptions become messages
-// to write, and newer messages replace those that it is too slow for. Sans I/O: bytes and time go in, messages come out.
+// One viewer of the live view, without its socket. Its messages become requests to its host; its subscriptions become messages to
+// write, of which newer ones replace those for which it is too slow. No I/O: bytes and time go in, messages come out.
 //
 // Three kinds of messages leave in this order: JSON texts and answers, never dropped; last values, of which a newer one replaces
 // an older one; pictures and events. Of a channel's pictures one waits, the newest; of its events the newest 64.
@@ -65,23 +65,23 @@ class Viewer;
 class ViewerHost {
  public:
   virtual ~ViewerHost() = default;
-  /// Null = there is none of that id.
+  /// Returns the channel of that id, or null.
   virtual const ViewChannel* channel(std::uint32_t id) const = 0;
   /// Offers the present values of a channel to a new subscriber.
   virtual void on_subscribed(Viewer& viewer, std::uint32_t channel) = 0;
-  /// No names = all. Unknown names are left out.
+  /// Returns the parameters of these names, or all if `names` is empty. Unknown names are left out.
   virtual std::vector<foxglove::Parameter> parameters(const Viewer& viewer, const std::vector<std::string>& names) = 0;
-  /// Empty, or why not.
+  /// Sets a parameter. Returns an empty text, or why it was not set.
   virtual std::string set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) = 0;
-  /// Answers with its state. False: the viewer looks at no trajectory.
+  /// Steers the trajectory and answers with its state. Returns false if the viewer looks at no trajectory.
   virtual bool steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) = 0;
-  /// Answers with Viewer::answer() or fail(), now or later.
+  /// Performs a call and answers with Viewer::answer() or fail(), now or later.
   virtual void call(Viewer& viewer, const foxglove::ServiceCall& call) = 0;
 };
 
 class Viewer {
  public:
-  /// Since any origin, never backwards.
+  /// A time that never decreases, from any origin.
   using Moment = std::chrono::nanoseconds;
   struct Rights {
     bool may_steer = false;
@@ -99,20 +99,20 @@ class Viewer {
   void on_binary(wire::BytesView frame, Moment now);
   /// The next message to write; nothing: wait until something is offered, or until next_due().
   std::optional<ViewMessage> next(Moment now);
-  /// When something that waits for its rate, or to say that all is well, is due.
+  /// The time at which next() must be called again for a message that waits for its rate, or for the end of a warning.
   std::optional<Moment> next_due(Moment now) const;
-  /// Not none: the connection must end.
+  /// If it is not `none`, the connection must be ended with this code.
   CloseCode close_code() const { return close_; }
 
   // ---- from the host
-  /// The first words, which may be many.
+  /// Adds one of the first messages, of which there may be many.
   void greet(std::string word) { words_.push_back({true, bytes_of(word), {}}); }
   void say(std::string word);
   void say_frame(wire::Bytes frame);
   void say_status(foxglove::StatusLevel level, const std::string& text, const std::string& id = {}) {
     say(foxglove::status(level, text, id));
   }
-  /// Gone after `lasts`.
+  /// Shows a status, which is removed after `lasts`.
   void say_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts);
   void offer(std::uint32_t channel, const ViewPayloadPointer& payload, Moment now);
   bool subscribes(std::uint32_t channel) const;
@@ -125,14 +125,14 @@ class Viewer {
   }
   void answer(const foxglove::ServiceCall& answer);
   void fail(const foxglove::ServiceCall& call, const std::string& why);
-  /// Those it watches of what has changed.
+  /// Sends those of the changed parameters that the viewer watches.
   void on_parameters(std::span<const foxglove::Parameter> changed);
   bool watches_parameters() const { return watches_all_ || !watched_.empty(); }
 
-  /// It looks at the trajectory of this vehicle, in the trajectory's time; empty = at none.
+  /// The vehicle whose trajectory the viewer looks at, in the time of the trajectory; empty = none.
   void play(std::string vehicle) { playback_ = std::move(vehicle); }
   const std::string& playback() const { return playback_; }
-  /// Parameters of this connection alone.
+  /// Parameters of this connection only.
   void choose(const std::string& parameter, double value) { choices_[parameter] = value; }
   double choice(const std::string& parameter, double usual) const {
     const auto found = choices_.find(parameter);

@@ -9,7 +9,7 @@ namespace sonar {
 
 inline constexpr double tilted = 0.5;  // further than 60 deg from upright
 
-/// How far up the body's z axis points, -1 to 1.
+/// Returns the upward component of the body's z axis, -1 to 1.
 inline double upright(Quatd q) { return 1 - 2 * (q.x * q.x + q.y * q.y); }
 
 /// Axes of a body, other than ours, that files of poses are often in.
@@ -18,9 +18,9 @@ struct OtherAxes {
   const char* cure;
   Vec3d up;  // upward direction in these axes
 };
-/// Those in which a body that mostly lies on its side would stay upright, more or less; null: none of them.
+/// Returns the axes in which a body that mostly lies on its side would be nearly upright; null if there are none.
 const OtherAxes* axes_of(const std::vector<Pose>& poses);
-/// The mounts turn the sonars upright in these axes.
+/// Returns whether the mounts turn the sonars upright in these axes.
 bool are_upright(const std::vector<Pose>& mounts, const OtherAxes& axes);
 
 }  // namespace sonar

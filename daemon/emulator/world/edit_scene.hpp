@@ -1,6 +1,6 @@
-// Scenes made from scenes: with an object more, less, hidden or elsewhere. Pure; SceneChanges calls them on its own thread.
-// What is not changed keeps its place in Scene::objects and so its speckle, and its rays' coordinates: an object that is removed
-// leaves an invisible place without a name, which the next one added takes.
+// Makes a scene from another: adds, removes, hides or moves an object. Pure; SceneChanges calls these functions on its own
+// thread. Unchanged objects keep their index in Scene::objects, and so their speckle and the coordinates of their rays. A removed
+// object leaves an invisible object without a name; the next added object gets its index.
 #pragma once
 
 #include <memory>
@@ -14,21 +14,21 @@ namespace sonar {
 
 using ScenePointer = std::shared_ptr<const Scene>;
 
-// Each refuses with one sentence that names what the scene has (usage), and then nothing is changed.
+// Each returns the new scene, or an error (usage) with a sentence that names what the scene has.
 
 Result<ScenePointer> with_object(const Scene& scene, const control::AddObject& wanted);
 Result<ScenePointer> without_object(const Scene& scene, std::string_view name);
-/// Hides, shows or moves an object that stands still. A moving one is only hidden or shown; its poses are the World's.
+/// Hides, shows or moves a static object. A moving one is only hidden or shown, because the World has its poses.
 Result<ScenePointer> with_object_set(const Scene& scene, const control::SetObject& wanted);
 
-/// The moving body of that name, or -1.
+/// Returns the index of the moving body of that name, or -1.
 int body_named(const Scene& scene, std::string_view name);
-/// The object of that name, or null.
+/// Returns the object of that name, or null.
 const Object* object_named(const Scene& scene, std::string_view name);
-/// "there is no object ...; did you mean ...".
+/// Makes the error "there is no object ...; did you mean ...".
 Error no_such_object(const Scene& scene, std::string_view name);
 
-/// Whether pings of both are the same, whatever the scenes are called.
+/// Returns whether both scenes give the same pings. Their names do not count.
 bool is_same(const Scene& a, const Scene& b);
 
 }  // namespace sonar

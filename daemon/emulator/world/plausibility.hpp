@@ -15,7 +15,7 @@
 
 namespace sonar {
 
-/// Something that was probably not meant, or a step that is still missing.
+/// A probable mistake, or a missing step.
 struct Note {
   std::string vehicle;  // the note's subject; empty = the scene or a sonar
   std::string text;     // a sentence
@@ -39,7 +39,7 @@ struct Surroundings {
   double longest_range_m = 0;  // longest range of any sonar
   MeshShapes meshes;           // that can be seen
 };
-/// `known`: of a scene before, whose meshes need no second look.
+/// `known`: shapes of the previous scene, whose meshes are not examined again.
 Surroundings surroundings_of(const Config& config, const Scene& scene, const MeshShapes& known = {});
 
 /// A vehicle, by name, and where its sonars sit on it (FLU).
@@ -54,21 +54,21 @@ std::vector<Note> notes_on_mounts(const Config& config);
 std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around);
 /// Whether the scene is near the origin of a world that has a latitude and longitude.
 std::vector<Note> notes_on_origin(const Surroundings& around);
-/// At most one concerns the place, and one the attitude.
+/// Returns at most one note on the position and one on the attitude.
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
 /// `largest_angle_rad`: as in PoseSample.
 std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad);
 /// Notes on at most some 10,000 poses, evenly spread. A carrier without mounts is a moving object: its place is not judged.
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around);
 
-/// All that is known before the first pose.
+/// Returns all notes that need no pose.
 std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surroundings& around);
 
 /// The notes of a running daemon: of its configuration and scene, and of the newest pose of each vehicle.
 class Plausibility {
  public:
-  /// At the start, and after either of the two has changed; returns what has not been returned before. Trajectories and poses
-  /// are judged again where the scene's places have changed.
+  /// Call it at the start, and after configuration or scene has changed. Returns notes that were not returned before. Judges
+  /// trajectories and poses again if positions in the scene have changed.
   std::vector<Note> use(const Config& config, const Scene& scene);
   /// Judges an accepted pose of a vehicle; returns the notes that were not returned before for this vehicle.
   std::vector<Note> use(const control::PoseSample& sample);
@@ -86,9 +86,10 @@ class Plausibility {
 
   Surroundings around_;
   std::vector<Carrier> carriers_;
-  std::vector<std::shared_ptr<const motion::Trajectory>> played_;  // what of_plans_ is of; a reload reads new ones
-  std::vector<Note> of_plans_, of_setup_;                          // the second has the first
-  std::map<std::string, LastPose> of_poses_;                       // by vehicle
+  std::vector<std::shared_ptr<const motion::Trajectory>>
+      played_;                                // the trajectories that of_plans_ is about; a reload reads new ones
+  std::vector<Note> of_plans_, of_setup_;     // of_setup_ contains of_plans_
+  std::map<std::string, LastPose> of_poses_;  // by vehicle
   std::set<std::string> told_;
 };
 

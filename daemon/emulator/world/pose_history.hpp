@@ -1,5 +1,5 @@
-// The last two seconds of one body's poses, and the pose at any moment from them: between samples, a little beyond them, or held.
-// Used by daemon/emulator/world/world.cpp, one per vehicle and moving object; times are the sender's.
+// The poses of one body in the last two seconds, and its pose at any time: interpolated, extrapolated for a short time, or held.
+// World has one for each vehicle and moving object. Times are those of the sender.
 #pragma once
 
 #include <deque>
@@ -29,10 +29,9 @@ class PoseHistory {
   std::size_t size() const { return samples_.size(); }
   const Sample& newest() const { return samples_.back(); }
 
-  /// `sample.at` must not lie before newest().at; an equal time replaces.
+  /// Adds a sample. `sample.at` must not be before newest().at; an equal time replaces the newest sample.
   void put(const Sample& sample);
-  /// In place of newest(): for poses that come faster than anybody needs. The same demand on `sample.at`; not on an empty
-  /// history.
+  /// Replaces newest(), for poses that come too fast. `sample.at` must not be before newest().at; the history must not be empty.
   void replace_newest(const Sample& sample) { samples_.back() = sample; }
   /// Interpolated (lerp, slerp) between samples; before the first one held; after the last one carried on by its velocity, or
   /// by the difference of the last two samples, for at most `extrapolate_max`, then held there. Not on an empty history.

@@ -20,10 +20,10 @@ struct PoseRules {
   std::chrono::nanoseconds extrapolate_max = std::chrono::milliseconds(200);
   std::chrono::nanoseconds stale_after = std::chrono::seconds(1);
   double max_jump_m = 50;
-  bool stepped = false;      // simulated time: WALL stamps are then read as the sender's own, and there is no rate to limit
-  bool follows = false;      // simulated time that is what the vehicles' stamps say (world_follows.cpp)
+  bool stepped = false;      // simulated time: WALL stamps are then those of the sender's own clock, and the rate is not limited
+  bool follows = false;      // simulated time that follows the stamps of the vehicles (world_follows.cpp)
   double most_per_s = 1000;  // poses kept of one body; faster ones replace the newest
-  double burst = 64;         // taken whole at once: what a network holds back and then delivers
+  double burst = 64;         // poses that may come at once, because networks delay and then deliver several
 };
 
 /// A vehicle, or a moving object of the scene.
@@ -46,7 +46,7 @@ struct PoseOutcome {
   PoseVerdict verdict = PoseVerdict::accepted;
   std::string refusal;  // one sentence when not accepted
   std::string notice;   // worth a log line: the source changed, poses came back
-  std::string body;     // with a notice: whose
+  std::string body;     // the body that the notice is about
 };
 
 struct PoseCounters {
@@ -57,19 +57,19 @@ struct PoseCounters {
   std::uint64_t over_rate = 0;  // replaced the newest because they came too fast
   std::uint64_t jumps = 0;      // beyond max_jump
   std::uint64_t resets = 0;     // reset counter changed
-  std::uint64_t histories = 0;  // begun: first pose, other sender, or after silence
+  std::uint64_t histories = 0;  // histories begun: by a first pose, another sender, or after silence
   std::uint64_t stale = 0;      // times a body's poses stopped coming
 };
 
-/// The motion of a sonar that is mounted on a body: its lever arm swings it round.
+/// The motion of a sonar that is mounted on a body, with the speed that a rotation gives to its lever arm.
 Twist mounted_moves(const PoseHistory::Motion& body_moves, const Pose& body_in_world, const Pose& mount);
 
 class World {
  public:
   World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start);
 
-  // When the configuration is read again or the scene changes. Bodies that are there under the same name keep their poses, and
-  // trajectories that are the same play on; others begin at `now`.
+  // Call these when the configuration is read again or the scene changes. Bodies of the same name keep their poses, and equal
+  // trajectories play on; others begin at `now`.
   void use_rules(const PoseRules& rules) { rules_ = rules; }
   void use_vehicles(std::vector<BodyStart> vehicles, Time now);
   void use_objects(std::vector<BodyStart> objects, Time now);
@@ -88,16 +88,16 @@ class World {
   std::optional<Played> object_plays(std::size_t object) const { return plays(objects_[object]); }
 
   Pose vehicle_at(std::size_t vehicle, Time t) const { return pose_at(vehicles_[vehicle], t); }
-  /// How it moves then, as vehicle_at() carries it on; at rest where that is faster than anything that carries a sonar.
+  /// The motion with which vehicle_at() extrapolates; zero if it is faster than any vehicle with a sonar.
   PoseHistory::Motion vehicle_moves(std::size_t vehicle, Time t) const;
   std::vector<Pose> objects_at(Time t) const;
   Pose object_at(std::size_t object, Time t) const { return pose_at(objects_[object], t); }
   bool is_hidden(std::size_t object) const { return objects_[object].hidden; }
-  /// Until its next pose, or show_again().
+  /// Hides an object until its next pose, or until show_again().
   void hide(std::size_t object, bool hidden) { objects_[object].hidden = objects_[object].hidden_for_now = hidden; }
-  /// Shows objects that hide() has hidden; those hidden by poses stay so.
+  /// Shows objects that hide() has hidden; those that poses have hidden stay hidden.
   void show_again();
-  /// True when poses came once and then stopped for longer than the rules allow.
+  /// True if poses came before and then stopped for longer than the rules allow.
   bool is_stale(std::size_t vehicle, Time now) const { return is_stale(vehicles_[vehicle], now); }
   struct Stale {
     std::string vehicle, sentence;
@@ -135,17 +135,17 @@ class World {
 
   std::vector<Track> taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const;
   Track* find(control::PoseSample::Of kind, const std::string& name, std::string& refusal);
-  /// WALL stamps in real time are of the clock that all share.
+  /// True for WALL stamps in real time: they are of the common clock.
   bool has_shared_clock(const control::PoseSample& sample) const {
     return sample.stamp.domain == control::ClockDomain::wall && !rules_.stepped;
   }
   /// Empty, or one sentence about a time stamp that cannot be accepted.
   std::string why_bad_time(const control::PoseSample& sample, Time at, Time now) const;
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now) const;
-  /// Whether a pose continues the history: refuses late ones, and clears the history at a jump.
+  /// Returns whether the pose continues the history. Refuses late poses, and clears the history at a jump.
   bool is_next(Track& track, const control::PoseSample& sample, Time at, PoseOutcome& out);
   void keep(Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now);
-  /// How far our time is ahead of the sender's, who stamped a pose with `at`.
+  /// Returns the offset of our time from the sender's clock, which stamped a pose with `at`.
   Ns offset_for(const Track& track, Time at, Time now, bool goes_on);
   Ns followed_offset_for(const Track& track, Time at, Time now);
   bool is_followed(const Track& track, Time newest) const;
@@ -154,7 +154,7 @@ class World {
   Time last_news(const Track& track) const;
   Pose pose_at(const Track& track, Time t) const;
   Pose orbit(const Pose& initial, Time t) const;
-  /// Moment of a body that follows its trajectory; moving as fast as it is played.
+  /// Returns pose and motion of a body that follows its trajectory at the speed of the playback.
   static motion::Moment played(const Track& track, Time t);
   static std::optional<Played> plays(const Track& track) {
     if (!track.body.plan || !track.history.empty()) return std::nullopt;

@@ -34,7 +34,8 @@ inline std::vector<BodyStart> bodies_of(const Scene& scene, const Config& config
   }
   return bodies;
 }
-/// Empty, or one sentence about an object that is to follow a trajectory and cannot: the scene has none that moves of this name.
+/// Returns a sentence about an object that should follow a trajectory, if the scene has no moving object of that name; else
+/// empty.
 inline std::string why_not_movable(const Scene& scene, const Config& config) {
   for (const ObjectConfig& o : config.objects) {
     if (std::find(scene.body_names.begin(), scene.body_names.end(), o.name) != scene.body_names.end()) continue;
