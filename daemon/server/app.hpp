@@ -1,5 +1,5 @@
-// The whole daemon, top down: the world, the pose listeners and one Device per sonar, run by one I/O thread until it must stop.
-// main.cpp and the tests make one; the engine factory is the seam where tests put a fake one.
+// The whole daemon: the world, the pose listeners and a Device for each sonar, run by one I/O thread until it must stop. main.cpp
+// and the tests create one; tests pass a factory of fake engines.
 #pragma once
 
 #include <functional>
@@ -83,7 +83,7 @@ class App {
  private:
   void stop(const std::string& why);
   void on_change();
-  void look();  // after a change: end, or take the next step of stepped time
+  void look();  // after a change: ends, or takes the next step of stepped time
   bool enough_served() const;
   bool files_are_written() const { return recordings_.idle() && writer_.idle(); }
   void log_new_notes();

@@ -1,5 +1,5 @@
-// Reads the configuration again when asked to: the file is read and its scene built on the scene thread, then everything changes
-// at once on the I/O thread. Owned by App; I/O thread only.
+// Reads the configuration again on request. The scene thread reads the file and builds the scene; then the I/O thread changes
+// everything in one step. App owns it; I/O thread only.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@ namespace sonar {
 
 class Reload {
  public:
-  /// Shortest time from the beginning of one reload to that of the next, however often it is asked for.
+  /// Shortest time from the beginning of one reload to that of the next.
   static constexpr std::chrono::milliseconds pause{500};
 
   /// Steps of a reload, in this order.
@@ -28,7 +28,7 @@ class Reload {
   Reload(asio::io_context& io, SceneChanges& changes, Log& log, Steps steps)
       : changes_(changes), log_(log), steps_(std::move(steps)), timer_(io) {}
 
-  /// Begins now or after the pause; many requests are as good as two: one now, one for all that come before the pause is over.
+  /// Begins a reload now, or after the pause. All requests before the end of the pause cause one reload.
   void request();
   void stop();
 
@@ -39,8 +39,8 @@ class Reload {
   Log& log_;
   Steps steps_;
   asio::steady_timer timer_;
-  int under_way_ = 0;   // begun, or waiting for one that is under way
-  bool waits_ = false;  // for the pause to be over
+  int under_way_ = 0;   // number of reloads that run or wait for the running one
+  bool waits_ = false;  // for the end of the pause
   bool stopped_ = false;
   std::chrono::steady_clock::time_point not_before_{};
 };

@@ -25,7 +25,7 @@ class Events {
   bool has_listeners() const { return !listeners_.empty(); }  // if false, no event needs to be made
 
   void publish(const v1::Event& event);
-  // The same, of an event that is made here when there are listeners.
+  // These make the event only if there are listeners, and publish it.
   void publish_client(const std::string& sonar, const std::string& client, bool connected, const std::string& why);
   void publish_pose(const std::string& vehicle, bool stale, const std::string& text);
   void publish_scene(const std::string& scene, const std::string& text);
@@ -44,9 +44,9 @@ class EventQueue {
 
   void subscribe(const control::Subscribe& wanted) { wanted_ = wanted; }
   bool subscribes_any() const { return wanted_.pings || wanted_.clients || wanted_.poses || wanted_.scene || wanted_.faults; }
-  /// True when it was queued.
+  /// Queues an event that is subscribed. Returns true if it was queued.
   bool offer(const v1::Event& event);
-  /// Null = there is none.
+  /// Returns the next event, or null.
   std::shared_ptr<v1::Event> next();
 
  private:

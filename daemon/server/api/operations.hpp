@@ -18,7 +18,7 @@ class Stepped;
 }  // namespace v1
 
 struct OperationResult {
-  enum class Code { done, refused, failed };  // refused: the request is wrong; failed: right, but it could not be done
+  enum class Code { done, refused, failed };  // refused: the request is wrong; failed: it is right but cannot be done
   Code code = Code::done;
   std::string text = {};                                // one sentence when it was not done
   std::shared_ptr<const v1::DaemonStatus> status = {};  // answer of a GetStatus that was done
@@ -35,7 +35,7 @@ class Operations {
   virtual void perform(const control::Operation& operation, const Sender& sender, Done done) = 0;
   /// Counters and histograms as Prometheus text, version 0.0.4.
   virtual std::string metrics() const = 0;
-  /// Empty when all is well, else one sentence: /healthz and the service manager's watchdog ask.
+  /// Returns a sentence about a problem, or an empty text. /healthz and the watchdog of the service manager use it.
   virtual std::string problem() const = 0;
 };
 

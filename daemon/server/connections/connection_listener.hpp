@@ -1,5 +1,5 @@
-// A listener whose connections hold a slot each: of both control servers and of sonars' HTTP. When all slots are taken, one is
-// closed for the new one (connection_slots.hpp says which).
+// A listener whose connections hold a slot each, for both control servers and the HTTP of sonars. If all slots are taken, a
+// connection is closed for the new one (connection_slots.hpp says which).
 // Where a token is required, clients that have not shown it yet share slots of their own, so that they can only evict each
 // other, first those of the address with most connections. The Connection class reads and writes the socket.
 #pragma once
@@ -43,7 +43,7 @@ class ConnectionListener {
   /// Port 0 = not listening.
   Endpoint at() const { return listener_.at(); }
   bool is_open() const { return listener_.is_open(); }
-  /// True after stop() when no connection is left.
+  /// Returns true after stop() if no connection is left.
   bool gone() const { return running_ == 0; }
 
  private:
@@ -59,7 +59,7 @@ class ConnectionListener {
     const Sender sender{protocol_ + " tcp " + address + ":" + std::to_string(peer.port()), protocol_ + " " + address};
     const bool untrusted = services_.token.needed();
     ConnectionSlots<Connection>& slots = untrusted ? untrusted_ : slots_;
-    // Clients of sonars count among limits.clients; control has slots of its own alone.
+    // Clients of sonars count for limits.clients; control has only its own slots.
     Admission::Place place;
     if (services_.purpose == Admission::Purpose::client) {
       place = services_.admission.enter(socket);
@@ -84,7 +84,7 @@ class ConnectionListener {
     log_limited(services_.log, services_.notices, LogLevel::info,
                 services_.server + " connection closed: longest idle, and its slot was needed", {{"from", evicted.sender().id}});
   }
-  /// After the client has shown the token. False: no slot is free.
+  /// Moves a client that has shown the token to the slots of such clients. Returns false if no slot is free.
   bool claim_slot(const std::shared_ptr<Connection>& connection) {
     if (!make_room(slots_, connection->sender())) return false;
     untrusted_.remove(connection);

@@ -27,7 +27,7 @@ struct ConnectionServices {
   LogLimiter refusals = {}, notices = {}, faults = {};
   WorkRate work = {};
 
-  /// How long a client waits after so much work.
+  /// Returns how long a client must wait after so much work.
   WorkRate::Steady::duration pause_after(const Sender& of, std::size_t amount);
 };
 
@@ -35,7 +35,7 @@ inline constexpr std::chrono::seconds greeting_limit{10};    // for the Hello, o
 inline constexpr std::chrono::seconds keep_alive_limit{60};  // between two HTTP requests
 inline constexpr std::chrono::minutes operation_limit{5};    // for a scene to load; HTTP stops waiting then
 
-/// Rate-limited, since any client can cause it.
+/// Logs a refusal at a limited rate, because any client can cause it.
 void log_refusal(ConnectionServices& services, const std::string& why, const std::string& from);
 void log_fault(ConnectionServices& services, const std::string& fault, const std::string& at);
 
@@ -63,7 +63,7 @@ class Deadline : public std::enable_shared_from_this<Deadline> {
   bool passed_ = false;
 };
 
-/// False when the client closed, or read no byte for limits.stall. `bytes` must stay valid until it returns.
+/// Writes all bytes, which must stay valid until then. Returns false if the client closed, or read no byte for limits.stall.
 asio::awaitable<bool> write_whole(ConnectionServices& services, tcp::socket& socket, Deadline& stall, const Sender& to,
                                   asio::const_buffer bytes);
 

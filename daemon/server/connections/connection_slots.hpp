@@ -1,5 +1,5 @@
-// A bounded set of connections of one listener. When all slots are taken, a new connection evicts another: one of the address
-// with most connections, first one that has asked for nothing yet, then the longest idle.
+// A bounded set of connections of one listener. If all slots are taken, a new connection evicts one of the address with most
+// connections: first one without a request so far, then the one that has been idle longest.
 #pragma once
 
 #include <algorithm>
@@ -23,15 +23,16 @@ class ConnectionSlots {
 
   using Owner = std::function<std::string(const Connection&)>;
 
-  /// A connection that was of use within `busy` is evicted only for an owner that has fewer.
+  /// A connection that was of use within `busy` is evicted only for an owner that has fewer connections.
   explicit ConnectionSlots(std::size_t most, Silence busy = std::chrono::seconds(1), Owner owner = {})
       : most_(most), busy_(busy), owner_(std::move(owner)) {}
-  /// True when a slot is free for a connection of `owner`; evicts a connection if necessary, and calls `evicted` with it first.
+  /// Returns true if a slot is free for a connection of `owner`. Evicts a connection if necessary, after calling `evicted` with
+  /// it.
   template <class Evicted>
   bool make_room(const std::string& owner, Evicted&& evicted) {
     return taken_.size() < most_ || evict(owner, std::forward<Evicted>(evicted));
   }
-  /// Evicts a connection whether or not a slot is free. False: all are busy, or there is none.
+  /// Evicts a connection even if a slot is free. Returns false if there is none, or if all are busy.
   template <class Evicted>
   bool evict(const std::string& owner, Evicted&& evicted) {
     std::map<std::string, int> counts;
@@ -59,7 +60,7 @@ class ConnectionSlots {
   }
   void add(const Pointer& connection) { taken_.push_back(connection); }
   void remove(const Pointer& connection) { taken_.remove(connection); }
-  /// Their slots are free; they are not closed.
+  /// Frees the slots of these connections without closing them.
   template <class Is>
   void forget_if(Is&& is) {
     taken_.remove_if([&](const Pointer& c) { return is(*c); });

@@ -12,7 +12,7 @@ struct HttpAnswer {
   std::string body;
   std::string type = "application/json";
   std::string allow = {};  // Allow header of status 405
-  std::string why = {};    // for the log, of a refusal worth a line
+  std::string why = {};    // the reason of a refusal, for the log; empty = no line
   std::vector<std::pair<std::string, std::string>> headers = {};
 };
 

@@ -34,16 +34,16 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   Endpoint reached() const { return reached_; }
   /// The address of the other end.
   Ipv4 peer() const { return peer_; }
-  /// Claims a slot for a client that has shown the token in a way that only the service knows. False: no slot is free.
+  /// Claims a slot for a client that has shown the token in a way that only the service knows. Returns false if no slot is free.
   bool claim_slot() { return !claim_slot_ || std::exchange(claim_slot_, nullptr)(); }
-  /// For a takeover.
+  /// The socket, for a takeover.
   tcp::socket& socket() { return socket_; }
-  /// For the service while it makes an answer.
+  /// A timer for the service while it makes an answer.
   asio::steady_timer& wait_timer() { return wake_operation_; }
 
-  /// For a service that has done more than its answer shows.
+  /// Counts work that the size of the answer does not show.
   void charge(std::size_t work) { services_.pause_after(sender_, work); }
-  /// How long a takeover waits after so much work.
+  /// Returns how long a takeover must wait after so much work.
   Steady::duration pause_after(std::size_t work) { return services_.pause_after(sender_, work); }
 
   Steady::time_point active_at = Steady::now();  // a whole request, or an answer
@@ -66,7 +66,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   ConnectionServices& services_;
   HttpService& service_;
   tcp::socket socket_;
-  Sender sender_;  // the address without the port, which differs for every curl
+  Sender sender_;  // the address without the port, because each connection of a program has another port
   Endpoint reached_;
   Ipv4 peer_{};
   std::shared_ptr<Deadline> request_limit_, stall_;

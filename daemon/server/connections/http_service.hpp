@@ -14,24 +14,24 @@
 
 namespace sonar {
 
-/// An answer without an end, written piece by piece until the client disconnects.
+/// An endless answer, written in pieces until the client disconnects.
 struct HttpStream {
   std::string type;
-  /// `wake`: there is a next piece. The stream is subscribed as long as what is returned lives.
+  /// Subscribes; `wake` is called when there is a next piece. The subscription lasts as long as the returned object.
   std::function<std::shared_ptr<void>(std::function<void()> wake)> subscribe;
-  std::function<std::optional<std::string>()> next;  // nothing: wait
+  std::function<std::optional<std::string>()> next;  // nullopt: wait for `wake`
 };
 
 /// Takes the connection over: an upgrade to another protocol, with coroutines of its own in place of the connection's.
 class HttpTakeover {
  public:
   virtual ~HttpTakeover() = default;
-  /// Sends the answer to the request. False: close the connection.
+  /// Sends the answer to the request. Returns false if the connection must be closed.
   virtual asio::awaitable<bool> begin() = 0;
-  // Both until the socket closes.
+  // Both run until the socket closes.
   virtual asio::awaitable<void> read() = 0;
   virtual asio::awaitable<void> write() = 0;
-  /// The socket is about to be closed by us: last words, if they can be sent at once.
+  /// Called before we close the socket. May send a last message if that does not block.
   virtual void on_closing() = 0;
 };
 
@@ -44,7 +44,7 @@ class HttpService {
   virtual ~HttpService() = default;
   /// `from` outlives the call. May wait on from.wait_timer(), which ends when the connection does.
   virtual asio::awaitable<HttpOutcome> answer(const HttpRequest& request, HttpConnection& from) = 0;
-  /// Answer to a request that cannot be parsed, or that finds no slot.
+  /// Returns the answer to a request that cannot be parsed, or for which no slot is free.
   virtual HttpAnswer refusal(const HttpRefusal& refusal) const = 0;
 };
 

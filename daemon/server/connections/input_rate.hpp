@@ -14,10 +14,10 @@ class InputRate {
   using Steady = std::chrono::steady_clock;
   /// Allows a second's worth of bytes at once after a pause. 0 bytes a second: no limit.
   explicit InputRate(std::size_t bytes_per_s) : rate_(static_cast<double>(bytes_per_s)), tokens_(rate_) {}
-  /// From now on.
+  /// Changes the rate from now on.
   void use(std::size_t bytes_per_s) { rate_ = static_cast<double>(bytes_per_s); }
 
-  /// No pause will be longer from now on.
+  /// Forgets bytes beyond the limit, so that the next pause is at most `longest`.
   void forgive_beyond(Steady::duration longest) {
     tokens_ = std::max(tokens_, -rate_ * std::chrono::duration<double>(longest).count());
   }
@@ -30,7 +30,7 @@ class InputRate {
     return tokens > 0 ? static_cast<std::size_t>(tokens) : 0;
   }
 
-  /// `bytes` were read; 0 = read on.
+  /// Counts bytes that were read. Returns the pause before the next read; 0 = none.
   Steady::duration pause_after(std::size_t bytes, Steady::time_point now) {
     if (rate_ <= 0) return {};
     if (begun_) tokens_ = std::min(rate_, tokens_ + rate_ * std::chrono::duration<double>(now - last_).count());

@@ -23,8 +23,8 @@ class Listener {
 
   /// Port 0: the system chooses one. After an error it does not listen.
   Result<void> open(Endpoint at);
-  /// `take` gets each connection, `fault` the text of an exception. Does nothing when it does not listen. It must live for
-  /// 100 ms after stop(): Admission may pause before it looks again.
+  /// `take` gets each connection, `fault` the text of an exception. Does nothing if the listener is not open. The object must
+  /// live for 100 ms after stop(), because Admission may pause so long.
   void start(Take take, Fault fault);
   void stop();
   /// Closes the socket, so that connections are refused as at a port where no program listens.
@@ -32,9 +32,9 @@ class Listener {
   /// Accepts connections again, at the same address and port. It retries while another program has that port; then
   /// `taken` gets the reason, once.
   void resume(Fault taken);
-  /// True also while paused.
+  /// Returns true also while paused.
   bool is_open() const { return acceptor_.is_open() || paused_; }
-  /// With the port the system chose. Port 0 = never opened.
+  /// The address, with the port that the system chose. Port 0 = it was not opened.
   Endpoint at() const { return at_; }
 
  private:

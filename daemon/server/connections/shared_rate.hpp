@@ -12,7 +12,7 @@ namespace sonar {
 class SharedRate {
  public:
   using Steady = InputRate::Steady;
-  /// One client's; it counts while it lives, and may outlive the rate.
+  /// The part of one client. The client counts as long as it lives; it may outlive the rate.
   class Part {
     friend class SharedRate;
     explicit Part(std::shared_ptr<const char> counted) : counted_(std::move(counted)) {}
@@ -28,7 +28,7 @@ class SharedRate {
     return Part(counted_);
   }
 
-  /// Share of one client, bytes a second.
+  /// The share of one client, bytes a second.
   std::size_t share() const {
     const auto parts = static_cast<std::size_t>(std::max(counted_.use_count() - 1, 1L));
     return std::max<std::size_t>(bytes_per_s_ / parts, 1);
@@ -38,7 +38,7 @@ class SharedRate {
     return std::max(std::min(part.share_.left(now), share()), together_.left(now));
   }
 
-  /// `bytes` of the client were read; 0 = read on.
+  /// Counts bytes that were read from the client. Returns the pause before the next read; 0 = none.
   Steady::duration pause_after(Part& part, std::size_t bytes, Steady::time_point now) {
     part.share_.use(share());
     const auto of_all = together_.pause_after(bytes, now);
@@ -49,7 +49,7 @@ class SharedRate {
   static constexpr std::size_t at_once = 4096;  // limit for a new sender; a larger one would reward connecting again and again
   std::size_t bytes_per_s_;
   InputRate together_;
-  std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // by us and by each Part
+  std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // shared with each Part, which it counts
 };
 
 }  // namespace sonar

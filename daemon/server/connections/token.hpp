@@ -16,18 +16,18 @@ class Token {
 
   Token() = default;  // none: all clients are authorized
   explicit Token(std::string secret) : secret_(std::move(secret)) {}
-  /// The file's text without surrounding blanks. `warning` is set when other users can read the file.
+  /// Reads the text of the file without surrounding blanks. Sets `warning` if other users can read the file.
   static Result<Token> read(const std::filesystem::path& file, std::string& warning);
 
   bool needed() const { return !secret_.empty(); }
-  /// Takes constant time. Also true if no token is required.
+  /// Compares in constant time. Returns true if no token is required.
   bool matches(std::string_view shown) const;
 
  private:
   std::string secret_;
 };
 
-/// The token in "Authorization: Bearer abc"; empty for anything else.
+/// Returns the token in "Authorization: Bearer abc"; empty for another text.
 std::string_view bearer_token(std::string_view authorization);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// The figures as Prometheus reads them: text format 0.0.4, names by its conventions (base units, _total for counters).
-// Pure text; Operations::metrics() calls metrics_text, docs/operations.md lists what is in it.
+// Writes the figures in the text format 0.0.4 of Prometheus, with names by its conventions (base units, _total for counters).
+// Pure; Operations::metrics() calls metrics_text, and docs/operations.md lists the metrics.
 #pragma once
 
 #include <string>

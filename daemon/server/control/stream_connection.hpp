@@ -37,8 +37,8 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
 
-  Steady::time_point active_at = Steady::now();  // a whole message, in or out: subscribers only read
-  bool proved = false;                           // it has said Hello
+  Steady::time_point active_at = Steady::now();  // time of the last whole message, received or sent (subscribers only read)
+  bool proved = false;                           // the client has sent Hello
 
  private:
   struct Work {
@@ -64,7 +64,7 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   asio::steady_timer wake_reader_, wake_writer_, rest_;
   control::DelimitedParser parser_;
   InputRate rate_;
-  std::optional<SharedRate::Part> pose_rate_;  // from the first pose without an answer
+  std::optional<SharedRate::Part> pose_rate_;  // set with the first pose without an answer
   std::optional<control::Bytes> newest_pose_;  // newest of the poses beyond the rate
   std::deque<control::Bytes> answers_;         // framed
   std::size_t unsettled_ = 0;                  // work: answers

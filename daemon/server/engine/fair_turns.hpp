@@ -1,5 +1,5 @@
-// Chooses the next ping when several sonars share one engine: that of the sonar that has used the least time; and decides whether
-// a ping may start before the one under way is finished. Pure: times are passed in; owned by the Simulator.
+// Chooses the next ping if several sonars share one engine: that of the sonar that has used the least time. Decides whether a
+// ping may start before the present one is finished. Pure: times are passed in. The Simulator owns it.
 #pragma once
 
 #include <algorithm>
@@ -30,8 +30,8 @@ class FairTurns {
   }
   bool several() const { return accounts_.size() > 1; }
 
-  /// Whether a ping of `other` comes first although one of `running` has been computed for `elapsed_s`: `other` has used less
-  /// time, and its ping takes less time than the rest of the one being computed.
+  /// Returns whether a ping of `other` should be computed before the rest of a ping of `running`, which has taken `elapsed_s` so
+  /// far: `other` has used less time, and its ping takes less time than that rest.
   bool goes_first(std::uint32_t other, std::uint32_t running, double elapsed_s) const {
     const auto a = accounts_.find(other), b = accounts_.find(running);
     if (a == accounts_.end() || b == accounts_.end() || a->second.pings == 0 || b->second.pings == 0) return false;

@@ -1,6 +1,6 @@
-// Loads and changes the scene while pings continue. Changes are made one after the other: on a thread of its own each is made and
-// built into an engine; then the new engine replaces the old one at once. Edits that wait together share one engine. Owned by
-// App; everything here is called on the I/O thread, except for Change::make.
+// Loads and changes the scene while pings continue. Changes are made one after the other: a separate thread makes the new scene
+// and builds an engine for it; then the new engine replaces the old one. Edits that wait together share one engine. App owns it;
+// everything here is called on the I/O thread, except for Change::make.
 //
 // Pings are made with the old scene until the new one is ready. Then the simulator gets the new engine and the world the new
 // moving bodies before anything else happens, so that a request's bodies are always those of the scene it meets. In stepped
@@ -21,43 +21,43 @@
 
 namespace sonar {
 
-/// Called on any thread. Empty: no scene can be loaded.
+/// May be called on any thread. Empty = scenes cannot be loaded.
 using LoadScene = std::function<Result<ScenePointer>(const SceneFile&)>;
 
 class SceneChanges {
  public:
-  /// On the thread of its own: the scene there shall be; the one there is, when it stays.
+  /// Called on the separate thread with the present scene; returns the new one, or the present one if it stays.
   using Make = std::function<Result<ScenePointer>(const ScenePointer& now)>;
   struct Change {
-    Make make;  // empty: nothing is to be made, it only waits for those before
-    /// Called on the I/O thread when the new scene is in use, or nothing was changed. Never called after stop().
+    Make make;  // empty: the change makes nothing and only waits for those before it
+    /// Called on the I/O thread when the new scene is in use, or if nothing was changed. Never called after stop().
     std::function<void(const Result<void>& outcome)> done;
-    bool shares_engine = false;  // with such Changes beside it; its `done` then meets the scene of all of them
+    bool shares_engine = false;  // with other such changes; `done` is then called with the scene of all of them
   };
-  /// A new scene is in use: called before its Change is done.
+  /// Called when a new scene is in use, before its Change is done.
   using InUse = std::function<void(const ScenePointer& scene)>;
   static constexpr std::size_t most_waiting = 64;
-  /// While drivers are served: each engine costs a driver at 40 Hz between one and two pings.
+  /// Limits while drivers are served, because each new engine costs a driver at 40 Hz one or two pings.
   static constexpr int most_at_once = 2;
   static constexpr std::chrono::milliseconds between_engines{1500};
 
   /// `nice_by` is added to the niceness of the thread; `on_change` is called when a Change is done.
   SceneChanges(asio::io_context& io, Simulator& simulator, ScenePointer scene, EngineFactory make_engine, int nice_by,
                InUse in_use, std::function<void()> on_change);
-  /// Waits for the engine being built.
+  /// Waits until the engine is built.
   ~SceneChanges();
   SceneChanges(const SceneChanges&) = delete;
   SceneChanges& operator=(const SceneChanges&) = delete;
 
-  /// Before the first change: whether drivers are served now, in real time.
+  /// Call it before the first change. The function returns whether drivers are served now, in real time.
   void pace_while(std::function<bool()> drivers_wait) { drivers_wait_ = std::move(drivers_wait); }
-  /// Done before this returns when nothing is to be made and nothing waits.
+  /// Submits a change. If it makes nothing and no change waits, it is done before this returns.
   void submit(Change change);
   bool busy() const { return under_way_ || !waiting_.empty(); }
   bool is_full() const { return waiting_.size() >= most_waiting; }
-  /// The thread is at work, perhaps for a Change that is not needed any more: the destructor would wait for it.
+  /// True while the thread works, perhaps for a change that is not needed any more; the destructor would wait for it.
   bool is_building() const { return building_; }
-  /// How long it has been at the change that is under way; 0 = none is.
+  /// How long the present change has been under way; 0 = none.
   std::chrono::steady_clock::duration building_for() const;
   void stop();
 
@@ -72,7 +72,7 @@ class SceneChanges {
   void begin();
   void build_next();
   std::chrono::steady_clock::duration pause_before_engine();
-  /// The waiting Changes that share the next engine: the first one at least.
+  /// Returns the waiting changes that share the next engine; at least the first one.
   std::vector<Make> next_makes() const;
   Built build(const std::vector<Make>& makes, const ScenePointer& now) const;
   void finish(Built built);

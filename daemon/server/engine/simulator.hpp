@@ -1,6 +1,6 @@
-// The simulation thread: one thread that owns the ping engine and computes requests, those of several sonars in turns by the time
-// they take, or together where the engine is faster so (PingEngine::most_together). Requests go over by value, finished pings
-// come back on the I/O thread; nothing else is shared.
+// The simulation thread owns the ping engine and computes requests. Several sonars take turns by the time that they use, or are
+// computed together if the engine is faster so (PingEngine::most_together). Requests are passed by value, and finished pings come
+// back on the I/O thread; nothing else is shared.
 #pragma once
 
 #include <chrono>
@@ -27,7 +27,7 @@ class Simulator : private Interruption {
 
   /// `nice_by` is added to the thread's niceness, as for the workers of the engine's pool.
   Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, int nice_by);
-  /// Waits for the pings asked for.
+  /// Waits until the requested pings are computed.
   ~Simulator() override;
   Simulator(const Simulator&) = delete;
   Simulator& operator=(const Simulator&) = delete;
@@ -38,7 +38,7 @@ class Simulator : private Interruption {
   /// thread, when it has answered those before.
   void use(std::unique_ptr<PingEngine> engine, Retired retired);
   const std::string& engine_description() const { return description_; }
-  /// I/O thread: for how long the engine has been at its present ping; 0 = it waits for work.
+  /// I/O thread. How long the engine has worked on its present ping; 0 = it waits for work.
   std::chrono::nanoseconds under_way_for() const;
 
  private:

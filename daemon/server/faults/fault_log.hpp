@@ -1,5 +1,5 @@
-// The journal of faults: what each did, as JSON lines in a file, in recordings, as events, as counters, and the last entries in
-// memory. Owned by App; I/O thread only. The file is written by the writer thread; what it does not take is counted.
+// The journal of faults: the effects of each, as JSON lines in a file, in recordings, as events, as counters, and the last
+// entries in memory. App owns it; I/O thread only. The writer thread writes the file; entries that it cannot write are counted.
 #pragma once
 
 #include <cstdint>
@@ -35,17 +35,17 @@ class FaultLog final : public FaultJournal {
   FaultLog(const FaultLog&) = delete;
   FaultLog& operator=(const FaultLog&) = delete;
 
-  /// Appends to `file` from now on. io, with the reason.
+  /// Appends to `file` from now on. Errors: io, with the reason.
   Result<void> open(const std::filesystem::path& file);
   void write(const FaultEntry& entry) override;
 
-  /// The latest, oldest first; each has a number counted from 1.
+  /// The latest entries, oldest first, with numbers counted from 1.
   const std::deque<std::shared_ptr<const v1::FaultEntry>>& entries() const { return entries_; }
-  /// Injections since the start, by code.
+  /// The number of injections since the start, by code.
   const std::map<std::string_view, std::uint64_t>& injections() const { return injections_; }
-  /// Entries that are not in the file.
+  /// The number of entries that are not in the file.
   std::uint64_t lost() const { return lost_; }
-  /// Text for the status: that entries are lost, and why.
+  /// Notes for the status if entries are lost, with the reason.
   std::vector<Note> notes() const;
 
  private:
@@ -59,7 +59,7 @@ class FaultLog final : public FaultJournal {
   WriterThread& writer_;
   Log& log_;
   std::filesystem::path path_;
-  std::shared_ptr<JournalFile> file_;  // the writer's while it writes
+  std::shared_ptr<JournalFile> file_;  // used by the writer thread while it writes
   std::string pending_;                // lines
   std::uint64_t pending_entries_ = 0, lost_ = 0;
   std::string why_lost_;

@@ -13,9 +13,9 @@ namespace sonar {
 
 class JournalFile {
  public:
-  /// A FIFO needs a reader. io.
+  /// Opens or creates the file. A FIFO must have a reader. Errors: io.
   static Result<std::shared_ptr<JournalFile>> open(const std::filesystem::path& file);
-  /// Says what open() would, and makes no file.
+  /// Returns the error that open() would, without creating the file.
   static Result<void> check(const std::filesystem::path& file);
   ~JournalFile();
   JournalFile(const JournalFile&) = delete;
@@ -25,7 +25,7 @@ class JournalFile {
     std::uint64_t lines = 0;
     std::string why;  // why entries are missing; empty = all are there
   };
-  /// Stops at the first line that fails; a later call tries again.
+  /// Appends lines. Stops at the first line that fails; a later call tries again.
   Written append(std::string_view lines);
 
  private:

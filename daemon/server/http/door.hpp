@@ -23,10 +23,10 @@ class ViewSecrets {
   static constexpr std::chrono::seconds ticket_lasts{30};
   static constexpr std::size_t most_tickets = 64;
 
-  /// 32 hexadecimal digits, new at every start; empty = there is none.
+  /// The key: 32 hexadecimal digits, new at every start; empty = none.
   const std::string& key() const { return key_; }
   void make_key();
-  /// Good for one connection within ticket_lasts. Beyond most_tickets the oldest goes.
+  /// Makes a ticket, which admits one connection within ticket_lasts. Beyond most_tickets the oldest is removed.
   std::string new_ticket(Steady::time_point now);
   bool take_ticket(std::string_view shown, Steady::time_point now);
 
@@ -37,11 +37,11 @@ class ViewSecrets {
 
 /// A handshake that is accepted.
 struct ViewWelcome {
-  std::string protocol;  // the one agreed upon
+  std::string protocol;  // the protocol that both sides know
   bool may_steer = false;
   double most_hz = 0;     // limit for the rate of pictures that the viewer set; 0 = none
-  std::string playback;   // the vehicle whose trajectory it looks at, as it asked; empty = none
-  std::string recording;  // the file that it looks at, as it asked; empty = the sonars
+  std::string playback;   // the requested vehicle whose trajectory it looks at; empty = none
+  std::string recording;  // the requested file that it looks at; empty = the sonars
 };
 struct ViewDoor {
   const Token& token;
@@ -49,8 +49,8 @@ struct ViewDoor {
   Ipv4 reached;  // our end of the connection
   const ControlConfig& config;
 };
-/// Host has been checked. `query` = of the target. A refusal is one sentence; its `why` names the configuration that would allow
-/// it.
+/// Decides about a handshake whose Host has been checked. `query` is that of the target. A refusal is one sentence; its `why`
+/// names the configuration that would allow the client.
 std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
                                                 const std::vector<std::pair<std::string, std::string>>& query,
                                                 const ViewDoor& door, ViewSecrets::Steady::time_point now);

@@ -28,7 +28,7 @@ struct HttpPolicy {
 
 struct HelpAction {};
 struct HealthAction {
-  bool with_text = false;  // the reason too, for authorized clients
+  bool with_text = false;  // also the reason, for authorized clients
 };
 struct MetricsAction {};
 struct OperationAction {
@@ -49,7 +49,7 @@ struct RoutedRequest {
 };
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy);
 
-/// The text of GET /, for those who do not ask for the page.
+/// The text of GET / for clients that do not request the page.
 std::string help_text(const std::string& address);
 
 }  // namespace sonar

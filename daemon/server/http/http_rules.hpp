@@ -20,31 +20,31 @@ struct Target {
   std::vector<std::string> segments;
   std::vector<std::pair<std::string, std::string>> query;
 };
-/// Empty for a full URL, a broken %xx, or control characters.
+/// Parses a target. Returns nullopt for a full URL, an invalid %xx, or control characters.
 std::optional<Target> parse_target(std::string_view text);
 
-/// Allowed values of "Host: name:port" when the connection's local address is `reached`: that address, loopback, localhost, and
-/// the names of control.hosts. Against DNS rebinding.
+/// Checks "Host: name:port" against DNS rebinding. Allowed names are the local address `reached` of the connection, loopback,
+/// localhost, and those of control.hosts.
 bool host_allowed(std::string_view host, Ipv4 reached, const std::vector<std::string>& names);
-/// The same for "Origin: http://name:port": rejects cross-origin requests of browsers.
+/// Checks "Origin: http://name:port" in the same way, to reject cross-origin requests of browsers.
 bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std::string>& names);
 
-/// The words of a header that is a list.
+/// Splits a header that is a list into its words.
 std::vector<std::string> words_of_header(std::string_view list);
-/// Whether a header that is a list has the word, in capital or small letters. `wanted` is in small letters.
+/// Returns whether a header that is a list has the word, in capital or small letters. `wanted` has small letters.
 bool header_names(std::string_view list, std::string_view wanted);
 
-/// "application/json", with any parameters.
+/// Returns whether the type is "application/json", with any parameters.
 bool is_json(std::string_view content_type);
 
-/// Needs the first longest_http_method bytes.
+/// Needs the first longest_http_method bytes of a stream.
 bool begins_http_request(std::string_view bytes);
 inline constexpr std::size_t longest_http_method = 8;  // "OPTIONS "
 
 /// Detects HTTP requests on ports of other protocols: any web page can make a browser send one.
 class HttpDetector {
  public:
-  /// Whether the stream, up to these bytes, begins as an HTTP request.
+  /// Takes the next bytes. Returns whether the stream begins as an HTTP request.
   bool speaks_http(std::span<const std::byte> received);
 
  private:
@@ -60,7 +60,7 @@ struct Route {
 };
 Route route_of(const Target& target, std::string_view method);
 
-/// ?pings=1&clients=0...; an empty query = all kinds. The error is a sentence.
+/// Parses ?pings=1&clients=0...; an empty query selects all kinds. The error is a sentence.
 Result<control::Subscribe> subscription_of(const Target& target);
 
 }  // namespace sonar

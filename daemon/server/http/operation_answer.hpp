@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// With the body that the operation's result has by HTTP.
+/// Returns the answer with the body for the result.
 HttpAnswer answer_from(const OperationResult& result);
 
 }  // namespace sonar

@@ -16,8 +16,8 @@ struct PageRequest {
   std::string_view accept, accept_encoding, if_none_match;
 };
 
-/// Answers GET and HEAD. nullopt if the path is not of the page, or is "/" and `accept` does not name text/html: then the help
-/// text answers. 304 for the version that the client has, 406 for clients without gzip.
+/// Answers GET and HEAD: 304 if the client has this version, 406 for clients without gzip. Returns nullopt if the path is not one
+/// of the page, and for "/" if `accept` does not name text/html, because the help text is then the answer.
 std::optional<HttpAnswer> page_answer(const PageRequest& request, std::span<const PageFile> files = page_files());
 
 }  // namespace sonar

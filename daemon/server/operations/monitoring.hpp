@@ -43,10 +43,10 @@ class Monitoring {
   explicit Monitoring(const Monitored& parts) : of_(parts) {}
 
   std::shared_ptr<const v1::DaemonStatus> status() const;
-  /// As Operations has them.
+  /// The answers of the functions of Operations with these names.
   std::string metrics() const;
   std::string problem() const;
-  /// A change of the scene takes longer than limits.load_s: a sentence; empty when none does.
+  /// Returns a sentence if a change of the scene takes longer than limits.load_s; else empty.
   std::string slow_load() const;
 
  private:

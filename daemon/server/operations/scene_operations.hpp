@@ -14,7 +14,7 @@ namespace sonar {
 
 class SceneOperations {
  public:
-  /// `config` gets the scene's file.
+  /// `config` receives the file of a loaded scene.
   SceneOperations(Config& config, SceneChanges& changes, PoseIntake& poses, Events& events, Log& log, LoadScene load_scene)
       : config_(config), changes_(changes), poses_(poses), events_(events), log_(log), load_scene_(std::move(load_scene)) {}
 
@@ -26,7 +26,7 @@ class SceneOperations {
  private:
   using Edit = std::function<Result<ScenePointer>(const Scene&)>;
 
-  /// Edits the scene as it is after the changes before. `what` = for the log: "object crate added".
+  /// Edits the scene that the previous changes make. `what` is for the log: "object crate added".
   void edit(Edit edit, const std::string& what, const Sender& sender, Operations::Done done);
   OperationResult without_details(const Error& error, const SceneFile& file, const Sender& sender);
   void log_change(const std::string& what, const Sender& sender);

@@ -9,7 +9,7 @@ namespace sonar {
 
 class SonarOperations {
  public:
-  /// `config` gets the water.
+  /// `config` receives changed water.
   SonarOperations(Config& config, Fleet& fleet, Recordings& recordings, Log& log)
       : config_(config), fleet_(fleet), recordings_(recordings), log_(log) {}
 
@@ -19,7 +19,7 @@ class SonarOperations {
   void stop(const control::StopRecording& asked, Operations::Done done);
 
  private:
-  /// An empty name: the only one there is.
+  /// Finds a sonar; an empty name stands for the only one.
   Result<Device*> find(const std::string& name);
 
   Config& config_;

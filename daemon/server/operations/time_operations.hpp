@@ -12,7 +12,7 @@ namespace sonar {
 
 class TimeOperations {
  public:
-  /// `on_change` is called when time may pass further.
+  /// `on_change` is called when time may advance.
   TimeOperations(SteppedTime& time, PoseIntake& poses, const Fleet& fleet, std::function<void()> on_change)
       : time_(time), poses_(poses), fleet_(fleet), on_change_(std::move(on_change)) {}
 

@@ -22,14 +22,14 @@ namespace sonar {
 
 class MavlinkServer {
  public:
-  /// Links and origin are those of `config` as it is now; who may send follows it.
+  /// Links and origin are those of the present `config`; the addresses that may send follow later changes of it.
   /// `began`: the daemon's time from which messages count the time since boot.
   MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log, Time began);
 
   /// Call it before open(). Sets what the command to inject a failure does, on every link. Without it the command is answered as
   /// unsupported.
   void inject_failures_with(mavlink::InjectFailure inject) { inject_ = std::move(inject); }
-  /// Call it before open(). `tell` is called when a vehicle began or ceased to want distances (wants_distances).
+  /// Call it before open(). `tell` is called when wants_distances() of a vehicle has changed.
   void on_distances_wanted(std::function<void()> tell) { distances_wanted_ = std::move(tell); }
   /// True if a link of that vehicle sends the distances of its range finders.
   bool wants_distances(const std::string& vehicle) const;
@@ -54,11 +54,11 @@ class MavlinkServer {
     mavlink::MavlinkPoses poses;
     udp::socket socket;
     asio::steady_timer timer;
-    std::optional<udp::endpoint> peer;  // whom we answer
+    std::optional<udp::endpoint> peer;  // the address to which replies are sent
     std::string name;                   // "mavlink udpin:127.0.0.1:14551"
     LogLimiter notices = {}, drops = {};
     LinkFigures distances = {};
-    bool distances_wanted = false;  // as of the last look
+    bool distances_wanted = false;  // result of the last look_at_wants()
   };
 
   asio::awaitable<void> receive(Link& link);

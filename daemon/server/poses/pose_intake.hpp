@@ -1,6 +1,6 @@
-// Receives all that moves bodies, from every source: poses, and requests to place objects and to steer trajectories. It maps wall
-// time to ours, lets the world accept or refuse, and logs refusals. PoseServer's datagrams and lines end here, and what clients
-// of the control servers send.
+// Receives everything that moves bodies, from PoseServer and the control servers: poses, and requests to place objects and to
+// steer trajectories. It converts wall time to the daemon's time, passes poses to the world, which accepts or refuses them, and
+// logs refusals.
 #pragma once
 
 #include <chrono>
@@ -21,11 +21,11 @@ class PoseIntake {
              Plausibility* plausibility = nullptr)
       : world_(world), clock_(clock), log_(log), on_pose_(std::move(on_pose)), events_(events), plausibility_(plausibility) {}
 
-  /// The refusal's sentence, or empty.
+  /// Takes a pose. Returns the sentence of a refusal, or an empty text.
   std::string take(control::PoseSample sample, const Sender& sender);
-  /// Places, shows or hides a moving object of the scene, body `body` of the world. The refusal's sentence, or empty.
+  /// Places, shows or hides a moving object of the scene, body `body` of the world. Returns as take().
   std::string place(const control::SetObject& asked, std::size_t body, const Sender& sender);
-  /// Pauses, seeks or plays a trajectory. The refusal's sentence, or empty.
+  /// Pauses, seeks or plays a trajectory. Returns as take().
   std::string steer(const control::SetTrajectory& asked, const Sender& sender);
   /// Counts and logs an invalid pose message.
   void refuse(const std::string& why, const Sender& sender);

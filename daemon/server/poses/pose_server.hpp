@@ -45,8 +45,8 @@ class PoseServer {
     udp::socket datagrams;
     Listener lines;  // for JSON only
   };
-  /// One TCP sender. It is closed by stop(), or if its slot is needed and it is the one that has sent no pose, or too much, for
-  /// the longest time. A sender that has disconnected has no slot.
+  /// One TCP sender. It is closed by stop(), or if its slot is needed and it has, for the longest time of all, sent no pose or
+  /// more than the limits. A sender that has disconnected has no slot.
   struct Connection {
     Connection(tcp::socket s, Sender from, std::size_t bytes_per_s, SharedRate::Part part)
         : socket(std::move(s)),
@@ -60,9 +60,10 @@ class PoseServer {
     InputRate rate;
     SharedRate::Part of_all;
     control::LineParser lines;
-    int not_json = 0;                                                                    // lines in a row
-    std::chrono::steady_clock::time_point active_at = std::chrono::steady_clock::now();  // a pose, within the limits
-    std::chrono::steady_clock::time_point kept_up_at = active_at;  // when little or nothing waited in the kernel
+    int not_json = 0;  // number of such lines in a row
+    std::chrono::steady_clock::time_point active_at =
+        std::chrono::steady_clock::now();                          // time of its last pose within the limits
+    std::chrono::steady_clock::time_point kept_up_at = active_at;  // last time when little or nothing waited in the kernel
     std::chrono::steady_clock::time_point behind_until{};
     bool proved = false;  // the last pose was within the limits
     void close() {
@@ -80,7 +81,7 @@ class PoseServer {
   enum class Turn { over, not_over, end };  // no whole line is left; one may be; the connection speaks no JSON
   struct Work {
     std::size_t bytes = 0;
-    bool has_pose = false;  // one that counts
+    bool has_pose = false;  // an accepted pose
   };
   Turn take_turn(Connection& connection, Work& work);
   enum class Rested { goes_on, leaves_much };  // leaves_much: it disconnected, and had sent more than the limits allow

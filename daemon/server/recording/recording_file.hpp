@@ -1,5 +1,5 @@
-// One file of a recording inside the daemon: what a sonar sends, and in MCAP also pictures, true poses and what each beam meets.
-// Made and written on the recording thread (recordings.hpp); it has no queue, no clock and no log.
+// One file of a recording inside the daemon: the messages of a sonar, and in MCAP also pictures, true poses and the first hit of
+// each beam. The writer thread creates and writes it (recordings.hpp); it has no queue, no clock and no log.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ namespace sonar {
 
 using recording::mcap::SceneNames;
 
-/// A ping on its way into files. What is large is shared with the clients that it was sent to.
+/// A ping to be written. It shares its large parts with the clients to which the ping was sent.
 struct RecordedPing {
   Time at{};  // when it was made
   std::shared_ptr<const Ping> ping;
@@ -46,26 +46,27 @@ class RecordingFile {
   using Kind = const recording::FileKind*;
   static const recording::FileKind mcap, pcap, raw_dump;
 
-  /// Whether it is the name of a file in a folder: letters, digits, - _ and . that does not begin it, at most 128.
+  /// Returns whether it is a plain file name: at most 128 letters, digits, - _ and . , not beginning with a dot.
   static bool is_plain_name(std::string_view name);
-  /// Whether its end is that of recordings too.
+  /// Returns whether it is a plain file name with the ending of a recording.
   static bool is_recording(std::string_view name);
-  /// Kind of a file's name: letters, digits, - _ and . that does not begin it, at most 128, ending in .mcap or as files of this
-  /// vendor do; for one whose pings are a stream also in .pcap or .raw. An error for another name.
+  /// Returns the kind of a plain file name by its ending: .mcap, those of this vendor, and .pcap or .raw if its pings are a
+  /// stream. Other names are errors.
   static Result<Kind> kind_of(std::string_view name, std::string_view vendor);
-  /// `labels`: in MCAP, of pings that have them. io; a file that is there already is not touched.
+  /// Creates the file. `labels`: also write the labels of pings, in MCAP. Errors: io. An existing file is not changed.
   static Result<std::unique_ptr<RecordingFile>> create(const std::filesystem::path& file, Kind kind, const RecordedSonar& sonar,
                                                        bool labels = false);
 
   RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, const RecordedSonar& sonar, bool labels = false);
 
-  /// A status message goes before it when the last one is a second old. After an error (io) only close() makes sense.
+  /// Writes a ping, and before it a status message if the last one is a second old. After an error (io) only close() may be
+  /// called.
   Result<void> write(const RecordedPing& ping);
-  /// A FaultEntry of control.proto, in JSON; files other than MCAP leave it out. io.
+  /// Writes a FaultEntry of control.proto, in JSON, to an MCAP file; other files leave it out. Errors: io.
   Result<void> write_fault(Time at, const std::string& json) {
     return mcap_ == nullptr ? Result<void>{} : mcap_->write_fault(at, json);
   }
-  /// Finishes the file, after an error too, as far as that goes. io.
+  /// Finishes the file, as far as possible also after an error. Errors: io.
   Result<void> close() { return writer_->close(); }
 
   struct Figures {

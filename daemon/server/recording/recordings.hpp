@@ -29,7 +29,7 @@ class Recordings {
  public:
   static constexpr std::size_t most_at_once = 4, most_remembered = 8;
   static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // limit for all recordings together
-  /// Called once, when the recording was begun or has ended; perhaps before start() or stop() returns, never after finish().
+  /// Called once when the recording has begun or ended, perhaps before start() or stop() returns; never after finish().
   using Done = std::function<void(const Result<void>&)>;
 
   /// `on_change` is called when a recording has ended.
@@ -66,7 +66,7 @@ class Recordings {
 
   /// Recordings that run, and the last ones that have ended, oldest first.
   std::vector<v1::RecordingStatus> status() const;
-  /// Whether no recording is open.
+  /// Returns true if no recording is open.
   bool idle() const { return running() == 0; }
 
  private:
@@ -84,7 +84,7 @@ class Recordings {
   template <class Job, class After>
   void on_thread(const std::shared_ptr<Work>& work, Job job, After after);
   std::size_t running() const;
-  /// Whether `bytes` more of this recording may wait. If there is no room, the recording with most waiting bytes is ended.
+  /// Returns whether `bytes` more of this recording may wait. If there is no room, the recording with most waiting bytes ends.
   bool has_room_for(const Pointer& recording, std::size_t bytes);
   Result<Pointer> begin(const control::StartRecording& asked, const RecordedSonar& sonar);
   /// Queues `job`, which writes `bytes` bytes, for the writer thread.

@@ -1,5 +1,5 @@
-// The thread that writes files: those of recordings, and the journal of faults. The I/O thread never waits for a disk; what is
-// to be written comes here as jobs, in order. Owned by App.
+// The thread that writes files: recordings and the journal of faults. The I/O thread never waits for a disk; it passes jobs to
+// this thread, which runs them in order. App owns it.
 #pragma once
 
 #include <unistd.h>
@@ -23,7 +23,7 @@ class WriterThread {
       if (nice_by != 0 && ::nice(nice_by) == -1) return;  // costs only smoothness
     });
   }
-  /// Waits for what is being written.
+  /// Waits until all jobs are done.
   ~WriterThread() { thread_.join(); }
   WriterThread(const WriterThread&) = delete;
   WriterThread& operator=(const WriterThread&) = delete;
@@ -40,7 +40,7 @@ class WriterThread {
       });
     });
   }
-  /// Returns, or throws, what `job` does.
+  /// Runs `job` and returns its result; an exception becomes an error.
   template <class Job>
   static Result<void> attempt(Job&& job) {
     try {
@@ -51,7 +51,7 @@ class WriterThread {
       return failure(ErrorKind::bug, std::string("writing it failed: ").append(e.what()));
     }
   }
-  /// No job runs or waits.
+  /// True if no job runs or waits.
   bool idle() const { return under_way_ == 0; }
 
  private:
