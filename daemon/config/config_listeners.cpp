@@ -1,4 +1,4 @@
-// Where the daemon listens and who may steer it, from the configuration.
+// Reads from the configuration where the daemon listens and which clients may steer it.
 #include "core/text/decimal.hpp"
 #include "daemon/config/config_parts.hpp"
 

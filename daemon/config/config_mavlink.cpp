@@ -1,4 +1,4 @@
-// Where poses come from by MAVLink, from the configuration: poses.mavlink and world.origin (docs/poses.md).
+// Reads the MAVLink links and the origin from the configuration: poses.mavlink and world.origin (docs/poses.md).
 #include <algorithm>
 
 #include "core/text/decimal.hpp"

@@ -258,7 +258,7 @@ class NatsQueue final : public Queue {
     return s;
   }
 
-  /// Null: the server does not answer.
+  /// Returns null if the server does not answer.
   kvStore* store(Table table) {
     auto& kv = stores_[table.name];
     if (kv || into(kv, [&](auto** made) { return js_KeyValue(made, jetstream_.get(), table.name); }) == NATS_OK) return kv.get();

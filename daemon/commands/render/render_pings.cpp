@@ -154,7 +154,7 @@ class JobRun {
       batch_[i].ping = std::move(pings.at(i));
       batch_[i].count = counts.at(i);
     }
-    // The same for all, as pings that a failed device had begun are made again.
+    // One description for all pings, because those that a failed device had begun are made again.
     const std::string description = engine_->description();
     pool_.for_each(batch_.size(),
                    [&](std::size_t i, int) { batch_[i].written = write_ping(job_, batch_[i], description, folder_); });

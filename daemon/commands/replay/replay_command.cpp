@@ -54,7 +54,7 @@ Result<Endpoint> endpoint_from(const std::string& place, const std::string& opti
   return Endpoint{*ip, static_cast<std::uint16_t>(*port)};
 }
 
-/// Empty: it is off, or its usual address is in use.
+/// Returns the line of the banner; empty if the page is off or its default address is in use.
 Result<std::string> open_page(ReplayPage& page, const ReplayCommand& command, Log& log) {
   if (command.http == "off") return std::string();
   const auto at = endpoint_from(command.http, "--http");

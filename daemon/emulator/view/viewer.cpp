@@ -133,7 +133,7 @@ void Viewer::on_word(const foxglove::UnknownWord& word, Moment) {
   say_ignored("operations such as \"" + word.op + "\" are ignored");
 }
 
-/// Once a connection.
+/// Warns once for each connection.
 void Viewer::say_ignored(const std::string& what) {
   if (!std::exchange(said_unknown_, true)) say_status(foxglove::StatusLevel::warning, what);
 }

@@ -212,7 +212,7 @@ asio::awaitable<void> HttpConnection::write() {
   finish_sending();
 }
 
-/// False: the request shows the token, but no slot of authenticated clients is free.
+/// Returns false if the request shows the token but no slot of authenticated clients is free.
 bool HttpConnection::has_slot(const HttpRequest& request) {
   return !services_.token.matches(bearer_token(request.authorization)) || claim_slot();
 }

@@ -159,7 +159,7 @@ asio::awaitable<void> StreamConnection::limit_rate(const Work& work) {
   co_await rest_.async_wait(into(ec));
 }
 
-/// False: close the connection.
+/// Returns false if the connection must be closed.
 bool StreamConnection::accept(control::BytesView message, Work& work) {
   work.bytes += least_work;
   const auto request = control::decode_request(message);

@@ -60,7 +60,7 @@ JournalFile::Written JournalFile::append(std::string_view lines) {
   return written;
 }
 
-/// Empty = done.
+/// Writes a line. Returns why it could not; empty if it is written.
 std::string JournalFile::write_line(std::string_view line) {
   const std::string text = (std::exchange(cut_, false) ? "\n" : "") + std::string(line);
   std::size_t done = 0;

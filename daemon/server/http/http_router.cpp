@@ -34,7 +34,7 @@ RoutedRequest operation_of(const Route& route, const std::string& body) {
       std::move(request->op));
 }
 
-/// Empty = accepted.
+/// Returns the refusal of a Host header; nullopt if it is accepted.
 std::optional<HttpAnswer> reject_host(const HttpRequest& request, const HttpPolicy& policy) {
   // HTTP/1.0 has no Host header (RFC 9112, 3.2). Browsers always send one, so this does not weaken the check.
   if (!request.has_host && !request.http_1_0) return refused(400, "the Host header is missing");

@@ -95,7 +95,7 @@ void add_viewers(v1::DaemonStatus& out, const std::vector<ViewerFigures>& viewer
   }
 }
 
-/// Empty = no listener.
+/// Returns the address as text; empty if there is no listener.
 std::string address(Endpoint at) { return at.port == 0 ? std::string() : text_of(at); }
 
 }  // namespace

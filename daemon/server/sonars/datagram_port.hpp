@@ -24,7 +24,7 @@ class DatagramPort {
   /// Binds the port at the sonar's own address; port 0: any free one. `shared`: host programs on this computer may bind the same
   /// port at all addresses, as they can with a real device. Errors name the address and the next step.
   Result<void> open(const SonarConfig& sonar, std::uint16_t port, bool shared);
-  /// Sets what answers the datagrams that arrive after start().
+  /// Sets the function that answers datagrams. Call this before start().
   void answer_with(Answer answer) { answer_ = std::move(answer); }
   /// Sets the function that is called with the address of a host when its computer answers a datagram with "port unreachable"
   /// (ICMP). Call this before start().
@@ -51,7 +51,7 @@ class DatagramPort {
   Answer answer_;
   std::function<void(Endpoint host)> closed_;
   std::list<Socket> sockets_;
-  std::uint16_t number_ = 0;  // number that was requested
+  std::uint16_t number_ = 0;  // the requested port number
   bool stopping_ = false;
 };
 

@@ -1,5 +1,5 @@
 // Sends the messages of an emulated sonar as datagrams: to all receivers of a port of kind udp_stream, or to the host at one of
-// kind udp_dialogue. Whole messages in order, no faster than the port allows. Owned by its Device and by its own coroutine.
+// kind udp_dialogue. It sends whole messages in order, not faster than the port allows. Its Device and its coroutine own it.
 #pragma once
 
 #include <chrono>
@@ -43,7 +43,7 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   std::chrono::nanoseconds gap_;
   asio::steady_timer wake_, pause_;
   std::chrono::steady_clock::time_point heard_at_ = std::chrono::steady_clock::now(), looked_at_;
-  int looks_ = 0;  // since then
+  int looks_ = 0;  // number of looks since heard_at_
   bool finishing_ = false, by_host_ = false;
   std::string why_;
 };

@@ -38,7 +38,7 @@ class SonarStatus;
 
 class Device;
 
-/// The daemon as a device uses it, besides DeviceNetwork. It outlives the device.
+/// The interface of a device to the daemon, besides DeviceNetwork. It outlives the device.
 class DeviceParent {
  public:
   virtual ~DeviceParent() = default;
@@ -46,11 +46,11 @@ class DeviceParent {
   virtual void compute(const Device& of, PingRequest request, Simulator::Done done) = 0;
   virtual void on_ping_queued(const Device& of, const PingQueued& ping) = 0;
   virtual void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) = 0;
-  /// The device has stopped for good.
+  /// Called when the device has stopped.
   virtual void on_stop(const Device& of, const std::string& why) = 0;
-  /// Something changed that stepped time or the shutdown may be waiting for.
+  /// Called after a change for which stepped time or the shutdown may wait.
   virtual void on_change() = 0;
-  /// The daemon cannot go on.
+  /// Called when the daemon must end.
   virtual void on_engine_failure(const Error& why) = 0;
 };
 
@@ -60,7 +60,7 @@ struct DeviceNetwork {
   Clock& clock;
   Admission& admission;
   Log& log;
-  bool digest = false;  // SHA-256 of what each client is sent
+  bool digest = false;  // compute the SHA-256 of the bytes sent to each client
 };
 
 struct StreamDigest {
@@ -84,10 +84,10 @@ class Device final : public SessionParent {
   /// Opens the ports of the vendor, then that of the observers. Errors name the address and the next step.
   Result<void> open();
   void start();
-  /// Stop accepting, stop pinging, let every client have its current message whole and a FIN.
+  /// Accepts no more clients, makes no more pings, and ends every connection after its present message, with FIN.
   void stop(const std::string& why = "sonard stops");
 
-  // Stepped time.
+  // For stepped time:
   void step() { perform(sonar_.tick_pacer(network_.clock.now())); }
   void tick_sessions() { perform(sonar_.tick_conversations(network_.clock.now())); }
   void skip(std::chrono::nanoseconds by) { sonar_.skip(by); }
@@ -95,14 +95,14 @@ class Device final : public SessionParent {
   /// Carries out the sonar's requests, in order.
   void perform(Actions actions);
 
-  bool gone() const;  // after stop(): nothing is left
+  bool gone() const;  // after stop(): no connection and no ping is left
   const Sonar& sonar() const { return sonar_; }
   Preview& preview() { return preview_; }
   const Preview& preview() const { return preview_; }
   const SonarConfig& config() const { return sonar_.config(); }
   DeviceFigures figures() const { return sonar_.figures(); }
   std::vector<StreamDigest> digests() const;
-  /// The vendor's first TCP port; port 0 when it has none.
+  /// The address of the vendor's first TCP port; port 0 if it has none.
   Endpoint data_endpoint() const;
   std::vector<udp::endpoint> status_destinations() const { return beacon_.destinations(); }
   std::vector<protocol::DriverAddress> addresses() const;
@@ -112,11 +112,11 @@ class Device final : public SessionParent {
   v1::PingEvent event_of(const PingQueued& queued) const;
   /// The name that recordings use.
   RecordedSonar recorded() const;
-  /// Empty when all is well.
+  /// Returns a sentence about a problem, or an empty text.
   std::string problem() const;
   /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
   Result<void> ask(const control::SetSonar& asked, const std::string& who);
-  /// Vehicle and mount, of a configuration that is otherwise the same.
+  /// Uses vehicle and mount of a configuration that is otherwise the same.
   void use_place(const SonarConfig& config) { sonar_.move(config, network_.clock.now()); }
   void use_water(const Water& water);
   /// See Sonar::run_itself.
@@ -127,7 +127,7 @@ class Device final : public SessionParent {
   void add_faults(const std::vector<Fault>& faults, bool manual) {
     perform(sonar_.add_faults(faults, manual, network_.clock.now()));
   }
-  /// Empty = all. False: there is none of that name.
+  /// Ends the faults of that name, or all if it is empty. Returns false if there is none.
   bool end_faults(const std::string& name);
   /// Closes connections whose peer hung up. Called periodically and before a client is admitted or refused: the
   /// listener may be ready before the reader of the closed connection.
@@ -149,7 +149,7 @@ class Device final : public SessionParent {
  private:
   using SessionPointer = std::shared_ptr<Session>;
   using StreamPointer = std::shared_ptr<DatagramStream>;
-  struct Arrived {  // has no session yet
+  struct Arrived {  // a connection without a session
     tcp::socket socket;
     Admission::Place place;
     Role role = Role::client;
@@ -208,7 +208,7 @@ class Device final : public SessionParent {
   std::optional<std::chrono::steady_clock::time_point> timer_at_;
 
   ConnectionId last_connection_ = 0;
-  std::map<ConnectionId, Arrived> arrived_;  // being decided upon, or waiting for a slot
+  std::map<ConnectionId, Arrived> arrived_;  // connections that wait for a decision or a slot
   std::list<SessionPointer> sessions_;
   std::list<StreamPointer> streams_;
   std::list<std::pair<Endpoint, std::chrono::steady_clock::time_point>> closed_;  // receivers, and when they are tried again

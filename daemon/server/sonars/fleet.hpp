@@ -44,7 +44,7 @@ class Fleet final : public DeviceParent {
     std::vector<const Device*> opened;
     std::vector<std::string> errors;  // sonars that could not be opened; the previous one stays if it can
   };
-  /// Stops, starts and keeps sonars as `next` says, whose vehicles the World must know by now.
+  /// Stops, starts and keeps sonars by the configuration `next`. The World must already have its vehicles.
   Change take_over(const Config& now, const Config& next);
 
   /// Call it periodically: it erases stopped sonars that have no work in progress.
@@ -56,7 +56,7 @@ class Fleet final : public DeviceParent {
   const Device* find(const std::string& name) const { return const_cast<Fleet*>(this)->find(name); }
   /// `tap` gets each ping when it is queued to clients, as recordings do; empty = none.
   using PingTap = std::function<void(const Device& of, const PingQueued& ping)>;
-  /// Whether the tap wants the ground truth of that sonar's next ping.
+  /// `wants_truth` returns whether the tap needs the ground truth of a sonar's next ping.
   using WantsTruth = std::function<bool(const std::string& sonar)>;
   void tap_pings(PingTap tap, WantsTruth wants_truth = {}) {
     tap_ = std::move(tap);
@@ -64,15 +64,15 @@ class Fleet final : public DeviceParent {
   }
   /// Computes a ping of a Preview: drivers and recordings get none of it.
   void compute_preview(PingRequest request, Simulator::Done done) { simulator_.submit(std::move(request), std::move(done)); }
-  bool gone() const;  // after stop(): nothing is left
+  bool gone() const;  // after stop(): no device has work left
   std::uint64_t served() const;
   bool has_clients() const;
-  /// Empty when all is well.
+  /// Returns a sentence about a problem, or an empty text.
   std::string problem() const;
 
  private:
   struct Retired {
-    std::list<Device> device;  // one
+    std::list<Device> device;  // exactly one
     int sweeps_gone = 0;
   };
   struct Opening {
@@ -80,7 +80,7 @@ class Fleet final : public DeviceParent {
     std::uint32_t index = 0;
     std::list<Device>::iterator before;  // the one it replaces, or end()
   };
-  /// For each sonar, by name: the word of the summary for what the reload did to it.
+  /// By name of the sonar: the word in the summary for the effect of the reload on it.
   using Outcomes = std::map<std::string, std::string>;
   bool is_held(Ipv4 ip) const;
   std::vector<Opening> sort_out(const Config& now, const Config& next, Outcomes& outcomes);
@@ -104,10 +104,11 @@ class Fleet final : public DeviceParent {
   Handlers handlers_;
   PingTap tap_;
   WantsTruth tap_wants_truth_;
-  std::map<std::uint32_t, std::shared_ptr<const SceneNames>> computed_names_;  // by index: of the scene its ping is computed in
-  std::list<Device> devices_;                                                  // in the configuration's order
+  std::map<std::uint32_t, std::shared_ptr<const SceneNames>>
+      computed_names_;         // by index: names of the scene in which its ping is computed
+  std::list<Device> devices_;  // in the configuration's order
   std::list<Retired> retired_;
-  std::uint64_t served_before_ = 0;   // by those swept away
+  std::uint64_t served_before_ = 0;   // pings served by erased devices
   std::vector<std::string> missing_;  // errors of sonars that should be there
 };
 

@@ -1,6 +1,6 @@
-// One connection of a sonar: its socket, read and written by two coroutines, and a timer that watches for peers that stopped. The
-// emulated sonar (daemon/emulator/sonar) interprets the bytes and keeps the messages that wait. Owned by its Device and by its
-// own coroutines; it reports to the Device once when it is over.
+// One connection of a sonar: its socket, two coroutines that read and write it, and a third that detects peers that hang. The
+// emulated sonar (daemon/emulator/sonar) interprets the bytes and holds the messages that wait. The Device and the coroutines own
+// the session; it reports its end once to the Device.
 #pragma once
 
 #include <array>
@@ -26,26 +26,26 @@ class SessionParent {
  public:
   virtual ~SessionParent() = default;
   virtual void on_bytes(ConnectionId from, protocol::BytesView bytes) = 0;
-  /// The next message to write; empty when there is none.
+  /// Returns the next message to write; empty if there is none.
   virtual Outbox::Message next_message(ConnectionId to) = 0;
-  /// Destinations of a stream's messages.
+  /// Returns the destinations of the messages of a stream.
   virtual std::vector<Endpoint> receivers(ConnectionId stream) = 0;
   virtual void on_sent(ConnectionId to, std::size_t bytes) = 0;
-  /// A message has been handed to the kernel whole.
+  /// Reports that a message has been passed to the kernel whole.
   virtual void on_written(ConnectionId to, const Outbox::Message& message) = 0;
-  /// The message of a stream that was taken last had no receiver left.
+  /// Reports that the last message of a stream had no receiver left.
   virtual void on_not_sent(ConnectionId stream) = 0;
-  /// A peer that sends nothing for longer is disconnected. nullopt: no limit.
+  /// Returns the silence after which a peer is disconnected; nullopt = no limit.
   virtual std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const = 0;
-  /// The host of a stream has been silent for half of that or longer: it may be asked for a sign.
+  /// Called when the host of a stream has been silent for half of that time: the parent may check whether it is alive.
   virtual void look_for_host(ConnectionId stream) = 0;
-  /// It ends after the message being written.
+  /// Reports that the session ends after the message being written.
   virtual void on_finish(ConnectionId session) = 0;
-  /// An exception ended one of its coroutines; on_over follows.
+  /// Reports that an exception ended a coroutine; on_over follows.
   virtual void on_fault(const std::string& what) = 0;
-  /// A datagram could not be sent.
+  /// Reports that a datagram could not be sent.
   virtual void on_send_error(const Endpoint& to, const std::string& why) = 0;
-  /// `by_client`: it left; the daemon did not end the connection.
+  /// Reports the end. `by_client`: the client closed the connection.
   virtual void on_over(ConnectionId session, const std::string& why, bool by_client) = 0;
 };
 
@@ -53,40 +53,41 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   struct Setup {
     ConnectionId id = 0;
-    bool digest = false;                // SHA-256 of what is sent
+    bool digest = false;                // compute the SHA-256 of the sent bytes
     LimitConfig limits;                 // limits for one client
     std::shared_ptr<const void> place;  // kept as long as the session lives
   };
-  /// Longest time a client may take for its last message after finish(); then it is reset. One whose computer has all of it, and
-  /// our FIN, is not waited for longer than `fin_limit`.
+  /// Limit for a client to take its last message after finish(); then it is reset. If its computer has acknowledged everything,
+  /// the limit for its own FIN is `fin_limit`.
   static constexpr std::chrono::milliseconds finish_limit{800}, fin_limit{400};
-  /// After an end of the stream by a fault: a client that ignores it has time to show that.
+  /// Limit after a fault ended the stream; it is longer, so that a client that ignores the end can be observed.
   static constexpr std::chrono::milliseconds fault_fin_limit{1500};
 
   Session(SessionParent& parent, tcp::socket socket, const Setup& setup);
 
   void start();
-  /// There is something to write.
+  /// Call it when there is something to write.
   void wake();
-  /// No more messages after the one being written, without its pauses; then FIN. Reset if the client does not take it in time.
+  /// Completes the message being written without its pauses, sends no other, then FIN. Resets a client that does not take it in
+  /// time.
   void finish(std::string why);
-  /// At once, without FIN.
+  /// Ends the connection at once with RST.
   void reset(std::string why);
-  /// Off: what the client sends is left to the kernels, until they are full.
-  /// The rest of the message that is being written comes without pauses.
+  /// `on` false: bytes of the client stay in the kernels, until these are full.
+  /// Writes the rest of the present message without pauses.
   void end_pauses();
   void read_from_client(bool on);
-  /// When the peer has hung up and every byte from it has been read: over.
+  /// Ends the session if the peer has closed and every byte from it has been read.
   void end_if_closed();
 
   ConnectionId id() const { return setup_.id; }
   const Sha256& digest() const { return digest_; }
   std::chrono::steady_clock::duration connected_for() const { return Steady::now() - connected_at_; }
-  /// How long no byte of the message being written has gone out; 0 when none is written, and in a pause that a fault makes.
+  /// The time since a byte of the present message was sent; 0 if none is being written, and in a pause of a fault.
   std::chrono::steady_clock::duration stands_for() const;
   /// Number of the ping being written; 0 = none.
   std::uint32_t writes_ping() const { return writing_ ? ping_ : 0; }
-  /// With the kernel, not yet confirmed by the client's.
+  /// The number of bytes in the kernel that the client's computer has not acknowledged.
   int unconfirmed_bytes();
 
  private:
@@ -119,8 +120,8 @@ class Session : public std::enable_shared_from_this<Session> {
   std::array<std::byte, 8192> received_{};
   HttpDetector http_;
   const Steady::time_point connected_at_ = Steady::now();
-  Steady::time_point received_at_ = connected_at_;  // a byte came in
-  Steady::time_point progress_at_{};                // a byte went out, while writing; in a pause its end
+  Steady::time_point received_at_ = connected_at_;  // time of the last received byte
+  Steady::time_point progress_at_{};                // time of the last sent byte while writing; in a pause its end
   Steady::time_point finish_by_{}, fin_at_{};
   std::uint32_t ping_ = 0;  // number of the ping that is or was written last; 0 = a reply
   bool reading_ = true, writing_ = false, hurries_ = false, finishing_ = false, sent_fin_ = false, over_ = false;

@@ -1,5 +1,5 @@
-// Boost.Asio as the daemon uses it: included here and nowhere else, so that <utility> comes first (Boost 1.74's awaitable.hpp
-// needs std::exchange and does not include it) and every await spells its error code the same way.
+// Includes Boost.Asio for the daemon. Only this file includes it, so that <utility> comes first (awaitable.hpp of Boost 1.74
+// needs std::exchange and does not include it) and every await handles its error code in the same way.
 #pragma once
 
 #include <chrono>
@@ -22,7 +22,7 @@ inline auto into(error_code& ec) { return asio::redirect_error(asio::use_awaitab
 /// Expiry of a timer that waits for an event only.
 inline constexpr auto never = std::chrono::steady_clock::time_point::max();
 
-/// Text of an exception that ended a coroutine. asio::detached would swallow it.
+/// Returns the text of an exception that ended a coroutine.
 inline std::string text_of(const std::exception_ptr& fault) {
   try {
     std::rethrow_exception(fault);
@@ -33,8 +33,8 @@ inline std::string text_of(const std::exception_ptr& fault) {
   }
 }
 
-/// Runs the coroutine that `loop` returns, and again after a fault for as long as `survives`, which is given its text, returns
-/// true: a listener outlives whatever one message does to it.
+/// Runs the coroutine that `loop` returns. After an exception it calls `survives` with the text and runs the coroutine again if
+/// that returns true, so that one message cannot end a listener.
 template <class Loop, class Survives>
 void keep_running(const asio::any_io_executor& executor, Loop loop, Survives survives) {
   asio::co_spawn(executor, loop, [executor, loop, survives](const std::exception_ptr& fault) {

@@ -1,4 +1,4 @@
-// Opening listeners with errors that say what, where, why and what to do next (docs/architecture.md, "Errors").
+// Opens listeners. Errors say what failed, where, why and what to do (docs/architecture.md, "Errors").
 #pragma once
 
 #include <chrono>
@@ -14,14 +14,14 @@ Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at);
 /// addresses.
 Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast, bool shared = false);
 
-/// Multicast leaves by the network interface of that address; 0.0.0.0: by the system's choice.
+/// Makes multicast leave by the network interface of that address; with 0.0.0.0 the system chooses.
 void send_multicast_from(udp::socket& socket, Ipv4 ip);
 
-/// If the peer answers neither our bytes nor, while there are none, probes, the connection ends within `limit` with
-/// asio::error::timed_out. Whole seconds; at least 3.
+/// Makes a connection end with asio::error::timed_out if the peer acknowledges neither bytes nor, without bytes, probes for
+/// `limit`. Whole seconds; at least 3.
 void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit);
 
-/// Whether the peer has closed the connection. Bytes that it sent before may still be unread.
+/// Returns whether the peer has closed the connection. Bytes that it sent before may still be unread.
 bool has_left(tcp::socket& socket);
 
 /// Whether poses from an address are accepted. Without ranges only those of this computer are: a reload may remove the ranges

@@ -21,9 +21,9 @@ class Log {
   void warning(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::warning, phrase, fields); }
   void error(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::error, phrase, fields); }
   void write(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields);
-  /// Banner and summary, which no level holds back. As they stand in the text format; in JSON a message each line.
+  /// Writes banner or summary, whatever the level: unchanged in the text format, one message for each line in JSON.
   void announce(std::string_view lines);
-  /// Gets the text of each line from info on, whatever the log's own level; empty = none.
+  /// Sets a function that gets each line of level info or above, whatever the level of the log; empty = none.
   using Listener = std::function<void(LogLevel level, const std::string& line, const std::vector<LogField>& fields)>;
   void listen(Listener listener) { listener_ = std::move(listener); }
 
@@ -35,11 +35,11 @@ class Log {
   std::unique_ptr<Sink> sink_;
 };
 
-/// For what an outsider can provoke: five lines at once, then one a second.
+/// Limits lines that clients can cause: five at once, then one a second.
 class LogLimiter {
  public:
   using Clock = std::chrono::steady_clock;
-  /// True: say it. `unsaid` receives how many were swallowed since the last line.
+  /// Returns true if the line should be written. `unsaid` receives the number of suppressed lines since the last one.
   bool allows(Clock::time_point now, std::uint64_t& unsaid);
 
  private:
@@ -48,7 +48,7 @@ class LogLimiter {
   std::uint64_t swallowed_ = 0;
 };
 
-/// Says a line as often as its limiter allows; one after others that were swallowed says how many.
+/// Writes a line if its limiter allows it. A line after suppressed ones has their number.
 void log_limited(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields = {});
 /// Reports a mistake in sonard; `where`: the sonar, listener or connection.
 void log_fault(Log& log, LogLimiter& limiter, const std::string& what, const LogField& where);

@@ -31,9 +31,9 @@ class Notify {
   Notify(const Notify&) = delete;
   Notify& operator=(const Notify&) = delete;
 
-  /// The listeners are open, after the start or a reload. The watchdog's messages begin with the first call.
+  /// Reports that the listeners are open, after the start or a reload. The first call starts the messages of the watchdog.
   void ready(const std::string& status);
-  /// Between this and the next ready() the configuration changes.
+  /// Reports that the configuration changes until the next ready().
   void reloading();
   /// Ends the watchdog's messages, so that the I/O loop may return.
   void stopping();

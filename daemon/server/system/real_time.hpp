@@ -7,14 +7,14 @@
 
 namespace sonar {
 
-/// Niceness of the threads that compute pings: of equals the I/O thread goes first. More would leave pings little beside programs
-/// that never sleep, which at +10 take nine tenths of their core.
+/// Niceness of the threads that compute pings, so that the I/O thread has priority over them. More would be too much: at +10,
+/// busy programs take nine tenths of a shared core.
 inline constexpr int compute_niceness = 1;
 /// Niceness of threads that no ping waits for: building a scene, recording.
 inline constexpr int background_niceness = 10;
 
-/// The calling thread runs before all others of the computer that are not scheduled so (SCHED_FIFO); threads it starts do not.
-/// `priority` 1 to 99. Empty, or a sentence: why not, and what to do.
+/// Gives the calling thread real-time priority (SCHED_FIFO), which threads that it starts do not inherit. `priority` 1 to 99.
+/// Returns an empty text, or a sentence with the reason of a failure and the remedy.
 std::string schedule_in_real_time(int priority);
 
 /// Runs `work` on a thread of its own in the background, and waits for it. Threads that `work` starts are as nice as that one:

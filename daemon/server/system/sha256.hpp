@@ -1,4 +1,4 @@
-// SHA-256 of a byte stream, for `--digest`: two runs served the same bytes when their digests are equal.
+// SHA-256 of a byte stream. With `--digest`, equal digests mean that two runs sent the same bytes.
 // Source: FIPS 180-4, sections 4.1.2, 5 and 6.2; its examples are the test.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Standard input, output and error made usable for the daemon, even if it was started without them. Called first in main().
+// Makes standard input, output and error usable, even if the daemon was started without them. main() calls it first.
 #pragma once
 
 namespace sonar {

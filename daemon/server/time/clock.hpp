@@ -11,27 +11,27 @@ namespace sonar {
 
 class Clock {
  public:
-  /// Time of the computer's wall clock; people and NTP set it, now() does not follow.
+  /// The time of the computer's wall clock. If it is set, by NTP for example, now() does not change.
   using Wall = Time (*)();
   static Time system_wall() { return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now()); }
   explicit Clock(bool stepped, Wall wall = system_wall)
       : stepped_(stepped), wall_(wall), started_(std::chrono::steady_clock::now()), origin_(stepped ? Time{} : wall()) {}
 
   bool stepped() const { return stepped_; }
-  /// Stepped time begins at the epoch: packets of two runs are the same.
+  /// Stepped time begins at the epoch, so that two runs send the same packets.
   Time now() const { return stepped_ ? origin_ : origin_ + (std::chrono::steady_clock::now() - started_); }
   /// How far now() is ahead of the wall clock at this moment: 0 until that clock is set. Real time only.
   std::chrono::nanoseconds ahead_of_wall() const { return now() - wall_(); }
-  /// When a timer must expire for `t`. Real time only.
+  /// The time at which a timer must expire for `t`. Real time only.
   std::chrono::steady_clock::time_point timer_at(Time t) const { return started_ + (t - origin_); }
-  /// Stepped time only; never backwards.
+  /// Advances to a time that is not before now(). Stepped time only.
   void advance_to(Time t) { origin_ = std::max(origin_, t); }
   /// Advances the clock without advancing unskipped time (stepped mode only).
   void skip(std::chrono::nanoseconds by) {
     origin_ += by;
     skipped_ += by;
   }
-  /// All skips together. Conversations run on unskipped time, so that jumps neither end silences nor cause keep-alives.
+  /// The sum of all skips. Conversations use unskipped time, so that a jump causes no time-outs and no keep-alives.
   std::chrono::nanoseconds skipped() const { return skipped_; }
 
  private:

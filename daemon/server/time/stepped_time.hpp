@@ -1,5 +1,5 @@
-// Computes how far stepped time may advance, and keeps the requests that wait for it: nothing bounds it (stepped), control
-// requests do (lockstep), or the stamps of the vehicles' poses do (follow). Used by Stepper and by control requests; I/O thread
+// Computes how far stepped time may advance, and keeps the requests that wait for it. The limit is set by nothing (stepped), by
+// control requests (lockstep), or by the stamps of the vehicles' poses (follow). Stepper and control requests use it; I/O thread
 // only.
 #pragma once
 
@@ -16,36 +16,35 @@ namespace sonar {
 
 class SteppedTime {
  public:
-  /// Limit of one request, and of all that wait.
+  /// Limits for one request and for all that wait.
   static constexpr double longest_step_s = 3600;
   static constexpr std::size_t most_waiting = 4096;
-  /// Poses of a simulator that does not wait for pings lead by no more than this; ticks before are skipped as in real time, but
-  /// for those that a request waits for.
+  /// If a simulator does not wait for pings, its poses may be ahead of time by at most this. Earlier ticks are skipped, as in
+  /// real time, unless a request waits for them.
   static constexpr std::chrono::nanoseconds most_lead = std::chrono::seconds(1);
 
   SteppedTime(ClockMode mode, const Clock& clock, const World& world) : mode_(mode), clock_(clock), world_(world) {}
 
-  /// Pings that are due up to `last_tick` may come, and so may what else conversations have to do; when there is no more, it is
-  /// `then`.
+  /// Pings and ticks of conversations that are due up to `last_tick` may run. If there are no more, time advances to `then`.
   struct Bound {
     Time last_tick = Time::max();
     std::optional<Time> then = {};
   };
-  /// `for_pings`: when the next ping is due, or will be asked for. Time that steps by itself passes as far as that.
+  /// `for_pings`: the time at which the next ping is due or will be requested. Time that steps by itself may advance to it.
   Bound bound(std::optional<Time> for_pings = {}) const;
-  /// When what was due at `due` comes.
+  /// Returns the time at which an event that was due at `due` happens.
   Time tick_at(Time due) const;
 
-  /// Lets time pass by `dt_s` after all steps before: ticks at its end belong to the next step. Empty, or a sentence why not.
+  /// Adds a step of `dt_s` after all previous steps; ticks at its end belong to the next step. Returns an empty text, or why not.
   std::string step(double dt_s);
 
   using Reached = std::function<void(Time then)>;
   /// `reached` is called when every ping that bound() allows at this moment has been served, and it is `then`.
   void wait(Reached reached);
-  /// No more requests may wait; one whose client hangs up is kept until its time is reached.
+  /// True if no more requests may wait. A request whose client closes is kept until its time is reached.
   bool is_full() const { return waiting_.size() >= most_waiting; }
   bool follows_poses() const { return mode_ == ClockMode::follow; }
-  /// All is done that was due before `next`; nothing = nothing more is due. Whether there was anybody to answer.
+  /// Call it when everything before `next` is done; nullopt = nothing more is due. Returns whether a request was answered.
   bool answer(std::optional<Time> next);
 
  private:
@@ -57,7 +56,7 @@ class SteppedTime {
   ClockMode mode_;
   const Clock& clock_;
   const World& world_;
-  Time asked_{};  // lockstep: steps let it pass so far
+  Time asked_{};  // lockstep: the end of all requested steps
   std::list<Waiting> waiting_;
 };
 

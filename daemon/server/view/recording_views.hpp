@@ -1,6 +1,6 @@
-// Recordings on the page: a viewer that asks for one gets a socket of its own (?recording=NAME), with the recording's pictures
-// and a time line of its own. Files are read and pictures drawn in short slices on one thread for all such viewers, so that
-// neither drivers nor other viewers wait. I/O thread only. Owned by ViewFeed and by `sonard replay`.
+// Recordings on the page. A viewer requests one by ?recording=NAME and gets its pictures, with a time line for this viewer. One
+// thread for all such viewers reads files and draws pictures in short slices, so that neither drivers nor other viewers wait. I/O
+// thread only. ViewFeed and `sonard replay` own it.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +13,7 @@
 
 namespace sonar {
 
-/// The one that is played.
+/// The recording that is played.
 struct PlayedRecording {
   std::filesystem::path file;
   std::string sonar = {};  // one of several in it, as --sonar of `sonard replay`
@@ -23,14 +23,14 @@ struct PlayedRecording {
 class RecordingViews {
  public:
   RecordingViews(asio::io_context& io, Log& log);
-  /// Waits for the slice under way.
+  /// Waits for the present slice.
   ~RecordingViews();
   RecordingViews(const RecordingViews&) = delete;
   RecordingViews& operator=(const RecordingViews&) = delete;
 
   std::shared_ptr<HttpTakeover> open(ConnectionServices& services, HttpConnection& from, const HttpRequest& request,
                                      ViewWelcome welcome, const PlayedRecording& wanted);
-  /// Viewers of recordings, now.
+  /// The present number of viewers of recordings.
   int count() const;
 
  private:

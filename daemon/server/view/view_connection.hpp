@@ -31,11 +31,11 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   Viewer& viewer() { return viewer_; }
   const Viewer& viewer() const { return viewer_; }
   bool over() const { return over_; }
-  /// With its port: of no other viewer.
+  /// The address with the port, which no other viewer has.
   const std::string& address() const { return address_; }
-  /// The vehicle whose trajectory it asked to look at; empty = none.
+  /// The requested vehicle whose trajectory it looks at; empty = none.
   const std::string& playback() const { return playback_; }
-  /// The viewer has something to write.
+  /// Call it when the viewer has something to write.
   void wake() { wake_.cancel(); }
 
  private:
@@ -53,7 +53,7 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   Viewer viewer_;
   std::unique_ptr<Socket> socket_;
   asio::steady_timer wake_, stall_, rest_;
-  Steady::time_point moved_at_{};  // bytes, to the viewer
+  Steady::time_point moved_at_{};  // time of the last byte sent to the viewer
   bool over_ = false, writing_ = false;
 };
 

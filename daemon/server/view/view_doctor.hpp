@@ -25,7 +25,7 @@ class ViewDoctor {
 
   /// The findings for a new subscriber, no older than the period. Null: there is no status.
   ViewPayloadPointer newest();
-  /// The same, null when all who have subscribed have it.
+  /// The same; null if all subscribers have it.
   ViewPayloadPointer news();
 
  private:
@@ -38,8 +38,9 @@ class ViewDoctor {
   const Clock& clock_;
   Steady::time_point looked_at_{};
   std::shared_ptr<const v1::DaemonStatus> last_;
-  std::deque<std::pair<Steady::time_point, std::uint64_t>> failed_;  // connections of this computer, when it was looked
-  ViewPayloadPointer newest_, said_;                                 // said_: to all who have subscribed
+  std::deque<std::pair<Steady::time_point, std::uint64_t>>
+      failed_;                        // failed connections of this computer at the time of each look
+  ViewPayloadPointer newest_, said_;  // said_: sent to all subscribers
 };
 
 }  // namespace sonar

@@ -80,7 +80,7 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
   arm();
 }
 
-/// At once, where the time of arrival is not the viewer's time.
+/// Sends the time at once if the viewer's time is not the time of arrival.
 void ViewFeed::say_time(Viewer& viewer) const {
   const Time now = of_.clock.now();
   if (const auto watch = watches_.find(viewer.playback()); watch != watches_.end())

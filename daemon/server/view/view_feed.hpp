@@ -47,12 +47,12 @@ class ViewFeed final : public ViewerHost {
   static constexpr double usual_threshold = 0.35;  // default threshold of a cloud, as a share of the full scale
 
   explicit ViewFeed(const Viewed& of);
-  /// Waits for the picture being made.
+  /// Waits until the picture being made is done.
   ~ViewFeed() override;
   ViewFeed(const ViewFeed&) = delete;
   ViewFeed& operator=(const ViewFeed&) = delete;
 
-  /// One more viewer, which is greeted.
+  /// Adds a viewer and greets it.
   void add(const std::shared_ptr<ViewConnection>& viewer);
   bool is_full() const;
   std::vector<ViewerFigures> viewers() const;
@@ -73,13 +73,13 @@ class ViewFeed final : public ViewerHost {
  private:
   using Steady = std::chrono::steady_clock;
   using MakePayload = std::function<ViewPayloadPointer(std::uint32_t channel, double threshold)>;
-  /// Made on the thread from the newest ping, the same for all its channels; what it shows may be some pings old.
+  /// A payload that the thread makes from the newest ping, the same for all its channels. It may be a few pings old.
   struct Slow {
     std::vector<std::uint32_t> channels{};
     std::string threshold = {};  // the parameter that it depends on; empty = on none
     bool under_way = false;
     Steady::time_point begun_at{};
-    Time of{Time::min()};                                                   // the ping's
+    Time of{Time::min()};                                                   // time of its ping
     std::map<std::pair<std::uint32_t, double>, ViewPayloadPointer> made{};  // by channel and threshold
   };
   struct SonarView {
@@ -91,12 +91,12 @@ class ViewFeed final : public ViewerHost {
     std::shared_ptr<const Ping> last = nullptr;
     ViewPayloadPointer picture = nullptr;               // picture of `last`, once it was requested
     wire::Bytes shape = {};                             // shape of `last`, without its number
-    std::string volume = {};                            // what the swath depends on
+    std::string volume = {};                            // the settings on which the swath depends
     std::shared_ptr<PicturePainter> painter = nullptr;  // for the view thread alone
     std::unique_ptr<DriverPicture> driver = nullptr;
     DriverPicture::Drawing drawing = nullptr;  // drawing of `last`
 
-    /// All that pings have left.
+    /// Clears everything that pings have left.
     void forget();
     /// Pings of another make are forgotten: a reload may give a sonar another profile.
     void be_of(const Device& device);
@@ -133,7 +133,7 @@ class ViewFeed final : public ViewerHost {
   static std::string services_word();
   ViewPayloadPointer current(const Viewer& viewer, std::uint32_t channel);
   void say_time(Viewer& viewer) const;
-  /// One payload to one viewer.
+  /// Offers a payload to one viewer.
   void give(Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload);
   void give(Viewer& viewer, const Slow& slow);
   static double threshold_of(const Viewer& viewer, const Slow& slow) { return viewer.choice(slow.threshold, usual_threshold); }
@@ -142,7 +142,7 @@ class ViewFeed final : public ViewerHost {
   std::string begin_playback(Viewer& viewer, const std::string& vehicle);
   void watch_playback(const Viewer* but = nullptr);
   ViewPayloadPointer in_time_of(const Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) const;
-  /// Empty, or why not; nothing: it is no parameter of the view's own.
+  /// Returns an empty text, or why not; nullopt if it is no parameter of the view itself.
   std::optional<std::string> set_own(Viewer& viewer, const foxglove::Parameter& wanted);
   template <class Visit>
   void each(Visit visit) const {
@@ -158,7 +158,7 @@ class ViewFeed final : public ViewerHost {
   std::uint32_t last_channel_ = 0, tf_ = 0, scene_ = 0, swath_ = 0, log_ = 0, status_ = 0, faults_ = 0, doctor_channel_ = 0;
   std::list<SonarView> sonars_;
   std::map<std::string, PlaybackWatch> watches_;                     // by vehicle that viewers look at
-  std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // who asked, by sonar
+  std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // the viewer that requested the preview, by sonar
   std::set<std::string> no_preview_;                                 // sonars whose preview a viewer has switched off
   std::map<std::string, Steady::time_point> preview_failed_at_;      // by sonar
   SceneShapes shapes_;

@@ -12,7 +12,7 @@ class FaultReport;
 }  // namespace v1
 
 ViewPayloadPointer ping_payload(const Device& of, const PingQueued& queued);
-/// For plots, in CDR.
+/// Returns the figures of a ping for plots, in CDR.
 ViewPayloadPointer figures_payload(const Device& of, const PingQueued& queued);
 ViewPayloadPointer status_payload(Time now, const v1::DaemonStatus& status);
 ViewPayloadPointer faults_payload(Time now, const v1::FaultReport& report);

@@ -22,11 +22,11 @@ struct ParameterSource {
   const Fleet& fleet;
 };
 
-/// The number of a parameter; nothing if it is no finite number.
+/// Returns the number of a parameter; nullopt if it is no finite number.
 std::optional<double> number_of(const foxglove::Value& value);
-/// All parameters; unset if they have no value now.
+/// Returns all parameters; those without a value are unset.
 std::vector<foxglove::Parameter> parameters_of(const ParameterSource& of);
-/// The operation that a write requests, or an error of kind usage.
+/// Returns the operation that a write requests, or an error of kind usage.
 Result<control::Operation> operation_of(const foxglove::Parameter& wanted, const ParameterSource& of);
 
 }  // namespace sonar

@@ -10,7 +10,7 @@
 namespace sonar {
 namespace {
 
-/// For the log.
+/// The name of the viewer in the log.
 Sender sender_of(const Viewer& viewer) { return {"live view " + viewer.who(), viewer.who()}; }
 
 /// Every POST of the HTTP API: the name there, in Request.op, and the message. Their ids count from 1.
@@ -79,7 +79,7 @@ std::string ViewFeed::set_parameter(Viewer& viewer, const foxglove::Parameter& w
   return perform_at_once(*operation, viewer);
 }
 
-/// Empty, or why it was not done.
+/// Returns an empty text, or why the operation was not done.
 std::string ViewFeed::perform_at_once(const control::Operation& operation, const Viewer& viewer) {
   const auto why = std::make_shared<std::string>();
   of_.operations.perform(operation, sender_of(viewer), [why](const OperationResult& result) {
