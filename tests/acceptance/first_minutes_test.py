@@ -1,4 +1,4 @@
-"""What the README prints is what comes out: tests/tools/first_minutes.sh, line by line beside it.
+"""Compares the output that the README prints with that of tests/tools/first_minutes.sh, line by line.
 
 Numbers differ from run to run and machine to machine; words must not.
 """

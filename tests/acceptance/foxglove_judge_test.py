@@ -1,4 +1,4 @@
-"""The live view before independent readers: Foxglove's client library and schemas, protobuf.js, Lichtblick's reader of ROS 2 messages.
+"""Reads the live view with independent software: Foxglove's client library and schemas, protobuf.js, Lichtblick's ROS 2 reader.
 
 npm installs them into the build folder, in the versions of view/node/package-lock.json. Skipped without npm or network."""
 import contextlib

@@ -1,4 +1,4 @@
-"""A strict viewer of the live view: WebSocket (RFC 6455), the Foxglove protocol and protobuf from their texts alone, no libraries.
+"""A strict viewer of the live view, written without libraries from the specifications of WebSocket (RFC 6455), Foxglove and protobuf.
 Shares nothing with the C++ code. Whatever is not as the texts demand is an AssertionError."""
 import base64
 import hashlib

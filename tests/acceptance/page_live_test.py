@@ -1,4 +1,4 @@
-"""The page of the live view in a real browser, before sonard itself with a driver. Skipped without browser or page.
+"""Tests the page of the live view in a real browser, with sonard and a driver. Skipped without browser or page.
 
 SONARD_SHOTS names a folder for pictures; without it there are only those of tests that fail
 (SONARD_SHOT_HZ: at that rate, for slow computers).

@@ -1,4 +1,4 @@
-"""The page of the live view in a real browser, before a scripted daemon (view/mock_daemon.py). Skipped without browser or page.
+"""Tests the page of the live view in a real browser, with a scripted daemon (view/mock_daemon.py). Skipped without browser or page.
 
 Pictures of the states are kept in the folder that SONARD_SHOTS names; without it only of tests that fail, beside the build.
 """

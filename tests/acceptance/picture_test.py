@@ -1,4 +1,4 @@
-"""The demo looks like a sonar image, in figures on its quantised samples, computed by `sonarctl stats`.
+"""Checks by statistics of the samples (`sonarctl stats`) that the picture of the demo is like that of a sonar.
 
 From the demo's first pose, with 256 beams as in the captured pings of a real M1200d, whose figures are: adjacent-beam correlation
 0.80, adjacent-row 0.58, quiet near field with a mean of 8, noise rising towards the far end. In the 512 format, which the demo's

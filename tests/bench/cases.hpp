@@ -35,9 +35,9 @@ struct BenchScene {
 };
 std::span<const BenchScene> bench_scenes();
 
-/// At most 1 m/s and 20 deg/s, as the goals assume.
+/// A pose at a time of the run. The vehicle moves at most 1 m/s and turns at most 20 deg/s, as the goals assume.
 Pose bench_pose(const BenchCase& c, const BenchScene& scene, double time_s);
-/// As high and as tilted, at another place and heading.
+/// A pose with the height and tilt of the case at another position and heading.
 Pose bench_pose_at(const BenchCase& c, const BenchScene& scene, double x_m, double y_m, double yaw_rad);
 
 }  // namespace sonar::bench

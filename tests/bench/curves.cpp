@@ -1,4 +1,4 @@
-// How the time of a ping grows with what is asked of it: one thing at a time from P1 or P3a, the rest as they are.
+// Measures how the time of a ping grows with each of its parameters. One parameter of P1 or P3a changes at a time.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -56,7 +56,7 @@ ScenePointer bed_of(const Scene& scene, double spacing_m, double bed_z_m) {
   return made;
 }
 
-/// So many sonars take turns over one scene; milliseconds of a round over their number.
+/// Measures a round of `count` sonars that take turns over one scene: its time divided by their number [ms].
 json sonars(int count, const ScenePointer& scene, const BenchScene& where, const BenchOptions& options) {
   const BenchCase c = *find_case("P3a");
   Bench bench(scene, options.threads.back(), options);

@@ -1,5 +1,5 @@
-// How the benchmark measures whole pings, from pose to framed bytes: median and best of many, by the clock on the wall and by the
-// processors' time, which counts what others on the machine do not.
+// Measures whole pings, from pose to framed bytes: median and best of many, in wall time and in processor time, which other
+// programs on the computer change less.
 #pragma once
 
 #include <array>

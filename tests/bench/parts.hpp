@@ -18,7 +18,7 @@ std::vector<std::string> parts_to_give();
 std::shared_ptr<const Scene> with_parts(std::shared_ptr<const Scene> scene, const std::vector<std::string>& parts);
 std::shared_ptr<const SonarModel> with_parts(std::shared_ptr<const SonarModel> model, const std::vector<std::string>& parts);
 
-/// Which of parts_to_give() the scene and the sonar have of their own.
+/// Returns those of parts_to_give() that the scene and the sonar already have.
 std::vector<std::string> parts_had(const Scene& scene, const FrequencyMode& mode);
 
 }  // namespace sonar::bench

@@ -52,7 +52,7 @@ double difference(const BeamSignals& truth, const BeamSignals& other) {
   return std::sqrt(off / all);
 }
 
-/// As one writes it first: magnitude, gain and power law of every sample, from beams by range to rows by beam.
+/// The simplest implementation, for comparison: magnitude, gain and power law of every sample, beam by beam.
 void detect_naively(const std::vector<float>& signal, const PingPlan& plan, std::vector<std::byte>& codes) {
   const PingSettings& s = plan.settings;
   for (int j = 0; j < s.beam_count; ++j)

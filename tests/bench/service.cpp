@@ -70,7 +70,7 @@ Result<std::unique_ptr<Service>> start(const ScenePointer& scene, const BenchOpt
 tcp::endpoint data_of() { return {asio::ip::make_address(own_address()), data_port}; }
 udp::endpoint poses_of(Service& service) { return {asio::ip::make_address(own_address()), service.app().poses().json().port}; }
 
-/// As far as settings of the grid differ; a gain that the device chose is echoed otherwise.
+/// Compares the settings of the grid only, because the echo has the gain that the device chose.
 bool answers(const oculus::FireRequest& fire, const oculus::DecodedPing& ping) {
   const oculus::FireSettings& echo = ping.head.fixed.fire;
   return echo.mode == fire.settings.mode && echo.range == fire.settings.range && echo.flags == fire.settings.flags &&
@@ -86,7 +86,7 @@ class Client {
     ::setsockopt(socket_.native_handle(), SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
   }
   void fire(const oculus::FireRequest& fire) { asio::write(socket_, asio::buffer(oculus::make_fire(fire))); }
-  /// When the last byte of the next ping, or of the next that echoes `fire`, was here; 0 = the stream has ended.
+  /// Returns when the last byte of the next ping, or of the next that echoes `fire`, was received; 0 = the stream has ended.
   double next_ping(const oculus::FireRequest* fire = nullptr) {
     for (;;) {
       while (auto message = decoder_.next())

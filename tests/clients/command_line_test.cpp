@@ -29,7 +29,7 @@ std::string complaint(const std::vector<std::string>& words) {
   return {};
 }
 
-/// With single spaces instead of line breaks and columns.
+/// Replaces line breaks and columns by single spaces.
 std::string unwrapped(const std::string& text) {
   std::string words;
   for (const char c : text)

@@ -51,7 +51,7 @@ class Server {
   std::thread thread_;
 };
 
-/// False: the client left without a request.
+/// Answers as a web server that refuses. Returns false if the client left without a request.
 bool refuse_as_a_web_server(const Socket& client) {
   std::array<std::byte, 1024> request;
   if (read_some(client, request, 60s).what != Wait::data) return false;

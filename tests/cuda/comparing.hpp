@@ -29,7 +29,7 @@ inline Result<std::unique_ptr<cuda::Machine>> test_machine() { return cuda::make
 #define SKIP_WITHOUT_A_MACHINE() \
   if (const auto machine = sonar::test::test_machine(); !machine) GTEST_SKIP() << "CUDA: " << machine.error().text
 
-/// Both over one scene.
+/// The CPU engine and the device engine over one scene.
 class BothEngines {
  public:
   explicit BothEngines(std::shared_ptr<const Scene> scene, SimdLevel simd = SimdLevel::portable, int batch = 8)

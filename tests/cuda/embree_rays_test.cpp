@@ -59,7 +59,7 @@ TEST(DeviceEngineBesideEmbree, DiffersByTheRimsOfShadowsAlone) {
   RecordProperty("mean", std::to_string(all / pings));
 }
 
-// With nothing that throws a shadow, there is nothing to differ by.
+// Without an object that casts a shadow both give the same.
 TEST(DeviceEngineBesideEmbree, IsTheSameWhereThereAreNoShadows) {
   SKIP_WITHOUT_A_MACHINE();
   SceneMaker maker;

@@ -14,7 +14,7 @@ namespace sonar::test {
 
 class FailingMachine final : public cuda::Machine {
  public:
-  /// When set, it has no transforms, and this is why.
+  /// If set, transforms fail with this reason.
   std::string no_transforms;
   /// Bytes of the device; more is DeviceMemoryFull. `tells_bytes`: what it claims to have free at the start.
   std::size_t room_bytes = std::numeric_limits<std::size_t>::max(), tells_bytes = room_bytes;

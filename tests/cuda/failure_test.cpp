@@ -58,7 +58,7 @@ class LostDevice : public ::testing::Test {
     device.say = [this](const std::string& what) { said_.push_back(what); };
     return cuda::make_device_engine(scene_, pool_, options_, std::make_unique<FailingMachine>(calls_, last_call), device);
   }
-  /// In calls of two, each submitted before the one before it is collected.
+  /// Submits calls of two requests; each is submitted before the previous one is collected.
   static std::vector<Ping> pipelined(PingEngine& engine, std::span<const PingRequest> requests) {
     std::vector<Ping> pings;
     const auto collect = [&] {

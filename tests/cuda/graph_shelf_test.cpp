@@ -1,4 +1,4 @@
-// Which launches become graphs: those that come twice, a few of them, whatever small number of cells they differ by.
+// Launches that become graphs: those that come twice, up to a small number, even if they differ by a few cells.
 #include "cuda/graph_shelf.hpp"
 
 #include <gtest/gtest.h>

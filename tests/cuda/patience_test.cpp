@@ -12,7 +12,7 @@ struct Waited {
   int code = 0, asked = 0, rested = 0;
   double s = 0;
 };
-/// On a clock that goes on by a millisecond at every look and every rest.
+/// Waits on a clock that advances by a millisecond at every look and every rest.
 Waited wait(double answers_after_s, int answer) {
   Waited w;
   w.code = wait_for(

@@ -82,7 +82,7 @@ class Link {
     for (const Time end = now_ + time; now_ < end && pings == before;) step_once();
     return pings > before;
   }
-  /// False: such a sonar has no such fault.
+  /// Returns false if such a sonar has no such fault.
   bool add(const FaultKind& kind) {
     FaultRecord record;
     record.what = std::string(kind.code);

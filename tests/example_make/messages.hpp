@@ -33,7 +33,7 @@ constexpr void fields(V& visit, M& m) {
   visit("payload", m.payload, means::payload_size);
 }
 
-/// From the host. `accepted` returns them; `refused` has no payload.
+/// Settings that the host sends. The message `accepted` returns them; `refused` has no payload.
 struct Settings {
   std::uint32_t range_mm = 10000;
   std::uint16_t rate_centihz = 0;  // 0: standby

@@ -1,5 +1,5 @@
 // The control stream: lengths, requests, and what they ask. First byte = length of the pieces, the rest is the stream.
-// Whatever the pieces, the messages are the same; what is accepted is usable; every request can be answered.
+// Checks that the messages do not depend on the pieces, that accepted ones are usable, and that every request gets an answer.
 #include <algorithm>
 #include <cmath>
 #include <vector>

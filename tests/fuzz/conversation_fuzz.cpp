@@ -73,7 +73,7 @@ protocol::Bytes blueview_message(Script& script, char letter) {
   return blueview::make_frame(letter == 's' ? FrameType::set : FrameType::get, id, payload);
 }
 
-/// In two pieces, now and then.
+/// Sends bytes; with `split` in two pieces.
 void send(SonarClients& talk, std::size_t place, protocol::BytesView bytes, bool split) {
   const std::size_t cut = split ? bytes.size() / 3 : 0;
   talk.receive(place, bytes.first(cut));

@@ -33,7 +33,7 @@ inline void check(const HeightGrid& grid) {
   check(made->mesh);
 }
 
-/// Whatever the bytes, a reader of files gives a sound grid or a sentence that starts with the file's name.
+/// Checks that a reader of files returns a valid grid or a sentence that begins with the name of the file, for any bytes.
 template <class Read>
 void check_grid_reader(const std::uint8_t* data, std::size_t size, Read&& read) {
   static const MemoryFile file;

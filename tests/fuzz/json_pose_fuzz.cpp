@@ -31,7 +31,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   take_lines(lines);
   lines.feed(bytes.subspan(size / 2));
   take_lines(lines);
-  // With a gap between the pieces, the same but for the line that holds it.
+  // A gap between the pieces changes only the line that contains it.
   sonar::control::LineParser gapped;
   gapped.feed(bytes.first(size / 2));
   gapped.skip_gap();

@@ -222,7 +222,7 @@ void SonarClients::finish(std::size_t place) {
   sonar_.finish(clients_[place]->id);
 }
 
-/// In the middle of whatever it was.
+/// Disconnects in the middle of anything.
 void SonarClients::disconnect(std::size_t place) {
   if (!clients_[place]) return;
   const ConnectionId id = clients_[place]->id;

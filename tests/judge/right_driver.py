@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A driver that does everything right, in one file: the judge must find nothing in it.
+"""A correct driver in one file. The judge must find no fault in it.
 
 usage: right_driver.py ADDRESS [PORT]      prints a tap line for each ping, and a log on standard error
 """

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A driver of the ping protocol by UDP that does everything right: the judge must find nothing in it.
+"""A correct driver of the ping protocol by UDP. The judge must find no fault in it.
 
 usage: right_ping_driver.py ADDRESS PORT [PERIOD_MS]     a Ping1D's profiles: a tap line for each, and a log on standard error
 """

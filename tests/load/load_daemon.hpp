@@ -21,7 +21,7 @@ class LoadDaemon {
   explicit LoadDaemon(const LoadSetup& setup);
   ~LoadDaemon();
   const std::string& address(std::size_t sonar = 0) const;
-  /// Where poses and control are taken: UDP 14770 and 14771, TCP 14770 (control stream), 14771 (JSON poses) and 8088 (HTTP).
+  /// The address of poses and control: UDP 14770 and 14771, TCP 14770 (control stream), 14771 (JSON poses) and 8088 (HTTP).
   const std::string& pose_address() const { return address(0); }
   int stop();
   /// After stop().

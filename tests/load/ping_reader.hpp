@@ -22,7 +22,7 @@ class Socket {
   Socket& operator=(Socket&&) = delete;
 
   int fd() const { return fd_; }
-  /// False when the other end does not take it within the time.
+  /// Sends bytes. Returns false if the other end does not take them within the time.
   bool send(const std::vector<std::byte>& bytes, std::chrono::milliseconds patience = std::chrono::seconds(20));
   /// Waits for bytes; -1 after the time or an error, 0 at the end of the stream.
   long receive(std::byte* into, std::size_t size, std::chrono::milliseconds patience);

@@ -92,7 +92,7 @@ TEST(Load, ConnectCommandDisconnect) {
        after.open_descriptors == idle.open_descriptors && after.threads == idle.threads && grown_mib <= 2);
 }
 
-/// As a driver does it: connect, ask, read, and be gone without a word, for which it needs no reason.
+/// Clients connect, request a ping, read it, and disconnect without a message, as drivers do.
 TEST(Load, ReconnectsOfADriver) {
   const int times = quick ? 60 : 1000;
   LoadDaemon daemon({1, "", ""});  // one place, as the product has

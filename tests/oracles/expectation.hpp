@@ -55,7 +55,7 @@ Result<std::vector<Expectation>> read_expectations(const std::string& text, cons
 std::string name_of(Measure measure);
 std::string unit_of(const Expectation& expectation);
 
-/// In the ping of that job.
+/// Measures the quantity in the ping of that job.
 Result<double> measure(const Expectation& expectation, const RenderJob& job, const Ping& ping);
 
 struct Verdict {

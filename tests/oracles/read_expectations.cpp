@@ -14,7 +14,7 @@ using text::Range;
 struct MeasureName {
   std::string_view name, unit;
 };
-/// In the order of Measure.
+/// The names and units of the measures, in the order of Measure.
 constexpr std::array<MeasureName, 8> measures{{{"peak_level_db", "dB"},
                                                {"peak_range_m", "m"},
                                                {"peak_bearing_deg", "deg"},

@@ -27,7 +27,7 @@ std::string quoted(const std::string& text) {
   return out + '"';
 }
 
-/// As Python's json module reads it, which knows NaN and Infinity.
+/// Writes a number for Python's json module, which reads NaN and Infinity.
 std::string number_text(double value) {
   if (std::isnan(value)) return "NaN";
   if (std::isinf(value)) return value > 0 ? "Infinity" : "-Infinity";

@@ -54,7 +54,8 @@ bool isolate() {
          loopback_up() && drop_capabilities();
 }
 
-/// In a child process first: some kernels allow the namespace but not its loopback interface, and there is no way back.
+/// Tries in a child process first, because some kernels allow the namespace but not its loopback interface, and a process cannot
+/// leave it again.
 bool may_isolate() {
   const pid_t child = fork();
   if (child == 0) _exit(isolate() ? 0 : 1);

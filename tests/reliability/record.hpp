@@ -14,8 +14,8 @@ struct ReliabilityFigure {
   std::string command;  // what a reader runs to measure it again, from the root of the tree
 };
 
-/// Writes the figure to FOLDER/ITEM.json, with date and machine, in place of an older one. Without SONARD_RELIABILITY, nothing.
-/// False when the file cannot be written.
+/// Writes the figure to FOLDER/ITEM.json, with date and machine, and replaces an older one. Without SONARD_RELIABILITY it
+/// writes nothing. Returns false if the file cannot be written.
 bool record_reliability(const ReliabilityFigure& figure);
 
 }  // namespace sonar::test

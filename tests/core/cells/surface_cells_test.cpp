@@ -243,7 +243,7 @@ TEST(SurfaceCells, SeveralViewsAtOnceFindWhatEachFindsAlone) {
   SurfaceCells alone(scene, Seed{5}, 1u << 30);
   CellView nothing = whole_scene(4, {0, 0, 500});
   nothing.max_range_m = 1;
-  // With next to no room everything is forgotten when nothing is looked at, and nothing within one call.
+  // With a tiny budget all cells are removed when none is in view, and none within one call.
   for (const std::size_t budget : {std::size_t{1} << 30, std::size_t{1} << 12}) {
     SurfaceCells together(scene, Seed{5}, budget);
     for (int again = 0; again < 2; ++again) {

@@ -1,4 +1,4 @@
-// Which moment is shown when: exact in nanoseconds, over loops, pauses and seeks.
+// The position of a playback at a time: exact in nanoseconds, over loops, pauses and seeks.
 #include "core/motion/playback.hpp"
 
 #include <gtest/gtest.h>

@@ -164,7 +164,7 @@ TEST(PaperEngine, ACanonicalPingIsTheCpuEnginesToTheByte) {
   EXPECT_EQ(pings[3].samples, s.last().samples);
   EXPECT_EQ(pings[1].samples, pings[2].samples);
   EXPECT_NE(pings[1].samples, pings[0].samples);
-  // In two halves: calls of either kind come back in their order.
+  // Submits in two ways: results of both kinds of calls come back in order.
   const std::span<const PingRequest> all(batch);
   for (const std::size_t first : {0u, 1u, 3u}) c.engine->submit(all.subspan(first, 1));
   c.engine->submit(all);

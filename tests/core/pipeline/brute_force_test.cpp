@@ -134,8 +134,8 @@ struct BruteForce {
   }
 };
 
-/// How far a ping is from brute force, sample by sample. What truly lies in shadow, 20 dB under the smooth bed, holds only the
-/// leak of beams and pulses and is judged by its mean; samples on a shadow's edge, between 10 and 20 dB, are not judged.
+/// The difference of a ping from brute force, sample by sample. Samples in shadow, 20 dB below the smooth bed, contain only the
+/// leak of beams and pulses, and are judged by their mean. Samples at the edge of a shadow, 10 to 20 dB below, are not judged.
 struct Difference {
   double rms_db = 0, within_1_db = 0, shadow_re_bed = 0;  // the last: mean power over the smooth bed's
   int lit = 0, shadowed = 0;

@@ -22,7 +22,7 @@
 namespace sonar::test {
 namespace {
 
-// To the rounding of a float.
+// They agree to the rounding of a float.
 TEST(KernelSets, AgreeOnAPing) {
   SceneMaker maker;
   maker.add(height_field(-2, 14, -10, 10, 0.1, rough_relief(0.03, 40)), -20).add(sphere(0.4, 3), -10, {5, 1, 0.4});

@@ -32,7 +32,7 @@ std::vector<double> intensities(const Sounding& s) {
   return all;
 }
 
-/// In the world after turning about the vertical through the origin and then moving.
+/// Returns the pose after a turn about the vertical axis through the origin and then a move.
 Pose carried(const Pose& by, const Pose& pose) {
   return {by.position_m + rotate(by.orientation, pose.position_m), by.orientation * pose.orientation};
 }

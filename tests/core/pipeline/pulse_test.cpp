@@ -134,7 +134,7 @@ TEST(Pulse, Oracle15_SideLobesOfASweep) {
   for (; t < p.reach_s(); t += width_s * 1e-3) highest = std::max(highest, std::abs(p.at(t)));
   record_oracle(15, "Hamming-weighted sweep, highest side lobe in range", -42.6, 20 * std::log10(highest), 0.5, "dB");
   EXPECT_NEAR(p.width_s() * sweep_bandwidth_hz(width_s), 1.30, 0.01);
-  // Where it is let fade out it is at -60 dB.
+  // At the end of its reach, where the fade begins, the pulse is at -60 dB.
   double cut = 0;
   for (double x = 0.98 * p.reach_s(); x < p.reach_s(); x += width_s * 1e-3) cut = std::max(cut, std::abs(p.at(x)));
   EXPECT_LT(20 * std::log10(cut), -60);

@@ -45,7 +45,7 @@ std::vector<int> beams_of_mean(const Sounding& s) {
   return beams;
 }
 
-/// How well these beams hear a direction of sine u, in the mean, as a power.
+/// The mean power pattern of these beams in a direction of sine u.
 class MeanPattern {
  public:
   MeanPattern(const Sounding& s, const std::vector<int>& beams) {

@@ -1,4 +1,4 @@
-// Where in its row an echo is taken: PingSettings::row_centre, through the whole engine.
+// The position of a sample in its row (PingSettings::row_centre), through the whole engine.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,7 +39,7 @@ TEST(RowOrigin, MovesAPointByHalfARow) {
   }
 }
 
-// From edge to edge is a whole row: what lay in row i + 1 now lies in row i, bed and points alike.
+// A change of row_centre from one edge to the other moves bed and points by one row, from i + 1 to i.
 TEST(RowOrigin, MovesTheBedWithThePoints) {
   const auto flat = [](double, double) { return -1.5; };
   for (const int samples_per_row : {1, 3}) {

@@ -28,7 +28,7 @@ Material gsab(float a_db, double b_deg, float c_db, float d = 2, float e_db = -2
 }
 std::vector<Material> seabeds() { return {gsab(-12, 5, -32), gsab(-8, 8, -24), gsab(-10, 20, -15)}; }  // mud, sand, gravel
 
-/// As the kernels read it.
+/// Looks a value up as the kernels do.
 double looked_up(const LawTable& law, double cosine) {
   if (!law.table()) return law.mu * cosine * cosine;
   const double at = law_steps * std::sqrt(1 - cosine);

@@ -69,7 +69,7 @@ struct TiffFile {
     return *this;
   }
 
-  /// With another picture after it.
+  /// Returns the bytes of a file with another picture after this one.
   std::string bytes_before(const TiffFile& next) const {
     std::string out = bytes(), more = next.bytes();
     out.resize(out.size() + out.size() % 2);

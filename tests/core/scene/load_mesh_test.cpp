@@ -186,7 +186,7 @@ TEST_F(LoadMesh, BinaryStlThatEndsBeforeItsLastTriangleIsRefused) {
 
 TEST_F(LoadMesh, TrianglesThatChangeBetweenThePassesAreRefused) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  // How many triangles the second pass gives, and a coordinate of the last.
+  // Number of triangles in the second pass, and a coordinate of the last one.
   for (const auto& given : {std::pair{2, 1.0}, {1, 1.0}, {3, 1.0}, {2, nan}, {2, 9.0}}) {
     const int count = given.first;
     const double x = given.second;
@@ -405,7 +405,7 @@ TEST_F(LoadMesh, TrianglesOutsideOfTheSceneOfACollada) {
   EXPECT_EQ(twice.lost + twice.hidden, 0u);
 }
 
-// As models of vehicles are: three of bluerov2_gz have more than 4 MiB.
+// Models of vehicles are that large: three of bluerov2_gz have more than 4 MiB.
 TEST_F(LoadMesh, AColladaOfManyMebibytesIsRead) {
   constexpr int edge = 350;
   std::string places, corners;

@@ -1,4 +1,4 @@
-// How much memory a triangle takes while a large scene is made: 20 million of them must fit a small computer.
+// The memory for a triangle while a large scene is made: 20 million must fit into a small computer.
 #include <gtest/gtest.h>
 
 #include <cmath>

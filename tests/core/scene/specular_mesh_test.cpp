@@ -118,7 +118,7 @@ TEST(SpecularMesh, UnwantedMaterialsAreLeftOut) {
   EXPECT_EQ(SpecularMesh(mesh, {}).faces(), 0u);
 }
 
-// Which of them mirrors is for the frequency to say: none may be taken for a repetition of the other.
+// The frequency decides which of the two reflects, so neither may be dropped as a repetition of the other.
 TEST(SpecularMesh, SurfacesOfTwoMaterialsAreNeverOne) {
   Mesh mesh = make_sphere(0.5, segments_for(0.5));
   const Mesh coat = make_sphere(0.5002, segments_for(0.5));

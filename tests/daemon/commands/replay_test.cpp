@@ -110,7 +110,7 @@ class Replay {
   std::future<void> done_;
 };
 
-/// True when there is something to receive, or the end, in good time: Asio's own receiving waits for ever.
+/// Waits, with a limit that Asio's receive does not have. Returns true if bytes or the end can be received.
 template <class Socket>
 bool readable(Socket& socket) {
   pollfd waited{socket.native_handle(), POLLIN, 0};
@@ -583,7 +583,7 @@ TEST(ReplayOf3d15, PausesWhileAcousticsAreOff) {
   EXPECT_FALSE(host.next().empty());
 }
 
-/// As if one of the server's parts had a bug.
+/// A reader that throws, as a bug in the server would.
 class BrokenReader final : public recording::RecordingReader {
  public:
   std::optional<RecordedMessage> next() override { throw std::runtime_error("out of order"); }

@@ -1,4 +1,4 @@
-// Which scene a name stands for, and that the built-in ones are the shipped ones and need no files.
+// Scenes by name. The built-in scenes are equal to the shipped ones and need no files.
 #include "daemon/config/scene_file.hpp"
 
 #include <gmock/gmock.h>

@@ -109,13 +109,13 @@ class Daemon {
   std::vector<PingRequest> requests() { return record_->all(); }
   /// The scenes in which those were made, one each.
   std::vector<ScenePointer> scenes();
-  /// On the I/O thread, and waits for the answer.
+  /// Performs an operation on the I/O thread and waits for its answer.
   OperationResult ask(const control::Operation& operation);
   std::future<OperationResult> ask_later(const control::Operation& operation);
   v1::DaemonStatus status();
-  /// On the I/O thread, and waits for it.
+  /// Runs `work` on the I/O thread and waits for its end.
   void on_io_thread(const std::function<void()>& work);
-  /// With setup.config_file: what a reload will read.
+  /// Writes setup.config_file, which the next reload reads.
   void write_config(const std::string& yaml) const;
   std::string log_text();
   /// Only after stop() or wait().
@@ -155,7 +155,7 @@ class Client {
   std::vector<std::byte> read_raw(std::size_t at_least, milliseconds timeout = patience);
   void reset();           // RST
   void finish_sending();  // FIN, but go on reading
-  /// From now on as a computer that lost its power: it takes and answers nothing, not even for its kernel.
+  /// From now on the client is like a computer without power: not even its kernel receives or acknowledges.
   void die();
   void close();
 

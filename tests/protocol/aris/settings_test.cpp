@@ -1,4 +1,4 @@
-// Which settings are valid, what is made of them, and where a sample lies.
+// Valid settings, the values derived from them, and the position of a sample.
 #include <gmock/gmock.h>
 
 #include "tests/protocol/aris/aris_testing.hpp"

@@ -47,8 +47,8 @@ TEST(DvlVelocity, ForwardStarboardAndDownArePositive) {
   EXPECT_NEAR(m.altitude_m, 2 * std::cos(rad_from_deg(22.5)), 1e-9);
 }
 
-/// As lines show that a real A50 sent (docs/protocols/dvl.md): id 0 looks aft to starboard, 1 aft to port, 2 forward to port,
-/// 3 forward to starboard; a beam's velocity is positive towards the ground.
+/// Lines of a real A50 (docs/protocols/dvl.md) show that beam 0 points aft to starboard, 1 aft to port, 2 forward to port and 3
+/// forward to starboard, and that the velocity of a beam is positive towards the ground.
 TEST(DvlVelocity, BeamsHaveTheOrderAndSignsOfARealDevice) {
   const double out = std::sin(rad_from_deg(22.5)) * std::sqrt(0.5), down = std::cos(rad_from_deg(22.5));
   const std::array<double, beam_count> of_x{-out, -out, out, out}, of_y{out, -out, -out, out};

@@ -8,7 +8,7 @@ struct Read {
   std::vector<Frame> frames;
   FrameCounts counts;
 };
-/// In a buffer of exactly the datagram's size, so that a sanitizer sees a byte too many.
+/// Reads from a buffer of exactly the size of the datagram, so that a sanitizer detects a read beyond it.
 Read read(const Bytes& datagram) {
   const Bytes exact(datagram);
   FrameReader reader(exact);

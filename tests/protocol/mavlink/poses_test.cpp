@@ -1,4 +1,4 @@
-// Which messages of whom count, what poses come of them, and how they are stamped.
+// The senders and messages that count, the poses made from them, and the stamps of these poses.
 #include <limits>
 #include <utility>
 

@@ -18,7 +18,7 @@ Bytes hex(std::string_view text) {
     if (text[i] != ' ') bytes.push_back(static_cast<std::byte>(std::stoi(std::string(text.substr(i, 2)), nullptr, 16)));
   return bytes;
 }
-/// So many scan lines, each requested when the one before has come.
+/// Requests `lines` scan lines, each after the previous one has arrived.
 std::vector<int> scanned(Talk& talk, int lines) {
   std::vector<int> all;
   for (int i = 0; i < lines; ++i) {

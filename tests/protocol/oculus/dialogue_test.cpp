@@ -148,13 +148,13 @@ TEST(Dialogue, DummiesOnlyFillSilence) {
 }
 
 struct Asking : Conversation {
-  /// As the device does with what a message changes.
+  /// Sends a fire message and applies the changes, as the device does.
   std::size_t fire_at(double when_s, PingRate rate, int flags = 0x49) {
     const auto reaction = say(make_fire(fire(0, 1, rate, flags, 5, 50)), when_s);
     for (const auto& change : events_of<ChangeSettings>(reaction)) state.settings = change.vendor_settings;
     return reaction.replies.size();
   }
-  /// In virtual time, one call after the other.
+  /// Calls on_tick() in virtual time and counts the dummies.
   std::size_t dummies(double from_s, double to_s) {
     std::size_t count = 0;
     for (double s = from_s; s < to_s; s += 0.1) count += dialogue->on_tick(at(s), false).replies.size();

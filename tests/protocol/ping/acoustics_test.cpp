@@ -346,7 +346,7 @@ TEST(Ping1DAcoustics, OpenWaterHasNoDistanceToTrust) {
 
 // ---- S500
 
-/// With automatic range and gain.
+/// The device uses automatic range and gain.
 TEST(S500Acoustics, TheBedIsAtItsDistance) {
   for (const double altitude_m : {0.6, 1.5, 5.0, 20.0, 60.0})
     for (const double strength_db : {-15.0, -35.0}) {

@@ -182,7 +182,7 @@ TEST(Ping360, ADatagramHasOneAnswerAndDevicesHaveNone) {
   }
 }
 
-/// As of hosts behind a bridge to a serial line.
+/// Hosts behind a bridge to a serial line send such datagrams.
 TEST(Ping360, FramesOfADatagramAreAnsweredByOneThatIsLittleLonger) {
   Talk talk("ping360");
   Bytes three = request(Id::set_device_id, hex("09"));

@@ -169,7 +169,7 @@ TEST_F(FarmJobTest, CountsThatNoJobHasAreRefused) {
   EXPECT_TRUE(load_files(is, folder_ / "job/set.yaml"));
 }
 
-/// In a process of its own, whose reads are confined from then on. What was wrong; 0 = nothing.
+/// Runs in a separate process, whose reads are confined from then on. Returns the number of the failed check; 0 = none.
 int work_on_foreign_shards(const path& folder) {
   TableInMemory queue;
   const auto job = dataset::load_job(folder / "job/set.yaml").value();

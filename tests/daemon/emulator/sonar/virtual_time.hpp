@@ -47,7 +47,7 @@ class VirtualTime {
     std::vector<Outbox::Shape::Pause> pauses;
   };
   bool listens(const std::string& name) { return !listening.contains(&sonar(name)) || listening[&sonar(name)]; }
-  /// As the daemon's control does it.
+  /// Adds a fault as the daemon's control does.
   void add_fault(const std::string& name, const FaultRecord& record, bool manual = true) {
     const auto faults = check_fault(record, manual);
     if (!faults) throw std::runtime_error(faults.error().text);
@@ -85,7 +85,7 @@ class VirtualTime {
     }
     now = until;
   }
-  /// As Fleet does it, but for the listeners.
+  /// Reloads as Fleet does, but without listeners.
   void reload(const std::string& yaml) {
     const Config next = parsed(yaml);
     for (auto it = sonars.begin(); it != sonars.end();) {

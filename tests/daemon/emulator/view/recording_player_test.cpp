@@ -1,4 +1,4 @@
-// Which ping of a recording is shown at which moment, forwards and backwards.
+// The ping of a recording that is shown at a time, forwards and backwards.
 #include "daemon/emulator/view/recording_player.hpp"
 
 #include "tests/protocol/recording/recording_testing.hpp"

@@ -1,4 +1,4 @@
-// How stamps become time with clock: follow: one clock, several, restarts, jumps, and stamps that mean harm.
+// Stamps become time with `clock: follow`: one clock, several clocks, restarts, jumps, and malicious stamps.
 #include <gtest/gtest.h>
 
 #include "daemon/emulator/world/world.hpp"

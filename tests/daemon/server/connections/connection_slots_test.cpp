@@ -1,4 +1,4 @@
-// Which connection is evicted for a new one.
+// The choice of the connection that is evicted for a new one.
 #include "daemon/server/connections/connection_slots.hpp"
 
 #include <gtest/gtest.h>

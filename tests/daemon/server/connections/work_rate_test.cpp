@@ -17,7 +17,7 @@ using std::chrono::seconds;
 
 constexpr std::size_t per_s = 1 << 20;
 
-/// How many times something of that cost is done within 5 s by one that always has the next ready.
+/// Returns how often work of that cost is done within 5 s for a client that always requests more.
 std::size_t done_in_5_s(std::size_t cost) {
   WorkRate rate;
   const auto begin = Steady::time_point(std::chrono::hours(5));

@@ -67,7 +67,7 @@ class ControlBench {
     thread_ = std::thread([this] { io.run(); });
   }
   ~ControlBench() { stop(); }
-  /// As App does; run() then returns by itself, or the test hangs here.
+  /// Stops the server as App does. run() must then return; otherwise the test hangs here.
   void stop() {
     asio::post(io, [this] { server->stop(); });
     if (thread_.joinable()) thread_.join();
@@ -76,7 +76,7 @@ class ControlBench {
     std::lock_guard lock(log_mutex_);
     return log_text_;
   }
-  /// On the I/O thread, and waits for it.
+  /// Runs `work` on the I/O thread and waits for its end.
   template <class Work>
   void on_io(Work&& work) {
     std::atomic<bool> done{false};

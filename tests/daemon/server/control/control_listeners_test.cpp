@@ -1,4 +1,4 @@
-// Where control listens: defaults give way, given addresses must be free, tokens must be there.
+// The listeners of control: a default address may be in use, a configured address must be free, tokens must exist.
 #include <gmock/gmock.h>
 
 #include "tests/daemon/server/control/control_bench.hpp"

@@ -36,7 +36,7 @@ ScenePointer wall_below_the_surface() {
   return std::make_shared<const Scene>(std::move(scene));
 }
 
-/// As main.cpp puts it together, in a thread; stopped by the destructor.
+/// The daemon as main.cpp composes it, in a thread; the destructor stops it.
 class RealDaemon {
  public:
   explicit RealDaemon(ScenePointer scene = wall_at(1.8)) {

@@ -1,5 +1,5 @@
-// With the real engine: pings that do not see what was changed in a scene are the same to the last bit, because everything else
-// keeps its speckle and its rays' coordinates.
+// Uses the real engine. Pings that do not see a change of the scene are equal to the last bit, because all other objects keep
+// their speckle and the coordinates of their rays.
 #include <gtest/gtest.h>
 
 #include "core/paper/paper_engine.hpp"
@@ -14,7 +14,7 @@ class ChangedScene : public ::testing::Test {
  protected:
   ChangedScene() : scene_(*load_built_in_scene("demo.yaml")) {}
 
-  /// From the west of the demo, looking east over its middle.
+  /// Makes a ping from the west of the demo, looking east over its middle.
   std::vector<std::byte> ping(const ScenePointer& scene) {
     const auto profile = protocol::find_profile("oculus-m1200d");
     protocol::DeviceState device;

@@ -1,4 +1,4 @@
-// From request to action: the rules in their order, and the text of each refusal.
+// The rules that map a request to an action, in their order, and the text of each refusal.
 #include "daemon/server/http/http_router.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Which file of the page answers, with which headers.
+// The files of the page that answer requests, and their headers.
 #include "daemon/server/http/page.hpp"
 
 #include <gmock/gmock.h>

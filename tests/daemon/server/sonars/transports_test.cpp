@@ -63,7 +63,7 @@ class UdpSocket {
     const sockaddr_in to = address_of(address, port);
     sendto(fd_, text.data(), text.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
   }
-  /// Empty at the deadline.
+  /// Returns the next datagram; empty at the deadline.
   std::string next(milliseconds timeout = patience) {
     pollfd p{fd_, POLLIN, 0};
     if (poll(&p, 1, static_cast<int>(timeout.count())) <= 0) return {};
