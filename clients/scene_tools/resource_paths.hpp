@@ -14,10 +14,10 @@ namespace sonar::scene_tools {
 /// and, for packages, ROS_PACKAGE_PATH; last ~/.gazebo/models.
 std::vector<std::filesystem::path> resource_folders(const std::vector<std::filesystem::path>& given);
 
-/// Finds the file that `uri` names in `from_file`; returns an empty path if there is none. It searches the folders, and those of
-/// `from_file` and up to eight levels above it. A Fuel address is searched in GZ_FUEL_CACHE_PATH, IGN_FUEL_CACHE_PATH, ~/.gz/fuel
-/// and
-/// ~/.ignition/fuel first. For a folder it returns the SDF that model.config names, or model.sdf, of the newest version.
+/// Finds the file that `uri` names in `from_file`; returns an empty path if there is none. It searches the folders, the folder
+/// of `from_file`, and up to eight levels above it. For a Fuel address it first searches GZ_FUEL_CACHE_PATH,
+/// IGN_FUEL_CACHE_PATH, ~/.gz/fuel and ~/.ignition/fuel. For a folder it returns the SDF that model.config names, or model.sdf,
+/// of the newest version.
 std::filesystem::path find_resource(std::string_view uri, const std::filesystem::path& from_file,
                                     const std::vector<std::filesystem::path>& folders);
 

@@ -1,4 +1,4 @@
-// One line of the log as data, so that its author does not need to know where it is written.
+// A line of the log as data, so that the code that makes it does not depend on where it is written.
 #pragma once
 
 #include <string>

@@ -20,8 +20,7 @@ Stepper::Due Stepper::next_due() {
   return due;
 }
 
-/// Advances time by at most one event, and only when all clients have received what was sent. Returns whether the daemon may
-/// end, because enough pings were served.
+/// Advances time by at most one event, and only if all clients have received what was sent.
 bool Stepper::step(const std::function<bool()>& enough_served) {
   skip();
   const std::list<Device>& devices = fleet_.devices();

@@ -1,5 +1,5 @@
-// Advances stepped time: to the next ping or event of a conversation that is due, as far as SteppedTime allows. Owned by App,
-// which calls step() after every change; I/O thread only.
+// Advances stepped time to the next ping or event of a conversation, as far as SteppedTime allows. App owns it and calls step()
+// after every change; I/O thread only.
 #pragma once
 
 #include <functional>
@@ -15,17 +15,17 @@ namespace sonar {
 
 class Stepper {
  public:
-  /// `on_change` asks for another step().
+  /// `on_change` is called when step() must be called again.
   Stepper(Clock& clock, World& world, SteppedTime& time, Fleet& fleet, Log& log, std::function<void()> on_change)
       : clock_(clock), world_(world), time_(time), fleet_(fleet), log_(log), on_change_(std::move(on_change)) {}
 
-  /// Does what is due next, once all that came before is done. With `enough_served` true, time does not pass any more; returns
-  /// true when all requests that it allows to be answered have been, so that the daemon may end.
+  /// Handles the next event if everything before it is done. Returns true if `enough_served` returns true and no request is
+  /// left to answer: the daemon may then end.
   bool step(const std::function<bool()>& enough_served);
 
  private:
   struct Due {
-    Device* pings = nullptr;  // next
+    Device* pings = nullptr;  // the device of the next ping
     std::optional<Time> ping, request, conversation;
   };
   Due next_due();

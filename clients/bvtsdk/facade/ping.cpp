@@ -62,7 +62,8 @@ RetVal BVTPing_GetRangeData(BVTPing self, BVTRangeData* out) {
       const auto fresh = std::make_shared<RangeListObject>();
       const int code = make_range_list(o.polar, o.imaging.ranges, fresh->list);
       if (code != success) return code;
-      // Programs divide ranges by range_resolution_m to get rows of the ping's image (verified). So it must be the image's.
+      // Programs divide ranges by range_resolution_m to get rows of the ping's image (verified), so the value must be that of
+      // the image.
       ImageGeometry image;
       if (plan_image(o.polar, o.imaging.type, o.imaging.image, image) == success)
         fresh->list.range_resolution_m = image.range_resolution_m;

@@ -12,7 +12,7 @@ namespace sonar::render {
 /// faster step in `steps_to_one_too_far` is taken as snapshots, not as a trajectory, unless it contains velocities.
 inline constexpr double fastest_vehicle_mps = 15, fastest_vehicle_radps = 5;
 inline constexpr std::size_t steps_to_one_too_far = 10;
-/// Poses closer in time than this are one step: the jitter of a fast log is not motion.
+/// Poses that are closer in time count as one step, because the jitter of a fast log is not motion.
 inline constexpr motion::Ns shortest_step = std::chrono::milliseconds(100);
 
 /// The steps of a trajectory.
@@ -22,7 +22,7 @@ struct Steps {
 };
 Steps steps_of(const motion::Trajectory& trajectory);
 bool are_snapshots(const motion::Trajectory& trajectory);
-/// One sentence about a trajectory that is taken as snapshots.
+/// Returns one sentence about a trajectory that is taken as snapshots.
 std::string note_of_snapshots(const motion::Trajectory& trajectory);
 
 }  // namespace sonar::render

@@ -44,7 +44,7 @@ std::size_t Connections::count(Role role, State state) const {
       std::count_if(all_.begin(), all_.end(), [&](const Connection& c) { return c.role == role && c.state == state; }));
 }
 
-/// Connections are in the order of their arrival.
+/// The list has the connections in the order of their arrival, so the first one that fits is the oldest.
 Connection* Connections::oldest_client() {
   const auto it = std::find_if(all_.begin(), all_.end(),
                                [](const Connection& c) { return c.role == Role::client && c.state == State::served; });
@@ -80,11 +80,13 @@ bool Connections::has_audience() const {
                                       [this](const Connection& c) { return c.role == Role::stream && !receivers(c).empty(); });
 }
 
+/// Observers do not count: a slow observer must not delay stepped time.
 bool Connections::settled() const {
   return std::all_of(all_.begin(), all_.end(),
                      [](const Connection& c) { return c.role == Role::observer || c.state != State::served || c.outbox.idle(); });
 }
 
+/// A full sonar takes over, queues or refuses, by the rule `when_full`. The queue is bounded; beyond it clients are refused.
 Connections::Verdict Connections::verdict(Role role) const {
   if (role == Role::observer)
     return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::refuse;
