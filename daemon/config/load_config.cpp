@@ -221,6 +221,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
                                           ": this looks like a scene, not a configuration, which names its scene: world: "
                                           "{scene: FILE} (docs/configuration.md)");
   read_world(root.required("world").map(), config, directory);
+  // The order matters: sonars refer to vehicles, MAVLink to vehicles as well, and faults to sonars.
   TrajectoryFiles files(directory);
   read_vehicles(root.required("vehicles"), files, config);
   read_objects(root.optional("objects"), files, config);

@@ -153,6 +153,7 @@ void remove_unfinished(const path& folder, const std::function<bool(const std::s
     if (mark == std::string::npos || !is_own(name.substr(0, mark))) continue;
     const int fd = ::open(entry->path().c_str(), O_WRONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) continue;
+    // A file that a running process writes is locked by it, and stays.
     if (::flock(fd, LOCK_EX | LOCK_NB) == 0) ::unlink(entry->path().c_str());
     ::close(fd);
   }
@@ -179,6 +180,8 @@ Result<void> ShardWriter::add(std::string_view name, std::span<const std::byte> 
 }
 
 Result<bool> ShardWriter::go_on(const path& aside, const std::string& digest) {
+  // The members of the file are copied, after its digest has shown that they are complete. The copy is hashed again, because
+  // the file may change between the two readings.
   const auto there = digest_of_file(aside);
   if (!there || *there != digest) return false;
   const auto in = open_regular(aside);
@@ -200,6 +203,7 @@ Result<std::string> ShardWriter::commit() {
   if (auto done = write(end); !done) return tl::make_unexpected(done.error());
   const std::string digest = hash_.hex();
   const path& file = file_.file();
+  // If another worker has made the shard first, its bytes must be the same, because a shard is reproducible.
   const auto is_new = file_.commit_new();
   if (!is_new) return tl::make_unexpected(is_new.error());
   if (!*is_new) {
@@ -210,6 +214,7 @@ Result<std::string> ShardWriter::commit() {
                                               digest +
                                               "): it was changed, or a disk or memory fails; remove it and what is wrong");
   }
+  // The digest is written after the archive, so a shard with a digest file is complete.
   const auto noted = write_durably(file.string() + ".sha256", digest + "  " + file.filename().string() + "\n");
   if (!noted) return tl::make_unexpected(noted.error());
   return digest;
@@ -232,6 +237,8 @@ Result<void> read_archive(const path& file, const ArchiveSink& take) {
     if (header.front() == '\0') return {};  // the archive's end
     const std::string name(header.substr(0, std::min<std::size_t>(header.find('\0'), 99)));
     const auto size = size_in(header);
+    // The header is made again from the name and size, and must have the same bytes. This checks all fields, the checksum
+    // included.
     if (!size || !is_plain_name(name) || block != tar_header(name, *size)) return damaged();
     const std::uint64_t padded = (*size + tar_block - 1) / tar_block * tar_block;
     if (padded > left) return damaged();

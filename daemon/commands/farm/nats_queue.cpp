@@ -62,6 +62,7 @@ class NatsTask final : public Task {
 class NatsQueue final : public Queue {
  public:
   Result<void> connect(const QueueOptions& o) {
+    // The text for messages is the address without the user name and password before the @.
     where_ = o.url.substr(o.url.find('@') == std::string::npos ? 0 : o.url.rfind('@') + 1);
     Owned<natsOptions, natsOptions_Destroy> options;
     natsStatus s = into(options, natsOptions_Create);
@@ -83,6 +84,7 @@ class NatsQueue final : public Queue {
     while ((s = into(connection_, [&](auto** c) { return natsConnection_Connect(c, options.get()); })) != NATS_OK) {
       const std::string why = std::string("no NATS server answers at ") + where_ + ": " + natsStatus_GetText(s) +
                               "; start one with nats-server -js -sd FOLDER, or give --nats its address";
+      // A server that is not there may come; wrong credentials stay wrong, so the program does not try again.
       const bool is_away = s == NATS_NO_SERVER || s == NATS_TIMEOUT || s == NATS_IO_ERROR || s == NATS_CONNECTION_CLOSED;
       if (!is_away || !o.try_again || !o.try_again(why)) return failure(ErrorKind::unavailable, why);
     }
@@ -192,6 +194,7 @@ class NatsQueue final : public Queue {
     const natsStatus s = natsSubscription_Fetch(&list, subscription_.get(), 1, wait.count(), &code);
     Message message(s == NATS_OK && list.Count > 0 ? std::exchange(list.Msgs[0], nullptr) : nullptr);
     natsMsgList_Destroy(&list);
+    // No shard is waiting.
     if (s == NATS_TIMEOUT) return std::unique_ptr<Task>();
     if (s != NATS_OK || !message) {
       subscription_.reset();
@@ -201,6 +204,7 @@ class NatsQueue final : public Queue {
     const std::string subject = natsMsg_GetSubject(message.get());
     const auto shard = text::parse_unsigned(subject.substr(subject.rfind('.') + 1));
     if (into(about, [&](auto** a) { return natsMsg_GetMetaData(a, message.get()); }) != NATS_OK || !shard) {
+      // Without this the server would deliver the message again.
       natsMsg_Term(message.get(), nullptr);
       return failure(ErrorKind::unavailable, "the queue holds " + subject + ", which is not a shard; it is removed");
     }
@@ -250,6 +254,7 @@ class NatsQueue final : public Queue {
       Owned<kvEntry, kvEntry_Destroy> entry;
       s = into(entry, [&](auto** e) { return kvWatcher_Next(e, watcher.get(), listing_ms); });
       if (s != NATS_OK || !entry) break;  // no entry: the end of the list
+      // A later entry of a key replaces the earlier one; a deletion is an entry as well.
       if (kvEntry_Operation(entry.get()) == kvOp_Put)
         found.insert(kvEntry_Key(entry.get()));
       else
@@ -261,6 +266,7 @@ class NatsQueue final : public Queue {
   /// Returns null if the server does not answer.
   kvStore* store(Table table) {
     auto& kv = stores_[table.name];
+    // The table is opened when it is used first, and made if the server does not have it.
     if (kv || into(kv, [&](auto** made) { return js_KeyValue(made, jetstream_.get(), table.name); }) == NATS_OK) return kv.get();
     kvConfig config;
     kvConfig_Init(&config);
@@ -301,6 +307,7 @@ Result<void> NatsTask::again(milliseconds later) {
 
 Result<void> NatsTask::bury(const std::string& why) {
   const std::string shard = std::to_string(shard_);
+  // The reason is stored before the shard leaves the queue. If the worker ends between the two, the shard is delivered again.
   if (const auto put = queue_.put(dead_table, job_ + "." + shard, why); !put) return put;
   queue_.announce("farm.dead." + job_ + "." + shard, why);
   return drop();

@@ -229,6 +229,7 @@ std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictu
          job.vehicle().orbits});
     add_way(hash, job.vehicle().plan.trajectory, job.begins_at);
     if (job.snapshots) add(hash, "snapshots");
+    // The index of a moving object is added, because its trajectory alone does not say which object moves.
     const std::vector<BodyStart> bodies = bodies_of(*job.scene, job.config);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       if (bodies[i].plan) add(hash, i);

@@ -192,7 +192,7 @@ void read_ping(Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& 
     s.range_bin_m = c / (2 * native_sample_rate_hz(envelope_parameter_hz(c, static_cast<double>(s.pulse_width_m))));
   else
     s.range_bin_m = before.range_bin_m * s.range_m / before.range_m;
-  if (!(s.range_bin_m > 0)) return;  // said already
+  if (!(s.range_bin_m > 0)) return;  // reported already
   s.range_bin_count = static_cast<int>(
       rows.integer_or(std::clamp<std::int64_t>(std::llround(std::ceil(shown_m / s.range_bin_m - 1e-9)), 1, 65535), 1, 65535));
   if (!pulse.present() && rows_of == RowsOf::device)

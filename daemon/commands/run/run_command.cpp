@@ -60,6 +60,7 @@ void log_notes(const Config& config, const Scene& scene, Log& log) {
 }  // namespace
 
 Result<int> run_daemon(const RunCommand& command, Steady::time_point begin, bool& json) {
+  // Signals are set before any thread is created, because threads inherit the mask.
   prepare_process();
   const auto prepare_begin = Steady::now();
   auto prepared = prepare_run(command, json, [](const Config& config) -> LoadProgress::Say {
@@ -76,6 +77,7 @@ Result<int> run_daemon(const RunCommand& command, Steady::time_point begin, bool
   const AppOptions options = app_options(command, found);
   App app(std::move(found.config), std::move(prepared->scene), make_engine_for, options, log);
   const double scene_ms = 1e3 * seconds_since(prepare_begin);
+  // Ports are open before the ready line is printed, so a script that waits for that line can connect.
   if (const auto r = app.open(); !r) return tl::make_unexpected(r.error());
   log.announce(banner(app, {found.how, scene_ms}) + ready_line(app, seconds_since(begin)));
 

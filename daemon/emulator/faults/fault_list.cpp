@@ -20,6 +20,8 @@ std::uint32_t key_of_name(const std::string& name) {
 
 std::optional<FaultRefusal> Faults::why_not(const std::vector<Fault>& faults) const {
   using Code = FaultRefusal::Code;
+  // A trouble consists of several kinds. It is accepted if at least one kind has an effect on this sonar, but a conflict of any
+  // kind refuses all of it.
   bool any = faults.empty();
   std::string why;
   for (const Fault& fault : faults) {

@@ -336,6 +336,7 @@ std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surro
 std::vector<Note> Plausibility::untold(const std::vector<Note>& notes) {
   std::vector<Note> fresh;
   for (const Note& n : notes)
+    // A note on a vehicle is given once for each cure, even if its numbers differ; a note on the scene once for each text.
     if (told_.insert(n.vehicle.empty() ? n.text : n.vehicle + "|" + n.cure).second) fresh.push_back(n);
   return fresh;
 }
@@ -343,6 +344,7 @@ std::vector<Note> Plausibility::untold(const std::vector<Note>& notes) {
 std::vector<Note> Plausibility::use(const Config& config, const Scene& scene) {
   Surroundings around = surroundings_of(config, scene, around_.meshes);
   auto played = trajectories_of(config);
+  // Judging trajectories takes longest, so it is repeated only if the trajectories or their surroundings differ.
   if (played != played_ || !is_same(around, around_)) of_plans_ = notes_on_plans(config, around);
   around_ = std::move(around);
   played_ = std::move(played);
@@ -350,6 +352,7 @@ std::vector<Note> Plausibility::use(const Config& config, const Scene& scene) {
   of_setup_ = notes_on_start(config, scene, around_);
   add(of_setup_, of_plans_);
   std::map<std::string, LastPose> before;
+  // The last pose of each vehicle is judged again in the new surroundings; vehicles that are gone are dropped.
   before.swap(of_poses_);
   for (const Carrier& c : carriers_)
     if (const auto last = before.find(c.vehicle); last != before.end()) judge(c, of_poses_[c.vehicle] = last->second);
@@ -377,6 +380,7 @@ std::vector<Note> Plausibility::use(const control::PoseSample& sample) {
 
 std::vector<Note> Plausibility::all() const {
   std::vector<Note> notes;
+  // A pose that has arrived replaces the notes on the initial pose of that vehicle.
   std::copy_if(of_setup_.begin(), of_setup_.end(), std::back_inserter(notes),
                [this](const Note& n) { return !of_poses_.contains(n.vehicle); });
   for (const auto& [vehicle, last] : of_poses_) notes.insert(notes.end(), last.notes.begin(), last.notes.end());

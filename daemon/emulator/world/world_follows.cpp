@@ -47,6 +47,7 @@ World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
 
 std::optional<Time> World::followed_until() const {
   if (!newest_followed_) return std::nullopt;
+  // The slowest vehicle limits time. A vehicle whose poses are older than stale_after is no longer waited for.
   Time least = *newest_followed_;
   for (const Track& t : vehicles_)
     if (is_followed(t, *newest_followed_)) least = std::min(least, t.history.newest().at + t.offset);
@@ -55,6 +56,8 @@ std::optional<Time> World::followed_until() const {
 
 World::Ns World::take_skipped() {
   const Ns skipped = std::exchange(skipped_, Ns{0});
+  // Nothing moves during the skipped time: orbits begin later by that much, received poses of objects keep their age, and
+  // trajectories stay where they were.
   start_ += skipped;
   for (Track& t : objects_)
     if (!t.history.empty()) t.offset += skipped;

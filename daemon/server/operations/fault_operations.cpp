@@ -116,6 +116,7 @@ OperationResult FaultOperations::add(const control::FaultRecord& record, bool ma
     if (!why_not)
       takers.push_back(&device);
     else if (record.sonar.empty() && why_not->code == FaultRefusal::Code::no_effect)
+      // A request for all sonars leaves out those on which the fault has no effect. Any other refusal ends the request.
       why = std::move(why_not->text);  // it may have an effect on other sonars
     else
       return refused(std::move(why_not->text));
@@ -163,6 +164,7 @@ mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureT
   std::vector<Device*> chosen;
   std::uint32_t number = 0;
   for (Device& device : fleet_.devices())
+    // Instances count sonars from 1 in the order of the configuration; 0 means all.
     if (++number == instance || instance == 0) chosen.push_back(&device);
 
   control::FaultRecord record;

@@ -112,6 +112,7 @@ std::shared_ptr<const v1::DaemonStatus> Monitoring::status() const {
   s.set_seed(of_.config.seed);
   s.set_uptime_s(uptime_s());
   s.set_resident_mb(static_cast<double>(figures_of_this_process().resident_bytes) / 1e6);
+  // All parts have the state of the same time, `now`, because nothing else runs on this thread meanwhile.
   for (const Device& d : of_.fleet.devices()) *s.add_sonars() = d.status(now);
   add_vehicles(s, of_.config, of_.world, now);
   add_objects(s, *of_.changes.scene(), of_.world, now);

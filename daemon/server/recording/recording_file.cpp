@@ -21,7 +21,7 @@ const protocol::Make& make_of(std::string_view vendor) {
   return found != nullptr ? *found : protocol::makes().front();
 }
 
-/// All messages of a ping, as they are sent.
+/// Returns whether a client of this make receives its pings as one stream of bytes, which a file can hold as it is.
 bool is_one_stream(const protocol::Make& make) {
   return make.codec.framing != nullptr && !make.each_ping_requested && make.device->pings_by() != protocol::PingsBy::datagrams;
 }

@@ -70,6 +70,7 @@ void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit) {
 }
 
 bool has_left(tcp::socket& socket) {
+  // POLLRDHUP is reported when the peer has closed its end, even while data that was not read yet is waiting.
   pollfd asked{socket.native_handle(), POLLRDHUP, 0};
   return ::poll(&asked, 1, 0) > 0;
 }

@@ -103,12 +103,14 @@ void Log::emit(LogLevel level, std::string_view phrase, const std::vector<LogFie
     ++sink_->lost;
     return;
   }
+  // A text line is cut, so that the pipe takes it in one piece. A JSON line is not cut, because the rest would not be JSON.
   std::string line = options_.json ? json_members(phrase, fields) : text_line(phrase, fields);
   if (!options_.json && line.size() > longest_line) line.replace(longest_line, std::string::npos, "...");
   sink_->logger.log(spdlog_level(level), spdlog::string_view_t(line));
 }
 
 bool LogLimiter::allows(Clock::time_point now, std::uint64_t& unsaid) {
+  // A token bucket: it gains one token a second, holds at most five, and each line takes one.
   if (last_ != Clock::time_point{}) tokens_ = std::min(5.0, tokens_ + std::chrono::duration<double>(now - last_).count());
   last_ = now;
   if (tokens_ < 1) {

@@ -51,6 +51,8 @@ Notify::~Notify() {
 }
 
 void Notify::ready(const std::string& status) {
+  // This is also sent when a reload is done, because systemd waits for READY after RELOADING. Watchdog messages begin with the
+  // first READY.
   send("READY=1\nSTATUS=" + one_line(status), 0);
   if (target_.socket.empty() || target_.watchdog.count() == 0 || stopping_ || std::exchange(keeping_, true)) return;
   keep_alive();
@@ -92,6 +94,7 @@ void Notify::send(const std::string& message, int flags) {
   } else {
     std::copy(target_.socket.begin(), target_.socket.end(), at.sun_path);
     if (at.sun_path[0] == '@') at.sun_path[0] = '\0';  // the abstract namespace, whose names have no end mark
+    // The length of an address in the file system includes the zero at its end, that of an abstract one does not.
     const bool abstract = at.sun_path[0] == '\0';
     const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + target_.socket.size() + (abstract ? 0 : 1));
     const auto* address = static_cast<const sockaddr*>(static_cast<const void*>(&at));

@@ -17,8 +17,8 @@ inline constexpr int background_niceness = 10;
 /// Returns an empty text, or a sentence with the reason of a failure and the remedy.
 std::string schedule_in_real_time(int priority);
 
-/// Runs `work` on a thread of its own in the background, and waits for it. Threads that `work` starts are as nice as that one:
-/// Embree's builders, which live on. Exceptions pass through.
+/// Runs `work` on a thread of its own in the background, and waits for it. Threads that `work` starts inherit its
+/// niceness, for example the builder threads of Embree, which are not ended. Exceptions are passed on to the caller.
 void compute_apart(const std::function<void()>& work);
 
 }  // namespace sonar

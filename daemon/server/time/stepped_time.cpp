@@ -32,6 +32,7 @@ std::string SteppedTime::step(double dt_s) {
   if (dt.count() == 0) return "dt_s is less than a nanosecond";
   if (seconds(asked_ + dt - clock_.now()) > longest_step_s)
     return "steps that wait to be done would take more than " + std::to_string(static_cast<int>(longest_step_s)) + " seconds";
+  // From here pings up to the new end are computed; the clock itself advances with them.
   asked_ += dt;
   return {};
 }
@@ -43,6 +44,7 @@ bool SteppedTime::answer(std::optional<Time> next) {
   // is answered then, or sender and sonard would wait for each other. An answered request may add another.
   bool any = false;
   while (!waiting_.empty() && (!next || *next > std::min(waiting_.front().until.last_tick, bound().last_tick))) {
+    // The request is removed before the call, because the call may add another.
     const Waiting done = std::move(waiting_.front());
     waiting_.pop_front();
     any = true;
