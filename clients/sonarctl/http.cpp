@@ -15,8 +15,8 @@ Result<HttpReply> http_ask(const Endpoint& at, const std::string& method, const 
   const auto deadline = std::chrono::steady_clock::now() + patience;
   const auto socket = connect_tcp(at, patience);
   if (!socket) return tl::unexpected(socket.error());
-  std::string request =
-      method + " " + path + " HTTP/1.0\r\nHost: " + text_from(at) + "\r\nConnection: close\r\n";  // 1.0: no chunks
+  std::string request = method + " " + path + " HTTP/1.0\r\nHost: " + text_from(at) +
+                        "\r\nConnection: close\r\n";  // HTTP/1.0 has no chunked answers
   if (!body.empty()) request += "Content-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) + "\r\n";
   request += "\r\n" + body;
   if (auto sent = write_all(*socket, std::as_bytes(std::span(request.data(), request.size()))); !sent)

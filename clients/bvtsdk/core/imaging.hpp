@@ -22,7 +22,7 @@ enum class ImageType { xy = 0, r_theta = 1 };
 /// XY no more than make a million pixels, because a client keeps whole images on its stack. Off: as automatic.
 enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 
-/// Where an XY image begins: at the nearest corners of the sector, or at the sonar.
+/// The place where an XY image begins: the nearest corners of the sector, or the sonar.
 enum class XyBottom { sector, sonar };
 /// BVE_XY=sector or sonar; default sector.
 XyBottom xy_bottom_from_environment();

@@ -1,4 +1,4 @@
-// A table that tells for each pixel of an XY image which samples it is interpolated from. It is computed once for a geometry,
+// A table of the samples from which each pixel of an XY image is interpolated. It is computed once for a geometry,
 // with all angles and square roots, and used for every ping of that geometry.
 #pragma once
 

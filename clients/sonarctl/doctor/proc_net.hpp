@@ -21,11 +21,11 @@ using sonar::doctor::SocketLine;
 std::vector<SocketLine> tcp_sockets();
 std::vector<SocketLine> udp_sockets();
 
-/// Returns the program of each socket inode, without programs of other users.
 struct Program {
   int pid = 0;
   std::string name;
 };
+/// Returns the program of each socket inode. Programs of other users are missing if /proc is not readable for them.
 std::map<std::uint64_t, Program> programs_by_socket();
 
 PortHolder holder_of(const SocketLine& socket, const std::map<std::uint64_t, Program>& programs);

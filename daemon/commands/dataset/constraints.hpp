@@ -25,7 +25,7 @@ std::set<std::string> names_of(const Scene& scene);
 /// Returns a sentence about a name that the scene does not have; empty if all are known.
 std::string why_unknown(const Constraints& constraints, const std::vector<std::string>& targets, const Scene& scene);
 
-/// How often each constraint was not met.
+/// Counts how often each constraint was not met.
 struct Unmet {
   int in_view = 0, above_bed = 0, no_overlap = 0;
   std::string sentence() const;

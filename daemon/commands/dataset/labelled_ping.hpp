@@ -37,7 +37,7 @@ class PingMaker {
   PingMaker(const DatasetJob& job, std::string inputs, std::optional<SimdLevel> simd)
       : job_(job), inputs_(std::move(inputs)), simd_(simd) {}
   Result<LabelledPing> make(std::uint64_t number);
-  /// The same as contact_cell().
+  /// Makes the ping and returns its contact_cell().
   Result<std::optional<Raster>> cell(std::uint64_t number);
 
  private:

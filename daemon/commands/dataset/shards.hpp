@@ -36,7 +36,7 @@ class DurableFile {
   Result<void> commit();
   /// Like commit(), but keeps a file of that name as it is and then returns false.
   Result<bool> commit_new();
-  /// Like commit(), under another name.
+  /// Does the same as commit(), but gives the file another name.
   Result<void> commit_as(std::filesystem::path file) { return file_ = std::move(file), commit(); }
   const std::filesystem::path& file() const { return file_; }
 

@@ -22,7 +22,7 @@ struct RunCommand {
   std::string profile;  // profile of the demo's sonar; empty = the default
   std::uint64_t exit_after_pings = 0;
   bool digest = false;
-  // Empty = as the configuration says.
+  // An empty value leaves the value of the configuration.
   std::string clock, log_format, log_level, bind;
   std::optional<int> clients;
   bool faults = false;

@@ -1,4 +1,4 @@
-// Measures the rate of a sonar's pings, which no setting tells if the host requests each ping.
+// Measures the rate of a sonar's pings. If the host requests each ping, no setting contains the rate.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// A listening TCP socket and its accept loop: sonars, control and poses use it. No connection can stop it.
+// A listening TCP socket and its accept loop: sonars, control and poses use it. An error of one connection does not end the
+// loop.
 #pragma once
 
 #include <functional>
@@ -16,25 +17,25 @@ class Listener {
   using Take = std::function<void(tcp::socket)>;
   using Fault = std::function<void(const std::string&)>;
 
-  /// `purpose`: which of the spare descriptors may be used; nullopt: the caller asks `admission` for a slot itself. `admission`
-  /// outlives the listener.
+  /// `purpose` selects the spare descriptors that may be used. If it is nullopt, the caller asks `admission` for a slot itself.
+  /// `admission` must outlive the listener.
   Listener(asio::io_context& io, Admission& admission, std::optional<Admission::Purpose> purpose)
       : admission_(admission), purpose_(purpose), acceptor_(io), reopen_timer_(io) {}
 
-  /// Port 0: the system chooses one. After an error it does not listen.
+  /// With port 0 the system chooses a port. After an error the object does not listen.
   Result<void> open(Endpoint at);
-  /// `take` gets each connection, `fault` the text of an exception. Does nothing if the listener is not open. The object must
-  /// live for 100 ms after stop(), because Admission may pause so long.
+  /// Passes each connection to `take`, and the text of an exception to `fault`. Does nothing if the listener is not open. The
+  /// object must exist for 100 ms after stop(), because Admission may pause so long.
   void start(Take take, Fault fault);
   void stop();
   /// Closes the socket, so that connections are refused as at a port where no program listens.
   void pause();
-  /// Accepts connections again, at the same address and port. It retries while another program has that port; then
-  /// `taken` gets the reason, once.
+  /// Accepts connections again, at the same address and port. It retries while another program has that port, and
+  /// then passes the reason to `taken`, once.
   void resume(Fault taken);
   /// Returns true also while paused.
   bool is_open() const { return acceptor_.is_open() || paused_; }
-  /// The address, with the port that the system chose. Port 0 = it was not opened.
+  /// Returns the address, with the port that the system chose. The port is 0 if the listener was never opened.
   Endpoint at() const { return at_; }
 
  private:

@@ -1,5 +1,6 @@
 // One client of the control stream: requests in, answers and events out. One coroutine reads, one writes; answers are sent as
-// operations finish, in any order. Owned by the listener's slots and by its own coroutines.
+// operations finish, in any order. The listener's slots and its own
+// coroutines own it.
 #pragma once
 
 #include <deque>
@@ -23,7 +24,7 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   /// Requests in progress, or answered but not yet read by the client; at this limit reading pauses.
   static constexpr std::size_t most_open_requests = 64;
 
-  /// `services` and `targets` outlive it.
+  /// `services` and `targets` must outlive it.
   StreamConnection(ConnectionServices& services, ControlTargets& targets, tcp::socket socket, Sender sender);
 
   asio::awaitable<void> read();
@@ -32,8 +33,8 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   bool over() const { return !socket_.is_open(); }
   /// Call it before read() if no slot is free.
   void reject() { ending_ = true; }
-  /// Call it before read(). The client is untrusted until it shows the token; `claim_slot` is then called, and is false when no
-  /// slot is free.
+  /// Call it before read(). The client is untrusted until it shows the token; `claim_slot` is then called, and
+  /// returns false if no slot is free.
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
 
@@ -42,7 +43,7 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
 
  private:
   struct Work {
-    std::size_t bytes = 0, pose_bytes = 0;  // pose_bytes: of poses without an answer; included in bytes
+    std::size_t bytes = 0, pose_bytes = 0;  // pose_bytes: the part of `bytes` that is poses without an answer
   };
   bool accept(control::BytesView message, Work& work);
   bool is_beyond_pose_rate();
@@ -67,12 +68,12 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   std::optional<SharedRate::Part> pose_rate_;  // set with the first pose without an answer
   std::optional<control::Bytes> newest_pose_;  // newest of the poses beyond the rate
   std::deque<control::Bytes> answers_;         // framed
-  std::size_t unsettled_ = 0;                  // work: answers
+  std::size_t unsettled_ = 0;                  // bytes of answers and work of requests for which no pause was made yet
   std::size_t in_progress_ = 0;                // requests whose answer is not in answers_ yet
   EventQueue events_;
   Events::Token subscription_;
   HttpDetector http_;
-  std::function<bool()> claim_slot_;       // empty: trusted
+  std::function<bool()> claim_slot_;       // empty if the client is trusted
   bool greeted_ = false, ending_ = false;  // ending: the last answer is being written
 };
 

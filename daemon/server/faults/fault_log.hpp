@@ -1,5 +1,6 @@
-// The journal of faults: the effects of each, as JSON lines in a file, in recordings, as events, as counters, and the last
-// entries in memory. App owns it; I/O thread only. The writer thread writes the file; entries that it cannot write are counted.
+// The journal of faults. Each effect of a fault is one entry: a JSON line in a file and in recordings, an event, and a count.
+// The last entries are kept in memory. App owns the journal, and only the I/O thread calls it. The writer thread writes the
+// file; entries that it cannot write are counted.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +29,7 @@ class FaultLog final : public FaultJournal {
  public:
   static constexpr std::size_t most_remembered = 1000;
 
-  static constexpr std::size_t most_waiting_bytes = 1u << 20;  // for the file
+  static constexpr std::size_t most_waiting_bytes = 1u << 20;  // limit for entries that are not in the file yet
 
   FaultLog(Events& events, Recordings& recordings, WriterThread& writer, Log& log);
   ~FaultLog() override;
@@ -39,13 +40,13 @@ class FaultLog final : public FaultJournal {
   Result<void> open(const std::filesystem::path& file);
   void write(const FaultEntry& entry) override;
 
-  /// The latest entries, oldest first, with numbers counted from 1.
+  /// Returns the latest entries, oldest first. Their numbers begin with 1.
   const std::deque<std::shared_ptr<const v1::FaultEntry>>& entries() const { return entries_; }
-  /// The number of injections since the start, by code.
+  /// Returns the number of injections since the start, by code.
   const std::map<std::string_view, std::uint64_t>& injections() const { return injections_; }
-  /// The number of entries that are not in the file.
+  /// Returns the number of entries that could not be written to the file.
   std::uint64_t lost() const { return lost_; }
-  /// Notes for the status if entries are lost, with the reason.
+  /// Returns a note for the status if entries were lost, with the reason.
   std::vector<Note> notes() const;
 
  private:
@@ -60,7 +61,7 @@ class FaultLog final : public FaultJournal {
   Log& log_;
   std::filesystem::path path_;
   std::shared_ptr<JournalFile> file_;  // used by the writer thread while it writes
-  std::string pending_;                // lines
+  std::string pending_;                // JSON lines that the writer thread has not got yet
   std::uint64_t pending_entries_ = 0, lost_ = 0;
   std::string why_lost_;
   bool writing_ = false, losing_ = false;

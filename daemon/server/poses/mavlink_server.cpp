@@ -174,7 +174,7 @@ void MavlinkServer::on_distance(const SonarConfig& sonar, const PingQueued& ping
       measured.range_m = ping.distance->range_m;
       measured.confidence_percent = ping.distance->confidence_percent;
       const auto message = link.poses.distance_message(mavlink::distance_sensor_of(measured));
-      if (!message) continue;  // the vehicle wants fewer
+      if (!message) continue;  // the vehicle has requested distances at a lower rate
       if (link.peer) link.socket.send_to(asio::buffer(*message), *link.peer, 0, failed);
     }
     LinkFigures& counts = link.distances;

@@ -1,7 +1,7 @@
-// Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. Owned by App; the control stream is a server of its own
+// Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. App owns it. The control stream is a server of its own
 // (daemon/server/control/). A malformed message is refused and counted, and from time to time logged; a connection that does not
-// speak JSON is closed. Connections are served in turns of bounded work, and no faster than the limits allow. Of what exceeds
-// them only the newest is kept, so that no pose takes effect long after it was sent.
+// speak JSON is closed. Connections are served in turns of bounded work, and no faster than the limits allow. Of the poses beyond
+// the limits only the newest is kept, so that no pose takes effect long after it was sent.
 #pragma once
 
 #include <list>
@@ -24,7 +24,7 @@ namespace sonar {
 
 class PoseServer {
  public:
-  /// All of it outlives the server.
+  /// All arguments must outlive the server.
   PoseServer(asio::io_context& io, const PoseConfig& config, const LimitConfig& limits, Admission& admission, PoseIntake& intake,
              Log& log);
 
@@ -32,7 +32,7 @@ class PoseServer {
   void start();
   void stop();
 
-  /// Where it listens, with the ports the system chose for 0. Port 0 = off.
+  /// These return the address at which it listens, with the port that the system chose if 0 was configured. Port 0 means off.
   Endpoint protobuf() const { return protobuf_at_; }
   Endpoint json() const { return json_at_; }
 
@@ -56,11 +56,11 @@ class PoseServer {
           of_all(std::move(part)) {}
     tcp::socket socket;
     Sender sender;
-    asio::steady_timer turn;  // waits until more of what it sent is worked on
+    asio::steady_timer turn;  // expires when the next lines of this connection are processed
     InputRate rate;
     SharedRate::Part of_all;
     control::LineParser lines;
-    int not_json = 0;  // number of such lines in a row
+    int not_json = 0;  // number of lines in succession that are not JSON
     std::chrono::steady_clock::time_point active_at =
         std::chrono::steady_clock::now();                          // time of its last pose within the limits
     std::chrono::steady_clock::time_point kept_up_at = active_at;  // last time when little or nothing waited in the kernel
@@ -78,7 +78,7 @@ class PoseServer {
   void log_fault(const std::string& fault, const std::string& at);
   asio::awaitable<void> receive(Port& port);
   asio::awaitable<void> read_lines(ConnectionPointer connection);
-  enum class Turn { over, not_over, end };  // no whole line is left; one may be; the connection speaks no JSON
+  enum class Turn { over, not_over, end };  // over: no whole line is left; end: the connection does not send JSON
   struct Work {
     std::size_t bytes = 0;
     bool has_pose = false;  // an accepted pose
@@ -104,7 +104,7 @@ class PoseServer {
   std::list<Port> ports_;
   ConnectionSlots<Connection> connections_;
   SharedRate together_;  // limit for all connections together
-  InputRate dropping_;   // likewise, of bytes that are read away
+  InputRate dropping_;   // limit for bytes of all connections that are read and dropped
   Endpoint protobuf_at_, json_at_;
   bool stopping_ = false;
 };

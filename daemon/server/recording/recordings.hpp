@@ -1,5 +1,5 @@
-// Recordings inside the daemon: control starts and stops them, devices hand over the pings they send, the writer thread writes.
-// Owned by App; everything here is called on the I/O thread.
+// Recordings inside the daemon: control starts and stops them, devices pass the pings that they send, and the writer thread
+// writes the files. App owns the object. All functions are called on the I/O thread.
 //
 // Pinging never waits for a file: pings wait in memory up to a bound, and beyond it, or when a file fails, the recording ends
 // with one line in the log. What was written stays readable.
@@ -39,9 +39,9 @@ class Recordings {
   Recordings(const Recordings&) = delete;
   Recordings& operator=(const Recordings&) = delete;
 
-  /// Names the newest files that are in the folder already, as recordings that have ended.
+  /// Lists the newest files that are in the folder already, as recordings that have ended.
   void find_earlier();
-  /// `who`: the requester's name for the log. Errors: usage (a bad file name, or recording is not configured), io, unavailable.
+  /// `who` is the requester's name for the log. Errors: usage (a bad file name, or recording is not configured), io, unavailable.
   void start(const control::StartRecording& asked, RecordedSonar sonar, const std::string& who, Done done);
   /// An empty name stops all recordings.
   void stop(const control::StopRecording& asked, Done done);
@@ -51,7 +51,7 @@ class Recordings {
   void finish();
 
   bool takes(const std::string& sonar) const;
-  /// Whether a recording wants the first hits of beams; only MCAP files hold them.
+  /// Returns whether a recording needs the first hits of beams. Only MCAP files hold them.
   bool wants_truth(const std::string& sonar) const;
   bool wants_labels(const std::string& sonar) const;
   void take(const std::string& sonar, RecordedPing ping);
@@ -61,10 +61,10 @@ class Recordings {
 
   /// Call it before anything is recorded, and whenever another scene is used.
   void use_scene(const Scene& scene);
-  /// Names of the objects of the scene in which pings are made from now on.
+  /// Returns the names of the objects of the scene in which pings are made from now on.
   const std::shared_ptr<const SceneNames>& names() const { return names_; }
 
-  /// Recordings that run, and the last ones that have ended, oldest first.
+  /// Returns the open recordings and the last ones that have ended, oldest first.
   std::vector<v1::RecordingStatus> status() const;
   /// Returns true if no recording is open.
   bool idle() const { return running() == 0; }

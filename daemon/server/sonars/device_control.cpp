@@ -1,4 +1,4 @@
-// A Device as the control protocol sees it: the status that it reports, and the requests that it takes while it runs.
+// The part of Device for the control protocol: the status that it reports, and the requests that it accepts while it runs.
 #include <algorithm>
 
 #include "core/sonar/range_image.hpp"

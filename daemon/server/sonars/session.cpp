@@ -156,7 +156,7 @@ asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Out
   co_return shape.end != Outbox::Shape::End::reset || co_await deliver();
 }
 
-/// The watch sees progress until its end. finish() and over() end it.
+/// A pause does not count as a stall: until its end `progress_at_` lies ahead. finish() and over() end the pause.
 asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
   if (length.count() > 0 && !finishing_ && !hurries_) {
     progress_at_ = Steady::now() + length;
@@ -309,7 +309,7 @@ void Session::end_if_closed() {
   over_after(ec);
 }
 
-/// A peer that closes while we finish has done what was wanted, so the reason stays that of finish().
+/// If the peer closes the connection after finish() was called, the reason of finish() is kept.
 void Session::over_after(const error_code& ec) {
   const bool left = ec == asio::error::eof || ec == asio::error::connection_reset || ec == asio::error::broken_pipe;
   if (finishing_)

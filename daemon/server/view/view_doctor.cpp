@@ -9,11 +9,11 @@
 namespace sonar {
 namespace {
 
-constexpr double longest_gap_s = 10;  // between two statuses that are compared; none are taken without viewers
+constexpr double longest_gap_s = 10;  // between two statuses that are compared; without viewers no status is read
 constexpr auto failures_told = std::chrono::seconds(8);
 constexpr std::size_t most_bytes = 256 << 10;  // limit for a table of the kernel: reading it takes a millisecond
 
-/// Empty when it cannot be read.
+/// Returns an empty string if the file cannot be read.
 std::string content_of(const char* file) {
   std::string text(most_bytes, '\0');
   std::ifstream in(file);
