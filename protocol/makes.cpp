@@ -22,6 +22,8 @@
 
 namespace sonar::protocol {
 
+// One row for each make. This file and the folders of the makes are the only product code that names one. The first row is the
+// make of the demo without a name and of unknown profiles. The first of `ports` is the one that a user may give another number.
 std::vector<Make> product_makes() {
   return {
       {.device = &oculus::vendor(),

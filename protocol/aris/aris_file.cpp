@@ -30,6 +30,8 @@ constexpr void fields(V& visit, M& m) {
   visit("SerialNumber", m.serial);
 }
 
+/// Reads frame by frame. All frames have the size that the file header states, so a damaged frame is skipped and the next one is
+/// read.
 class ArisFileReader final : public RecordingReader {
  public:
   ArisFileReader(std::unique_ptr<Source> source, const FileHeader& header)
@@ -103,6 +105,8 @@ class ArisFileReader final : public RecordingReader {
   Damages damages_;
 };
 
+/// Collects the datagrams of frames and writes whole frames in the order of the picture. The file header takes its sizes from the
+/// first.
 class ArisFileWriter final : public RecordingWriter {
  public:
   explicit ArisFileWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}

@@ -32,6 +32,7 @@ Time time_of(const OculusLogTime& t) {
 
 bool is_item(const OculusLogItem& item) { return item.magic == OculusLogItem{}.magic && item.size == item_bytes; }
 
+/// Reads item by item. After a damaged item it searches for the magic number of the next one; items of other types are skipped.
 class LogReader final : public RecordingReader {
  public:
   explicit LogReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_, file_header_bytes) {}
@@ -133,6 +134,7 @@ class LogReader final : public RecordingReader {
   Damages damages_;
 };
 
+/// Writes each message as two items: the message, and its exact time.
 class LogWriter final : public RecordingWriter {
  public:
   explicit LogWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}

@@ -50,6 +50,7 @@ std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
 
 constexpr std::size_t longest_payload = 65535, chunk_bytes = std::size_t{64} << 10;
 
+/// Reads frame by frame. Bytes between frames are noted as damage.
 class PingLogReader final : public RecordingReader {
  public:
   explicit PingLogReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
@@ -105,6 +106,7 @@ class PingLogReader final : public RecordingReader {
   Damages damages_;
 };
 
+/// Writes the frames of the device behind a JSON text, which is made when the first message shows which product sends.
 class PingLogWriter final : public RecordingWriter {
  public:
   explicit PingLogWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}

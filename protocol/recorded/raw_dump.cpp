@@ -5,6 +5,7 @@ namespace {
 
 constexpr std::size_t dump_block_bytes = 256 << 10;
 
+/// Reads the file in blocks and splits it into messages. A raw dump has no times, so all are 0.
 class RawReader final : public RecordingReader {
  public:
   RawReader(std::unique_ptr<Source> source, const Framing& framing)

@@ -19,6 +19,7 @@ std::optional<Time> time_of(BytesView content) {
   return std::nullopt;
 }
 
+/// Reads packet by packet; the CRC of each tells whether it is whole.
 class SonarFileReader final : public RecordingReader {
  public:
   explicit SonarFileReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}

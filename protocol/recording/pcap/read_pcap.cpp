@@ -109,6 +109,8 @@ struct Connection {
   }
 };
 
+/// Returns the messages of the sonar that find_device() found. At the end of the capture the connections that are still open are
+/// finished one by one.
 class PcapReader final : public RecordingReader {
  public:
   PcapReader(std::unique_ptr<Source> source, PacketReader packets, Found found)

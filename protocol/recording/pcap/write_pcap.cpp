@@ -89,6 +89,7 @@ struct End {
   std::uint32_t sequence = 0;
 };
 
+/// Writes messages as packets of one connection, each acknowledged by the other end, and datagrams as UDP packets.
 class PcapWriter final : public RecordingWriter {
  public:
   PcapWriter(std::unique_ptr<Sink> sink, const PcapConversation& conversation)
