@@ -43,6 +43,8 @@ void put(wire::Bytes& out, std::span<const Vec3> vectors) {
 
 }  // namespace
 
+// Layout: header of 12 bytes; a JSON chunk, padded with blanks to a multiple of 4; a binary chunk with positions, normals and
+// indices, to which the JSON refers by buffer views and accessors.
 wire::Bytes glb(std::span<const Vec3> vertices, std::span<const std::array<std::uint32_t, 3>> triangles,
                 const std::array<double, 3>& colour) {
   const std::size_t of_vectors = 12 * vertices.size(), of_indices = 12 * triangles.size();

@@ -15,6 +15,7 @@ std::array<std::uint8_t, 4> digits_of(std::uint16_t length) {
   return digits;
 }
 
+/// Whether this protocol has the message, by the public drivers' lists.
 bool is_known(Id id) {
   switch (id) {
     case Id::version_data:
