@@ -20,7 +20,9 @@ Stepper::Due Stepper::next_due() {
   return due;
 }
 
-/// Advances time by at most one event, and only if all clients have received what was sent.
+// A step of simulated time: if every client has taken what it was sent, time advances to the next event (a tick of a dialogue or
+// a ping) that the clock allows, and that event happens. Returns true if the daemon may end: enough is served and every request
+// that may still be answered has its answer.
 bool Stepper::step(const std::function<bool()>& enough_served) {
   skip();
   const std::list<Device>& devices = fleet_.devices();

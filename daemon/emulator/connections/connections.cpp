@@ -24,6 +24,7 @@ bool Connection::receives(std::size_t stream) const {
                      [stream](const protocol::SetReceivers& list) { return list.stream == stream && !list.to.empty(); });
 }
 
+// `not_before` bounds the rate of ticks: a dialogue that is always due must not keep the sonar busy.
 std::optional<Time> Connection::next_tick() const {
   if (finishing || dialogue == nullptr) return std::nullopt;
   return std::max(dialogue->next_tick(), not_before);
@@ -51,6 +52,7 @@ Connection* Connections::oldest_client() {
   return it == all_.end() ? nullptr : &*it;
 }
 
+// The list is in the order of arrival, so the first one that waits has waited longest.
 Connection* Connections::longest_waiting() {
   const auto it = std::find_if(all_.begin(), all_.end(), [](const Connection& c) { return c.state == State::waiting; });
   return it == all_.end() ? nullptr : &*it;

@@ -21,6 +21,8 @@ std::size_t Outbox::Message::size() const {
   return all;
 }
 
+// A slow client gets the newest pings: the oldest that waits is dropped (drop_newest is for a fault). The message that is being
+// written is never dropped, or the stream would be cut.
 void Outbox::push(Message ping, bool limited) {
   const std::size_t size = ping.size();
   ++pings_offered_;
@@ -43,6 +45,8 @@ void Outbox::push(Message ping, bool limited) {
   pings_.push_back(std::move(ping));
 }
 
+// Replies come before pings, because a client may wait for a reply before it reads on. One message is out at a time: the caller
+// returns it by written() or not_written().
 Outbox::Message Outbox::take() {
   if (writing_ || (replies_.empty() && pings_.empty())) return {};
   writing_ = true;
@@ -78,6 +82,7 @@ void Outbox::drop_waiting_pings(DropReason why) {
   ping_bytes_ = 0;
 }
 
+// Each ping that was offered is counted once, also the one that is being written: offered = written + dropped (+ waiting).
 void Outbox::end(DropReason why) {
   drop_waiting_pings(why);
   // The message being written is incomplete at the client, so its ping counts as dropped.

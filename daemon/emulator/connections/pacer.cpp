@@ -7,6 +7,7 @@ namespace sonar {
 
 namespace {
 
+/// Time until the last echo is back, and a rest of 2 ms before the next ping.
 double travel_s(const PingSettings& s) {
   const double sound_speed_mps = s.device_sound_speed_mps > 0 ? static_cast<double>(s.device_sound_speed_mps) : 1500.0;
   return 2.0 * s.range_m / sound_speed_mps + 0.002;
@@ -22,7 +23,7 @@ std::chrono::nanoseconds ping_period(const PingSettings& s) {
 void Pacer::configure(const PingSettings& settings, Time now) {
   const auto period = ping_period(settings);
   travel_ = nanoseconds_from(travel_s(settings));
-  // An unchanged rhythm keeps its grid: some drivers repeat their settings at ping rate.
+  // With an unchanged period the grid stays: some drivers repeat their settings for every ping and would postpone each one.
   if (running_ && period == period_ && settings.triggered == triggered_) return;
   // A new grid begins when the last echo has arrived and the shorter of both periods is over.
   const Time quiet_until = has_fired_ ? std::max(home_at_, last_tick_ + std::min(period_, period)) : now;
@@ -54,6 +55,8 @@ void Pacer::forget_trigger() {
   if (std::exchange(trigger_waits_, false)) ++skipped_.trigger;
 }
 
+// States of a triggered sonar: idle; a trigger waits (trigger_waits_) for its time (trigger_at_), which is when the previous ping
+// is over; then fire() fires it.
 void Pacer::trigger(Time now, bool joins) {
   if (!running_ || !triggered_) return;
   // At most one ping is due. A trigger joins the one that waits, or is counted as skipped.
@@ -82,6 +85,7 @@ void Pacer::note_ping(Time at) {
   has_fired_ = true;
 }
 
+// Free running: ticks lie at start_ + index_ * period_, so that a late call does not shift the later ones.
 bool Pacer::fire(Time now, bool busy) {
   const auto due = next_tick();
   if (!due || now < *due) return false;

@@ -10,7 +10,7 @@ constexpr std::size_t most_receivers = 16;  // limit for one list
 
 bool is_client(const Connection& c) { return c.role == Role::client && c.state == Connection::State::served && !c.finishing; }
 
-/// The next receiver of a stream is not sent pings that were made for the last one.
+/// Drops pings that wait in a stream without receivers: the next receiver must not get pings that were made for the last one.
 void drop_unreceived(Connections& connections) {
   for (Connection& c : connections.all())
     if (c.role == Role::stream && connections.receivers(c).empty()) c.outbox.drop_waiting_pings(DropReason::gone);
@@ -20,6 +20,8 @@ void drop_unreceived(Connections& connections) {
 
 // ---- slots
 
+// Order: the configuration decides, a fault may override it, a client that is taken over begins to leave, and then the new
+// connection is entered, so that it is the newest.
 Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protocol::Port* port, Faults::Admission by_fault,
                             Actions& actions) {
   using Verdict = Connections::Verdict;
@@ -53,7 +55,7 @@ void Audience::serve(Connection& connection, Time now, Actions& actions) {
   connection.dialogue = sonar_.vendor.converse(*connection.port, sonar_.state, sonar_.unskipped(now));
   // Serve makes the session that later actions name, such as the ReadFrom of a fault.
   actions.emplace_back(Serve{connection.id});
-  // Observers are not counted.
+  // Clients are numbered for faults that act on one of them; observers are not.
   if (connection.role != Role::observer) connection.number = ++sonar_.figures.clients;
 }
 
@@ -79,6 +81,7 @@ void Audience::open_stream(ConnectionId id, const protocol::Port& port) {
   if (port.group.port != 0) stream.receivers.front().to.push_back(port.group);
 }
 
+// A client has its own list for each stream; without a client (over HTTP or by a datagram) the list is the device's.
 void Audience::set_receivers(Connection* from, protocol::Ipv4 ip, protocol::SetReceivers wanted) {
   Connection* const stream = connections_.stream(wanted.stream);
   if (stream == nullptr) return;

@@ -81,6 +81,7 @@ void PingSource::override_settings(const protocol::SettingsOverride& wanted, Tim
 
 // ---- when pings are due
 
+/// A sonar pings for viewers (runs_itself), or for an audience after a first request, if its protocol needs one.
 bool PingSource::wants_pings() const {
   if (runs_itself()) return true;
   return !audience_.stopping() && audience_.has_audience() && (asked_ || sonar_.vendor.pings_before_first_request(sonar_.state));
@@ -139,7 +140,7 @@ PingNumber PingSource::next_number() {
   return PingNumber(sonar_.state.last_ping = ++ping_number_);
 }
 
-/// The request without its number.
+/// The request of a ping at a moment. Its number is set by the caller.
 PingRequest PingSource::request_at(Time at, const protocol::RequestPing& aim) const {
   const Config& config = sonar_.around.config;
   const World& world = sonar_.around.world;
@@ -186,6 +187,8 @@ void PingSource::request_ping(Time at, Actions& actions) {
   actions.emplace_back(ComputePing{std::move(request)});
 }
 
+// Order: counters; the device's own changes after the ping; then the decision whether clients get it. False: the ping failed or
+// has no audience any more, which is counted.
 bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions) {
   DeviceFigures& figures = sonar_.figures;
   busy_ = false;

@@ -94,6 +94,7 @@ Actions Sonar::tick_conversations(Time now) {
   return actions;
 }
 
+// Dialogues do not see the jump: they get unskipped time, so no keep-alive becomes due by it.
 void Sonar::skip(std::chrono::nanoseconds by) {
   data_.state.skipped += by;
   source_.skip(by);
@@ -188,6 +189,7 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool
   return actions;
 }
 
+// Clients get the message that is being written whole; those that wait for a slot are reset.
 Actions Sonar::stop(const std::string& why) {
   Actions actions;
   source_.stop();
@@ -285,6 +287,7 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
   }
 }
 
+/// A fault may ignore the request, hold it back, or end the connection in place of the change.
 void Sonar::change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions) {
   const Faults::RequestVerdict verdict = faults_.on_request(change, from.name, state(), now);
   apply_fault_orders(now, actions);

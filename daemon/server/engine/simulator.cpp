@@ -19,13 +19,14 @@ Simulator::Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, i
     : io_(io), description_(engine->description()), engine_(std::move(engine)) {
   engine_->set_interruption(this);
   thread_ = std::thread([this, nice_by] {
-    // Niceness belongs to the thread on Linux; a refusal costs only smoothness.
+    // On Linux niceness belongs to the thread. If it is refused, pings may delay the I/O thread, which costs only smoothness.
     if (nice_by != 0 && ::nice(nice_by) == -1) {
     }
     queue_.run();
   });
 }
 
+// The thread ends when its queue is empty: jobs that were submitted are computed first.
 Simulator::~Simulator() {
   queue_stays_.reset();
   thread_.join();
@@ -53,6 +54,7 @@ std::chrono::nanoseconds Simulator::under_way_for() const {
 
 // ---- the simulation thread
 
+// Called from the queue, also within run_other() and work_off(), which poll it: then working_ is set and the job only waits.
 void Simulator::arrive(Job job) {
   if (!job.engine) turns_.ask(job.request.sonar_id);
   waiting_.push_back(std::move(job));
@@ -175,6 +177,7 @@ Simulator::Outcome Simulator::run(const PingRequest& request) {
   return outcome;
 }
 
+/// Swaps the engines between two pings. The old one goes back to the I/O thread through `retired`.
 void Simulator::change_engine(Job job) {
   engine_->set_interruption(nullptr);
   std::swap(engine_, job.engine);

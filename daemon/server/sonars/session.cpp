@@ -52,8 +52,9 @@ Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
   prepare(socket_, setup_.limits);
 }
 
-/// Three coroutines share the session: read() receives, write() sends, watch() ends the session of a client that hangs. Each
-/// holds a pointer to the session, which lives until the last one returns.
+// Three coroutines on the I/O thread: read() passes bytes to the sonar, write() takes messages from the outbox, watch() ends the
+// session of a client that takes nothing or is silent. A session goes from serving to finishing_ (the last message, then FIN) to
+// over_ (the socket is closed); each coroutine tests over_ after every wait, because any of them may have ended the session.
 void Session::start() {
   spawn(&Session::read);
   spawn(&Session::write);
@@ -214,7 +215,8 @@ void Session::send_fin() {
   wake_watch_.cancel();
 }
 
-/// Takes one message after the other from the outbox. Sends FIN when finish() was called and the outbox is empty.
+/// Writes one whole message at a time. Without one it waits for wake(); when finishing_, it sends FIN in place of the next
+/// message.
 asio::awaitable<void> Session::write() {
   const auto self = shared_from_this();
   while (!over_) {
@@ -290,7 +292,7 @@ void Session::finish(std::string why) {
   pause_.cancel();
 }
 
-/// Ends at once with RST: closing a socket with linger 0 discards what was not sent.
+// With linger 0, close() sends RST and discards what was not sent.
 void Session::reset(std::string why) {
   if (over_) return;
   error_code ec;
@@ -318,7 +320,7 @@ void Session::over_after(const error_code& ec) {
     over(reason(ec), left);
 }
 
-/// Every end of a session comes here; only the first call has an effect. The coroutines return when their waits are cancelled.
+/// The one end of a session: closes the socket, wakes the coroutines so that they end, and reports the end.
 void Session::over(std::string why, bool by_client) {
   if (std::exchange(over_, true)) return;
   error_code ec;
