@@ -35,6 +35,7 @@ natsStatus into(Owner& owner, const Call& call) {
   return status;
 }
 
+/// Each shard is one message with a subject of its own, so that the server itself refuses a second one (ExpectNoMessage).
 std::string subject_of(const std::string& job, const std::string& shard) { return "farm.work." + job + "." + shard; }
 
 class NatsQueue;
@@ -95,6 +96,7 @@ class NatsQueue final : public Queue {
     return s == NATS_OK ? make_stream() : refused("no JetStream", s);
   }
 
+  // Tables are key-value stores of JetStream; a lifetime is the store's TTL.
   Result<void> put(Table table, const std::string& key, std::string_view value) override {
     kvStore* kv = store(table);
     const natsStatus s =
@@ -145,6 +147,7 @@ class NatsQueue final : public Queue {
     return s == NATS_OK ? Result<void>{} : refused("cannot open job " + job, s, code);
   }
 
+  /// False: the shard is in the queue already.
   Result<bool> publish(const std::string& job, std::uint64_t shard) override {
     const std::string number = std::to_string(shard), id = job + "/" + number;
     // The server drops an id that it has seen within two minutes. If that shard has left the queue since then, it must be made
@@ -176,6 +179,7 @@ class NatsQueue final : public Queue {
     return Waiting{info->NumPending, static_cast<std::uint64_t>(info->NumAckPending)};
   }
 
+  /// Null: no shard came within `wait`. After an error the next call subscribes anew.
   Result<std::unique_ptr<Task>> take(const std::string& job, milliseconds wait) override {
     if (!subscription_ || subscribed_ != job) {
       jsSubOptions options;
@@ -227,6 +231,7 @@ class NatsQueue final : public Queue {
   void flush() { natsConnection_FlushTimeout(connection_.get(), patience_ms); }
 
  private:
+  /// js_WorkQueuePolicy: the server removes a message once it is acknowledged, so the stream holds exactly the work that is left.
   Result<void> make_stream() {
     const char* subjects[] = {"farm.work.>"};
     jsStreamConfig config;
@@ -284,11 +289,14 @@ class NatsQueue final : public Queue {
   std::string subscribed_;
 };
 
+// The end of a delivery, as JetStream names it: in progress (the time to acknowledge begins again), ack (done), nak (again,
+// perhaps later), term (never again).
 Result<void> NatsTask::in_progress() {
   const natsStatus s = natsMsg_InProgress(message_.get(), nullptr);
   return s == NATS_OK ? Result<void>{} : queue_.refused("cannot keep a shard", s);
 }
 
+// Waits for the server's confirmation: otherwise a lost acknowledgement would give the finished shard to another worker.
 Result<void> NatsTask::done() {
   jsErrCode code{};
   jsOptions options;
@@ -305,6 +313,7 @@ Result<void> NatsTask::again(milliseconds later) {
   return s == NATS_OK ? Result<void>{} : queue_.refused("cannot give a shard back", s);
 }
 
+// The table comes before the removal: if the worker dies between them, the shard is delivered again and not lost.
 Result<void> NatsTask::bury(const std::string& why) {
   const std::string shard = std::to_string(shard_);
   // The reason is stored before the shard leaves the queue. If the worker ends between the two, the shard is delivered again.

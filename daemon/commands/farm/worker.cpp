@@ -137,6 +137,7 @@ class Worker {
     return {};
   }
 
+  /// Receives the files of the job and opens its folder. The last job stays open, because the next shard is mostly of it too.
   Result<void> open(const FarmJob& record) {
     const path out = path(c_.out) / record.folder();
     const auto file = receive_files(record, out / "files", queue_);

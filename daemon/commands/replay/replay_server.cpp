@@ -79,6 +79,9 @@ void ReplayServer::spawn(Coroutine coroutine) {
   });
 }
 
+// One client at a time. Its serve() plays messages at their times and also writes the replies; listen_to() reads its requests.
+// The replay ends when the recording was served to its end, or after stop(): by then the client has got FIN, or RST when
+// goodbye_limit has passed.
 void ReplayServer::start() {
   if (!device_.is_only_seen.empty()) {
     // Serves only the page, until a signal comes.
@@ -301,6 +304,7 @@ void ReplayServer::apply(Client& client, const protocol::Event& event) {
   }
 }
 
+/// As the device does it: a dialogue with a keep-alive ends the connection of a silent client.
 void ReplayServer::end_if_silent() {
   if (!client_ || !client_->dialogue) return;
   const auto limit = client_->dialogue->longest_silence();

@@ -252,6 +252,7 @@ std::map<std::string, std::string> Fault::used() const {
 
 Result<std::vector<Fault>> check_fault(const FaultRecord& record, bool manual) { return Check(record, manual).faults(); }
 
+/// Two faults may not write the same part of the same sonar, because the result would depend on their order.
 std::string conflict_of(const Fault& a, const Fault& b) {
   if (a.kind->touches.empty() || a.kind->touches != b.kind->touches || !overlap(a.sonar, b.sonar)) return {};
   return "fault " + a.name + " (" + std::string(a.kind->code) + ") and fault " + b.name + " (" + std::string(b.kind->code) +

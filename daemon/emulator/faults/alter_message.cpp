@@ -197,6 +197,7 @@ Touch splice(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   return {};
 }
 
+/// A message that is valid and empty: the header declares a payload of 0 bytes.
 Touch only_header(const MessageContext& c, Bytes& bytes) {
   const auto header = c.vendor.region(Region::header, bytes);
   const auto size = c.vendor.field(Part::ping, FieldName::payload_size, bytes);

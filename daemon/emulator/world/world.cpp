@@ -108,6 +108,7 @@ std::string World::why_bad_time(const PoseSample& sample, Time at, Time now) con
   return {};
 }
 
+/// A late pose is refused and not inserted. A jump clears the history, so that nothing is interpolated across it.
 bool World::is_next(Track& track, const PoseSample& sample, Time at, PoseOutcome& out) {
   const bool seq_is_old = sample.seq != 0 && track.seq != 0 && sample.seq <= track.seq;
   if (seq_is_old || at < track.history.newest().at) {
@@ -252,6 +253,7 @@ PoseHistory::Motion World::vehicle_moves(std::size_t vehicle, Time t) const {
   return motion::is_jump(moves.velocity_mps, moves.angular_velocity_radps) ? PoseHistory::Motion{} : moves;
 }
 
+// The body is rigid: at the mount r its velocity is v + w x r.
 Twist mounted_moves(const PoseHistory::Motion& body_moves, const Pose& body_in_world, const Pose& mount) {
   const Vec3d swing = rotate(body_in_world.orientation, cross(body_moves.angular_velocity_radps, mount.position_m));
   return {body_moves.velocity_mps + swing, rotate(conjugate(mount.orientation), body_moves.angular_velocity_radps)};

@@ -110,6 +110,10 @@ void HttpConnection::reject() {
 
 // ---- requests
 
+// Two coroutines: read() fills the parser and hands one request over; write() answers it and asks for the next. While a request
+// is answered (busy_), nothing is read, so pipelined requests wait in the parser and in the kernel, and are answered in order
+// (RFC 9112, 9.3.2). Time limits: greeting_limit for a request to be complete, keep_alive_limit between requests, none while an
+// answer is made.
 asio::awaitable<void> HttpConnection::read() {
   std::vector<std::byte> buffer(16384);
   request_limit_->within(greeting_limit);
@@ -250,6 +254,7 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
   if (!over()) next_request();
 }
 
+/// HTTP/1.1 gets chunks. HTTP/1.0 does not know them (RFC 9112, 6.1): there the end of the connection ends the body.
 asio::awaitable<void> HttpConnection::write_stream(HttpStream stream, Head head) {
   discards_ = true;  // reading continues, to notice that the client disconnects
   wake_reader_.cancel();

@@ -58,6 +58,7 @@ Result<void> MavlinkServer::open() {
   return {};
 }
 
+// Each link has two coroutines that never end before stop(): receive() and tick(). A fault in one is logged, and it starts again.
 void MavlinkServer::start() {
   for (Link& l : links_) {
     look_at_wants(l);
@@ -194,6 +195,7 @@ void MavlinkServer::on_distance(const SonarConfig& sonar, const PingQueued& ping
   }
 }
 
+// Ticks send heartbeats, report changes of the link, and request messages again while no poses come.
 asio::awaitable<void> MavlinkServer::tick(Link& link) {
   while (!stopping_) {
     act_on(link, link.poses.on_tick(wire_time()), link.name, link.peer);

@@ -45,6 +45,8 @@ Recordings::Recordings(WriterThread& writer, const Config& config, Log& log, std
 Recordings::~Recordings() = default;
 
 /// Runs `job` on the thread of the recording. `after` runs here, with the result and the size of the file.
+// States of a recording: opening (the file is made), running, ending (no more pings; what waits is written, the file is closed),
+// ended (only its status is kept). All changes of state happen on the I/O thread; the writer thread sees only Work.
 template <class Job, class After>
 void Recordings::on_thread(const std::shared_ptr<Work>& work, Job job, After after) {
   const auto figures = std::make_shared<RecordingFile::Figures>();

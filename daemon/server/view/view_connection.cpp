@@ -126,6 +126,7 @@ ViewConnection::ViewConnection(ConnectionServices& services, HttpConnection& fro
 }
 ViewConnection::~ViewConnection() = default;
 
+// HttpConnection has read the request already, so it is made again for Beast, which checks the key and answers (RFC 6455, 4.2).
 asio::awaitable<bool> ViewConnection::begin() {
   auto& stream = socket_->stream;
   stream.auto_fragment(false);  // a picture is one frame
@@ -225,6 +226,7 @@ asio::awaitable<void> ViewConnection::say_goodbye(std::uint16_t code, const char
   co_await socket_->stream.async_close(reason, into(ec));
 }
 
+/// A close frame may be sent only between two frames, and a message is one frame. Within a message the connection just ends.
 void ViewConnection::on_closing() {
   wake_.cancel();
   stall_.cancel();
