@@ -22,6 +22,7 @@ std::vector<std::pair<const Object*, Pose>> placed(const std::string& name, cons
 
 Vec3d middle_of(const Object& object, const Pose& in_world) { return transform(in_world, extent_of(*object.mesh).centre_m()); }
 
+/// Whether a point lies within range, the horizontal aperture and the vertical beam width of the sonar.
 bool is_in_fan(Vec3d in_world, const PingRequest& r) {
   const Vec3d p = transform(inverse(r.sonar_in_world), in_world);
   const FrequencyMode& mode = r.model->modes[static_cast<std::size_t>(r.settings.mode)];
@@ -39,6 +40,7 @@ std::optional<double> height_at(const Mesh& mesh, double x, double y) {
                 c = to_double(mesh.vertices[corners[2]]);
     const double area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
     if (area == 0) continue;
+    // Barycentric coordinates of the place in the triangle as seen from above.
     const double v = ((x - a.x) * (c.y - a.y) - (c.x - a.x) * (y - a.y)) / area;
     const double w = ((b.x - a.x) * (y - a.y) - (x - a.x) * (b.y - a.y)) / area;
     if (v < 0 || w < 0 || v + w > 1) continue;
@@ -64,6 +66,7 @@ Extent box_of(const Object& object, const Pose& in_world) {
   return box;
 }
 
+/// Boxes along the axes of the world: objects that are turned have larger boxes, so the test may refuse a pair that is apart.
 bool overlap(const Extent& a, const Extent& b) {
   return a.low_m.x < b.high_m.x && b.low_m.x < a.high_m.x && a.low_m.y < b.high_m.y && b.low_m.y < a.high_m.y &&
          a.low_m.z < b.high_m.z && b.low_m.z < a.high_m.z;

@@ -32,6 +32,7 @@ std::string visible_of(const Scene& scene) {
   return flags;
 }
 
+/// Pixels per class. Pixels without an instance are either in a shadow or of nothing.
 json pixels_of(const PingLabels& labels, const Scene& scene) {
   std::vector<std::uint64_t> by_instance(labels.visible.size() + 1);
   std::uint64_t shadow = 0;

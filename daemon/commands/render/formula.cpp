@@ -59,6 +59,8 @@ class Parser {
     at_ = text_.size();
   }
 
+  // Grammar: sum = product {(+|-) product}; product = sign {(*|/) sign}; sign = [-] sign | power; power = atom [^ sign];
+  // atom = (sum) | number | name | function(sum).
   double sum() {
     double value = product();
     for (;;) {

@@ -137,7 +137,7 @@ OutputFolder::~OutputFolder() {
 
 std::string OutputFolder::stem(std::uint64_t number) const { return (options_.folder / number_text(number)).string(); }
 
-/// The sidecar is last.
+/// The sidecar is written last, so a ping whose sidecar exists is whole.
 std::vector<path> OutputFolder::files_of(std::uint64_t number) const {
   const auto with = [&](const char* end) { return path(stem(number) + end); };
   std::vector<path> files;

@@ -54,6 +54,8 @@ bool Faults::fires(const Entry& e, std::uint32_t ping) const {
   return !at.time_s && !e.fault.on && e.begun == 0;  // at once
 }
 
+// States of a fault: it waits (not active, not over) for its trigger; `begins` is set while its delay passes; active until its
+// time or its pings are used up; then it waits again or, after its last time, is over.
 void Faults::begin(Entry& e, Time now) {
   if (e.active || e.over) return;
   // With a delay this call only sets the time; on_tick() calls again when it has come.

@@ -71,6 +71,8 @@ void Viewer::complain(const std::string& why) {
   if (++complaints_ >= most_complaints) close_ = CloseCode::policy;
 }
 
+// Each subscription gets a slot, which holds what waits for it: events in a queue of limited depth; of other channels only the
+// newest message.
 void Viewer::on_word(const foxglove::Subscribe& word, Moment) {
   for (const auto& [id, channel] : word.subscriptions) {
     const ViewChannel* const offered = host_.channel(channel);

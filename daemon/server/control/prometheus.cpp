@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-/// In labels quotes are escaped, too.
+/// The text format of Prometheus escapes \ and newlines, and in the values of labels also quotes.
 std::string escaped(std::string_view text, bool label) {
   std::string out;
   for (const char c : text) {
@@ -22,6 +22,7 @@ std::string escaped(std::string_view text, bool label) {
   return out;
 }
 
+/// Counters are written as whole numbers up to 2^53, above which a double does not hold each of them.
 std::string number(double value) {
   std::array<char, 32> text{};
   const bool whole = std::trunc(value) == value && std::abs(value) < 9007199254740992.0;
@@ -54,6 +55,7 @@ void PrometheusText::line(std::string_view suffix, const Labels& labels, const s
 
 void PrometheusText::sample(const Labels& labels, double value) { line("", labels, number(value)); }
 
+// Buckets of this format are cumulative: "le" counts all values up to its bound.
 void PrometheusText::sample(const Labels& labels, const Histogram& histogram) {
   std::uint64_t up_to = 0;
   for (std::size_t i = 0; i <= Histogram::bounds_s.size(); ++i) {

@@ -137,6 +137,7 @@ void Device::stop(const std::string& why) {
   if (!started_) streams_.clear();
 }
 
+/// True when nothing of the device uses a socket any more, so that it may be destroyed.
 bool Device::gone() const {
   return sessions_.empty() && streams_.empty() && refusing_ == 0 && !sonar_.busy() &&
          std::all_of(http_.begin(), http_.end(), [](const SonarHttp& http) { return http.gone(); });
