@@ -111,8 +111,8 @@ Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings) {
   return picture;
 }
 
-// The first part has room for 620 samples beside the header, the others for 1370, in datagrams of 1400 bytes. A longer datagram
-// has so many more samples.
+// The first part has room for 620 samples beside the header, the others for 1370, in datagrams of 1400 bytes. If
+// `longest` is larger, each part holds one more sample for each byte more.
 std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples, std::size_t longest) {
   const std::size_t more = longest - longest_datagram;
   std::vector<Bytes> parts;

@@ -23,7 +23,7 @@ std::span<const std::shared_ptr<const SonarModel>> models();
 /// Presets of the model's heads, as many as it has modes.
 std::span<const HeadPreset> head_presets(std::string_view profile);
 
-/// The preset of the performance table: 10 m in 394 rows of 25.4 mm, 512 beams, pulse 25.4 mm.
+/// The ping of benchmark P1 (docs/benchmarks.md): 10 m in 394 rows of 25.4 mm, 512 beams, pulse 25.4 mm.
 PingSettings p900_90_preset();
 
 }  // namespace sonar::blueview

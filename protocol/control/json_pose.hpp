@@ -1,5 +1,5 @@
-// Poses as JSON lines: the keys of ArduPilot's JSON simulator reply, so that a physics back-end sends us a copy of what it
-// already has. Source: ArduPilot libraries/SITL/examples/JSON (timestamp, position, attitude, quaternion, velocity).
+// Poses as JSON lines: the keys of ArduPilot's JSON simulator reply, so that a physics back-end can send a copy of what
+// it already has. Source: ArduPilot libraries/SITL/examples/JSON (timestamp, position, attitude, quaternion, velocity).
 #pragma once
 
 #include <cstddef>
@@ -25,21 +25,21 @@ Result<PoseSample> parse_json_pose(std::string_view line);
 /// Whether the line is a JSON object, with any keys; other lines belong to another protocol.
 bool is_json_object(std::string_view line);
 
-/// Cuts a byte stream into lines. A line beyond the limit is swallowed to its end and reported once. A byte order mark at the
+/// Cuts a byte stream into lines. A line beyond the limit is discarded to its end and reported once. A byte order mark at the
 /// start of the stream is skipped.
 class LineParser {
  public:
   struct Line {
     std::string text;
     bool too_long = false;
-    bool begins_object = false;  // its first sign is a brace
+    bool begins_object = false;  // its first character is a brace
   };
   void feed(std::span<const std::byte> received);
   std::optional<Line> next();
   /// A part of the stream was dropped here: the line that has begun is discarded, and the bytes up to the end of the next one.
   void skip_gap();
-  /// The line that has begun can still become a JSON object: only blanks have come of it, or its first sign is a brace. A request
-  /// line of HTTP never can.
+  /// Whether the line that has begun can become a JSON object: so far only blanks have come, or its first character is a brace. A
+  /// request line of HTTP never can.
   bool may_become_object() const;
 
  private:
@@ -47,7 +47,7 @@ class LineParser {
   std::string buffer_;     // never longer than one line and one read
   std::size_t start_ = 0;  // start of the next line
   bool swallowing_ = false;
-  bool begun_ = false;  // the stream, after its mark
+  bool begun_ = false;  // the stream has begun: a byte order mark is no longer expected
   bool in_gap_ = false;
 };
 

@@ -36,11 +36,11 @@ struct Request {
 /// Numbers of v1::Status::Code.
 enum class StatusCode { ok = 1, refused, unsupported, failed, unauthenticated };
 
-struct RefusedRequest {  // its id is known, for the Response
+struct RefusedRequest {  // a refused message, with the id that the Response repeats
   std::uint64_t id = 0;
   std::string why;
   bool pose = false;        // true for a malformed pose
-  bool is_protobuf = true;  // a Request, if a wrong one
+  bool is_protobuf = true;  // the message is a Request with a wrong content; false: it cannot be parsed
 };
 
 }  // namespace sonar::control

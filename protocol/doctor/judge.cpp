@@ -13,9 +13,9 @@ namespace {
 
 using text::format;
 
-constexpr double soon_s = 1;               // within this time a correct driver has requested pings, and reads what was sent
+constexpr double soon_s = 1;               // time in which a correct driver requests pings, and reads what was sent
 constexpr double recent_s = 60;            // visits that are longer ago are not reported
-constexpr double enough_of_rate = 0.9;     // a lower part of the requested rate is reported
+constexpr double enough_of_rate = 0.9;     // share of the requested rate below which the rate is reported
 constexpr std::size_t most_elsewhere = 4;  // connections to wrong addresses that are reported at a time
 
 std::string seconds_text(double s) { return format("%.0f s", s); }
@@ -97,7 +97,7 @@ class SonarJudge {
         past_s_(before == nullptr ? 0 : status.uptime_s() - before->uptime_s()),
         findings_(findings) {}
 
-  /// Without a driver and without pings the absence of a driver is reported, and no finding on settings and rates.
+  /// If there is no driver and no ping, only that is reported: settings and rates mean nothing then.
   void run() {
     check_places();
     if (sonar_.clients().empty() && !sonar_.pinging()) return check_absence();

@@ -34,7 +34,7 @@ struct FrameCounts {
   std::uint64_t frames = 0;        // good ones
   std::uint64_t unknown = 0;       // unsupported messages, which are skipped whole
   std::uint64_t bad_checksum = 0;  // damaged, or of a dialect that gave the number to another message
-  std::uint64_t wrong_size = 0;    // version 1 payload of another length than the message has
+  std::uint64_t wrong_size = 0;    // frames of version 1 whose payload has not the length of the message
   std::uint64_t junk_bytes = 0;    // belong to no frame
 };
 
@@ -56,7 +56,7 @@ class FrameReader {
   FrameCounts counts_;
 };
 
-/// CRC-16/MCRF4XX, which MAVLink calls X.25; `crc` carries on an earlier one.
+/// CRC-16/MCRF4XX, which MAVLink calls X.25. `crc`: the checksum of the bytes before these, if there are any.
 std::uint16_t checksum(BytesView bytes, std::uint16_t crc = 0xFFFF);
 
 /// System, component and sequence number of a sender.

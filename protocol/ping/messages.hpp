@@ -101,7 +101,7 @@ template <class M>
 Bytes framed_message(Id id, std::uint8_t source, const M& message) {
   return framed(id, source, wire::bytes_of(message));
 }
-/// Frames whose fields were changed, of the same size as `before`: their sums are made right again.
+/// Corrects the sums of frames whose fields were changed. `before`: the frames before the change, which have the same sizes.
 void reseal(BytesView before, Bytes& frames);
 Bytes ack(Id id, std::uint8_t source);
 Bytes nack(Id id, std::uint8_t source, std::string_view why);
@@ -112,10 +112,11 @@ struct Frame {
   bool sum_is_right = true;
 };
 
-/// Frames of a byte stream, however it is split. A payload stated to be longer than `longest` is no frame, and after a wrong sum
-/// the search continues behind its start. So at most one incomplete frame waits. In a datagram (`all_is_there`) no more bytes
-/// come, so the search continues behind the start of an incomplete frame. The work is proportional to the number of bytes,
-/// whatever they are: each is summed once, and the sum of a frame is a difference of two sums.
+/// Finds the frames of a byte stream, in pieces of any size. A header that states a payload longer than `longest` is not taken as
+/// a frame, and after a wrong sum the search continues behind the start of that frame. So at most one incomplete frame waits. In
+/// a datagram (`all_is_there`) no more bytes come, so the search also continues behind the start of an incomplete frame. The work
+/// is proportional to the number of bytes, also for hostile input: sums_ has the sum of all bytes up to each position, and the
+/// sum of a frame is the difference of two of them.
 class Framer {
  public:
   explicit Framer(std::size_t longest = longest_request, bool all_is_there = false)
@@ -197,7 +198,7 @@ constexpr void fields(V& visit, M& m) {
   visit("reserved", m.reserved);
 }
 
-/// Followed by `count` samples of a byte.
+/// Followed by `count` samples of one byte each.
 struct DeviceData {
   std::uint8_t mode = 1, gain = 0;
   std::uint16_t angle = 0, transmit_us = 0, period = 0, khz = 0, samples = 0, count = 0;
@@ -233,7 +234,7 @@ constexpr void fields(V& visit, M& m) {
   visit("delay", m.delay_ms);
 }
 
-/// Followed by `count` samples of a byte.
+/// Followed by `count` samples of one byte each.
 struct AutoDeviceData {
   std::uint8_t mode = 1, gain = 0;
   std::uint16_t angle = 0, transmit_us = 0, period = 0, khz = 0, start = 0, stop = 0;
