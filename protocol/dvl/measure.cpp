@@ -172,8 +172,8 @@ Measurement measure(const Ping& ping) {
   return m;
 }
 
-// unknown: the search. Without a velocity the next higher mode is tried, after the highest the lowest; with one the device keeps
-// its mode while the altitude belongs to it (docs/protocols/dvl.md, "Range modes").
+// The search of the device is unknown. Here it tries the next higher mode if it has no velocity, and after the highest the
+// lowest. With a velocity it keeps its mode while the altitude belongs to that (docs/protocols/dvl.md, "Range modes").
 int next_mode(const Measurement& measured, const Settings& settings, const Product& product) {
   if (!measured.is_valid) return settings.mode < settings.highest_mode ? settings.mode + 1 : settings.lowest_mode;
   const auto has = [&](int index) {

@@ -14,7 +14,7 @@ inline constexpr std::array<std::string_view, 15> figure_names = {
     "stamp_s", "number", "range_m", "rate_hz", "simulation_ms", "latency_ms", "clients",    "served",
     "dropped", "x",      "y",       "z",       "roll_deg",      "pitch_deg",  "heading_deg"};
 
-/// sonard_msgs/msg/SonarFigures: float64 each, by the names above.
+/// The schema of sonard_msgs/msg/SonarFigures: one float64 for each of figure_names.
 Schema figures_schema();
 wire::Bytes figures(const std::array<double, figure_names.size()>& values);
 /// The figures with another stamp_s.

@@ -32,7 +32,7 @@ SonarModel make_model() {
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(3));     // ROCK
   mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(35));  // ROCK
   mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;
-  mode.receiver.tvg_slope_db = 20;  // unknown: the law
+  mode.receiver.tvg_slope_db = 20;  // chosen: the law of the device is unknown
   mode.receiver.tvg_ceiling_db = 60;
   mode.receiver.full_scale_upa = 2e7f;
   SonarModel model;
@@ -85,7 +85,8 @@ std::string complaint(const HeadCommand& c) {
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
   const HeadCommand& c = settings.command;
-  // The device samples at intervals of time and has no setting for the sound speed. Each row lies where sound has come from.
+  // The device samples at intervals of time and has no setting for the sound speed. So each row
+  // has the range from which the sound came at the true speed.
   const double speed = true_sound_speed_mps(device.water, device.depth_m);
   PingSettings s;
   s.beam_count = 1;
@@ -129,7 +130,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     c.interval = static_cast<std::uint16_t>(std::lround(*wanted.range_m / unit_m));
     c.range_dm = static_cast<std::uint16_t>(std::lround(10 * *wanted.range_m));
   }
-  if (wanted.rate_hz) return refused("the rate of a Micron is that of its host's requests and of its head (rate_hz)");
+  if (wanted.rate_hz) return refused("a Micron has no rate_hz: it sends a scan line for each request, as fast as its head turns");
   if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) c.gain = c.gain2 = static_cast<std::uint8_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
   if (wanted.mode && *wanted.mode != 0) return refused("a Micron has one mode, 0");
@@ -140,8 +141,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   return change_to(s, device);
 }
 
-// Bearings grow clockwise from above; 3200 is ahead (ROCK, MCG). The head of an inverted sonar hangs upside down, so for it they
-// grow counter-clockwise in its own frame.
+// Bearings grow clockwise from above; 3200 is ahead (ROCK, MCG). The head of an inverted sonar hangs upside down; in its own
+// frame bearings grow counter-clockwise.
 double head_rad(const Settings& settings) {
   const double to_starboard = (settings.bearing - ahead) * 2 * pi / turn;
   return (settings.command.control & control::inverted) != 0 ? to_starboard : -to_starboard;

@@ -14,7 +14,7 @@ std::span<const std::shared_ptr<const SonarModel>> models();
 
 /// The settings that a host has made.
 struct Settings {
-  std::uint8_t id = 0;  // id of the device; unknown: its number
+  std::uint8_t id = 0;  // id of the device; its value in a new device is unknown
   OsPingParams parameters;
   float speed_mps = 1500;
   bool operator==(const Settings&) const = default;

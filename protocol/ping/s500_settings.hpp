@@ -30,9 +30,9 @@ inline Results results_of(Id id) {
 }
 
 struct Settings {
-  std::uint8_t id = 0;  // id of the device; unknown: its number
+  std::uint8_t id = 0;  // id of the device; its value in a new device is unknown
   Parameters parameters;
-  Results results = no_result;  // results for which the ping is fired; a ping without a host has its profile
+  Results results = no_result;  // results for which the ping is fired; without a host: the profile
   std::vector<Echo> earlier;    // the newest is the last
 };
 /// Compares settings without the results and the echoes, which differ from ping to ping.

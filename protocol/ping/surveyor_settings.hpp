@@ -15,7 +15,7 @@ std::span<const std::shared_ptr<const SonarModel>> models();
 
 /// The settings that a host has made.
 struct Settings {
-  std::uint8_t id = 0;  // id of the device; unknown: its number
+  std::uint8_t id = 0;  // id of the device; its value in a new device is unknown
   PingParameters parameters;
   std::optional<std::chrono::nanoseconds> utc_ahead;  // offset of the device's clock, once a host has set it
 };

@@ -35,7 +35,7 @@ class Reader {
   Scan scan_;
   std::map<std::uint16_t, Schema> schemas_;
   std::map<std::uint16_t, Channel> channels_;
-  std::uint64_t described_bytes_ = 0;  // read for those
+  std::uint64_t described_bytes_ = 0;  // bytes of the schemas and channels that were read
   Damages damages_;
   std::uint64_t chunk_end_ = 0;  // 0 = not in a chunk
   bool ended_ = false;
