@@ -95,7 +95,7 @@ std::optional<Frame> Framer::next() {
   Frame frame;
   wire::Reader reader(left.first(header_size));
   fields(reader, frame.header);
-  // The length of a broken frame cannot be trusted, so the begin of the next frame is unknown and the connection ends.
+  // The length of a broken frame cannot be trusted, so the start of the next frame is unknown and the connection ends.
   if (frame.header.magic != magic) {
     broken_ = "is not a BVE1 link: a frame has another magic number";
     return std::nullopt;

@@ -133,7 +133,7 @@ bool is_json_object(std::string_view line) {
 void LineParser::feed(std::span<const std::byte> received) {
   buffer_.erase(0, start_);  // erases all lines at once that next() has returned
   start_ = 0;
-  if (in_gap_) {  // the rest of a line whose begin was lost
+  if (in_gap_) {  // the rest of a line whose start was lost
     const auto end = std::find(received.begin(), received.end(), std::byte{'\n'});
     if (end == received.end()) return;
     received = received.subspan(static_cast<std::size_t>(end - received.begin()) + 1);

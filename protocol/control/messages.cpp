@@ -45,7 +45,7 @@ std::optional<std::string> find_first(const Message& message, const std::string&
   return std::nullopt;
 }
 
-/// Length of the UTF-8 character at the begin of `rest`. 0: it is not well-formed (Unicode 15, table 3-7).
+/// Length of the UTF-8 character at the start of `rest`. 0: it is not well-formed (Unicode 15, table 3-7).
 std::size_t utf8_length(std::string_view rest) {
   const auto at = [&](std::size_t i) { return i < rest.size() ? static_cast<unsigned char>(rest[i]) : 0u; };
   const auto follows = [&](std::size_t i, unsigned low = 0x80, unsigned high = 0xbf) { return at(i) >= low && at(i) <= high; };

@@ -69,7 +69,7 @@ struct DataFront {
   float sound_speed_mps = 0;
   std::uint32_t samples = 0;        // of each beam
   float near_m = 0, far_m = 0;      // limits of the mode
-  float start_s = 0, length_s = 0;  // of the sampling window; `start_s` counts from the begin of the ping
+  float start_s = 0, length_s = 0;  // of the sampling window; `start_s` counts from the start of the ping
   std::uint16_t beams = 0, processing = 0;
 };
 template <class V, wire::Like<DataFront> M>
@@ -117,7 +117,7 @@ struct DataBack {
   std::array<float, 3> offset_m{}, rotation_deg{};  // of the head: x to starboard, y ahead, z up
   std::uint32_t mounting = 0;                       // looks ahead
   double latitude_deg = 0, longitude_deg = 0;
-  float transmit_s = 0;  // of the pulse's begin, from the begin of the ping
+  float transmit_s = 0;  // of the pulse's start, from the start of the ping
   std::uint8_t head_sensors = 1, head_status = 0, sound_speed_source = 1, time_mode = 1;
   float own_heading_deg = 0, own_pitch_deg = 0, own_roll_deg = 0;
   std::array<RotatorOffset, 3> rotators{};

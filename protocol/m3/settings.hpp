@@ -29,7 +29,7 @@ inline Settings settings_from(const VendorSettings* held) { return protocol::set
 /// The near range that the program sets for a far range.
 double near_of(double far_m);
 
-/// When the receiver samples; `start_s` counts from the pulse's begin.
+/// When the receiver samples; `start_s` counts from the pulse's start.
 struct Window {
   double start_s = 0, interval_s = 0;
   int samples = 0, pulse_us = 0;

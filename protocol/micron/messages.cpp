@@ -36,7 +36,7 @@ bool is_known(Id id) {
 }
 
 /// Length of the frame with this header. A frame states its length twice, as digits and as a number. Both have to agree, so that
-/// bytes of an image that look like the begin of a frame are seldom taken for one.
+/// bytes of an image that look like the start of a frame are seldom taken for one.
 std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
   const auto header = read_front<Header>(bytes);
   if (!header || header->hex_length != digits_of(header->length) || (strict && !is_known(header->id))) return std::nullopt;

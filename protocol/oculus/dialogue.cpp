@@ -174,7 +174,7 @@ class OculusDialogue final : public protocol::Dialogue {
   const DeviceState& device_;
   Framer framer_{Sender::client};
   protocol::Bytes last_request_;
-  protocol::StoredAddress stored_;  // the device's, read at the begin of each call, and changed by writes in it
+  protocol::StoredAddress stored_;  // the device's, read at the start of each call, and changed by writes in it
   Time dummy_at_{};
   std::shared_ptr<const VendorSettings> fired_;  // settings of the last fire message
   bool is_heard_ = false;                        // the device has used settings of this client at some time

@@ -47,7 +47,7 @@ std::optional<wire::BytesView> Framer::next() {
   while (buffered_bytes() > 0) {
     const auto waiting = wire::BytesView(buffer_).subspan(begin_);
     const bool starts_like_header = waiting[0] == first_magic && (waiting.size() < 2 || waiting[1] == second_magic);
-    // These bytes may be the begin of a header; its rest has not arrived.
+    // These bytes may be the start of a header; its rest has not arrived.
     if (starts_like_header && waiting.size() < header_size) return std::nullopt;
     const auto length = starts_like_header ? message_length(header_of(waiting), sender_) : std::nullopt;
     if (length) {

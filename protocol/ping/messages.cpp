@@ -97,7 +97,7 @@ std::optional<Frame> Framer::next() {
     std::uint16_t stated = 0;
     wire::Reader behind(left.subspan(summed));
     behind("checksum", stated);
-    // The sum of the frame is the difference of two sums from the begin of the buffer, so no byte is added twice.
+    // The sum of the frame is the difference of two sums from the start of the buffer, so no byte is added twice.
     frame.sum_is_right = stated == static_cast<std::uint16_t>(sums_[begin_ + summed] - sums_[begin_]);
     if (frame.sum_is_right) {
       const BytesView payload = left.subspan(header_size, frame.header.length);

@@ -55,7 +55,7 @@ class PingLogReader final : public RecordingReader {
  public:
   explicit PingLogReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
 
-  /// The next frame. Frames without a time of their own get that of the frame before. The JSON text at the begin is no message
+  /// The next frame. Frames without a time of their own get that of the frame before. The JSON text at the start is no message
   /// of the device and is left out.
   std::optional<RecordedMessage> next() override {
     while (const auto frame = next_frame()) {

@@ -54,7 +54,7 @@ std::optional<Message> Reader::next() {
 }
 
 /// Reads one record, which ends before `end`, and returns its message if it is one. After damage inside a chunk the rest of the
-/// chunk is skipped; outside of chunks damage ends the reading, because the begin of the next record is unknown.
+/// chunk is skipped; outside of chunks damage ends the reading, because the start of the next record is unknown.
 std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   const std::uint64_t at = scan_.position();
   const auto give_up = [&](std::string why) {

@@ -177,7 +177,7 @@ class PcapReader final : public RecordingReader {
       take(Origin::device);
   }
 
-  /// Adds a segment to its connection. A SYN with another number on the same ports begins a new one. A connection whose begin
+  /// Adds a segment to its connection. A SYN with another number on the same ports begins a new one. A connection whose start
   /// is not in the capture begins with its first bytes.
   void add(Time at, const Segment& segment, const IpEnd& client, Origin from) {
     const bool syn = (segment.flags & tcp_flag::syn) != 0;
@@ -236,7 +236,7 @@ class PcapReader final : public RecordingReader {
     MessageSplitter& splitter = from == Origin::device ? connection.device : connection.client;
     while (const auto run = stream_of(connection, from).next()) {
       const std::uint64_t lost = splitter.lost_bytes();
-      // After a gap, or at the begin of a capture, the bytes may lie within a message.
+      // After a gap, or at the start of a capture, the bytes may lie within a message.
       if (run->missing_before > 0 || run->from_middle) splitter.break_off();
       splitter.append(run->at, run->bytes);
       while (auto message = splitter.next()) ready_.push_back(std::move(*message));
