@@ -13,7 +13,7 @@ class DaemonStatus;
 namespace sonar::doctor {
 
 inline constexpr const char* less_to_compute =
-    "fewer beams, less range, more threads (engine.threads), or less else on this computer";
+    "fewer beams, less range, more threads (engine.threads), or fewer other programs on this computer";
 inline constexpr const char* free_a_place = "stop the other client, or raise clients.max of the sonar";
 
 /// A text such as "computing takes 138 ms per ping: 7.2 Hz at most here".

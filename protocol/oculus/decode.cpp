@@ -120,7 +120,7 @@ Received decode_message(wire::BytesView message) {
       return log;
     }
     default:
-      return unreadable(header, message.size(), "a message type drivers do not read");
+      return unreadable(header, message.size(), "a message type that drivers do not read");
   }
 }
 

@@ -12,7 +12,7 @@ namespace means = protocol::means;
 
 inline constexpr std::uint16_t magic = 0x4F53;  // bytes 53 4F
 inline constexpr std::uint16_t tcp_port = 52100, status_port = 52102;
-inline constexpr std::uint32_t image_offset = 2048;           // capture; past both bearing tables
+inline constexpr std::uint32_t image_offset = 2048;  // from captures; in both versions it is behind the table of bearings
 inline constexpr std::uint32_t request_payload_limit = 4096;  // a client's larger payload size is junk
 inline constexpr std::size_t reply_limit = 4u << 20;  // a device's longer message is junk: the largest real ping has 1.5 MB
 
@@ -40,8 +40,8 @@ struct MessageHeader {
   std::uint16_t oculus_id = magic, source = 0, destination = 0;
   MessageType type{};
   std::uint16_t version = 0;
-  std::uint32_t payload_size = 0;  // from clients unreliable, often 0
-  std::uint16_t part_number = 0;   // 0 but in the status message
+  std::uint32_t payload_size = 0;  // unreliable in messages of clients, which often send 0
+  std::uint16_t part_number = 0;   // 0 except in the status message
 };
 template <class V, wire::Like<MessageHeader> M>
 constexpr void fields(V& visit, M& m) {

@@ -1,4 +1,4 @@
-// A host's conversation with a Ping360: it turns the head, and has a ping fired when that has arrived.
+// A host's conversation with a Ping360: each request turns the head, and the ping is fired when the head has arrived.
 #pragma once
 
 #include <memory>

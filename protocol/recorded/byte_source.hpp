@@ -35,16 +35,16 @@ class Sink {
   /// All or nothing: a partial write on a full disk is undone, so that the file ends with a whole record. io; then every later
   /// call fails the same way.
   virtual Result<void> append(BytesView record) = 0;
-  /// Replaces bytes that were appended before. io.
+  /// Replaces bytes that were appended before. Errors: io.
   virtual Result<void> overwrite(std::uint64_t offset, BytesView bytes) = 0;
   /// After a failure: one more record may be tried, a smaller one.
   virtual void try_again() {}
-  /// Late errors of the file system. io.
+  /// Late errors of the file system. Errors: io.
   virtual Result<void> close() = 0;
 };
-/// Creates the file, or empties an existing one. io.
+/// Creates the file, or empties an existing one. Errors: io.
 Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file);
-/// Creates a new file; an existing one is an error and stays unchanged. io.
+/// Creates a new file; an existing one is an error and stays unchanged. Errors: io.
 Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file);
 /// Appends to `bytes`, which must outlive it.
 std::unique_ptr<Sink> sink_into(Bytes& bytes);

@@ -29,13 +29,14 @@ class RecordingReader {
   virtual ~RecordingReader() = default;
   /// nullopt at the end.
   virtual std::optional<RecordedMessage> next() = 0;
-  /// One sentence of kind bad_data on what could not be read so far, and where. Complete once next() returned nullopt.
+  /// An error of kind bad_data whose text names the first damage and counts the others. It is complete once next() has returned
+  /// nullopt.
   virtual std::optional<Error> damage() const = 0;
   /// Starts again from the front and forgets the damage.
   virtual void rewind() = 0;
   /// False when the format stores no times: all are 0.
   virtual bool knows_times() const { return true; }
-  /// Names what of the recording was skipped (other sonars in the same file); empty when nothing was.
+  /// Names the parts of the recording that were skipped, such as other sonars in the same file; empty: nothing was skipped.
   virtual std::string note() const { return {}; }
 };
 
@@ -44,7 +45,7 @@ class RecordingWriter {
   virtual ~RecordingWriter() = default;
   /// Times must not decrease. After an error (io) the file stays as it was before this message, and later calls write nothing.
   virtual Result<void> write(const RecordedMessage& message) = 0;
-  /// Finishes and closes the file. io.
+  /// Finishes and closes the file. Errors are of kind io.
   virtual Result<void> close() = 0;
 };
 

@@ -20,7 +20,7 @@ class Writer {
   /// Messages of a channel are numbered from 0. io: later calls fail; the file stays readable.
   Result<void> write(std::uint16_t channel, Time at, BytesView data);
   /// Ends the last chunk, adds summary and footer, closes. After an error of write(): tries to add those of the
-  /// chunks in the file, and returns the first error. io.
+  /// chunks in the file, and returns the first error. Errors: io.
   Result<void> close();
 
  private:
