@@ -64,7 +64,8 @@ class Damages {
   const std::string& first() const { return first_; }
   std::optional<Error> error(const std::string& file) const {
     if (count_ == 0) return std::nullopt;
-    const std::string others = count_ == 1 ? "" : "; " + std::to_string(count_ - 1) + " more such places";
+    const std::string others =
+        count_ == 1 ? "" : "; " + std::to_string(count_ - 1) + (count_ == 2 ? " more such place" : " more such places");
     return Error{ErrorKind::bad_data, file + ": " + first_ + others};
   }
 

@@ -306,7 +306,7 @@ TEST(CaptureFiles, Pcapng) {
   const Told told = read(damaged);
   EXPECT_EQ(told.stream, ping_message(2)) << "only what it belongs to is lost";
   EXPECT_THAT(told.damage, HasSubstr("begins within a message"));
-  EXPECT_THAT(told.damage, HasSubstr("; 1 more such places"));
+  EXPECT_THAT(told.damage, HasSubstr("; 1 more such place"));
   for (std::size_t size = 12; size < file.size(); size += 7)
     static_cast<void>(read({file.begin(), file.begin() + static_cast<std::ptrdiff_t>(size)}));
 }

@@ -87,7 +87,7 @@ TEST(PingLog, CutOrDamagedSaysWhere) {
   EXPECT_EQ(read.damage, bytes(text + 64, text + 109));
   file[text + 2] = std::byte{0xFF};  // a length beyond the end hides nothing
   file[text + 3] = std::byte{0xFF};
-  EXPECT_EQ(read_back(file).damage, bytes(text, text + 45) + "; 1 more such places");
+  EXPECT_EQ(read_back(file).damage, bytes(text, text + 45) + "; 1 more such place");
   EXPECT_THAT(read_back(Bytes(3, std::byte{'B'})).damage, ::testing::HasSubstr("is not a recording"));
   EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "one sonar without a name";
 }

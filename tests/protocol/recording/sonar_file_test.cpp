@@ -81,7 +81,7 @@ TEST(SonarFile, DamagedSaysWhereAndGoesOn) {
   EXPECT_EQ(read.packets.size(), 5u) << "the next one is found, whatever length this one states";
   read = read_back(joined({shots[0], Bytes(100, std::byte{'R'}), shots[1], Bytes(3, std::byte{0})}));
   EXPECT_EQ(read.packets.size(), 4u);
-  EXPECT_EQ(read.damage, "f: no packet begins at byte " + second + "; 1 more such places");
+  EXPECT_EQ(read.damage, "f: no packet begins at byte " + second + "; 1 more such place");
   EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "one sonar without a name";
 }
 
