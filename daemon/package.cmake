@@ -41,7 +41,8 @@ install(FILES docs/protocols/blueview-link.md DESTINATION ${CMAKE_INSTALL_DATADI
 install(FILES scenes/sonard.yaml scenes/sonard-blueview.yaml scenes/sonard-aris.yaml scenes/sonard-3d15.yaml scenes/sonard-ping360.yaml
   scenes/sonard-surveyor.yaml scenes/sonard-omniscan.yaml scenes/sonard-ping1d.yaml
   scenes/sonard-s500.yaml
-  scenes/sonard-dvl.yaml scenes/sonard-m3.yaml scenes/sonard-micron.yaml scenes/sonard-suite.yaml DESTINATION ${documents}/examples COMPONENT sonard)
+  scenes/sonard-dvl.yaml scenes/sonard-m3.yaml scenes/sonard-micron.yaml scenes/sonard-norbit.yaml scenes/sonard-suite.yaml
+  DESTINATION ${documents}/examples COMPONENT sonard)
 install(FILES README.md CONTRIBUTING.md LICENSE DESTINATION ${documents} COMPONENT sonard)
 install(DIRECTORY tests/judge DESTINATION ${documents}/tests COMPONENT sonard PATTERN "__pycache__" EXCLUDE)  # examples of docs/judge.md
 install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT sonard PATTERN "man" EXCLUDE PATTERN "__pycache__" EXCLUDE)
@@ -51,6 +52,7 @@ install(FILES protocol/waterlinked/README.md DESTINATION ${documents}/protocol/w
 install(FILES protocol/dvl/README.md DESTINATION ${documents}/protocol/dvl COMPONENT sonard)
 install(FILES protocol/m3/README.md DESTINATION ${documents}/protocol/m3 COMPONENT sonard)
 install(FILES protocol/micron/README.md DESTINATION ${documents}/protocol/micron COMPONENT sonard)
+install(FILES protocol/norbit/README.md DESTINATION ${documents}/protocol/norbit COMPONENT sonard)
 install(FILES protocol/ping/README.md DESTINATION ${documents}/protocol/ping COMPONENT sonard)
 install(FILES protocol/control/control.proto DESTINATION ${CMAKE_INSTALL_DATADIR}/sonard/protocol/control COMPONENT sonard)
 # What pages link to beyond the documents is installed below share/sonard; symbolic links lead there from where it lies in the
@@ -110,8 +112,8 @@ set(CPACK_COMPONENT_SONARD_DESCRIPTION "emulates imaging sonars on the network, 
 sonard holds a 3D scene, takes the pose of a vehicle, computes what a
 multibeam sonar would hear, and serves it as an Oculus, a BlueView sonar, an
 ARIS, a Sonar 3D-15, a Ping360, a Surveyor, an Omniscan, a Ping1D, an S500, a
-DVL, an M3 or a Micron: drivers written for the real device connect unchanged,
-those of BlueView with libraries of sonard's. With sonarctl, which listens to,
+DVL, an M3, a Micron or a Norbit: drivers written for the real device connect
+unchanged, those of BlueView with libraries of sonard's. With sonarctl, which listens to,
 looks at and steers sonars, and with a systemd unit, which is not started by
 the installation.")
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_NAME sonard-bvtsdk)

@@ -9,6 +9,8 @@
 #include "protocol/m3/m3.hpp"
 #include "protocol/micron/host.hpp"
 #include "protocol/micron/micron.hpp"
+#include "protocol/norbit/host.hpp"
+#include "protocol/norbit/norbit.hpp"
 #include "protocol/oculus/host.hpp"
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/ping/host.hpp"
@@ -150,6 +152,15 @@ std::vector<Make> product_makes() {
        .own_numbers = true,
        .scans = true,
        .picture = PictureKind::sweep},
+      {.device = &norbit::vendor(),
+       .title = "a Norbit",
+       .request = "command",
+       .remedy = "send set_power 1 to port 2209",
+       .ports = norbit::host_ports,
+       .host = norbit::make_host,
+       .codec = norbit::codec(),
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
+       .picture = PictureKind::points},
   };
 }
 

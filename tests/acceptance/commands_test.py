@@ -80,7 +80,7 @@ class Mistakes(unittest.TestCase):
                  (["run", "a.yaml", "b.yaml"], 'unexpected argument "b.yaml"'),
                  (["run", "--clock"], "--clock: 1 required"),
                  (["--demo", "my.yaml"], "--demo runs the built-in demo, not my.yaml"),
-                 (["--demo=maybe"], 'there is no demo "maybe"; there are oculus, blueview, aris, 3d15, ping360, surveyor, omniscan, ping1d, s500, dvl, m3, micron, and'),
+                 (["--demo=maybe"], 'there is no demo "maybe"; there are oculus, blueview, aris, 3d15, ping360, surveyor, omniscan, ping1d, s500, dvl, m3, micron, norbit, and'),
                  (["--profile", "blueview-p900"], "--profile: unknown profile 'blueview-p900'", "oculus-m370s", "blueview-mb2250-90"),
                  (["chekc"], 'no command or file "chekc"; did you mean "check"?'),
                  (["check"], "sonard: config is required: the configuration file", "sonard check --help"),

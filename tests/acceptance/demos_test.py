@@ -21,7 +21,7 @@ HTTP, SONAR = "127.0.0.1", "127.0.0.2"
 DEMOS = {"oculus": ("fan", 1, 52100), "blueview": ("fan", 1, 14750), "aris": ("fan", 1, 56888), "3d15": ("range image", 1, 80),
          "ping360": ("sweep", 200, 12345), "surveyor": ("points", 1, 62312), "omniscan": ("waterfall", 20, 51200),
          "ping1d": ("waterfall", 20, 9090), "s500": ("waterfall", 20, 51200), "dvl": ("waterfall", 20, 16171), "m3": ("fan", 1, 20001),
-         "micron": ("sweep", 200, 4001)}
+         "micron": ("sweep", 200, 4001), "norbit": ("points", 1, 2210)}
 MOST_NOISE = 0.95        # of samples that are noise lie below what counts as an echo
 LEAST_ECHOES = 0.2
 

@@ -67,7 +67,7 @@ class ExampleMake(unittest.TestCase):
     def test_the_demo_has_it(self):
         self.assertIn("example", run(SONARD, "--help").stdout)
         refused = run(SONARD, "--demo", "none").stderr
-        self.assertIn("ping1d, s500, dvl, m3, micron, example, and --profile NAME", refused)
+        self.assertIn("ping1d, s500, dvl, m3, micron, norbit, example, and --profile NAME", refused)
 
 
 if __name__ == "__main__":

@@ -32,7 +32,8 @@ MAKES = {"oculus-m1200d": (52100, "--range", 3, "--gain", 60, "--rate", 5, "--mo
          "s500": (51200, "--make", "s500", "--range", 3, "--gain", 60, "--rate", 5),
          "dvl-a50": (16171, "--as-it-is"),  # it pings before settings come
          "m3": (20001, "--as-it-is"),  # no settings come
-         "micron": (4001, "--range", 3, "--gain", 60)}
+         "micron": (4001, "--range", 3, "--gain", 60),
+         "norbit-wbms": (2209, "--range", 3, "--gain", 60, "--rate", 5)}
 PINGS = 4
 LONGEST_BEACON = 142  # bytes; beacons hold the address, which differs from run to run
 PATIENCE = ("--wait", 120)
@@ -140,7 +141,7 @@ class Recordings(unittest.TestCase):
                 self.assertEqual(len(shown), 1, "the same of every file")
                 for kind in kinds:
                     with self.subTest(profile=profile, kind=kind):
-                        self.replay(folder / f"run.{kind}", port, profile in ("blueview-p900-90", "ping360", "micron"))
+                        self.replay(folder / f"run.{kind}", port, profile in ("blueview-p900-90", "ping360", "micron", "norbit-wbms"))
 
     def replay(self, path, port, depends_on_requests):
         """`sonarctl listen` of `sonard replay`."""

@@ -22,7 +22,7 @@ WANTED = {
                DOCUMENTS + "examples/sonard.yaml", DOCUMENTS + "examples/sonard-blueview.yaml",
                DOCUMENTS + "examples/sonard-aris.yaml", DOCUMENTS + "examples/sonard-3d15.yaml",
                DOCUMENTS + "examples/sonard-ping360.yaml", DOCUMENTS + "examples/sonard-surveyor.yaml",
-               DOCUMENTS + "examples/sonard-omniscan.yaml", DOCUMENTS + "examples/sonard-ping1d.yaml", DOCUMENTS + "examples/sonard-s500.yaml", DOCUMENTS + "examples/sonard-micron.yaml",
+               DOCUMENTS + "examples/sonard-omniscan.yaml", DOCUMENTS + "examples/sonard-ping1d.yaml", DOCUMENTS + "examples/sonard-s500.yaml", DOCUMENTS + "examples/sonard-micron.yaml", DOCUMENTS + "examples/sonard-norbit.yaml",
                DOCUMENTS + "examples/sonard-dvl.yaml",
                DOCUMENTS + "examples/sonard-m3.yaml", DOCUMENTS + "examples/sonard-suite.yaml",
                "usr/share/sonard/python/sonard_client/__init__.py",

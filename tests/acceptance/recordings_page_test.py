@@ -91,7 +91,7 @@ class Recordings(PageChecks, unittest.TestCase):
                     self.assertIn("open      http://127.0.0.1:8088", replay.text())
                     with urllib.request.urlopen("http://127.0.0.1:8088/healthz", timeout=PATIENCE_S) as answer:  # doctor asks for it
                         self.assertEqual(answer.read(), b"ok\n")
-                    if maker not in ("blueview", "ping360", "micron"):
+                    if maker not in ("blueview", "ping360", "micron", "norbit"):
                         done = run(SONARCTL, "listen", f"{replay.address}:{port}", "--quiet", "--pings", 2)
                         self.assertIn("pings 2", done.stdout, "the driver is served beside it: " + done.stderr)
 

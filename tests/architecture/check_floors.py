@@ -31,7 +31,7 @@ FLOORS = {
     "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/", "protocol/host.hpp"],
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
     **{f"protocol/{make}": [*DEVICE, f"protocol/{make}/"]
-       for make in ("aris", "blueview", "dvl", "m3", "micron", "oculus", "ping", "waterlinked")},
+       for make in ("aris", "blueview", "dvl", "m3", "micron", "norbit", "oculus", "ping", "waterlinked")},
     "protocol/recorded": ["core/base/", "core/sonar/", "protocol/wire/", "protocol/recorded/"],
     "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/sender.hpp",
                            "protocol/wire/", "protocol/recorded/", "protocol/recording/"],
@@ -117,8 +117,8 @@ FORBIDDEN = [
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]
 # A make of sonar is its folder and a line of makes.cpp; these files still name one. The list only gets shorter.
-MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|\bs500|surveyor|omniscan|3d-?15|protocol/ping/|\bping::|dvl-a|protocol/dvl/|\bdvl::|\bmicron", re.I)
-MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl|micron)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|clients/python/sonard_client/judge/makes/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
+MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|\bs500|surveyor|omniscan|3d-?15|protocol/ping/|\bping::|dvl-a|protocol/dvl/|\bdvl::|\bmicron|\bnorbit", re.I)
+MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl|micron|norbit)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|clients/python/sonard_client/judge/makes/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
 NAME_MAKES = {
     "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py",
     "clients/python/sonard_client/judge/cases.py",

@@ -154,7 +154,7 @@ TEST(Doctor, NamesWhatOtherNetworksDoNotPass) {
   expect(line(behind_a_router("blueview"), "network"), Level::warn, "(searches at udp 14751)",
          "give the driver the address 192.0.2.7");
   expect(line(behind_a_router("ping360"), "network"), Level::warn, "(searches at udp 30303)", "the address 192.0.2.7");
-  for (const char* of_unicast : {"surveyor240", "omniscan450", "ping1d", "s500", "dvl", "m3", "micron"})
+  for (const char* of_unicast : {"surveyor240", "omniscan450", "ping1d", "s500", "dvl", "m3", "micron", "norbit"})
     EXPECT_THAT(text_from(run_checks(behind_a_router(of_unicast))), Not(HasSubstr("another network")));
   Facts facts = behind_a_router("oculus");
   facts.status.received.push_back(received("192.0.2.7"));  // it does pass

@@ -10,6 +10,7 @@
 #include "daemon/emulator/sonar/sonar.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
 #include "protocol/host.hpp"
+#include "tests/protocol/stream_ports.hpp"
 
 namespace sonar::host_link {
 
@@ -38,7 +39,7 @@ inline SonarConfig sonar_of(const Make& make) {
   sonar.profile = {make.device, make.device->models().front()};
   sonar.device_id = 7001;
   sonar.options = *protocol::check_options(*make.device, {});
-  sonar.max_clients = 1;
+  sonar.max_clients = std::max(1, static_cast<int>(protocol::test::conversations_of(make).size()));
   return sonar;
 }
 
@@ -67,8 +68,7 @@ class Link {
         streams_.push_back(++last_id_);
         perform(sonar.open_stream(last_id_, port, now_));
       }
-    const bool by_udp = make.ports.front().kind == protocol::HostPort::Kind::udp;
-    port_ = make.device->port(by_udp ? Kind::udp_dialogue : Kind::tcp_stream);
+    for (const auto& [at, port] : protocol::test::conversations_of(make)) lines_.push_back({at, port});
     if (!make.host(wanted()))
       if (auto changed = sonar.change(wanted().settings, "the test", now_)) perform(*std::move(changed));
     connect();
@@ -93,7 +93,7 @@ class Link {
   }
   /// Bytes of any kind from the driver, and to it.
   void to_sonar(protocol::BytesView bytes) {
-    if (id_ != 0 && served_) perform(sonar.on_bytes(id_, bytes, now_));
+    if (!lines_.empty()) send(0, bytes);
     drain();
   }
   void to_host(std::size_t port, protocol::BytesView bytes) {
@@ -137,25 +137,49 @@ class Link {
     drain();
   }
 
+  /// A connection, or the conversation by datagrams.
+  struct Line {
+    std::size_t host_port = 0;
+    const protocol::Port* port = nullptr;
+    ConnectionId id = 0;
+    bool served = false;
+  };
+  Line* line_of(ConnectionId id) {
+    const auto found = std::ranges::find(lines_, id, &Line::id);
+    return id == 0 || found == lines_.end() ? nullptr : &*found;
+  }
+  void close() {
+    for (Line& line : lines_) {
+      line.served = false;
+      if (line.id != 0) perform(sonar.on_closed(std::exchange(line.id, 0), "closed by the client", now_, true));
+    }
+  }
+
   void connect() {
-    if (id_ != 0) perform(sonar.on_closed(std::exchange(id_, 0), "closed by the client", now_, true));
+    close();
     auto host = make_.host(wanted());
     host_ = host ? *std::move(host) : *make_.host({});  // drivers of some set nothing
-    lost_ = served_ = false;
+    lost_ = false;
     last_sign_ = now_;
-    if (port_ != nullptr) {
-      if (!listens_ && port_->kind == protocol::Port::Kind::tcp_stream) return;
-      id_ = ++last_id_;
-      perform(sonar.on_connect(id_, Role::client, {"driver", {127, 0, 0, 1}}, now_, port_));
-      if (id_ == 0) return;
+    for (Line& line : lines_) {
+      if (!listens_ && line.port->kind == protocol::Port::Kind::tcp_stream) return;
+      line.id = ++last_id_;
+      perform(sonar.on_connect(line.id, Role::client, {"driver", {127, 0, 0, 1}}, now_, line.port));
+      if (line.id == 0) return;
     }
     carry_out(host_->on_open(std::vector<std::uint16_t>(make_.ports.size(), 40000), now_));
+  }
+
+  void send(std::size_t host_port, protocol::BytesView bytes) {
+    for (std::size_t i = 0; i < lines_.size(); ++i)
+      if (lines_[i].host_port == host_port && lines_[i].id != 0 && lines_[i].served)
+        perform(sonar.on_bytes(lines_[i].id, bytes, now_));
   }
 
   void carry_out(protocol::HostActions actions) {
     for (protocol::HostAction& action : actions) {
       if (const auto* send = std::get_if<protocol::HostSend>(&action)) {
-        if (id_ != 0 && served_) perform(sonar.on_bytes(id_, send->bytes, now_));
+        this->send(send->port, send->bytes);
       } else if (const auto* ask = std::get_if<protocol::ResourceRequest>(&action)) {
         auto answer = sonar.on_http(*make_.device->port(protocol::Port::Kind::http), *ask, now_);
         perform(std::move(answer.actions));
@@ -170,8 +194,9 @@ class Link {
   }
 
   void lose(ConnectionId id) {
-    if (id != id_) return;
-    id_ = 0;
+    Line* const line = line_of(id);
+    if (line == nullptr) return;
+    line->id = 0;
     lost_ = true;
     perform(sonar.on_closed(id, "ended", now_));
   }
@@ -181,9 +206,9 @@ class Link {
       if (auto* compute = std::get_if<ComputePing>(&action)) {
         perform(sonar.on_ping({.ping = computed(std::move(compute->request)), .seconds = 1e-3}, now_));
       } else if (const auto* serve = std::get_if<Serve>(&action)) {
-        served_ = served_ || serve->connection == id_;
+        if (Line* const line = line_of(serve->connection)) line->served = true;
       } else if (const auto* away = std::get_if<Refuse>(&action)) {
-        if (away->connection == id_) id_ = 0, lost_ = true;
+        if (Line* const line = line_of(away->connection)) line->id = 0, lost_ = true;
       } else if (const auto* finish = std::get_if<Finish>(&action)) {
         finished_.push_back(finish->connection);
       } else if (const auto* reset = std::get_if<Reset>(&action)) {
@@ -199,7 +224,8 @@ class Link {
   /// Writes all that waits, to the host.
   void drain() {
     std::vector<ConnectionId> ids = streams_;
-    if (id_ != 0 && served_) ids.push_back(id_);
+    for (const Line& line : lines_)
+      if (line.id != 0 && line.served) ids.push_back(line.id);
     for (const ConnectionId id : ids)
       while (sonar.connections().find(id) != nullptr) {
         const Outbox::Message message = sonar.next_message(id, now_);
@@ -217,18 +243,19 @@ class Link {
     }
     if (message.datagrams == nullptr) sonar.on_sent(id, message.size());
     sonar.on_written(id, message, now_);
-    const bool to_all = message.datagrams != nullptr && id != id_;
+    const Line* const line = line_of(id);
+    const bool to_all = message.datagrams != nullptr && line == nullptr;
+    const std::size_t host_port = to_all || line == nullptr ? make_.ports.size() - 1 : line->host_port;
     for (const Bytes& piece : pieces)
-      if (!lost_ && !(to_all && sonar.receivers(id).empty()))
-        carry_out(host_->on_bytes(to_all ? make_.ports.size() - 1 : 0, piece, now_));
+      if (!lost_ && !(to_all && sonar.receivers(id).empty())) carry_out(host_->on_bytes(host_port, piece, now_));
     if (message.shape != nullptr && message.shape->end != Outbox::Shape::End::none) lose(id);
   }
 
-  const protocol::Port* port_ = nullptr;
   std::unique_ptr<protocol::Host> host_;
   std::vector<ConnectionId> streams_, finished_;
-  ConnectionId id_ = 0, last_id_ = 0;
-  bool served_ = false, lost_ = false, listens_ = true;
+  std::vector<Line> lines_;
+  ConnectionId last_id_ = 0;
+  bool lost_ = false, listens_ = true;
   Time last_sign_ = start;
 };
 

@@ -16,6 +16,7 @@
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/recording/recording.hpp"
+#include "tests/protocol/stream_ports.hpp"
 
 namespace sonar::protocol::hosts_test {
 namespace {
@@ -61,9 +62,7 @@ class Talk {
     state.settings = first.vendor_settings;
     settings = first.settings;
     if (sets_nothing(of)) apply({*device.apply_override(wanted.settings, state)});
-    port_ = device.port(Port::Kind::tcp_stream);
-    if (make.ports.front().kind == HostPort::Kind::udp) port_ = device.port(Port::Kind::udp_dialogue);
-    if (port_ != nullptr) dialogue_ = device.converse(*port_, state, now);
+    for (const auto& [at, port] : test::conversations_of(make)) lines_.push_back({at, port, device.converse(*port, state, now)});
     const std::vector<std::uint16_t> own(make.ports.size(), 40000);
     carry_out(host->on_open(own, now));
   }
@@ -72,7 +71,8 @@ class Talk {
   void run(int steps) {
     for (int i = 0; i < steps && !error; ++i) {
       now += 100ms;
-      while (dialogue_ && dialogue_->next_tick() <= now) react(dialogue_->on_tick(now, false));
+      for (Line& line : lines_)
+        while (line.dialogue->next_tick() <= now) react(line, line.dialogue->on_tick(now, false));
       carry_out(host->on_tick(now));
       carry_out(host->on_demand(now));
       const bool by_request = make.each_ping_requested || make.scans;
@@ -84,8 +84,9 @@ class Talk {
   void carry_out(HostActions actions) {
     for (HostAction& action : actions) {
       if (const auto* send = std::get_if<HostSend>(&action)) {
-        ASSERT_TRUE(dialogue_) << "bytes for a port without a conversation";
-        in_pieces(send->port, send->bytes, [this](BytesView part) { react(dialogue_->on_bytes(part, now)); });
+        const auto line = std::ranges::find(lines_, send->port, &Line::host_port);
+        ASSERT_NE(line, lines_.end()) << "bytes for a port without a conversation";
+        in_pieces(send->port, send->bytes, [&](BytesView part) { react(*line, line->dialogue->on_bytes(part, now)); });
       } else if (const auto* ask = std::get_if<ResourceRequest>(&action)) {
         const ResourceReply reply = device.on_http(*device.port(Port::Kind::http), *ask, state, now);
         apply(reply.events);
@@ -112,8 +113,13 @@ class Talk {
   double head_rad = 0;     // head angle of the request before
 
  private:
-  void react(const Reaction& reaction) {
-    for (const Bytes& reply : reaction.replies) deliver(0, reply);
+  struct Line {
+    std::size_t host_port;
+    const Port* port;
+    std::unique_ptr<Dialogue> dialogue;
+  };
+  void react(const Line& line, const Reaction& reaction) {
+    for (const Bytes& reply : reaction.replies) deliver(line.host_port, reply);
     apply(reaction.events);
   }
   void apply(const std::vector<Event>& events) {
@@ -159,25 +165,27 @@ class Talk {
       const std::size_t row = i / sample_bytes / beams, beam = i / sample_bytes % beams;
       made.samples[i] = static_cast<std::byte>(row % 16 == 8 && beam < beams / 4 ? 100 : 0);
     }
-    const auto framed = device.frame(made, state);
     const Port* const stream = device.port(Port::Kind::udp_stream);
-    if (dialogue_) {
-      const auto delivery = dialogue_->on_ping(request.vendor_settings.get(), framed ? framed->size() : 0, now);
+    bool by_stream = false;
+    for (Line& line : lines_) {
+      const auto framed = test::bytes_at(make, *line.port, made, state);
+      by_stream = by_stream || (framed && line.port->kind == Port::Kind::tcp_stream);
+      const auto delivery = line.dialogue->on_ping(request.vendor_settings.get(), framed ? framed->size() : 0, now);
       for (const Bytes& prefix : delivery.prefixes) {
         if (!framed) continue;
         Bytes whole = prefix;
         whole.insert(whole.end(), framed->begin(), framed->end());
-        deliver(0, whole);
+        deliver(line.host_port, whole);
       }
       apply(delivery.events);
     }
-    if (framed && port_->kind == Port::Kind::tcp_stream) return;
+    if (by_stream) return;
     const std::size_t to = make.ports.size() - 1;
-    for (const Bytes& datagram : device.datagrams(stream != nullptr ? *stream : *port_, made, state)) deliver(to, datagram);
+    for (const Bytes& datagram : device.datagrams(stream != nullptr ? *stream : *lines_.front().port, made, state))
+      deliver(to, datagram);
   }
 
-  const Port* port_ = nullptr;
-  std::unique_ptr<Dialogue> dialogue_;
+  std::vector<Line> lines_;
   std::shared_ptr<const VendorSettings> with_;
   int requested_ = 0;
 };

@@ -31,7 +31,18 @@ std::shared_ptr<const Outbox::Shape> pauses_between(const std::vector<protocol::
 // ---- a ping as bytes
 
 FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping)
-    : vendor_(vendor), state_(state), ping_(ping), bytes_(vendor.frame(ping, state)) {}
+    : vendor_(vendor), state_(state), ping_(ping) {
+  if (!has_several_streams()) {
+    bytes_ = vendor.frame(ping, state);
+    return;
+  }
+  // The parts are needed anyway, and make up the whole.
+  auto whole = std::make_shared<Bytes>();
+  for (const protocol::Port& port : vendor.ports())
+    if (port.kind == protocol::Port::Kind::tcp_stream)
+      for (const Bytes& part : *parts(port)) whole->insert(whole->end(), part.begin(), part.end());
+  bytes_ = std::move(whole);
+}
 
 FramedPing::AtPort& FramedPing::at(const protocol::Port& port) {
   for (AtPort& made : ports_)
@@ -39,6 +50,16 @@ FramedPing::AtPort& FramedPing::at(const protocol::Port& port) {
   auto parts = std::make_shared<const std::vector<Bytes>>(vendor_.datagrams(port, ping_, state_));
   auto pauses = port.kind == protocol::Port::Kind::tcp_stream ? pauses_between(*parts, port.gap) : nullptr;
   return ports_.emplace_back(AtPort{&port, std::move(parts), std::move(pauses)});
+}
+
+bool FramedPing::has_several_streams() const {
+  return std::ranges::count(vendor_.ports(), protocol::Port::Kind::tcp_stream, &protocol::Port::kind) > 1;
+}
+
+std::shared_ptr<const FramedPing::Bytes> FramedPing::bytes_at(const protocol::Port& port) {
+  if (!has_several_streams()) return bytes_;
+  const Datagrams& own = parts(port);
+  return own->empty() ? nullptr : std::shared_ptr<const Bytes>(own, &own->front());
 }
 
 const FramedPing::Datagrams& FramedPing::parts(const protocol::Port& port) { return at(port).parts; }
@@ -69,13 +90,13 @@ PingQueued Delivery::queue(const PingOutcome& outcome, Time now, Requests& reque
 std::vector<protocol::Event> Delivery::offer(Connection& to, FramedPing& framed, PingQueued& queued, Time now, Actions& actions) {
   const bool by_datagrams = to.takes_datagrams();
   if (to.finishing || to.state != Connection::State::served || (!by_datagrams && framed.bytes() == nullptr)) return {};
+  const auto bytes = by_datagrams ? nullptr : to.role == Role::observer ? framed.bytes() : framed.bytes_at(*to.port);
   if (to.role == Role::stream && receivers(to.id).empty()) return {};
   const PingRequest& request = queued.ping->request;
   // A stream has no conversation: its receivers get every ping as it is.
   protocol::Delivery wanted{{protocol::Bytes{}}, {}};
   if (to.dialogue != nullptr)
-    wanted =
-        to.dialogue->on_ping(request.vendor_settings.get(), by_datagrams ? 0 : framed.bytes()->size(), sonar_.unskipped(now));
+    wanted = to.dialogue->on_ping(request.vendor_settings.get(), bytes == nullptr ? 0 : bytes->size(), sonar_.unskipped(now));
   if (!wanted.prefixes.empty()) {
     Outbox::Message message{
         .bytes = nullptr, .ping = static_cast<std::uint32_t>(request.number), .prefixes = {}, .fired_at = request.fired_at};
@@ -83,7 +104,7 @@ std::vector<protocol::Event> Delivery::offer(Connection& to, FramedPing& framed,
       message.datagrams = datagrams_for(to, framed, message.ping, now);
       if (message.datagrams != nullptr) queued.datagrams.push_back(message.datagrams);
     } else {
-      message.bytes = framed.bytes();
+      message.bytes = bytes;
       if (wanted.prefixes.size() == 1 && wanted.prefixes.front().empty())
         message.shape = framed.pauses(*to.port);
       else

@@ -24,6 +24,8 @@ class FramedPing {
 
   /// The bytes of the ping over TCP; null if the vendor sends only datagrams.
   const std::shared_ptr<const Bytes>& bytes() const { return bytes_; }
+  /// The bytes for clients at that port of kind tcp_stream: bytes(), or the port's own part of them. Null: none.
+  std::shared_ptr<const Bytes> bytes_at(const protocol::Port& port);
   /// The parts of the ping at that port: datagrams, or what a port of kind tcp_stream with a gap sends between pauses.
   const Datagrams& parts(const protocol::Port& port);
   /// The pauses between the parts of bytes(). Null: it is written without pauses.
@@ -34,6 +36,7 @@ class FramedPing {
   const protocol::DeviceState& state_;
   const Ping& ping_;
   std::shared_ptr<const Bytes> bytes_;
+  bool has_several_streams() const;
   struct AtPort {
     const protocol::Port* port;
     Datagrams parts;

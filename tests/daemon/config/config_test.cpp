@@ -328,6 +328,7 @@ TEST(Config, TheShippedExampleIsValid) {
                                       {"sonard-ping1d.yaml", "ping1d"},
                                       {"sonard-s500.yaml", "s500"},
                                       {"sonard-micron.yaml", "micron"},
+                                      {"sonard-norbit.yaml", "norbit-wbms"},
                                       {"sonard-dvl.yaml", "dvl-a50"},
                                       {"sonard-suite.yaml", "oculus-m1200d"},
                                       {"sonard-m3.yaml", "m3"}}) {

@@ -112,6 +112,7 @@ TEST(CommandLine, TheDemoHasTheSonarThatIsAskedFor) {
   EXPECT_EQ(sonar_of({"--demo", "dvl"}), "dvl-a50");
   EXPECT_EQ(sonar_of({"--demo", "m3"}), "m3");
   EXPECT_EQ(sonar_of({"--demo", "micron"}), "micron");
+  EXPECT_EQ(sonar_of({"--demo", "norbit"}), "norbit-wbms");
   EXPECT_EQ(sonar_of({"run", "--demo=blueview", "--threads", "1"}), "blueview-p900-90");
   EXPECT_EQ(sonar_of({"--demo", "--threads", "1"}), "oculus-m1200d");
   EXPECT_EQ(sonar_of({"--profile", "blueview-m900-130"}), "blueview-m900-130");

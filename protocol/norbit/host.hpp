@@ -1,0 +1,16 @@
+// The driver's end, and the part of the make that recordings need.
+#pragma once
+
+#include "protocol/host.hpp"
+#include "protocol/norbit/messages.hpp"
+
+namespace sonar::norbit {
+
+inline constexpr protocol::HostPort host_ports[]{{protocol::HostPort::Kind::tcp, command_port},
+                                                 {protocol::HostPort::Kind::tcp, bathymetry_port},
+                                                 {protocol::HostPort::Kind::tcp, column_port}};
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+recording::Codec codec();
+
+}  // namespace sonar::norbit

@@ -1,0 +1,40 @@
+// A ping as packets, and packets as their parts.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "protocol/norbit/messages.hpp"
+#include "protocol/recorded/message_splitter.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::norbit {
+
+/// Boundaries of packets in a stream.
+extern const recording::Framing framing;
+
+Bytes encode_bathymetry(const Ping& ping, const protocol::DeviceState& device);
+Bytes encode_column(const Ping& ping, const protocol::DeviceState& device);
+
+struct Bathymetry {
+  BathymetryFront front;
+  std::vector<Beam> beams;
+  double range_m(const Beam& beam) const;
+};
+struct Column {
+  ColumnFront front;
+  BytesView pixels, directions;  // pixels: row by row, near first; each row in the order of the directions
+  double sample_m() const;
+};
+/// Nothing if it is no whole packet of that type, or its checksum is wrong.
+std::optional<Bathymetry> read_bathymetry(BytesView packet);
+/// Also nothing if its pixels have another size than 16 bits.
+std::optional<Column> read_column(BytesView packet);
+
+/// Corrects the checksums of packets whose bytes were changed.
+void reseal(BytesView before, Bytes& packets);
+
+std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packets);
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView packets);
+
+}  // namespace sonar::norbit

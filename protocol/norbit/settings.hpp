@@ -1,0 +1,50 @@
+// The settings that commands change, and the grids of samples that follow from them. Pure functions.
+#pragma once
+
+#include <string>
+
+#include "protocol/held_settings.hpp"
+#include "protocol/norbit/models.hpp"
+#include "protocol/vendor.hpp"
+
+namespace sonar::norbit {
+
+inline constexpr double most_gain_db = 40;          // DFD
+inline constexpr double gain_slope_db_per_m = 0.4;  // of two-way range; unknown: assumed
+
+/// Format of the samples from which both packets are made; gain_db is in them.
+inline constexpr SampleFormat sample_format{
+    .bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -120, .ceiling_db = 40};
+
+struct Settings {
+  bool power = false;
+  double start_m = 0, stop_m = 50;
+  double rate_hz = -1;  // -1: as fast as the range permits
+  double gain_db = 20;
+  int samples = 256, beams = 128;  // of the water column; samples: about
+  double sound_mps = -1;           // -1: as measured
+  bool operator==(const Settings&) const = default;
+};
+using HeldSettings = protocol::Held<Settings>;
+inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
+
+/// Why a sonar cannot have these; empty: it can.
+std::string complaint(const Settings& settings);
+
+/// Sample numbers count at sample_hz from the time it fires. A row of the ping is `step` of them, one of the water column `thin`
+/// rows.
+struct Grid {
+  int first = 0, step = 1, rows = 0;  // first: a multiple of step * thin
+  int thin = 1;
+  double sample_m = 0;  // range of one
+  int column_rows() const { return (rows + thin - 1) / thin; }
+};
+Grid grid_of(const Settings& settings, double sound_mps);
+double sound_mps(const Settings& settings, const protocol::DeviceState& device);
+
+PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
+protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+inline double gain_percent(const Settings& settings) { return 100 * settings.gain_db / most_gain_db; }
+
+}  // namespace sonar::norbit

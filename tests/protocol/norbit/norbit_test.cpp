@@ -1,0 +1,234 @@
+// The packets of an emulated Norbit by hand-typed offsets, its commands, and what is refused; without a socket.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "protocol/norbit/host.hpp"
+#include "protocol/recorded/zlib.hpp"
+#include "tests/protocol/norbit/norbit_testing.hpp"
+
+namespace sonar::norbit {
+namespace {
+
+using namespace tests;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+template <class T>
+T at(BytesView bytes, std::size_t offset) {
+  T value;
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
+}
+
+/// An echo in row 100 of beam 10 of 256: to port.
+struct Packets : testing::Test {
+  Settings settings{.power = true, .stop_m = 12};
+  protocol::DeviceState state = device();
+  Ping ping = ping_with(settings, state, 100, 10);
+  Bytes bathymetry = encode_bathymetry(ping, state), column = encode_column(ping, state);
+};
+
+TEST_F(Packets, HaveTheHeaderOfThePublicDescription) {
+  for (const Bytes& packet : {bathymetry, column}) {
+    EXPECT_EQ(at<std::uint32_t>(packet, 0), 0xDEADBEEF);
+    EXPECT_EQ(at<std::uint32_t>(packet, 8), packet.size());
+    EXPECT_EQ(at<std::uint32_t>(packet, 12), 4u);
+    EXPECT_EQ(at<std::uint32_t>(packet, 20), recording::crc32(BytesView(packet).subspan(24)));
+    EXPECT_EQ(at<float>(packet, 24), 1500);
+    EXPECT_EQ(at<double>(packet, 40), 1.7e9 + 0.25);
+  }
+  EXPECT_EQ(at<std::uint32_t>(bathymetry, 4), 1u);
+  EXPECT_EQ(at<std::uint32_t>(column, 4), 2u);
+  EXPECT_EQ(bathymetry.size(), 112u + 20 * 256);
+  EXPECT_EQ(at<std::uint32_t>(bathymetry, 32), 256u);
+  EXPECT_EQ(at<std::uint32_t>(bathymetry, 36), 7u);
+  EXPECT_EQ(at<float>(bathymetry, 28), 78125);
+  EXPECT_EQ(at<std::uint32_t>(column, 108), 7u);
+  EXPECT_EQ(at<float>(column, 72), 400) << "kHz";
+  EXPECT_EQ(at<float>(bathymetry, 80), 400e3f) << "Hz";
+}
+
+TEST_F(Packets, AnEchoToPortHasANegativeAngleAndItsRange) {
+  const double range_m = ping.request.settings.range_of_row(100);
+  int found = 0;
+  for (std::size_t i = 0; i < 256; ++i) {
+    const std::size_t beam = 112 + 20 * i;
+    if (at<std::uint32_t>(bathymetry, beam) == 0) {
+      EXPECT_EQ(bathymetry[beam + 18], std::byte{0});
+      continue;
+    }
+    ++found;
+    EXPECT_EQ(i, 10u);
+    EXPECT_NEAR(at<float>(bathymetry, beam + 4), -ping.beam_azimuth_rad[10], 0.002);
+    EXPECT_NEAR(at<std::uint32_t>(bathymetry, beam) * 1500 / (2 * 78125.0), range_m, 0.01);
+    EXPECT_EQ(bathymetry[beam + 18], std::byte{3});
+    EXPECT_NEAR(at<float>(bathymetry, beam + 12), std::pow(10, (-20.0 - 20) / 20), 1e-4) << "free of the gain of 20 dB";
+  }
+  EXPECT_EQ(found, 1);
+}
+
+TEST_F(Packets, TheWaterColumnHasItAtTheSamePlace) {
+  const auto beams = at<std::uint32_t>(column, 32), rows = at<std::uint32_t>(column, 36);
+  EXPECT_EQ(beams, 128u);
+  EXPECT_NEAR(rows, 256, 64);
+  ASSERT_EQ(column.size(), 192 + beams * (2 * rows + 4));
+  std::size_t brightest = 0;
+  for (std::size_t i = 0; i < beams * rows; ++i)
+    if (at<std::uint16_t>(column, 192 + 2 * i) > at<std::uint16_t>(column, 192 + 2 * brightest)) brightest = i;
+  const std::size_t directions = 192 + 2 * beams * rows;
+  const double coarse_m = 1500 / (2 * static_cast<double>(at<float>(column, 28)));
+  EXPECT_NEAR((at<std::int32_t>(column, 52) + static_cast<double>(brightest / beams)) * coarse_m,
+              ping.request.settings.range_of_row(100), coarse_m);
+  EXPECT_NEAR(at<float>(column, directions + 4 * (brightest % beams)), -ping.beam_azimuth_rad[10], 0.02);
+  EXPECT_LT(at<float>(column, directions), at<float>(column, directions + 4));
+  EXPECT_NEAR(std::fmod(78125, static_cast<double>(at<float>(column, 28))) / 78125, 0, 1e-3) << "a whole fraction";
+}
+
+TEST_F(Packets, CutOffOrDamagedAreNone) {
+  EXPECT_TRUE(read_bathymetry(bathymetry));
+  EXPECT_TRUE(read_column(column));
+  EXPECT_FALSE(read_column(bathymetry));
+  for (const Bytes& packet : {bathymetry, column}) {
+    for (std::size_t size = 0; size < packet.size(); size += size < 300 ? 1 : 97) {
+      EXPECT_FALSE(read_bathymetry(BytesView(packet).first(size)));
+      EXPECT_FALSE(read_column(BytesView(packet).first(size)));
+    }
+    for (std::size_t i = 24; i < packet.size(); i += 101) {
+      Bytes damaged = packet;
+      damaged[i] ^= std::byte{1};
+      EXPECT_FALSE(read_bathymetry(damaged)) << i;
+      EXPECT_FALSE(read_column(damaged)) << i;
+      reseal(packet, damaged);
+      EXPECT_NE(at<std::uint32_t>(damaged, 20), at<std::uint32_t>(packet, 20));
+    }
+  }
+}
+
+TEST_F(Packets, FaultsFindTheirFields) {
+  Bytes both = bathymetry;
+  both.insert(both.end(), column.begin(), column.end());
+  EXPECT_EQ(locate(means::ping_id, bathymetry)->offset, 36u);
+  EXPECT_EQ(locate(means::ping_id, column)->offset, 108u);
+  EXPECT_EQ(locate(means::rows, both)->offset, bathymetry.size() + 36);
+  EXPECT_EQ(locate(protocol::Region::image, both)->first, bathymetry.size() + 192);
+  EXPECT_EQ(locate(protocol::Region::bearings, column)->second, 4u * 128);
+  EXPECT_EQ(locate(protocol::Region::bearings, bathymetry), std::nullopt);
+  Bytes changed = both;
+  changed[40] ^= std::byte{1};
+  changed[bathymetry.size() + 40] ^= std::byte{1};
+  reseal(both, changed);
+  EXPECT_TRUE(read_bathymetry(BytesView(changed).first(bathymetry.size())));
+  EXPECT_TRUE(read_column(BytesView(changed).subspan(bathymetry.size())));
+}
+
+TEST_F(Packets, OfOneTypeAreAPingOfTheHostToo) {
+  protocol::Wanted wanted;
+  wanted.as_it_is = true;
+  const auto host = *make_host(wanted);
+  int pings = 0;
+  for (std::uint32_t number = 1; number <= 6; ++number) {
+    ping.request.number = PingNumber{number};
+    for (const auto& action : host->on_bytes(2, encode_column(ping, state), at_s(number)))
+      if (const auto* seen = std::get_if<protocol::HostPing>(&action)) {
+        EXPECT_EQ(seen->facts.number, static_cast<std::uint32_t>(++pings));
+        EXPECT_TRUE(seen->picture());
+      }
+  }
+  EXPECT_EQ(pings, 4) << "two wait for their bathymetry";
+}
+
+TEST(NorbitCommands, AreAnsweredWithTheValuesInUse) {
+  Talk talk;
+  talk.tick(0);
+  EXPECT_EQ(talk.take(), "Sonar is ready to accept commands\r\n");
+  talk.say("set_range .5 30\r\nset_range\n");
+  EXPECT_EQ(talk.take(), "set_range 0.5 30 # m\r\nset_range 0.5 30 # m\r\n");
+  EXPECT_EQ(talk.settings.rate_hz, 0) << "no power";
+  talk.say("set_power 1\r\n");
+  EXPECT_THAT(talk.take(), StartsWith("set_power 1 #"));
+  EXPECT_NEAR(talk.settings.rate_hz, 1 / (2 * 30 / 1500.0 + 0.005), 0.2);
+  EXPECT_NEAR(talk.settings.range_m, 30, 0.1);
+  talk.say("set_rate 5\nset_gain 30\nset_resolution 512 256\nsound_velocity 1480\n");
+  EXPECT_EQ(talk.settings.rate_hz, 5);
+  EXPECT_EQ(talk.settings.gain_db, 30);
+  EXPECT_EQ(talk.settings.device_sound_speed_mps, 1480);
+  EXPECT_EQ(talk.held().beams, 256);
+  talk.take();
+  talk.say("serial\nset_time_source 1\nset_mode 5\n");
+  EXPECT_EQ(talk.take(), "serial 7001\r\nset_time_source 1 # fixed\r\nset_mode 1 # fixed\r\n");
+  talk.say("set_default\nexit\n");
+  EXPECT_EQ(talk.held(), Settings{});
+  EXPECT_TRUE(talk.closed);
+}
+
+TEST(NorbitCommands, WithoutAnEndOfLineEndAfterSilence) {
+  Talk talk;
+  talk.tick(0);
+  talk.take();
+  talk.say("set_ra", 1);
+  talk.say("nge 1 20", 1.01);
+  EXPECT_EQ(talk.take(), "");
+  talk.tick(1.029);
+  EXPECT_EQ(talk.take(), "");
+  EXPECT_EQ(talk.dialogue->next_tick(), at_s(1.03));
+  talk.tick(1.03);
+  EXPECT_EQ(talk.take(), "set_range 1 20 # m\r\n");
+  EXPECT_EQ(talk.dialogue->next_tick(), Time::max());
+  talk.state.simulated_time = true;
+  talk.say("set_power 1", 2);
+  EXPECT_THAT(talk.take(), StartsWith("set_power 1")) << "time may stand still";
+}
+
+TEST(NorbitCommands, OutOfLimitsChangeNothing) {
+  Talk talk;
+  talk.tick(0);
+  talk.take();
+  for (const char* wrong : {"set_range 5 5", "set_range -1 20", "set_range 0 700", "set_range 5", "set_range a b",
+                            "set_range nan 5", "set_rate 0", "set_rate 61", "set_gain 41", "set_resolution 256 100",
+                            "set_resolution 1e300 128", "sound_velocity 100", "set_power 1 2"}) {
+    talk.say(std::string(wrong) + "\n");
+    EXPECT_THAT(talk.take(), HasSubstr("unchanged: ")) << wrong;
+  }
+  EXPECT_EQ(talk.held(), Settings{});
+  talk.say("no_such 1\n\x01\xff\n");
+  EXPECT_EQ(talk.take(), "no_such # unknown command\r\n?? # unknown command\r\n");
+  talk.say(std::string(100000, 'x') + "\n");
+  EXPECT_LT(talk.take().size(), 100u);
+  std::string many;
+  for (int i = 0; i < 10000; ++i) many += "x\n";
+  talk.notices = 0;
+  talk.say(many);
+  EXPECT_LE(talk.notices, 100) << "bounded";
+}
+
+TEST(Norbit, EachPortHasItsOwnPackets) {
+  const protocol::DeviceState state = device();
+  const Ping ping = ping_with({.power = true, .stop_m = 5}, state, 50, 10);
+  const auto whole = vendor().frame(ping, state);
+  Bytes joined;
+  for (const protocol::Port& port : vendor().ports())
+    for (const Bytes& part : vendor().datagrams(port, ping, state)) joined.insert(joined.end(), part.begin(), part.end());
+  EXPECT_EQ(*whole, joined);
+  EXPECT_TRUE(Talk(command_port).dialogue->on_ping(nullptr, 1, at_s(0)).prefixes.empty());
+  EXPECT_EQ(Talk(bathymetry_port).dialogue->on_ping(nullptr, 1, at_s(0)).prefixes.size(), 1u);
+}
+
+TEST(Norbit, GridsFitTheirRange) {
+  for (const double stop_m : {1.0, 2.0, 5.0, 50.0, 150.0, 600.0})
+    for (const double start_m : {0.0, 0.5, stop_m - 1})
+      for (const int samples : {64, 256, 2048}) {
+        if (start_m < 0 || stop_m - start_m < 1) continue;
+        const Grid grid = grid_of({.start_m = start_m, .stop_m = stop_m, .samples = samples}, 1500);
+        SCOPED_TRACE(testing::Message() << start_m << " to " << stop_m << " m, " << samples);
+        EXPECT_LE(grid.rows, 1100);
+        EXPECT_EQ(grid.first % (grid.step * grid.thin), 0);
+        EXPECT_GT(grid.first, 0);
+        EXPECT_LE(grid.column_rows(), 2 * samples);
+        EXPECT_NEAR((grid.first + grid.rows * grid.step) * grid.sample_m, stop_m, 1.01 * grid.step * grid.sample_m);
+      }
+}
+
+}  // namespace
+}  // namespace sonar::norbit
