@@ -165,14 +165,16 @@ Bytes encode_column(const Ping& ping, const protocol::DeviceState& device) {
     const int begin = std::max(0, m * grid.thin - grid.thin / 2), end = std::min(grid.rows, m * grid.thin + grid.thin / 2 + 1);
     for (int n = 0; n < settings.beams; ++n) {
       double sum = 0;
-      for (int row = begin; row < end; ++row) sum += power_at(ping, row, n * beam_step + beam_step / 2);
-      const double level = scale * std::sqrt(sum / (end - begin));
+      for (int row = begin; row < end; ++row)
+        for (int beam = n * beam_step; beam < (n + 1) * beam_step; ++beam) sum += power_at(ping, row, beam);
+      const double level = scale * std::sqrt(sum / ((end - begin) * beam_step));
       const auto pixel = static_cast<std::uint16_t>(std::lround(std::min(level, most_pixel)));
       write("pixel", pixel);
     }
   }
   for (int n = 0; n < settings.beams; ++n) {
-    const float angle_rad = -ping.beam_azimuth_rad[static_cast<std::size_t>(n * beam_step + beam_step / 2)];
+    const auto first = ping.beam_azimuth_rad.begin() + n * beam_step;
+    const float angle_rad = -(first[0] + first[beam_step - 1]) / 2;
     write("direction", angle_rad);
   }
   return sealed(Type::column, front, rest);

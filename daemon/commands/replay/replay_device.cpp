@@ -1,5 +1,7 @@
 #include "daemon/commands/replay/replay_device.hpp"
 
+#include <algorithm>
+
 #include "daemon/server/time/clock.hpp"
 #include "protocol/host.hpp"
 #include "protocol/oculus/decode.hpp"
@@ -9,6 +11,14 @@ namespace sonar {
 namespace {
 
 constexpr std::uint64_t most_looked_at_bytes = 64u << 20;  // a status comes every second
+
+/// Why pings of that make cannot be served to a driver; empty: they can.
+std::string why_only_seen(const protocol::Make& make) {
+  if (make.each_ping_requested || make.scans) return "depend on the requests of its host";
+  const bool has_several_streams =
+      std::ranges::count(make.device->ports(), protocol::Port::Kind::tcp_stream, &protocol::Port::kind) > 1;
+  return has_several_streams ? "come by several connections" : "";
+}
 
 /// A sonar that answers its hosts.
 void take(ReplayDevice& device, const recording::SentBy& by) {
@@ -60,13 +70,13 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   ReplayDevice device;
   std::optional<std::uint16_t> id;
   std::uint64_t looked_at = 0;
-  const protocol::Make* unserved = nullptr;  // make whose pings depend on the requests of its host
+  const protocol::Make* unserved = nullptr;
   while (auto message = reader.next()) {
     looked_at += message->bytes.size();
     if (looked_at > most_looked_at_bytes || (id && device.recorded_status)) break;
     if (message->from != recording::Origin::device) continue;
     const auto by = recording::sender_of(*message);
-    if (by && (by->make->each_ping_requested || by->make->scans)) {
+    if (by && !why_only_seen(*by->make).empty()) {
       unserved = by->make;
       break;
     }
@@ -88,8 +98,8 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   reader.rewind();
   if (device.vendor != nullptr) return device;
   if (unserved != nullptr) {
-    device.is_only_seen = file + " holds pings of " + std::string(unserved->title) +
-                          ", which depend on the requests of its host: they cannot be replayed to a driver, the page shows them";
+    device.is_only_seen = file + " holds pings of " + std::string(unserved->title) + ", which " + why_only_seen(*unserved) +
+                          ": they cannot be replayed to a driver, the page shows them";
     return device;
   }
   if (!id)

@@ -37,7 +37,7 @@ TEST_F(Packets, HaveTheHeaderOfThePublicDescription) {
     EXPECT_EQ(at<std::uint32_t>(packet, 12), 4u);
     EXPECT_EQ(at<std::uint32_t>(packet, 20), recording::crc32(BytesView(packet).subspan(24)));
     EXPECT_EQ(at<float>(packet, 24), 1500);
-    EXPECT_EQ(at<double>(packet, 40), 1.7e9 + 0.25);
+    EXPECT_NEAR(at<double>(packet, 40), 1.7e9 + 0.25, 1e-6);
   }
   EXPECT_EQ(at<std::uint32_t>(bathymetry, 4), 1u);
   EXPECT_EQ(at<std::uint32_t>(column, 4), 2u);
