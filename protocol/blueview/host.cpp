@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 using protocol::HostActions;
 
-constexpr auto keep_alive_after = 2s;    // since this host sent its last message
+constexpr auto host_keep_alive_after = 2s;    // since this host sent its last message
 constexpr std::uint16_t abi_of_sdk = 4;  // the sonar reads this number and ignores it
 
 /// The text of an error frame, such as "no head 3 (code 2010)".
@@ -180,7 +180,7 @@ class BlueViewHost final : public protocol::Host {
     if (now >= next_tick()) send(FrameType::keep_alive, 0, {}, now, actions);
     return actions;
   }
-  std::optional<Time> next_tick() const override { return sent_at_ + keep_alive_after; }
+  std::optional<Time> next_tick() const override { return sent_at_ + host_keep_alive_after; }
 
   HostActions on_demand(Time now) override {
     HostActions actions;
