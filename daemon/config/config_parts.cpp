@@ -59,6 +59,7 @@ SceneFile read_scene_file(const Node& node, const std::filesystem::path& directo
   const std::string given = node.text();
   if (auto found = find_scene(given, directory)) return *std::move(found);
   std::error_code ec;
+  // A file that is there but cannot be read is reported as that, not as missing.
   if (const auto place = directory / given; !given.empty() && std::filesystem::exists(place, ec))
     if (const auto opened = open_regular(place); !opened) {
       node.fail(opened.error().text);
@@ -104,6 +105,8 @@ protocol::OptionValues read_options(const Node& node, const protocol::Vendor& ve
   Map map = node.map();
   for (const protocol::Option& option : vendor.options())
     if (const Node value = map.optional(option.name)) given[std::string(option.name)] = read_option(value, option);
+  // Options of other makes are checked and kept, so that a configuration stays valid when its profile is replaced by one of
+  // another make.
   if (others_too)
     for (const protocol::Vendor* other : protocol::vendors())
       for (const protocol::Option& option : other->options())
@@ -132,6 +135,7 @@ EngineConfig read_engine(const Node& node, const Switches& defaults) {
     bool& is_on = engine.switches.*part.is_on;
     const Node given = map.optional(part.name);
     is_on = given.choice_or<bool>(is_on, {{"on", true}, {"off", false}});
+    // A switch is refused if another one makes it ineffective. The mode and fixed_fan are read before, because they count too.
     const std::string why = why_without_effect(engine.switches, part);
     if (given.present() && is_on && !why.empty()) given.fail("has no effect: " + why + "; leave out one of them");
   }

@@ -6,6 +6,7 @@ namespace sonar {
 
 void derive_addresses(SonarConfig& sonar) {
   if (!sonar.has_own_netmask) sonar.netmask = is_loopback(sonar.advertise_ip) ? Ipv4{255, 0, 0, 0} : Ipv4{255, 255, 255, 0};
+  // Without destinations of its own a sonar sends status messages to the broadcast address of its network.
   if (sonar.has_own_status_to) return;
   Endpoint broadcast;
   for (std::size_t i = 0; i < 4; ++i)
@@ -62,6 +63,7 @@ struct Listening {
   bool udp, tcp;
   bool gives_way = false;  // a default, which is left out when its port is taken
 };
+/// Returns whether two listeners would use the same port. 0.0.0.0 uses the port at all addresses.
 bool meet(const Listening& a, const Listening& b) {
   const bool same_ip = a.at.ip == b.at.ip || a.at.ip == Ipv4{} || b.at.ip == Ipv4{};
   return same_ip && a.at.port == b.at.port && ((a.udp && b.udp) || (a.tcp && b.tcp));
@@ -125,6 +127,7 @@ Result<void> check_ports_apart(const Config& config) {
 Result<void> move_addresses(Config& config, int offset, bool first_too) {
   const Config unmoved = config;
   for (SonarConfig& sonar : config.sonars) {
+    // The device number is moved as well, because drivers tell sonars apart by it.
     const int id = sonar.device_id + 100 * offset;
     if (id > 65535)
       return cannot_move("device_id " + std::to_string(sonar.device_id) + " would exceed 65535; give a smaller offset");

@@ -10,6 +10,7 @@
 namespace sonar::dataset {
 namespace {
 
+/// The name without the index of an instance: "rock[3]" gives "rock".
 std::string shared_name(const std::string& name) { return name.substr(0, name.find('[')); }
 
 /// Visible objects of that name, where they stand.
@@ -56,6 +57,7 @@ bool is_above(Vec3d place, const Object& bed, const Pose& bed_in_world) {
   return z && p.z > *z;
 }
 
+/// The box along the world axes around the turned box of the object.
 Extent box_of(const Object& object, const Pose& in_world) {
   const Extent own = extent_of(*object.mesh);
   Extent box;
@@ -75,6 +77,7 @@ bool overlap(const Extent& a, const Extent& b) {
 bool are_in_view(const Constraints& c, const PingRequest& request, const Scene& scene) {
   return std::all_of(c.in_view.begin(), c.in_view.end(), [&](const std::string& name) {
     const auto objects = placed(name, request, scene);
+    // A name without visible objects is no failure, because a draw may hide objects.
     return objects.empty() || std::any_of(objects.begin(), objects.end(),
                                           [&](const auto& o) { return is_in_fan(middle_of(*o.first, o.second), request); });
   });
@@ -144,6 +147,7 @@ std::string Unmet::sentence() const {
 }
 
 bool meets(const Constraints& constraints, const PingRequest& request, const Scene& scene, Unmet& unmet) {
+  // The first constraint that is not met is counted; the others are not tested.
   if (!are_in_view(constraints, request, scene)) return ++unmet.in_view, false;
   if (!are_above_bed(constraints, request, scene)) return ++unmet.above_bed, false;
   if (!are_apart(constraints, request, scene)) return ++unmet.no_overlap, false;

@@ -71,6 +71,7 @@ Result<DrawnPing> PingMaker::compute(std::uint64_t number, Ping& ping) {
   auto drawn = draw_ping(job_, number, known_);
   if (!drawn) return drawn;
   const std::string key = drawn->scene_key + "\n" + visible_of(*drawn->job.scene);
+  // An engine is used again while the scene and the visibility of its objects are the same.
   if (!engine_ || key != engine_key_) {
     const SimdLevel simd = simd_.value_or(drawn->job.config.engine.simd);
     // The engine that start_engine() returns is the one that is kept.
@@ -87,6 +88,7 @@ Result<DrawnPing> PingMaker::compute(std::uint64_t number, Ping& ping) {
     engine_.reset(static_cast<ChangingEngine*>(started->release()));
     engine_key_ = key;
   }
+  // The next draw may use this scene again without loading it.
   known_ = {drawn->scene_key, drawn->whole_scene, &shapes_};
   try {
     PingRequest request = request_of(*drawn, number);
@@ -111,6 +113,7 @@ Result<LabelledPing> PingMaker::make(std::uint64_t number) {
   made.width = s.beam_count, made.height = s.range_bin_count, made.negative = drawn->negative;
   Result<void> done;
   const auto put_picture = [&](const char* ending, std::span<const std::byte> values, int bits) {
+    // After an error no more pictures are encoded; the error is returned below.
     if (!done) return;
     auto png = encode_gray_png(values, made.width, made.height, bits);
     if (png)

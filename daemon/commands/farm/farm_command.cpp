@@ -39,6 +39,8 @@ Result<int> submit(const FarmCommand& c) {
   auto job = dataset::load_job(c.job);
   if (!job) return tl::make_unexpected(job.error());
   auto level = enum_from<SimdLevel>(c.simd, simd_level_names).value_or(SimdLevel::automatic);
+  // All shards of a job are computed with one instruction set, because other sets round differently. It is chosen now, and is
+  // part of the record.
   if (level == SimdLevel::automatic) {
     const auto first = draw_ping(*job, 1);
     if (!first) return tl::make_unexpected(first.error());
@@ -67,6 +69,7 @@ Result<int> submit(const FarmCommand& c) {
   for (std::uint64_t shard = 0; shard < record->shards; ++shard) {
     const auto is_there = (*folder)->holds(shard);
     if (!is_there) return tl::make_unexpected(is_there.error());
+    // A shard that was given up earlier is tried again, because its cause may have been removed.
     const std::string grave = record->id + "." + std::to_string(shard);
     if (std::find(dead->begin(), dead->end(), grave) != dead->end())
       if (const auto done = (*queue)->erase(dead_table, grave); !done) return tl::make_unexpected(done.error());
@@ -118,6 +121,7 @@ Result<std::string> describe_farm(Queue& queue) {
     if (!*table) return tl::make_unexpected(table->error());
   std::string text;
   for (const auto& [id, words] : *records) {
+    // The key ID.stopped marks a stopped job; it is not a job.
     if (id.find('.') != std::string::npos) continue;
     const auto record = parse_farm_job(id, words);
     const auto waiting = queue.waiting(id);
@@ -145,6 +149,7 @@ Result<std::string> describe_farm(Queue& queue) {
       workers += text::format("  %s: %s, %.1f pings/s, %.0f shards made\n", text::printable(name).c_str(),
                               text::printable(text_in(is, "shard")).c_str(), rate, number_in(is, "shards"));
     }
+    // Every shard that neither waits nor runs nor was given up is done.
     const std::uint64_t left = waiting->queued + waiting->running;
     const std::uint64_t done = record->shards - std::min(record->shards, left + dead_shards);
     text += text::format("%s (%s): %llu shards: %llu done, %llu running, %llu queued, %llu dead",
@@ -169,7 +174,9 @@ Result<int> status(const FarmCommand& c) {
   if (!queue) return tl::make_unexpected(queue.error());
   while (true) {
     const auto text = describe_farm(**queue);
+    // A watch goes on after an error, and shows it, because the server may come back.
     if (!text && !c.watch) return tl::make_unexpected(text.error());
+    // The escape sequence clears the terminal, so each status replaces the one before.
     std::printf("%s%s", c.watch ? "\033[H\033[J" : "", (text ? *text : text.error().text + "\n").c_str());
     std::fflush(stdout);
     if (!c.watch) return 0;

@@ -48,6 +48,7 @@ class Parser {
   void skip_blanks() {
     while (at_ < text_.size() && text_[at_] == ' ') ++at_;
   }
+  // Skips blanks, and then the character `c` if it is next. Returns whether it was.
   bool take(char c) {
     skip_blanks();
     if (at_ >= text_.size() || text_[at_] != c) return false;
@@ -55,6 +56,7 @@ class Parser {
     return true;
   }
   void complain(std::string what) {
+    // Only the first error is kept. The parser is moved to the end of the text, so that all loops end.
     if (wrong_.empty()) wrong_ = std::move(what);
     at_ = text_.size();
   }
@@ -180,6 +182,7 @@ Result<std::string> substitute(std::string_view text, const Values& values, cons
     out += text.substr(at, dollar - at);
     if (dollar == std::string_view::npos) return out;
     const std::size_t end = end_of_reference(text, dollar);
+    // A $ before anything else, such as a digit, is copied as it is.
     if (end == dollar) {
       out += '$';
       at = dollar + 1;
@@ -187,9 +190,11 @@ Result<std::string> substitute(std::string_view text, const Values& values, cons
     }
     const auto value = evaluate(text.substr(dollar + 1, end - dollar - 1), values);
     if (!value) {
+      // The error names the line of the file. The formula itself is in the text of the error.
       const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(dollar), '\n');
       return failure(ErrorKind::config, name + ":" + std::to_string(line) + ": " + value.error().text);
     }
+    // The value is written with 15 digits, so that 0.1 stays 0.1.
     char number[40];
     std::snprintf(number, sizeof number, "%.15g", *value);
     out += number;

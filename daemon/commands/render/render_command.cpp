@@ -42,6 +42,7 @@ class ProgressLine {
 
   void show(const Progress& p) {
     const auto now = Clock::now();
+    // The last line is always shown.
     const bool last = p.done == p.all;
     if (quiet_ || (!last && now - shown_ < (terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(1000))))
       return;

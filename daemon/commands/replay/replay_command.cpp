@@ -108,8 +108,10 @@ Result<void> run_replay(const ReplayCommand& command) {
   const LimitConfig limits;
   Admission admission(limits, log);
   ReplayPage page(io, limits, admission, log, {command.file, command.sonar, command.rate_hz});
+  // The page keeps the event loop running, so it is stopped with the replay.
   options->on_end = [&page] { page.stop(); };
   ReplayServer server(io, *opened->reader, *device, *options, log);
+  // The sonar's port is opened first. If it is in use, the command ends; without the page it continues.
   if (auto listening = server.open(); !listening) return listening;
   if (!opened->reader->note().empty()) log.info(opened->reader->note());
   const auto where = open_page(page, command, log);

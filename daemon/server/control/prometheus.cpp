@@ -25,6 +25,7 @@ std::string escaped(std::string_view text, bool label) {
 /// Counters are written as whole numbers up to 2^53, above which a double does not hold each of them.
 std::string number(double value) {
   std::array<char, 32> text{};
+  // Counters are whole numbers, and stay exact up to 2^53.
   const bool whole = std::trunc(value) == value && std::abs(value) < 9007199254740992.0;
   std::snprintf(text.data(), text.size(), whole ? "%.0f" : "%.9g", value);
   return text.data();
@@ -59,6 +60,7 @@ void PrometheusText::sample(const Labels& labels, double value) { line("", label
 void PrometheusText::sample(const Labels& labels, const Histogram& histogram) {
   std::uint64_t up_to = 0;
   for (std::size_t i = 0; i <= Histogram::bounds_s.size(); ++i) {
+    // Buckets are cumulative: each one contains those before it.
     up_to += histogram.counts()[i];
     const std::string bound = i < Histogram::bounds_s.size() ? number(Histogram::bounds_s[i]) : "+Inf";
     Labels with_bound = labels;

@@ -91,6 +91,8 @@ Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vend
     return refuse("the name of a recording has letters, digits, - _ and . only, 128 at most, and no folder: run-1.mcap");
   if (name.front() == '-')
     return refuse("the name of a recording does not begin with -, which every program takes for an option: run-1.mcap");
+  // MCAP holds pings of all sonars. Other kinds are tried in order: those for any single stream, those of this make, and those
+  // of other makes, which are refused with a reason.
   if (name.ends_with(mcap.ending)) return &mcap;
   const protocol::Make& own = make_of(vendor);
   for (const Kind kind : {&pcap, &raw_dump}) {
@@ -162,6 +164,7 @@ Result<void> RecordingFile::put_truth(const RecordedPing& ping) {
   truth.beams = ping.ping->truth;
   truth.bodies_in_world = request.bodies_in_world;
   truth.names = ping.names.get();
+  // Labels are written before the truth of the same ping, which is the last message of a ping.
   if (labels_ && ping.ping->labels)
     if (Result<void> written = mcap_->write_labels(ping.at, truth, *ping.ping->labels); !written) return written;
   return mcap_->write_truth(ping.at, truth);
