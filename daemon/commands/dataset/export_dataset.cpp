@@ -84,6 +84,7 @@ class Export {
       count_instances(*part, instances_);
       for (const json& image : (*part)["images"]) {
         std::string scene = image["scene"].get<std::string>();
+        // With --split-by, pings with equal values of these draws count as one scene.
         if (!split_.by.empty()) scene.clear();
         for (const std::string& name : split_.by) {
           if (!image["draws"].contains(name)) return unknown_draw(name);
@@ -139,6 +140,7 @@ class Export {
   Result<void> put(std::uint64_t ping, const std::string& ending, std::span<const std::byte> contents) {
     const path split = folder_of(split_of_[ping - 1]);
     if (form_ == ExportForm::coco)
+      // COCO has all labels in one file, so only the picture of a ping is unpacked.
       return ending == "samples.png" ? write_whole_file(split / name_of(ping), {contents}) : Result<void>{};
     const path folder = split / ending.substr(0, ending.find('.'));
     if (made_.insert(folder).second) {
@@ -236,6 +238,7 @@ Result<Split> parse_split(const std::string& shares, const std::string& by) {
     double sum = 0;
     for (std::size_t i = 0; i < words.size() && i < split.shares.size(); ++i) {
       const auto share = text::parse_decimal(words[i]);
+      // An invalid share makes the sum infinite, which is refused below.
       split.shares[i] = share && *share >= 0 ? *share : HUGE_VAL;
       sum += split.shares[i];
     }

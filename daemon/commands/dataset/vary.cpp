@@ -24,11 +24,13 @@ std::uint64_t hash_of(std::string_view name) {  // FNV-1a
 
 /// Two numbers in (0, 1) with 53 bits each.
 std::array<double, 2> uniforms(Seed seed, std::uint64_t ping, std::uint32_t attempt, std::string_view name) {
+  // The numbers depend on seed, name, ping and attempt only, so pings can be drawn in any order and on any machine.
   const std::uint64_t hash = hash_of(name);
   RandomKey key = key_of(seed, draws_domain);
   key.domain ^= static_cast<std::uint32_t>(hash >> 32);
   key.high ^= static_cast<std::uint32_t>(ping >> 32);
   const Random4 r = philox(static_cast<std::uint32_t>(ping), attempt, static_cast<std::uint32_t>(hash), key);
+  // The added half keeps out 0, whose logarithm the normal distribution would need, and 1.
   const auto open = [](std::uint32_t high, std::uint32_t low) {
     return (static_cast<double>((std::uint64_t{high >> 6} << 26) | (low >> 6)) + 0.5) / 4503599627370496.0;
   };
@@ -90,6 +92,7 @@ std::string word_of(const Variation& v, Seed seed, std::uint64_t ping, std::uint
     case Variation::Kind::choice:
       return v.words[std::min(static_cast<std::size_t>(u * static_cast<double>(v.words.size())), v.words.size() - 1)];
     case Variation::Kind::list:
+      // A list is not random: ping 1 gets the first word, ping 2 the second, and so on.
       return v.words[(ping - 1) % v.words.size()];
   }
   return {};
@@ -126,6 +129,7 @@ std::string put_words(std::string_view text, const std::map<std::string, std::st
     std::size_t end = dollar + 1;
     while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) != 0 || text[end] == '_')) ++end;
     const auto word = words.find(std::string(text.substr(dollar + 1, end - dollar - 1)));
+    // A $name that is not a word of a draw stays as it is, because the formulas replace it later.
     out += word != words.end() ? word->second : std::string(text.substr(dollar, end - dollar));
     at = end;
   }

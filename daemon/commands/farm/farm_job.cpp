@@ -176,6 +176,7 @@ Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const p
     if (!is_there(files / f.name, f.digest))
       if (const auto done = write_below(files, f.name, *contents); !done) return done;
     if (!record.in_bucket) continue;
+    // A file without bytes is sent as one empty piece.
     for (std::size_t at = 0, piece = 0; at < contents->size() || piece == 0; at += piece_bytes, ++piece)
       if (const auto done =
               queue.put(file_table, piece_key(f.digest, piece), std::string_view(*contents).substr(at, piece_bytes));
@@ -195,6 +196,7 @@ Result<path> receive_files(const FarmJob& record, const path& files, Queue& queu
       if (!piece) return tl::make_unexpected(piece.error());
       if (!*piece) break;
       contents += **piece;
+      // A short piece is the last one. If the size is a multiple of piece_bytes, the next piece is missing instead.
       if ((*piece)->size() < piece_bytes || contents.size() > most_in_bucket) break;
     }
     if (digest_of(contents) != f.digest)

@@ -11,6 +11,7 @@
 namespace sonar::render {
 
 double first_depth_m(const RenderJob& job) {
+  // A world without objects is enough to place the sonar.
   const World vehicles(pose_rules(job.config), vehicles_of(job.config), {}, job.begins_at);
   return depth_from_z(compose(vehicles.vehicle_at(job.sonar().vehicle, Time{}), job.sonar().mount).position_m.z);
 }
@@ -60,6 +61,7 @@ Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const st
   if (!trajectory) return tl::make_unexpected(trajectory.error());
   job.snapshots = are_snapshots(**trajectory);
   job.begins_at = Time{} + file.begins_at;
+  // The poses of the file replace the initial pose and the trajectory of the vehicle.
   job.vehicle() = {.name = job.vehicle().name, .initial_pose = {}, .plan = {.trajectory = *std::move(trajectory)}};
   return {};
 }
@@ -78,6 +80,7 @@ World world_of(const RenderJob& job) {
 PingRequest make_request(const RenderJob& job, const World& world, PingNumber number, Time at) {
   const SonarConfig& sonar = job.sonar();
   PingRequest request = ping_request(job.config, world, sonar.vehicle, sonar.mount, at);
+  // Snapshots are unrelated poses, so the sonar does not move during a ping.
   if (job.snapshots) request.sonar_moves = {};
   request.model = sonar.profile.model;
   request.number = number;

@@ -21,6 +21,7 @@ void Events::remove_expired() {
 void Events::publish(const v1::Event& event) {
   remove_expired();
   for (const std::weak_ptr<Listener>& l : listeners_)
+    // lock() is empty if a listener that was called before has ended this one.
     if (const auto listener = l.lock()) (*listener)(event);
 }
 

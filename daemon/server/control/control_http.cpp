@@ -69,6 +69,7 @@ asio::awaitable<HttpAnswer> ControlHttp::perform(control::Operation operation, H
   const auto result = std::make_shared<std::optional<OperationResult>>();
   targets_.operations.perform(operation, from.sender(), [weak = from.weak_from_this(), result](OperationResult done) {
     *result = std::move(done);
+    // The operation may end after its connection.
     if (const auto connection = weak.lock()) connection->wait_timer().cancel();
   });
   asio::steady_timer& timer = from.wait_timer();

@@ -71,6 +71,8 @@ RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy
       return {*std::move(page)};
   }
   const Route route = route_of(*target, request.method);
+  // The token is checked before the path, so a client without it does not learn which paths exist. Health is reported without a
+  // token, but without the reason.
   const bool authorised = policy.token.matches(bearer_token(request.authorization));
   if (!authorised && route.kind != Kind::health)
     return {refused(401, "token required: send Authorization: Bearer TOKEN, with the token of control.token_file")};

@@ -138,6 +138,7 @@ asio::awaitable<bool> ViewConnection::begin() {
   }));
   const int unsent = most_unsent;
   ::setsockopt(from_.socket().native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
+  // HttpConnection has read the request already, so the headers that the handshake needs are copied into a request for Beast.
   beast::http::request<beast::http::empty_body> request(beast::http::verb::get, "/", 11);
   request.set(beast::http::field::host, request_.host);
   request.set(beast::http::field::connection, request_.connection);
@@ -167,12 +168,15 @@ asio::awaitable<void> ViewConnection::read() {
     buffer.consume(buffer.size());
     wake();
   }
+  // Without a close code the viewer has left. With one, write() sends the code and ends the connection.
   if (viewer_.close_code() == Viewer::CloseCode::none) over_ = true;
   wake();
 }
 
 asio::awaitable<void> ViewConnection::write() {
   while (!over_) {
+    // A close code is sent first, then messages that are due. Otherwise the writer waits until the next one is due, or for
+    // wake().
     if (const auto code = viewer_.close_code(); code != Viewer::CloseCode::none) {
       co_await say_goodbye(static_cast<std::uint16_t>(code),
                            code == Viewer::CloseCode::policy ? "too many or malformed messages" : "too slow");
@@ -231,6 +235,7 @@ void ViewConnection::on_closing() {
   wake_.cancel();
   stall_.cancel();
   rest_.cancel();
+  // While a message is being written, a frame must not be put between its bytes.
   if (!std::exchange(over_, true) && !writing_) {
     const std::array<std::uint8_t, 4> going_away{0x88, 2, 1001 >> 8, 1001 & 0xFF};  // a frame of RFC 6455, 5.5.1
     if (::send(from_.socket().native_handle(), going_away.data(), going_away.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) return;
