@@ -87,6 +87,7 @@ Result<std::optional<Raster>> contact_cell(const Ping& ping, const Scene& scene,
            static_cast<std::uint8_t>(dimmed * p.b)};
 
   FanPainter painter({.width_px = sheet_width_px, .colours = *gray, .rings = false});
+  // From here the samples of `polar` are a mask, first of the shadows, then of one instance after the other.
   polar.full_scale = 1;
   const PingLabels& labels = *ping.labels;
   std::ranges::transform(labels.caster, polar.samples.begin(), [](std::uint16_t caster) { return caster != 0 ? 1.0f : 0.0f; });
@@ -94,6 +95,7 @@ Result<std::optional<Raster>> contact_cell(const Ping& ping, const Scene& scene,
   const std::vector<std::string> classes = classes_of_things(scene);
   const FanLayout from = fan_layout(polar, {.width_px = render::cartesian_width_px, .colours = {}, .rings = false});
   const FanLayout to = fan_layout(polar, style);
+  // Boxes of annotations are pixels of a larger picture; they are scaled about the apex of the fan.
   const double scale = from.metres_per_pixel / to.metres_per_pixel;
   for (const json& thing : annotations) {
     const auto instance = thing["instance"].get<std::uint16_t>();

@@ -16,6 +16,7 @@ using nlohmann::json;
 
 constexpr int beams_a_side = 4;  // corners of a polygon along an arc are no farther apart
 
+/// Returns whether an instance is annotated: objects with a label and point targets are.
 bool is_thing(const Scene& scene, std::size_t i) {
   const std::size_t objects = scene.objects.size();
   return i < objects ? !scene.objects[i].label.empty() : true;
@@ -54,6 +55,7 @@ class Cartesian {
 
 double tenth(double x) { return std::round(10 * x) / 10; }
 
+/// The box [left, top, width, height] around all polygons, in pixels.
 json box_of(const std::vector<json>& polygons) {
   double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
   for (const json& polygon : polygons)
@@ -118,6 +120,7 @@ json annotations_of(const PingLabels& labels, const Ping& ping, const Scene& sce
   const auto at = [&](int x, int y) {
     return labels.instance[static_cast<std::size_t>(y) * beams + static_cast<std::size_t>(x)];
   };
+  // Finds the box of every instance in one pass, so that outlines() looks only at the samples in a box.
   for (int y = 0; y < labels.rows; ++y)
     for (int x = 0; x < labels.beams; ++x) {
       if (at(x, y) == 0) continue;

@@ -94,12 +94,13 @@ Result<RenderInput> input_of(const RenderCommand& command) {
       if (const auto r = follow(job, *file, command.poses, body); !r) return tl::make_unexpected(r.error());
     }
   }
-  std::set<std::string> ranges;  // a line each, however many steps a sweep has
+  std::set<std::string> ranges;  // each note once, although a sweep repeats it for every step
   for (const RenderJob& job : input->jobs)
     if (std::string note = note_of_range(job); !note.empty()) ranges.insert(std::move(note));
   input->notes.insert(input->notes.end(), ranges.begin(), ranges.end());
   bool is_noted = false;
   for (RenderJob& job : input->jobs) {
+    // Motion that was requested is computed even if the poses look like snapshots.
     if (job.wants_motion || is_given_on(command.engine, &Switches::motion)) job.snapshots = false;
     if (job.snapshots && !std::exchange(is_noted, true))
       input->notes.push_back(note_of_snapshots(*job.vehicle().plan.trajectory));
@@ -108,6 +109,7 @@ Result<RenderInput> input_of(const RenderCommand& command) {
 }
 
 Result<Coverage> coverage_of(const RenderJob& given, Parallel& pool) {
+  // Only the bed is measured. keep_pressure keeps the pressures, because samples are rounded and limited.
   const RenderJob job = with_bed_only(given);
   const auto make = [&](std::shared_ptr<const Scene> s) {
     return make_engine(std::move(s), pool, {.simd = job.config.engine.simd});
@@ -137,7 +139,7 @@ Result<void> report_coverage(const std::vector<RenderJob>& jobs) {
   return {};
 }
 
-/// A line each, however many steps a sweep has.
+/// Prints each note once, although a sweep repeats it for every step.
 void print_notes(const RenderInput& input) {
   std::set<std::string> notes{note_of_parts_left_out(input.jobs.front().config.engine.switches)};
   for (const RenderJob& job : input.jobs) notes.insert(job.scene->notes.begin(), job.scene->notes.end());

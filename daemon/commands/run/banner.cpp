@@ -19,6 +19,7 @@ std::string address_text(const Endpoint& e) { return text_of(e); }
 std::filesystem::path sdk_library_folder() {
   std::error_code ec;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ec);
+  // The first folder is that of an installed program, the second that of a build.
   for (const char* folder : {"../lib/sonard", ".."}) {
     const auto place = (program.parent_path() / folder / "bvt4/lib").lexically_normal();
     if (!ec && std::filesystem::exists(place / "libbvtsdk.so", ec)) return place;
@@ -26,7 +27,7 @@ std::filesystem::path sdk_library_folder() {
   return {};
 }
 
-/// How a program connects to a sonar that needs our library in place of an unchanged driver.
+/// The lines that say how a program connects to a sonar that needs our library in place of an unchanged driver.
 std::string library_lines(const protocol::Make& make, std::string at, unsigned port) {
   const std::string folder = sdk_library_folder().string();
   if (port != make.ports.front().number) at += format(":%u", port);
@@ -72,15 +73,16 @@ std::string control_line(const App& app) {
   return text + (app.config().control.token_file.empty() ? "\n" : "   token needed\n");
 }
 
-/// The page; empty in builds without it.
+/// The line with the address of the page; empty in builds without the page.
 std::string page_line(const App& app) {
   const Endpoint http = app.control().http();
   if (http.port == 0 || app.config().limits.viewers == 0 || page_files().empty()) return {};
+  // A browser cannot open 0.0.0.0, so the page is shown at the loopback address.
   const std::string host = http.ip == Ipv4{} ? "127.0.0.1:" + std::to_string(http.port) : address_text(http);
   return "open      http://" + host + "   the live view, in a browser\n";
 }
 
-/// For viewers whose pages come from elsewhere: the key is good until sonard stops.
+/// The address for viewers whose page comes from another server. The key is valid until sonard stops.
 std::string view_line(const App& app) {
   const Endpoint http = app.control().http();
   const std::string& key = app.view().secrets().key();

@@ -215,6 +215,7 @@ class Check {
     const double seconds = lasts.seconds.value_or(lasts.pings || kind.per_ping() ? 0 : default_s);
     fault.span.time = nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9)));
     fault.span.pings = lasts.pings.value_or(seconds > 0 ? 0 : 1);
+    // A trigger that can occur again has no limit unless a count is given. Any other fault acts once.
     const bool once = !record_.at.every && !record_.at.probability && record_.at.on.empty();
     fault.span.count = lasts.count.value_or(once ? 1 : 0);
     // A record without a trigger and with a count acts on that many pings in a row.

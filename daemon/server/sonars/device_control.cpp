@@ -36,7 +36,7 @@ v1::Visit message_of(const Visit& visit) {
   return out;
 }
 
-/// `session`: null when it ends.
+/// `session` is null if the session has ended.
 void fill(v1::ClientStatus& out, const Connection& c, Session* session) {
   out.set_address(c.peer.name);
   out.set_pings_written(c.pings_written());
