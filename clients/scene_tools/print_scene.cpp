@@ -12,7 +12,7 @@ namespace {
 
 using text::format;
 
-/// Three significant digits, without trailing zeros or exponent.
+/// Formats a number with three significant digits, without trailing zeros or exponent.
 std::string short_number(double v) {
   const double size = std::abs(v);
   const int decimals = size == 0 || size >= 1e6 ? 0 : std::clamp(2 - static_cast<int>(std::floor(std::log10(size))), 0, 4);
@@ -24,7 +24,7 @@ std::string short_number(double v) {
 
 using Row = std::vector<std::string>;
 
-/// Columns of minimal width; those in `right` are right-aligned.
+/// Formats columns of minimal width; those in `right` are right-aligned.
 std::string table(const std::vector<Row>& rows, const std::vector<std::size_t>& right) {
   std::vector<std::size_t> width(rows.front().size(), 0);
   for (const Row& row : rows)

@@ -23,7 +23,7 @@ struct SdfFrame {
 };
 
 struct SdfModel {
-  std::string name, path;  // crane, ship/crane; both empty for the world
+  std::string name, path;  // such as crane and ship/crane; both are empty for the world
   std::string source;      // name of the included model, which may tell more than the name in this file
   Element element;         // <model> or <world>
   SdfModel* parent = nullptr;
@@ -41,8 +41,8 @@ struct SdfPose {
 };
 SdfPose read_sdf_pose(const Element& pose, Findings& findings);
 
-/// Builds the tree below <world> or, without one, below <sdf>. Bounded: 16 includes deep, 4096 models, 5 million elements. Keeps
-/// the files that the tree's elements are in.
+/// Builds the tree below <world> or, without one, below <sdf>. The limits are 16 nested includes, 4096 models and 5 million
+/// elements. The object keeps the files that contain the elements of the tree.
 class SdfTree {
  public:
   SdfTree(const Library& library, const ReadOptions& options, Findings& findings)
@@ -71,11 +71,11 @@ class SdfTree {
   std::size_t models_ = 0, elements_ = 0;
 };
 
-/// Pose of the frame `name` ("", "__model__", "arm", "crane::hook") in the model. An unknown name, or poses that refer to each
-/// other in a circle, are errors at `asked_by`.
+/// Returns the pose of the frame `name` ("", "__model__", "arm", "crane::hook") in the model. An unknown name, or poses that
+/// refer to each other in a circle, are errors at `asked_by`.
 Pose frame_in_model(SdfModel& model, const std::string& name, const Place& asked_by, Findings& findings, int depth = 0);
 
-/// Pose of a nested model in its parent.
+/// Returns the pose of a nested model in its parent.
 Pose model_in_parent(SdfModel& nested, const Place& asked_by, Findings& findings, int depth = 0);
 
 }  // namespace sonar::scene_tools

@@ -12,7 +12,7 @@
 
 namespace sonar::clients {
 
-/// Seconds on a monotonic clock, from any origin.
+/// A time in seconds on a monotonic clock. The origin is arbitrary.
 using Seconds = double;
 
 using protocol::HostPing;

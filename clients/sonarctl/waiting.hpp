@@ -15,7 +15,7 @@ class FirstPingWait {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds moment{300};
 
-  /// `observes`: nothing was requested.
+  /// `observes` is true if the command only observes and has requested nothing.
   FirstPingWait(const SourceOptions& source, const PingStream& stream, bool observes, Clock::time_point now = Clock::now());
   /// Returns how long to wait: `most`, or less if the line is due before.
   std::chrono::milliseconds patience(std::chrono::milliseconds most, Clock::time_point now = Clock::now()) const;

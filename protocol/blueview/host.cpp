@@ -14,8 +14,8 @@ namespace {
 using namespace std::chrono_literals;
 using protocol::HostActions;
 
-constexpr auto host_keep_alive_after = 2s;    // since this host sent its last message
-constexpr std::uint16_t abi_of_sdk = 4;  // the sonar reads this number and ignores it
+constexpr auto host_keep_alive_after = 2s;  // since this host sent its last message
+constexpr std::uint16_t abi_of_sdk = 4;     // the sonar reads this number and ignores it
 
 /// The text of an error frame, such as "no head 3 (code 2010)".
 std::string text_of_error(wire::BytesView payload) {

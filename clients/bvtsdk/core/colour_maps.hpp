@@ -28,7 +28,7 @@ Code save_colour_map(const std::string& path, const ColourMap& map);
 
 /// Order of the bytes of a colour pixel in memory. Clients hand the pixels to OpenCV as BGRA (inferred).
 enum class PixelOrder { bgra, rgba };
-/// BVE_PIXEL=bgra or rgba; default bgra.
+/// Reads the environment variable BVE_PIXEL (bgra or rgba); the default is bgra.
 PixelOrder pixel_order_from_environment();
 
 struct ColourImage : ImageGeometry {

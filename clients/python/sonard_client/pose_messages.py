@@ -28,7 +28,7 @@ class PoseMessage:
 
 
 def json_line(pose: PoseMessage) -> bytes:
-    """The keys of ArduPilot's JSON simulator interface, without seq and angular velocity."""
+    """Encodes the keys of ArduPilot's JSON simulator interface, without seq and angular velocity."""
     line: Dict[str, Any] = {"frame": pose.frame, "position": pose.position_m, "quaternion": pose.orientation}
     if pose.timestamp_s is not None:
         line["timestamp"] = pose.timestamp_s
@@ -40,7 +40,7 @@ def json_line(pose: PoseMessage) -> bytes:
 
 
 def pose_update(pose: PoseMessage) -> bytes:
-    """One datagram. Its velocities are in body axes."""
+    """Encodes one datagram. Its velocities are in body axes."""
     stamped = pose.timestamp_s is not None
     time = _number(1, CLOCKS[pose.clock if stamped else "arrival"])
     if pose.timestamp_s is not None:
@@ -78,5 +78,5 @@ def _field(field: int, content: bytes) -> bytes:
 
 
 def _doubles(values: Sequence[float]) -> bytes:
-    """A message of doubles with the field numbers 1, 2, 3, ..."""
+    """Encodes a message of doubles with the field numbers 1, 2, 3, ..."""
     return b"".join(_key(field, 1) + struct.pack("<d", value) for field, value in enumerate(values, 1))

@@ -11,7 +11,7 @@ function whereToConnect(sonar) {
   return found ? `${found.protocol} ${found.address}` : host(sonar.listens) || sonar.advertised;
 }
 
-/// The part of an address that a user knows: without the port.
+/// Returns an address without its port.
 const host = (address) => address?.replace(/:\d+$/, '') ?? '';
 const noted = (facts, check) => facts.findings?.find((f) => f.check === check && f.level !== 0)?.text;
 

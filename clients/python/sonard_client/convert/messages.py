@@ -99,7 +99,7 @@ def _from_json(topic: str, data: bytes) -> List[Found]:
 
 
 def _protobuf(data: bytes) -> "Iterator[Tuple[int, Union[int, float, bytes]]]":
-    """Yields field numbers and values: varints, doubles, bytes."""
+    """Yields the number and the value of each field. A value is a varint, a double or bytes."""
     at = 0
 
     def varint() -> int:

@@ -14,7 +14,7 @@ const place = (layout, range_m, azimuth) => [
   layout.apex_y - (range_m / layout.metres_per_pixel) * Math.cos(azimuth),
 ];
 
-/// Starboard positive, as operators read it: "+15°".
+/// Formats an angle with starboard positive, as operators read it: "+15°".
 export function bearingText(azimuth_rad, digits = 0) {
   const bearing = -degrees(azimuth_rad);
   const text = Math.abs(bearing).toFixed(digits);

@@ -70,7 +70,7 @@ const formats = (gl) => ({
   '32FC1': { internal: gl.R32F, format: gl.RED, type: gl.FLOAT, sampler: 'sampler2D', unit: 1 },
 });
 
-/// Null without WebGL2.
+/// Returns null if the browser has no WebGL2.
 export function makeFanPainter(canvas) {
   const gl = canvas.getContext('webgl2', { alpha: false, antialias: false, preserveDrawingBuffer: true });
   return gl && new FanPainter(gl);
@@ -122,7 +122,7 @@ class FanPainter {
     return this.programs.get(key);
   }
 
-  /// A new ping: its samples go into the texture.
+  /// Copies the samples of a new ping into the texture.
   load(image, samples, table, full_scale) {
     const gl = this.gl;
     const format = formats(gl)[image.encoding] ?? formats(gl)['32FC1'];

@@ -18,7 +18,7 @@ function rateOf(facts) {
 /// The product's short name: "oculus-m1200d" -> "M1200d".
 const product = (profile) => profile.replace(/^(oculus|blueview)-/, '').replace(/^aris-/, 'ARIS ').replace('waterlinked-3d15', 'Sonar 3D-15').replace(/^./, (c) => c.toUpperCase());
 
-/// UTC; a dash for files without times.
+/// Returns the time in UTC, or a dash for files without times.
 const recordedTime = (ns) => (ns > 1e17 ? new Date(ns / 1e6).toISOString().slice(0, 19).replace('T', ' ') : dash);
 
 export function drawHead(facts) {

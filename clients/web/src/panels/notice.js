@@ -18,7 +18,7 @@ export class Notice {
     else if (button) this.steering.call(button.service, button.request);
   }
 
-  /// The situation, or null.
+  /// Shows the situation; hides the notice if there is none.
   draw() {
     const { facts } = this;
     const now = (this.now = situationOf(facts, this.connection));

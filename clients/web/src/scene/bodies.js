@@ -18,7 +18,7 @@ export function makeVehicle() {
   return { group, hollow: (yes) => (body.visible = !yes) };
 }
 
-/// The last minute of places as a line.
+/// A line through the positions of the last minute.
 export function makeTrail() {
   const most = 900;
   const points = [];  // {t, x, y, z}
@@ -133,7 +133,7 @@ export function makeFanPlane() {
     mesh.geometry.setAttribute('position', new BufferAttribute(new Float32Array(triangles), 3));
   };
 
-  /// True when something changed.
+  /// Returns true if something changed.
   const show = (fan) => {
     const { ping, polar, table, map, gain } = fan;
     mesh.visible = Boolean(ping && polar && fan.samples);

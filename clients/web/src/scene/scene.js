@@ -161,7 +161,7 @@ export class Scene {
     this.graph.updateMatrixWorld();
   }
 
-  /// At most 15 times a second, and only when something moved.
+  /// Draws at most 15 times a second, and only if something moved.
   draw() {
     if (this.missing || document.hidden) return;
     const now = performance.now();
