@@ -32,14 +32,14 @@ class Profile {
     first_ = size();
     last_ = 0;
   }
-  void add(const RangeReturns& returns, const RangeReturn& r, double weight) {
+  void add(const RangeReturns& returns, const RangeReturn& r, int block, double weight) {
     if (r.last + 2 > size()) return;  // beyond the picture
     first_ = std::min<std::ptrdiff_t>(first_, r.first);
     last_ = std::max<std::ptrdiff_t>(last_, r.last);
     if (re_.empty()) return add_steps(steps_, r, weight * r.of_first, weight * r.of_each, weight * r.of_last);
     const double amplitude = std::sqrt(weight), each = amplitude * std::sqrt(r.of_each);
     for (std::ptrdiff_t k = r.first; k <= r.last; ++k) {
-      const ComplexNormal speckle = returns.speckle_in(r, k);
+      const ComplexNormal speckle = returns.speckle_in(r, k, block);
       const double a = k > r.first && k < r.last ? each : amplitude * std::sqrt(r.power_in(k));
       re_[static_cast<std::size_t>(k)] += a * static_cast<double>(speckle.re);
       im_[static_cast<std::size_t>(k)] += a * static_cast<double>(speckle.im);
@@ -162,12 +162,13 @@ class RangeImager {
   /// Calls f(pixel) for each of the pixels around a pixel that has a return.
   template <class F>
   void for_each_neighbour(const std::vector<Reported>& all, int column, int row, F f) const {
-    const int block = wanted_.block_rows > 0 ? wanted_.block_rows : grid_.rows, first = row / block * block;
-    for (int r = std::max(row - 1, first); r <= std::min({row + 1, first + block - 1, grid_.rows - 1}); ++r)
+    for (int r = std::max(row - 1, 0); r <= std::min(row + 1, grid_.rows - 1); ++r) {
+      if (block_of(r) != block_of(row)) continue;
       for (int c = std::max(column - 1, 0); c <= std::min(column + 1, grid_.columns - 1); ++c) {
         const Reported& other = all[static_cast<std::size_t>(r * grid_.columns + c)];
         if ((r != row || c != column) && other.power > 0) f(other);
       }
+    }
   }
   /// Calls change(before, column, row, pixel) for every pixel that has a return; `before` has the values of all pixels before the
   /// first call.
@@ -227,6 +228,14 @@ class RangeImager {
                            (settings_.tvg ? tvg_db(mode_.receiver, range_m, settings_.device_absorption_db_per_m) : 0);
     return amplitude * full_scale_factor(mode_.receiver, gain_db) * static_cast<double>(settings_.format.max_code >> 16);
   }
+  int block_of(int row) const { return wanted_.block_rows > 0 ? row / wanted_.block_rows : 0; }
+  /// Range of the loudest scatterer that a return has in a range cell: random, and the same for all beams that hear it.
+  double place_in_cell_m(const RangeReturn& r, std::ptrdiff_t k) const {
+    const double from = std::max(center_of(k) - cell_m_ / 2, r.range_m - r.half_m),
+                 to = std::min(center_of(k) + cell_m_ / 2, r.range_m + r.half_m);
+    const Random4 bits = philox(r.draw, static_cast<std::uint32_t>(k), 1, key_of(request_.seed, Domain::range_speckle));
+    return from + (to - from) * static_cast<double>(uniform_open(bits.v[0]));
+  }
   double center_of(std::ptrdiff_t k) const { return (static_cast<double>(k) + 0.5) * cell_m_; }
   double least_power() const { return request_.switches.noise ? wanted_.detection * noise_power_ : 0; }
   bool is_detected(double power, double range_m) const {
@@ -248,10 +257,11 @@ class RangeImager {
   Reported pixel(int column, int row, std::uint32_t index, Profile& profile) {
     const Random4 bits =
         philox(static_cast<std::uint32_t>(request_.number), request_.sonar_id, index, key_of(request_.seed, Domain::range_noise));
+    const int block = block_of(row);
     profile.clear();
     for_each_return(
         column, row, [](const RangeReturn&) { return true; },
-        [&](const RangeReturn& r, double weight) { profile.add(returns_, r, weight); });
+        [&](const RangeReturn& r, double weight) { profile.add(returns_, r, block, weight); });
     profile.finish();
     double power = 0, range_m = 0;
     if (!profile.empty()) {
@@ -260,14 +270,18 @@ class RangeImager {
       range_m = profile.centre_m(k);
       if (!request_.switches.expected_power) {
         // Rays are shared by neighbouring beams, and so is their speckle.
-        double re = 0, im = 0;
+        double re = 0, im = 0, loudest_power = 0;
+        const RangeReturn* loudest = nullptr;
         const auto is_in_cell = [k](const RangeReturn& r) { return r.first <= k && r.last >= k; };
         for_each_return(column, row, is_in_cell, [&](const RangeReturn& r, double weight) {
           const double amplitude = std::sqrt(r.power_in(k) * weight);
-          const ComplexNormal speckle = wanted_.chosen_as_heard ? returns_.speckle_in(r, k) : r.speckle;
+          const ComplexNormal speckle = wanted_.chosen_as_heard ? returns_.speckle_in(r, k, block) : r.speckle;
+          const double of_return = amplitude * amplitude * static_cast<double>(speckle.re * speckle.re + speckle.im * speckle.im);
+          if (of_return > loudest_power) loudest = &r, loudest_power = of_return;
           re += amplitude * static_cast<double>(speckle.re);
           im += amplitude * static_cast<double>(speckle.im);
         });
+        if (wanted_.range_of_loudest && loudest != nullptr) range_m = place_in_cell_m(*loudest, k);
         if (request_.switches.noise) {
           const ComplexNormal noise = complex_normal(bits.v[0], bits.v[1]);
           re += std::sqrt(noise_power_) * static_cast<double>(noise.re);

@@ -58,9 +58,10 @@ class RangeReturns {
   }
   /// Returns of the point targets that are not hidden.
   std::vector<PointReturn> of_points() const;
-  /// Speckle of a return in one range cell, if each cell has its own speckle.
-  ComplexNormal speckle_in(const RangeReturn& r, std::ptrdiff_t cell) const {
-    return draws_[(r.draw + static_cast<std::uint32_t>(cell) * 389u) % static_cast<std::uint32_t>(draws_.size())];
+  /// Speckle of a return in one range cell for one block of rows, if each cell has its own speckle.
+  ComplexNormal speckle_in(const RangeReturn& r, std::ptrdiff_t cell, int block) const {
+    const std::uint32_t of_cell = static_cast<std::uint32_t>(cell) * 389u + static_cast<std::uint32_t>(block) * 1543u;
+    return draws_[(r.draw + of_cell) % static_cast<std::uint32_t>(draws_.size())];
   }
   double device_per_true() const { return device_per_true_; }  // factor from true ranges to ranges of the device
 

@@ -23,9 +23,10 @@ struct RangeImageSettings : VendorSettings {
   double detection = 16;             // returns below so many times the noise power are dropped
   bool nearest = false;              // use the nearest return of a direction, not the strongest
   bool chosen_as_heard = false;      // choose the strongest cell with speckle, which each range cell has of its own
+  bool range_of_loudest = false;     // report the range of the loudest return in the chosen cell, not the centre of all returns
   double range_sample_m = 0;         // ranges are whole multiples of it, 0 = any
   // The filters of the device, in the order of use. Neighbours of a pixel are those of the eight around it in its block of rows.
-  int block_rows = 0;        // rows that are measured together; 0 = all
+  int block_rows = 0;        // rows that are measured together, with speckle of their own; 0 = all
   int least_confirming = 0;  // a return is dropped if fewer of its neighbours confirm it
   double confirming_m = 0;   // a neighbour confirms a return if its range differs by no more than this
   int median_passes = 0;     // number of passes that replace each range by the median of itself and its neighbours

@@ -7,11 +7,12 @@
 namespace sonar::waterlinked {
 
 // Sources. DOC: the vendor's public documentation. SMP: a recording of a real unit. unknown: centre of the low frequency
-// (recalled), widths of the beams, range resolution.
+// (recalled), beams of the high frequency, range resolution. Width of a beam of the low frequency: strengths have a correlation
+// of 0.7 with those in the next column if it is 0.9 degrees, of 0.85 if it is 1.5; SMP: 0.62.
 std::span<const ModeRow> mode_rows() {
   static constexpr std::array<ModeRow, 2> all{{
-      {"low-frequency", 1.2e6, 90, 40, 1.5, 0.02, 5},    // DOC, SMP: field of view; DOC: rate
-      {"high-frequency", 2.4e6, 40, 40, 0.7, 0.01, 20},  // DOC: frequency, field of view, rate
+      {"low-frequency", 1.2e6, 90, 40, 0.9, 1.5, 0.02, 5},    // DOC, SMP: field of view; DOC: rate
+      {"high-frequency", 2.4e6, 40, 40, 0.7, 0.7, 0.01, 20},  // DOC: frequency, field of view, rate
   }};
   return all;
 }
@@ -29,7 +30,7 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
       mode.centre_hz = static_cast<float>(row.centre_hz);
       mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(row.horizontal_deg));
       mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(row.vertical_deg));
-      mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(row.beam_deg));
+      mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(row.beam_width_deg));
       mode.beam_spacing = BeamSpacing::uniform_in_angle;
       mode.min_range_m = 0;
       mode.max_range_m = static_cast<float>(longest_range_m);

@@ -15,10 +15,11 @@ constexpr float first_gain_db = 30;           // gain of the first pictures, fro
 
 // The values of the model of the image (protocol/waterlinked/README.md); models.hpp has their evidence.
 HeldSettings::HeldSettings(const Settings& s) : settings(s) {
-  beam_height_rad = rad_from_deg(mode_rows()[s.mode].beam_deg);
+  beam_height_rad = rad_from_deg(mode_rows()[s.mode].beam_height_deg);
   range_unit_m = pixel_scale_m;
   RangeImageSettings::least_strength = waterlinked::least_strength;
   chosen_as_heard = true;
+  RangeImageSettings::range_of_loudest = waterlinked::range_of_loudest;
   RangeImageSettings::range_sample_m = waterlinked::range_sample_m;
   RangeImageSettings::block_rows = waterlinked::block_rows;
   RangeImageSettings::least_confirming = waterlinked::least_confirming;

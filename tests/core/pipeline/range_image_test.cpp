@@ -344,6 +344,55 @@ TEST(RangeImage, FiltersAndSpeckleLeaveAPlaneWhereItIs) {
     EXPECT_NEAR(std::remainder(s.range_m(column, 31), 0.005), 0, s.wanted->range_unit_m) << column;
 }
 
+TEST(RangeImage, BeamsThatHearTheSameScattererReportItsRange) {
+  RangeImageSounding s(plane_ahead(5));
+  s.wanted->chosen_as_heard = true;
+  const auto equal = [&s] {  // share of ranges that are equal to the one beside them
+    s.ping();
+    double same = 0, n = 0;
+    for (int row = 20; row < 44; ++row)
+      for (int column = 112; column < 144; ++column)
+        if (s.at(column, row).range != 0) same += s.at(column, row).range == s.at(column + 1, row).range, ++n;
+    return same / n;
+  };
+  EXPECT_LT(equal(), 0.2);  // next beam, next centre of the echo
+  s.wanted->range_of_loudest = true;
+  EXPECT_GT(equal(), 0.35);
+  double squares = 0, sum = 0, n = 0;
+  for (int row = 20; row < 44; ++row)
+    for (int column = 112; column < 144; ++column) {
+      if (s.at(column, row).range == 0) continue;
+      const double beyond_m = s.place(column, row).x - 5;
+      sum += beyond_m, squares += beyond_m * beyond_m, ++n;
+    }
+  EXPECT_GT(n, 0.95 * 24 * 32);
+  EXPECT_NEAR(sum / n, 0, 0.005);
+  EXPECT_LT(std::sqrt(squares / n), 0.015);
+}
+
+TEST(RangeImage, BlocksOfRowsHaveSpeckleOfTheirOwn) {
+  RangeImageSounding s(plane_ahead(5));
+  s.wanted->chosen_as_heard = true;
+  s.request().settings.gain_db = 40;
+  s.wanted->least_strength = 1;
+  const auto alike = [&s](std::initializer_list<int> of_rows) {  // correlation of strengths with those of the row above
+    std::vector<double> below, above;
+    for (const int row : of_rows)
+      for (int column = 80; column < 176; column += 2) {  // the plane is about as bright everywhere there
+        below.push_back(s.at(column, row).strength);
+        above.push_back(s.at(column, row + 1).strength);
+      }
+    return correlation(below, above);
+  };
+  s.ping();
+  EXPECT_GT(alike({15, 31, 47}), 0.5);
+  s.wanted->block_rows = 16;
+  s.ping();
+  EXPECT_LT(alike({15, 31, 47}), 0.25);
+  EXPECT_GT(alike({14, 30, 46}), 0.5);
+  EXPECT_GT(alike({16, 32, 48}), 0.5);
+}
+
 TEST(RangeImage, SameBytesOnAnyNumberOfThreadsAndAnotherPingHasOtherNoise) {
   const auto scene = SceneMaker().add(wall(3, 3), -20, {5, 0, 0}).add(sphere(0.5, 4), -15, {3, 1, 0}).make();
   RangeImageSounding one(scene, 1), three(scene, 3);
