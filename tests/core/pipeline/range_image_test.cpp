@@ -397,7 +397,7 @@ TEST(RangeImage, SameBytesOnAnyNumberOfThreadsAndAnotherPingHasOtherNoise) {
   const auto scene = SceneMaker().add(wall(3, 3), -20, {5, 0, 0}).add(sphere(0.5, 4), -15, {3, 1, 0}).make();
   RangeImageSounding one(scene, 1), three(scene, 3);
   for (RangeImageSounding* s : {&one, &three}) {
-    s->wanted->chosen_as_heard = true;
+    s->wanted->chosen_as_heard = s->wanted->range_of_loudest = true;
     s->wanted->block_rows = 16, s->wanted->least_confirming = 1, s->wanted->confirming_m = 0.1, s->wanted->median_passes = 2;
   }
   one.request().switches.noise = three.request().switches.noise = true;

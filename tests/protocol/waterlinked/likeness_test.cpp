@@ -7,6 +7,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "core/base/geometry.hpp"
+#include "core/scene/shapes/primitives.hpp"
 #include "core/sonar/range_image.hpp"
 #include "protocol/waterlinked/messages.hpp"
 #include "protocol/waterlinked/rip.hpp"
@@ -200,6 +202,29 @@ TEST(WaterLinkedLikeness, WithoutWhatIsFittedTheyHaveNone) {
   EXPECT_LT(image.holes(0.064, 15), 0.02);
   EXPECT_GT(image.alike_across(), 0.8);
   EXPECT_GT(image.alike_between_blocks(), 0.5);
+}
+
+TEST(WaterLinkedLikeness, NoFilterDropsAThinPoleAnywhere) {
+  const tests::Unit unit;
+  const Settings settings = settings_from(unit.device.settings.get(), unit.device);
+  PingSettings ping = ping_settings(settings, unit.device);
+  ping.gain_db = 50;
+  for (const double turn_rad : {0.0, pi / 2}) {  // upright, level
+    const Quatd turn{std::cos(turn_rad / 2), std::sin(turn_rad / 2), 0, 0};
+    const auto scene = test::SceneMaker().add(make_cylinder(0.01, 6, 48, Caps::none), -8, {8, 0, 0}, turn).make();
+    test::Sounding sounding(scene, unit.device.model->modes[0], ping);
+    sounding.request.vendor_settings = std::make_shared<HeldSettings>(settings);
+    sounding.request.switches.noise = true;
+    int least = rows * columns, most = 0;  // pixels with a return
+    for (int n = 0; n < 8; ++n) {          // within a cell of the beam grid
+      const Ping& shot = sounding.ping_from({0, n * 0.006, n * 0.011}, {0, 0, 0});
+      int heard = 0;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(rows * columns); ++i) heard += range_pixel(shot, i).range != 0;
+      least = std::min(least, heard), most = std::max(most, heard);
+    }
+    EXPECT_GT(least, 250);
+    EXPECT_GT(least, 0.8 * most);
+  }
 }
 
 TEST(WaterLinkedLikeness, TheRecordingHasThoseTraces) {
