@@ -140,7 +140,7 @@ class Vendor {
     return nullptr;
   }
   /// The datagrams of a ping in order, at most 65,507 bytes each, for a port of kind udp_stream with receivers, or udp_dialogue.
-  /// For one of kind tcp_stream with a gap: the parts of frame() between which it pauses.
+  /// For one of kind tcp_stream: the parts of frame() between which it pauses; of several such ports each has its own part.
   virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};

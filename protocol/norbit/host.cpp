@@ -70,7 +70,7 @@ class NorbitHost final : public protocol::Host {
 
   HostActions on_open(std::span<const std::uint16_t>, Time) override {
     if (!request_) return {};
-    return {protocol::HostSend{0, *request_}};
+    return {protocol::HostSend{std::size(host_ports) - 1, *request_}};
   }
   HostActions on_bytes(std::size_t port, BytesView received, Time now) override {
     HostActions actions;
@@ -87,7 +87,7 @@ class NorbitHost final : public protocol::Host {
         const std::uint32_t number = column->front.ping;
         parts_[number].column = std::move(whole->bytes);
         on_part(number, actions);
-      } else if (port > 0) {  // no reply to a command
+      } else if (port == 1) {  // others may hold replies to commands: a recording is one stream
         counts_.junk_bytes += whole->bytes.size();
       }
     }

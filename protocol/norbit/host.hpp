@@ -6,9 +6,9 @@
 
 namespace sonar::norbit {
 
-inline constexpr protocol::HostPort host_ports[]{{protocol::HostPort::Kind::tcp, command_port},
-                                                 {protocol::HostPort::Kind::tcp, bathymetry_port},
-                                                 {protocol::HostPort::Kind::tcp, column_port}};
+inline constexpr protocol::HostPort host_ports[]{{protocol::HostPort::Kind::tcp, bathymetry_port},
+                                                 {protocol::HostPort::Kind::tcp, column_port},
+                                                 {protocol::HostPort::Kind::tcp, command_port}};
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();

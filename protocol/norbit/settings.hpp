@@ -18,8 +18,8 @@ inline constexpr SampleFormat sample_format{
 
 struct Settings {
   bool power = false;
-  double start_m = 0, stop_m = 50;
-  double rate_hz = -1;  // -1: as fast as the range permits
+  double start_m = 0, stop_m = 10;  // chosen; DFD: 50, or as the product has it
+  double rate_hz = -1;              // -1: as fast as the range permits
   double gain_db = 20;
   int samples = 256, beams = 128;  // of the water column; samples: about
   double sound_mps = -1;           // -1: as measured

@@ -33,7 +33,7 @@ MAKES = {"oculus-m1200d": (52100, "--range", 3, "--gain", 60, "--rate", 5, "--mo
          "dvl-a50": (16171, "--as-it-is"),  # it pings before settings come
          "m3": (20001, "--as-it-is"),  # no settings come
          "micron": (4001, "--range", 3, "--gain", 60),
-         "norbit-wbms": (2209, "--range", 3, "--gain", 60, "--rate", 5)}
+         "norbit-wbms": (2210, "--range", 3, "--gain", 60, "--rate", 5)}
 PINGS = 4
 LONGEST_BEACON = 142  # bytes; beacons hold the address, which differs from run to run
 PATIENCE = ("--wait", 120)

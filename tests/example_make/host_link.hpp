@@ -91,9 +91,9 @@ class Link {
     perform(sonar.add_faults(*faults, true, now_));
     return true;
   }
-  /// Bytes of any kind from the driver, and to it.
+  /// Bytes of any kind from the driver, in all its conversations, and to it.
   void to_sonar(protocol::BytesView bytes) {
-    if (!lines_.empty()) send(0, bytes);
+    for (std::size_t port = 0; port < make_.ports.size(); ++port) send(port, bytes);
     drain();
   }
   void to_host(std::size_t port, protocol::BytesView bytes) {
