@@ -2,6 +2,7 @@
 // daemon keeps the time and the buffers to be sent; a Dialogue is one client's conversation, a Vendor frames pings and beacons.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstddef>
@@ -69,6 +70,8 @@ class Vendor {
       if (port.kind == kind) return &port;
     return nullptr;
   }
+  /// Whether the bytes of a ping are spread over several TCP ports.
+  bool has_several_streams() const { return std::ranges::count(ports(), Port::Kind::tcp_stream, &Port::kind) > 1; }
   virtual std::span<const Option> options() const { return {}; }
   virtual int default_max_clients() const = 0;
   /// The model that a device with these (complete) options emulates. Called once, when its configuration is read.

@@ -32,7 +32,7 @@ std::shared_ptr<const Outbox::Shape> pauses_between(const std::vector<protocol::
 
 FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping)
     : vendor_(vendor), state_(state), ping_(ping) {
-  if (!has_several_streams()) {
+  if (!vendor.has_several_streams()) {
     bytes_ = vendor.frame(ping, state);
     return;
   }
@@ -52,12 +52,8 @@ FramedPing::AtPort& FramedPing::at(const protocol::Port& port) {
   return ports_.emplace_back(AtPort{&port, std::move(parts), std::move(pauses)});
 }
 
-bool FramedPing::has_several_streams() const {
-  return std::ranges::count(vendor_.ports(), protocol::Port::Kind::tcp_stream, &protocol::Port::kind) > 1;
-}
-
 std::shared_ptr<const FramedPing::Bytes> FramedPing::bytes_at(const protocol::Port& port) {
-  if (!has_several_streams()) return bytes_;
+  if (!vendor_.has_several_streams()) return bytes_;
   const Datagrams& own = parts(port);
   return own->empty() ? nullptr : std::shared_ptr<const Bytes>(own, &own->front());
 }

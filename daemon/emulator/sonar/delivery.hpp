@@ -36,7 +36,6 @@ class FramedPing {
   const protocol::DeviceState& state_;
   const Ping& ping_;
   std::shared_ptr<const Bytes> bytes_;
-  bool has_several_streams() const;
   struct AtPort {
     const protocol::Port* port;
     Datagrams parts;
