@@ -298,6 +298,25 @@ class Page(PageChecks, unittest.TestCase):
                 self.assertIn("to the settings", page.text("#help-keys"))
                 page.close()
 
+    def test_settings_come_first(self):
+        """The first panel beside the picture, or of its tab on a phone: seen without scrolling, and the first that Tab reaches there."""
+        for width in (1600, 390):
+            with self.subTest(width=width):
+                page = self.open(width, 844, touch=width < 800)
+                page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
+                page.wait("!!document.querySelector('#troubles button')")
+                if width < 800:
+                    page.click("#tabs [data-tab=clients]")  # which leaves the focus
+                tops = page.run("[...document.querySelectorAll('#rail > .panel')].filter((p) => p.offsetHeight > 0).map((p) => [p.getBoundingClientRect().top, p.id]).sort((a, b) => a[0] - b[0])")
+                self.assertEqual(tops[0][1], "settings", tops)
+                self.assertEqual(page.run("document.querySelector('#rail').scrollTop"), 0)
+                self.assertTrue(page.run("document.querySelector('#settings').getBoundingClientRect().bottom <= document.querySelector('#rail').getBoundingClientRect().bottom"))
+                for key in ("Tab", "Enter", "Tab"):  # the link to the panels
+                    page.press(key)
+                self.assertEqual(page.run("document.activeElement.name"), "/front/range_m")
+                self.picture(page, f"settings-{width}")
+                page.close()
+
     def test_a_refusal_covers_no_other_setting(self):
         for width in (1600, 390):
             with self.subTest(width=width):
