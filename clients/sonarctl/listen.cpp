@@ -49,6 +49,7 @@ class Listener {
   PingSummary summary() const { return log_.summary(counts()); }
   /// True if settings were sent that pings echo.
   bool asked() const { return asked_; }
+  std::string_view rate_unit() const { return rate_unit_; }
   const std::optional<HostPing>& last_ping() const { return last_ping_; }
   std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }
 
@@ -57,6 +58,7 @@ class Listener {
     stream_.emplace(std::move(stream));
     received_ = !stream_->host().counts();
     asked_ = stream_->host().expects_echo();
+    rate_unit_ = stream_->make().rate_unit();
     last_message_ = Clock::now();
   }
 
@@ -123,6 +125,7 @@ class Listener {
   std::optional<PingStream> stream_;
   std::optional<protocol::Host::Counts> before_;  // counts of connections that are lost
   bool received_ = false, asked_ = false;
+  std::string_view rate_unit_;
   Outage outage_;
   PingLog log_;
   Clock::time_point start_, last_message_ = Clock::now();
@@ -134,7 +137,7 @@ class Listener {
 Result<void> report(const ListenOptions& options, const Listener& listener) {
   const PingSummary summary = listener.summary();
   const bool asked = listener.asked();
-  std::puts(options.json ? json_from(summary, asked).c_str() : text_from(summary, asked).c_str());
+  std::puts(options.json ? json_from(summary, asked).c_str() : text_from(summary, asked, listener.rate_unit()).c_str());
   if (listener.first_ping_after_s() && !options.json)
     std::printf("first ping after %.3f s%s\n", *listener.first_ping_after_s(),
                 options.started_at_unix_s > 0 ? " from the daemon's start" : "");

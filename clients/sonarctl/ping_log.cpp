@@ -77,14 +77,14 @@ std::string line_from(const HostPing& ping) {
   return line;
 }
 
-std::string text_from(const PingSummary& s, bool asked) {
+std::string text_from(const PingSummary& s, bool asked, std::string_view rate_unit) {
   std::string text = format("pings %llu", wide(s.pings));
   if (s.of_wire)
     text += format(", missing ids %llu, identity errors %llu, junk bytes %llu, dummies %llu", wide(s.of_wire->missing_pings),
                    wide(s.identity_errors), wide(s.of_wire->junk_bytes), wide(s.of_wire->dummies));
   text += "\n";
-  text += format("rate %.2f Hz, interval p50 %.1f ms, p99 %.1f ms, longest %.1f ms, %.2f MB/s", s.rate_hz, s.interval_p50_ms,
-                 s.interval_p99_ms, s.interval_max_ms,
+  text += format("rate %.2f %s, interval p50 %.1f ms, p99 %.1f ms, longest %.1f ms, %.2f MB/s", s.rate_hz,
+                 std::string(rate_unit).c_str(), s.interval_p50_ms, s.interval_p99_ms, s.interval_max_ms,
                  s.pings > 0 ? s.rate_hz * static_cast<double>(s.bytes) / static_cast<double>(s.pings) / 1e6 : 0.0);
   if (asked) text += "\nsettings echoed as asked: " + echo_text(s);
   return text;

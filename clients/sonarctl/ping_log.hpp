@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocol/host.hpp"
@@ -45,7 +46,8 @@ double percentile(std::vector<double> values, double share);
 std::vector<std::string> complaints(const PingSummary& summary, bool asked);
 
 std::string line_from(const HostPing& ping);  // one line per ping
-std::string text_from(const PingSummary& summary, bool asked);
+/// `rate_unit`: of the make of the sonar.
+std::string text_from(const PingSummary& summary, bool asked, std::string_view rate_unit);
 std::string json_from(const HostPing& ping, Seconds at);
 std::string json_from(const PingSummary& summary, bool asked);
 

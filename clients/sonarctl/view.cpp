@@ -57,7 +57,7 @@ Result<void> view_one(const ViewOptions& options) {
   const auto lines = lines_of(options, *picture, 2);
   if (!lines) return tl::unexpected(lines.error());
   for (const std::string& line : *lines) std::puts(line.c_str());
-  ViewCaption caption;
+  ViewCaption caption("");  // one ping has no rate
   caption.add(*ping, std::nullopt, 0);
   std::puts(caption.text().c_str());
   return {};
@@ -71,7 +71,8 @@ class LiveView {
       : options_(options),
         waits_(options.source, opened.stream, opened.observes),
         stream_(std::move(opened.stream)),
-        painter_(options.style) {}
+        painter_(options.style),
+        figures_(stream_->make().rate_unit()) {}
 
   /// Succeeds when interrupted, after the requested pings, or when the output was closed. A run without an end connects again
   /// when the device has gone.

@@ -20,7 +20,7 @@ std::string ViewCaption::text() const {
   std::string text = ping_text_;
   if (arrivals_.size() < 2) return text;
   const double rate_hz = static_cast<double>(arrivals_.size() - 1) / std::max(1e-9, arrivals_.back() - arrivals_.front());
-  text += text::format("  %.1f Hz", rate_hz);
+  text += text::format("  %.1f ", rate_hz) + rate_unit_;
   if (!missed_) return text;
   return text + (*missed_ == 0 ? "  no gaps" : "  " + std::to_string(*missed_) + " missed");
 }

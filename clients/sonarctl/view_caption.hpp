@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <string>
+#include <string_view>
 
 #include "clients/sonarctl/ping_log.hpp"
 
@@ -11,6 +12,8 @@ namespace sonar::clients {
 
 class ViewCaption {
  public:
+  /// `rate_unit`: of the make of the sonar.
+  explicit ViewCaption(std::string_view rate_unit) : rate_unit_(rate_unit) {}
   /// `of_wire`: counts of the host after the ping, if it has any.
   void add(const HostPing& ping, const std::optional<protocol::Host::Counts>& of_wire, Seconds at);
   std::uint64_t pings() const { return pings_; }
@@ -19,6 +22,7 @@ class ViewCaption {
 
  private:
   static constexpr std::size_t remembered = 20;  // arrivals that determine the rate
+  std::string rate_unit_;
   std::optional<std::uint64_t> missed_;
   std::deque<Seconds> arrivals_;
   std::uint64_t pings_ = 0;

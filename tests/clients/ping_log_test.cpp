@@ -58,11 +58,17 @@ TEST(PingLog, SaysItInTextAndInJson) {
   EXPECT_THAT(line_from(ping(77)), HasSubstr("ping 77  4 x 3  8 bit  2.00 m"));
   EXPECT_THAT(json_from(ping(77), 0), HasSubstr("\"ping\":77"));
   const protocol::Host::Counts counts{1, 0, 0, 5};
-  EXPECT_THAT(text_from(log.summary(counts), true),
+  EXPECT_THAT(text_from(log.summary(counts), true, "Hz"),
               testing::AllOf(HasSubstr("echoed as asked: ping 1"), HasSubstr("missing ids 5")));
   EXPECT_THAT(json_from(log.summary(counts), true),
               testing::AllOf(HasSubstr("\"echo_satisfied_at\":1"), HasSubstr("\"missing_ids\":5")));
   EXPECT_THAT(json_from(log.summary(std::nullopt), false), HasSubstr("\"missing_ids\":null")) << "of a wire that does not number";
+}
+
+TEST(PingLog, TellsTheRateInTheUnitOfTheMake) {
+  PingLog log;
+  for (std::uint32_t i = 0; i < 11; ++i) log.add(ping(i), 0.1 * i);
+  EXPECT_THAT(text_from(log.summary(std::nullopt), false, "lines/s"), HasSubstr("rate 10.00 lines/s, interval p50 100.0 ms"));
 }
 
 TEST(Percentile, TakesTheNearestRank) {

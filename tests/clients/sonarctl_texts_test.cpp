@@ -44,7 +44,7 @@ protocol::HostPing ping(std::uint32_t id) {
 
 TEST(ViewCaption, TellRateAndGaps) {
   const auto missing = [](std::uint64_t pings) { return protocol::Host::Counts{0, 0, 0, pings}; };
-  ViewCaption figures;
+  ViewCaption figures("Hz");
   figures.add(ping(7), missing(0), 100.0);
   EXPECT_EQ(figures.text(), "ping 7  10.00 m  2.1 MHz  512 beams x 400 rows");
   figures.add(ping(8), missing(0), 100.1);
@@ -54,9 +54,9 @@ TEST(ViewCaption, TellRateAndGaps) {
   for (std::uint32_t i = 0; i < 50; ++i) figures.add(ping(12 + i), missing(2), 101.0 + 0.5 * i);
   EXPECT_THAT(figures.text(), HasSubstr("  2.0 Hz")) << "of late, not of all time";
   EXPECT_EQ(figures.pings(), 53u);
-  ViewCaption unnumbered;
+  ViewCaption unnumbered("lines/s");
   for (std::uint32_t i = 0; i < 2; ++i) unnumbered.add(ping(i), std::nullopt, i);
-  EXPECT_THAT(unnumbered.text(), testing::EndsWith("1.0 Hz"));
+  EXPECT_THAT(unnumbered.text(), testing::EndsWith("  1.0 lines/s"));
 }
 
 TEST(StatusText, NamesEverything) {
