@@ -4,15 +4,22 @@
 #include "protocol/norbit/packet.hpp"
 
 namespace sonar::norbit {
+namespace {
 
-recording::Codec codec() {
-  return {.framing = &framing, .sender = [](const recording::RecordedMessage& message) -> std::optional<recording::Sender> {
-            std::optional<int> mode;
-            if (const auto bathymetry = read_bathymetry(message.bytes)) mode = bathymetry->front.sonar_mode;
-            if (const auto column = read_column(message.bytes)) mode = column->front.sonar_mode;
-            if (!mode) return std::nullopt;
-            return recording::Sender{*mode == 0 ? models().back() : models().front()};
-          }};
+/// By the first packet: a recording of the daemon has both of a ping in one message.
+std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
+  const auto size = framing.length(message.bytes, recording::Origin::device, true);
+  if (!size || *size > message.bytes.size()) return std::nullopt;
+  const BytesView packet = BytesView(message.bytes).first(*size);
+  std::optional<int> mode;
+  if (const auto bathymetry = read_bathymetry(packet)) mode = bathymetry->front.sonar_mode;
+  if (const auto column = read_column(packet)) mode = column->front.sonar_mode;
+  if (!mode) return std::nullopt;
+  return recording::Sender{*mode == 0 ? models().back() : models().front()};
 }
+
+}  // namespace
+
+recording::Codec codec() { return {.framing = &framing, .sender = sender_of}; }
 
 }  // namespace sonar::norbit
