@@ -15,7 +15,7 @@ import urllib.request
 
 from foxglove_viewer import NAMES, Closed, Refused, Viewer
 from oculus_reader import Client, fire_message
-from running_sonard import BUILD, Sonard, eventually
+from running_sonard import BUILD, SONARCTL, Sonard, eventually, run
 
 ORIGINS = ', view_origins: ["https://look.example", {origin: "https://steer.example", steer: true}], hosts: [sonar-lab]'
 
@@ -387,6 +387,7 @@ class Preview(unittest.TestCase):
             self.assertTrue(1 <= len(shown) <= 22, shown)
             status = json.loads(http(daemon, "/api/v1/status"))
             self.assertTrue(status["sonars"][0]["preview"], status)
+            eventually(lambda: re.search(r" Hz, preview [0-5]\.\d Hz  gain", run(SONARCTL, "status", "--control", f"{daemon.address}:14770").stdout))
             self.assertEqual((status["sonars"][0]["figures"]["pings"], status["sonars"][0]["clients"]), ("0", []))
             with Client(daemon.address) as client:
                 client.send(fire_message())

@@ -109,6 +109,8 @@ TEST(StatusText, HasTheMeasuredRateBesideTheOneThatIsSet) {
               HasSubstr("  on request, measured 14.0 lines/s  gain"));
   EXPECT_THAT(text_of(R"(profile: "omniscan-450" rate_hz: 10 figures { made_hz: 9.96 })"),
               HasSubstr("  10 Hz, measured 10.0 lines/s  gain"));
+  EXPECT_THAT(text_of(R"(profile: "oculus-m1200d" rate_hz: 10 preview: true figures { made_hz: 4.97 })"),
+              HasSubstr("  10 Hz, preview 5.0 Hz  gain"));
 }
 
 TEST(StatusText, TellsEvents) {

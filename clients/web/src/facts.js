@@ -87,7 +87,7 @@ export class Facts {
   get linesByPing() {
     return ['sweep', 'waterfall'].includes(this.pictureKind);
   }
-  /// The measured rate of the pings; the sonar does not count previews.
+  /// The measured rate of the pings; of previews from their numbers, before the next status.
   get madeRate() {
     return this.preview ? this.numbered.rate : this.sonarStatus?.figures?.made_hz;
   }

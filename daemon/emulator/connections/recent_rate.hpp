@@ -20,8 +20,8 @@ class RecentRate {
   /// Pings a second of the last five seconds, or between the last two if those are farther apart; 0 once they have stopped.
   double hz(Time now) const {
     if (fired_.size() < 2) return 0;
-    const double mean_s = seconds(fired_.back() - fired_.front()) / static_cast<double>(fired_.size() - 1);
-    const bool has_stopped = seconds(now - fired_.back()) > std::max(stopped_after_s, 2 * mean_s);
+    const double mean_s = sonar::seconds(fired_.back() - fired_.front()) / static_cast<double>(fired_.size() - 1);
+    const bool has_stopped = sonar::seconds(now - fired_.back()) > std::max(stopped_after_s, 2 * mean_s);
     return has_stopped || mean_s <= 0 ? 0 : 1 / mean_s;
   }
 

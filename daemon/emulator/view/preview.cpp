@@ -27,4 +27,14 @@ std::optional<PingRequest> Preview::due(const Sonar& sonar, Time now) {
   return request;
 }
 
+void Preview::done(bool made) {
+  busy_ = false;
+  if (made && on()) made_.add(*fired_at_);
+}
+
+void Preview::end() {
+  until_.reset();
+  made_ = {};  // the pause before the next preview is no part of its rate
+}
+
 }  // namespace sonar

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "daemon/emulator/connections/recent_rate.hpp"
 #include "daemon/emulator/sonar/sonar.hpp"
 
 namespace sonar {
@@ -17,7 +18,7 @@ class Preview {
   static constexpr std::chrono::seconds longest{600};
 
   void begin(Time now) { until_ = now + longest; }
-  void end() { until_.reset(); }
+  void end();
   bool on() const { return until_.has_value(); }
   /// The time between two previews of this sonar.
   static std::chrono::nanoseconds period(const Sonar& sonar);
@@ -25,12 +26,15 @@ class Preview {
   std::string why_over(const Sonar& sonar, Time now) const;
   /// Returns the ping that is due. Call done() when it is computed; until then no other is due.
   std::optional<PingRequest> due(const Sonar& sonar, Time now);
-  void done() { busy_ = false; }
+  void done(bool made);
+  /// Previews a second, as RecentRate measures them; 0 = none.
+  double hz(Time now) const { return made_.hz(now); }
 
  private:
   std::optional<Time> until_, fired_at_;
   std::uint32_t number_ = 0;
   bool busy_ = false;
+  RecentRate made_;
 };
 
 }  // namespace sonar

@@ -99,7 +99,7 @@ v1::SonarStatus Device::status(Time now) const {
   if (gone_) *s.mutable_gone() = message_of(*gone_);
   if (searched_) *s.mutable_searched() = message_of(*searched_);
   fill(*s.mutable_figures(), figures());
-  s.mutable_figures()->set_made_hz(made_.hz(now));
+  s.mutable_figures()->set_made_hz(preview_.on() ? preview_.hz(now) : made_.hz(now));
   return s;
 }
 

@@ -71,7 +71,7 @@ void ViewFeed::drive_previews() {
 void ViewFeed::on_preview(const std::string& sonar, const PingOutcome& outcome) {
   Device* const device = of_.fleet.find(sonar);
   if (stopping_ || device == nullptr) return;
-  device->preview().done();
+  device->preview().done(outcome.ping != nullptr);
   if (!outcome.ping) {
     preview_failed_at_[sonar] = Steady::now();
     return end_preview(*device, "the ping failed: " + outcome.failure);

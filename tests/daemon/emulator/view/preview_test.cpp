@@ -30,7 +30,7 @@ Story story_of(bool with_preview) {
       if (preview.on() && preview.why_over(sonar, time.now).empty())
         if (auto request = preview.due(sonar, time.now)) {
           story.shown.push_back(*request);
-          preview.done();
+          preview.done(true);
         }
     }
   };
@@ -67,7 +67,7 @@ TEST(Preview, HasNumbersAndNoiseOfItsOwn) {
     noise.insert(first->sonar_id);
     EXPECT_EQ(static_cast<std::uint32_t>(first->number), 1u);
     EXPECT_FALSE(preview.due(sonar, time.now + milliseconds(200))) << "the first is being computed";
-    preview.done();
+    preview.done(true);
     EXPECT_FALSE(preview.due(sonar, time.now + milliseconds(199)));
     const auto second = preview.due(sonar, time.now + milliseconds(200));
     ASSERT_TRUE(second);
@@ -77,6 +77,29 @@ TEST(Preview, HasNumbersAndNoiseOfItsOwn) {
     EXPECT_EQ(preview.why_over(sonar, time.now + std::chrono::seconds(600)), "after 600 s");
   }
   EXPECT_EQ(noise.size(), 4u);
+}
+
+TEST(Preview, MeasuresItsRateFromThePingsThatWereMade) {
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
+  const Sonar& sonar = time.sonar("front");
+  Preview preview;
+  const auto run = [&](int pings, bool made) {
+    preview.begin(time.now);
+    for (int n = 0; n < pings; ++n) {
+      ASSERT_TRUE(preview.due(sonar, time.now));
+      preview.done(made);
+      time.now += milliseconds(250);
+    }
+  };
+  run(3, false);
+  EXPECT_EQ(preview.hz(time.now), 0) << "the engine made none";
+  run(8, true);
+  EXPECT_NEAR(preview.hz(time.now), 4, 1e-9);
+  preview.end();
+  EXPECT_EQ(preview.hz(time.now), 0);
+  time.now += std::chrono::seconds(1);
+  run(2, true);
+  EXPECT_NEAR(preview.hz(time.now), 4, 1e-9) << "without the pause";
 }
 
 }  // namespace
