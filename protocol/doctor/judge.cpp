@@ -237,7 +237,7 @@ class SonarJudge {
             : f.simulation_ms();
     const bool skips =
         !sonar_.on_request() && f.skipped_ticks() > then.skipped_ticks() && made < enough_of_rate * sonar_.rate_hz() * past_s_;
-    const std::string rates = format("%.1f of %g Hz", made / past_s_, sonar_.rate_hz());
+    const std::string rates = format("%.1f of %g ", made / past_s_, sonar_.rate_hz()) + std::string(make_.rate_unit());
     if (skips && ms * sonar_.rate_hz() > 1000 * enough_of_rate)
       add(Level::warn, "rate", sonar_.name() + " makes " + rates + ": computing takes " + format("%.0f ms", ms), less_to_compute);
     else if (skips && status_.sonars_size() > 1)

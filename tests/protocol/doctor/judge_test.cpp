@@ -212,6 +212,8 @@ TEST(Judge, AnEngineThatIsTooSlow) {
   const Finding f = trouble(judge(now, &before), "rate");
   EXPECT_EQ(f.text, "front makes 7.0 of 10 Hz: computing takes 138 ms");
   EXPECT_EQ(f.cure, less_to_compute);
+  now.mutable_sonars(0)->set_profile("omniscan-450");
+  EXPECT_EQ(trouble(judge(now, &before), "rate").text, "front makes 7.0 of 10 lines/s: computing takes 138 ms");
   before.mutable_sonars(0)->mutable_figures()->set_skipped_ticks(30);  // its host asked for no more
   EXPECT_THAT(troubles(judge(now, &before)), IsEmpty());
   now.mutable_sonars(0)->mutable_figures()->set_refused(3);
