@@ -1,4 +1,4 @@
-// The products: beams, limits, range modes. Sources: docs/protocols/dvl.md.
+// The products: beams, limits, range modes. Sources: protocol/dvl/README.md.
 #pragma once
 
 #include <array>

@@ -8,7 +8,7 @@
 namespace sonar::m3 {
 namespace {
 
-// Sources: PKT, LOG: docs/protocols/m3.md.
+// Sources: PKT, LOG: protocol/m3/README.md.
 constexpr double elevation_deg = 30;  // recalled from the data sheet
 constexpr double elements = 64;       // PKT
 // unknown: levels. Full scale so that the strongest echoes of the demo scene have the level of those of PKT, about.

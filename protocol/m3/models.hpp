@@ -1,4 +1,4 @@
-// The product and its mode. Sources: docs/protocols/m3.md.
+// The product and its mode. Sources: protocol/m3/README.md.
 #pragma once
 
 #include <memory>
