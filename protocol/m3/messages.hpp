@@ -1,4 +1,5 @@
-// A packet of beam-formed data: head, data header, samples, foot. Little-endian. Layout: docs/protocols/m3.md; sources: protocol/m3/README.md.
+// A packet of beam-formed data: head, data header, samples, foot. Little-endian.
+// Layout: docs/protocols/m3.md; sources: protocol/m3/README.md.
 #pragma once
 
 #include <array>

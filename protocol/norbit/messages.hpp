@@ -1,4 +1,4 @@
-// The packets of a Norbit, little-endian: bathymetry (port 2210) and water column (2211). Sources: docs/protocols/norbit.md.
+// The packets of a Norbit, little-endian: bathymetry (port 2210) and water column (2211). Sources: protocol/norbit/README.md.
 #pragma once
 
 #include <array>

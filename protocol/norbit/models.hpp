@@ -1,4 +1,4 @@
-// The products. Sources: docs/protocols/norbit.md.
+// The products. Sources: protocol/norbit/README.md.
 #pragma once
 
 #include <memory>
