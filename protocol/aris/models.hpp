@@ -1,5 +1,5 @@
 // The ARIS products as SonarModel rows, one mode per ping mode, frequency and lens, and the limits of their settings. Sources:
-// docs/protocols/aris.md.
+// protocol/aris/README.md.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // The Ping1D: its product, the checks of its settings, its automatic mode, and the frames of a ping. Pure functions; sources:
-// docs/protocols/ping1d.md.
+// protocol/ping/README.md.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
 // The S500: its product, the checks of its settings, the mean of its distances, and the frames of a ping. Pure functions;
-// sources: docs/protocols/ping1d.md.
+// sources: protocol/ping/README.md.
 #pragma once
 
 #include <string>
