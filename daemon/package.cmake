@@ -113,9 +113,9 @@ sonard holds a 3D scene, takes the pose of a vehicle, computes what a
 multibeam sonar would hear, and serves it as an Oculus, a BlueView sonar, an
 ARIS, a Sonar 3D-15, a Ping360, a Surveyor, an Omniscan, a Ping1D, an S500, a
 DVL, an M3, a Micron or a Norbit: drivers written for the real device connect
-unchanged, those of BlueView with libraries of sonard's. With sonarctl, which listens to,
-looks at and steers sonars, and with a systemd unit, which is not started by
-the installation.")
+unchanged, those of BlueView with libraries of sonard's. With sonarctl, which
+listens to, looks at and steers sonars, and with a systemd unit, which is not
+started by the installation.")
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_NAME sonard-bvtsdk)
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_SUGGESTS sonard)
