@@ -188,7 +188,9 @@ class MadeUpVendor final : public protocol::Vendor {
     bytes.insert(bytes.end(), ping.samples.begin(), ping.samples.end());
     return std::make_shared<const Bytes>(std::move(bytes));
   }
-  std::vector<Bytes> datagrams(const protocol::Port& port, const Ping& ping, const DeviceState&) const override {
+  std::vector<Bytes> datagrams(const protocol::Port& port, const Ping& ping, const DeviceState& device) const override {
+    if (port.kind == Kind::tcp_stream)  // each of the two sends its own part of a ping
+      return port.number == data_port ? std::vector{*frame(ping, device)} : std::vector<Bytes>{};
     const std::string number = std::to_string(static_cast<std::uint32_t>(ping.request.number));
     if (port.group.port != 0) return {bytes_of(number)};
     std::vector<Bytes> all;
