@@ -31,18 +31,7 @@ std::shared_ptr<const Outbox::Shape> pauses_between(const std::vector<protocol::
 // ---- a ping as bytes
 
 FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping)
-    : vendor_(vendor), state_(state), ping_(ping) {
-  if (!vendor.has_several_streams()) {
-    bytes_ = vendor.frame(ping, state);
-    return;
-  }
-  // The parts are needed anyway, and make up the whole.
-  auto whole = std::make_shared<Bytes>();
-  for (const protocol::Port& port : vendor.ports())
-    if (port.kind == protocol::Port::Kind::tcp_stream)
-      for (const Bytes& part : *parts(port)) whole->insert(whole->end(), part.begin(), part.end());
-  bytes_ = std::move(whole);
-}
+    : vendor_(vendor), state_(state), ping_(ping), bytes_(vendor.frame(ping, state)) {}
 
 FramedPing::AtPort& FramedPing::at(const protocol::Port& port) {
   for (AtPort& made : ports_)
