@@ -31,7 +31,18 @@ std::shared_ptr<const Outbox::Shape> pauses_between(const std::vector<protocol::
 // ---- a ping as bytes
 
 FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping)
-    : vendor_(vendor), state_(state), ping_(ping), bytes_(vendor.frame(ping, state)) {}
+    : vendor_(vendor), state_(state), ping_(ping) {
+  if (!vendor.has_several_streams()) {
+    bytes_ = vendor.frame(ping, state);
+    return;
+  }
+  // The parts make up the whole, so that the ping is encoded once.
+  auto whole = std::make_shared<Bytes>();
+  for (const protocol::Port& port : vendor.ports())
+    if (port.kind == protocol::Port::Kind::tcp_stream)
+      for (const Bytes& part : *parts(port)) whole->insert(whole->end(), part.begin(), part.end());
+  bytes_ = std::move(whole);
+}
 
 FramedPing::AtPort& FramedPing::at(const protocol::Port& port) {
   for (AtPort& made : ports_)
