@@ -36,7 +36,7 @@ class Make(NamedTuple):
     stream: Callable[[], Reader] = NoPings       # reads a TCP connection
     datagrams: Callable[[], Reader] = NoPings    # reads a flow of datagrams
     is_request: Callable[[bytes], bool] = bool   # whether bytes of a driver are settings or a request for pings
-    needs_request: bool = True                   # False: the sonar pings for whoever connects
+    needs_request: bool = True                   # False: the sonar pings as soon as a client connects
     is_pushed: Optional[Callable[[bytes], bool]] = None  # whether a datagram that no driver's datagram preceded is of a ping
     numbered: bool = True                        # False: its pings have other numbers than the journal, or none
     sonar: Mapping[str, object] = {}             # keys of the sonar's configuration, beside the usual ones

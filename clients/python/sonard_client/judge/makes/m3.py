@@ -1,4 +1,4 @@
-"""M3: packets of beam-formed samples, streamed to whoever connects. The samples are I and Q as sent, beam by beam."""
+"""M3: packets of beam-formed samples, streamed to every client that connects. The samples are I and Q as sent, beam by beam."""
 from __future__ import annotations
 
 import struct
