@@ -112,8 +112,8 @@ def demos(report):
 
 
 def service(report):
-    rows = [["P0", f"{d['make']} ({demo_of(d)}) as `sonard --profile` serves it, from a ping's pose to its last byte at a driver on loopback, "
-             f"{d['threads']} threads", f"median {d['latency']['median_ms']:.1f} ms, p95 {d['latency']['p95_ms']:.1f} ms; {d['processor_ms']:.1f} "
+    rows = [["P0", f"{d['make']} ({demo_of(d)}), {d['threads']} threads",
+             f"median {d['latency']['median_ms']:.1f} ms, p95 {d['latency']['p95_ms']:.1f} ms; {d['processor_ms']:.1f} "
              f"processor ms; {ticks_of(d)}", "no tick skipped", "", "holds" if d["skipped_ticks"] == 0 else "**missed**"]
             for d in report.get("demos", []) if d["demo"]]
     if "latency" in report:
@@ -310,8 +310,9 @@ def page(report, scene="local-search", other_rates=()):
               "0.3 Hz with 300 rays a beam. Its public successor reports about 36 ms a frame. Ours without a GPU: "
               + ("; ".join(times) or "not measured") + ".", "", "![rates](benchmarks-rates.svg)", ""]
     lines += ["## As a service", "",
-              "P0, the demos: `build/release/tests/own_network/in_own_network build/release/tests/bench/sonard_bench --scene local-search "
-              "--case P0`; the tables have a row for every product.", ""] + service(report)
+              "P0: each demo as `sonard --profile NAME` serves it, from a ping's pose to its last byte at a driver on loopback "
+              "(`build/release/tests/own_network/in_own_network build/release/tests/bench/sonard_bench --scene local-search --case P0`; "
+              "the tables have a row for every product).", ""] + service(report)
     if report.get("curves"):
         lines += ["## How times grow", "", "![curves](benchmarks-curves.svg)", ""]
     return "\n".join(lines)
