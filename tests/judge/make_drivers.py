@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Small drivers of several makes, each with decoders of its own: the judge must find nothing in them without a plant.
 
-usage: make_drivers.py MAKE ADDRESS PORT [PLANT]     MAKE: aris, blueview, dvl, m3, micron, s500, waterlinked
+usage: make_drivers.py MAKE ADDRESS PORT [PLANT]
+MAKE: aris, blueview, dvl, m3, micron, norbit, omniscan, ping1d, ping360, s500, surveyor, waterlinked
 PLANT: drops (every fifth ping is not published), mirrors (every fifth ping is turned around)
 """
 import json
@@ -16,10 +17,12 @@ SILENT_S = 1.5
 
 
 class Stream:
-    """Whole numbers of bytes of a TCP connection."""
+    """Whole numbers of bytes of a TCP connection, or of datagrams one behind the other."""
 
-    def __init__(self, address, port):
-        self.socket = socket.create_connection((address, port), timeout=SILENT_S)
+    def __init__(self, address, port, kind=socket.SOCK_STREAM):
+        self.socket = socket.socket(socket.AF_INET, kind)
+        self.socket.settimeout(SILENT_S)
+        self.socket.connect((address, port))
         self.send, self.data = self.socket.sendall, bytearray()
 
     def take(self, count):
@@ -91,16 +94,56 @@ def micron(address, port):
             yield None, frame[8:-1], frame[8:39] + frame[39:-1][::-1]
 
 
-def s500(address, port):
-    sonar = Stream(address, port)
-    body = b"BR" + struct.pack("<HHBB", 20, 1015, 0, 0) + struct.pack("<IIhhHHHBB", 0, 5000, -1, 100, 0, 1308, 0, 0, 0)
-    sonar.send(body + struct.pack("<H", sum(body) & 0xFFFF))
+def ping_family(sonar, requests, data, number_at, front, item=1):
+    """Sends requests and reads the messages `data`: a number at `number_at`, and after `front` bytes items that can be turned around."""
+    for kind, payload in requests:
+        body = b"BR" + struct.pack("<HHBB", len(payload), kind, 0, 0) + payload
+        sonar.send(body + struct.pack("<H", sum(body) & 0xFFFF))
     while True:
         sonar.until(b"BR")
-        size, number = struct.unpack("<HHxx", sonar.take(6))
+        size, kind = struct.unpack("<HHxx", sonar.take(6))
         payload = sonar.take(size + 2)[:-2]
-        if number == 1308:
-            yield int.from_bytes(payload[:4], "little"), payload, payload[:66] + payload[66:][::-1]
+        if kind == data:
+            items = [payload[at:at + item] for at in range(front, size, item)]
+            number = None if number_at is None else int.from_bytes(payload[number_at:number_at + 4], "little")
+            yield number, payload, payload[:front] + b"".join(reversed(items))
+
+
+def s500(address, port):
+    request = struct.pack("<IIhhHHHBB", 0, 5000, -1, 100, 0, 1308, 0, 0, 0)
+    return ping_family(Stream(address, port), [(1015, request)], 1308, 0, 66)
+
+
+def ping1d(address, port):
+    requests = [(1003, b"\1"), (1004, struct.pack("<H", 100)), (1400, struct.pack("<H", 1300))]
+    return ping_family(Stream(address, port, socket.SOCK_DGRAM), requests, 1300, 8, 26)
+
+
+def ping360(address, port):
+    request = struct.pack("<BBHHHHHHBB", 1, 1, 32, 222, 740, 600, 0, 399, 1, 0)
+    return ping_family(Stream(address, port, socket.SOCK_DGRAM), [(2602, request)], 2301, None, 20)
+
+
+def omniscan(address, port):
+    request = struct.pack("<IIIffffhHBB", 0, 5000, 100, 0, 0, 0.002, 0.0015, -1, 600, 1, 0)
+    return ping_family(Stream(address, port), [(2197, request)], 2198, None, 52, 2)
+
+
+def surveyor(address, port):
+    request = struct.pack("<iifhhHBBBBBBiHHf", 0, 10000, 1500, -1, 100, 0, 0, 1, 0, 0, 0, 1, 240000, 400, 0, 1.5)
+    return ping_family(Stream(address, port), [(3023, request)], 3012, 20, 40, 16)
+
+
+def norbit(address, port):
+    sonar, commands = Stream(address, port), Stream(address, port - 1)
+    commands.send(b"set_range 0 10\r\nset_rate 10\r\nset_power 1\r\n")
+    while True:
+        sonar.until(b"\xef\xbe\xad\xde")
+        kind, size = struct.unpack("<II12x", sonar.take(20))
+        body = sonar.take(size - 24)
+        if kind == 1:
+            beams = [body[at:at + 20] for at in range(88, len(body), 20)]
+            yield int.from_bytes(body[12:16], "little"), b"".join(beams), b"".join(reversed(beams))
 
 
 def blueview(address, port):

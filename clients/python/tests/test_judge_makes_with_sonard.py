@@ -12,9 +12,10 @@ from common import PACKAGE, ROOT, SONARD
 
 from sonard_client import lab
 
-PROFILES = {"m3": "m3", "dvl": "dvl-a50", "micron": "micron", "s500": "s500", "blueview": "blueview-p900-90", "aris": "aris-3000",
-            "waterlinked": "waterlinked-3d15"}
-DATAGRAMS = {"aris", "waterlinked"}  # a busy computer may drop some
+PROFILES = {"m3": "m3", "dvl": "dvl-a50", "micron": "micron", "norbit": "norbit-wbms", "s500": "s500", "ping1d": "ping1d",
+            "ping360": "ping360", "omniscan": "omniscan-450", "surveyor": "surveyor-240", "blueview": "blueview-p900-90",
+            "aris": "aris-3000", "waterlinked": "waterlinked-3d15"}
+DATAGRAMS = {"aris", "ping1d", "ping360", "waterlinked"}  # a busy computer may drop some
 MOST_RUNS = 5
 
 

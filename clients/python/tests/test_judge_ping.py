@@ -29,9 +29,10 @@ class Stream(judge_makes.StreamChecks, unittest.TestCase):
             self.assertFalse(self.shows(self.found(bytes(damaged), bytes(300)), [message]), at)
 
     def test_makes_and_requests(self):
-        for name in ("ping1d", "s500", "surveyor-240-16"):
+        for name in ("ping1d", "s500"):
             self.assertIs(make_of(name), ping.NUMBERED, name)
-        for name in ("ping360", "omniscan-450-fs"):
+        self.assertIs(make_of("surveyor-240"), ping.SURVEYOR)
+        for name in ("ping360", "omniscan-450"):
             self.assertIs(make_of(name), ping.UNNUMBERED, name)
         self.assertTrue(ping.NUMBERED.is_request(frame(6, b"\x14\x05")))
         self.assertFalse(ping.NUMBERED.is_request(b"GET /"))
@@ -47,6 +48,12 @@ class Sectors(judge_makes.StreamChecks, unittest.TestCase):
 class ProfilesOfAnS500(judge_makes.StreamChecks, unittest.TestCase):
     make, numbers, size, step = ping.NUMBERED, [0x01020307, 8], (1, 166), 5
     messages = [[frame(1308, struct.pack("<I", number) + bytes(62) + bytes([number & 255]) * 100)] for number in (0x01020307, 8)]
+    samples = [messages[0][0][8:-2]]
+
+
+class PointsOfASurveyor(judge_makes.StreamChecks, unittest.TestCase):
+    make, numbers, size, step = ping.SURVEYOR, [7, 8], (1, 88), 3
+    messages = [[frame(3012, bytes(20) + struct.pack("<I", number) + bytes([number]) * 64)] for number in (7, 8)]
     samples = [messages[0][0][8:-2]]
 
 

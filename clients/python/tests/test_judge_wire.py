@@ -63,6 +63,30 @@ class Packets(unittest.TestCase):
         self.assertIn("00000060", next(line for line in lines if line[0] == ">"))
 
 
+class Streams(unittest.TestCase):
+    """The driver connects from the same port to several ports of the sonar."""
+    DEVICE, DRIVER = bytes([127, 0, 0, 2]), bytes([127, 0, 0, 1])
+
+    @staticmethod
+    def packet(source, destination, ports, sequence, ack, flags, payload=b""):
+        segment = struct.pack(">HHIIBBHHH", *ports, sequence, ack, 0x50, flags, 1000, 0, 0) + payload
+        return bytes(12) + b"\x08\x00" + struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(segment), 5, 0, 64, 6, 0) + source + destination + segment
+
+    def test_connections_to_further_ports(self):
+        make = Make((), stream=Whole, is_request=lambda sent: sent == b"go")
+        with mock.patch("socket.socket"):
+            capture = wire.Capture("lo", "127.0.0.2", 2210, make, [2209, 2210])
+        for port, sent, answer in ((2210, b"", b"\x07"), (2209, b"go", b""), (2211, b"go", b"\x08")):
+            for packet in (self.packet(self.DRIVER, self.DEVICE, (4000, port), 0, 0, 0x02),
+                           self.packet(self.DEVICE, self.DRIVER, (port, 4000), 0, 1, 0x12),
+                           self.packet(self.DRIVER, self.DEVICE, (4000, port), 1, 1, 0x10, sent),
+                           self.packet(self.DEVICE, self.DRIVER, (port, 4000), 1, 1, 0x10, answer),
+                           self.packet(self.DRIVER, self.DEVICE, (4000, port), 1 + len(sent), 1 + len(answer), 0x10)):
+                capture._packet(1.0, 0, packet)
+        self.assertEqual([s.ping.number for s in capture.delivered()], [7])
+        self.assertEqual([len(c.fires) for c in capture.connections], [0, 1])
+
+
 class Whole:
     """Takes each datagram for a ping."""
     at = 0

@@ -99,15 +99,21 @@ def port_of(sonar: Dict[str, Any]) -> int:
     return int([*for_drivers, sonar["listens"]][0].rpartition(":")[2])
 
 
+def tcp_ports_of(sonar: Dict[str, Any]) -> List[int]:
+    return [int(a["address"].rpartition(":")[2]) for a in sonar.get("addresses", ()) if a.get("protocol") == "tcp"]
+
+
 def _with_driver(spec: Dict[str, Any], case: Optional[Case], folder: pathlib.Path, laboratory: Optional[lab.Lab], sonard: Daemon,
                  address: str, http_port: int) -> Dict[str, Any]:
     (folder / "driver.log").write_bytes(b"")
     control = Control("127.0.0.1", http_port, timeout=2)
-    port = port_of(control.status()["sonars"][0])
+    sonar = control.status()["sonars"][0]
+    port = port_of(sonar)
     words = expand(spec["driver"], address, port, _DEVICE_ID)
     driver = Driver(words, laboratory.host if laboratory else [], folder / "driver.log", spec["tap"] == "json")
     try:
-        capture: Optional[Capture] = Capture(lab.LINK if laboratory else "lo", address, port, make_of(spec["profile"]))
+        capture: Optional[Capture] = Capture(lab.LINK if laboratory else "lo", address, port, make_of(spec["profile"]),
+                                             tcp_ports_of(sonar))
     except (PermissionError, OSError):
         capture = None
     scene = Scene(spec, folder, address, sonard, driver, capture, StatusWire(control), Journal(folder / "journal.jsonl"),

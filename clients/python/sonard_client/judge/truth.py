@@ -42,6 +42,9 @@ class Make(NamedTuple):
     sonar: Mapping[str, object] = {}             # keys of the sonar's configuration, beside the usual ones
 
 
+LOOKS_DOWN = {"mount": {"frame": "FRD", "xyz_m": [0, 0, 0], "rpy_deg": [0, -90, 0]}}  # Make.sonar of those that see only a floor
+
+
 class WholeMessages:
     """Finds whole messages at any offset, whatever is between them. A message that is never completed hides none behind it.
 

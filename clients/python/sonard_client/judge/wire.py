@@ -10,7 +10,7 @@ import socket
 import struct
 import threading
 import time
-from typing import Callable, Deque, Dict, List, NamedTuple, Optional, Tuple
+from typing import Callable, Collection, Deque, Dict, List, NamedTuple, Optional, Tuple
 
 from .truth import Make, Reader, TruePing
 
@@ -115,18 +115,20 @@ class DatagramFlow(Connection):
 class Capture(threading.Thread):
     """Captures packets from start() to stop(). Needs CAP_NET_RAW, which a process has in its own network namespace.
 
-    interface: "lo" or the end of the cable. device: the sonar's address. make: None reads no pings."""
+    interface: "lo" or the end of the cable. device: the sonar's address. port: where a driver connects first; tcp_ports: further
+    ones. make: None reads no pings."""
 
-    def __init__(self, interface: str, device: str, port: int, make: Optional[Make]) -> None:
+    def __init__(self, interface: str, device: str, port: int, make: Optional[Make], tcp_ports: Collection[int] = ()) -> None:
         super().__init__(daemon=True)
         self._make = make or Make(())
         self._flows: Dict[Tuple[bytes, int], DatagramFlow] = {}
         self._fragments: Dict[Tuple[bytes, bytes, bytes], Dict[int, bytes]] = {}  # of datagrams that are not complete
         self._lo, self._device, self.port = interface == "lo", ipaddress.IPv4Address(device).packed, port
+        self._tcp_ports = {port, *tcp_ports}
         self.connections: List[Connection] = []
         self.lost_packets = 0
         self._idle_at = 0.0  # the latest time when no packet was waiting
-        self._open: Dict[Tuple[bytes, int], Connection] = {}
+        self._open: Dict[Tuple[bytes, int, int], Connection] = {}  # by address and port of the driver, and port of the sonar
         self._stopping = threading.Event()
         self._lock = threading.Lock()
         self._before: Deque[Tuple[int, bytes]] = collections.deque()
@@ -256,13 +258,13 @@ class Capture(threading.Thread):
     def _tcp(self, mono: float, source: bytes, destination: bytes, packet: bytes, at: int, end: int) -> bool:
         source_port, destination_port, sequence, ack, offset, flags, window = struct.unpack_from(">HHIIBBH", packet, at)
         payload = packet[at + (offset >> 4) * 4:end]
-        if source == self._device and source_port == self.port:
-            connection = self._open.get((destination, destination_port))
+        if source == self._device and source_port in self._tcp_ports:
+            connection = self._open.get((destination, destination_port, source_port))
             if connection is not None:
                 connection.from_device(mono, sequence, flags, payload)
             return True
-        if destination == self._device and destination_port == self.port:
-            key = (source, source_port)
+        if destination == self._device and destination_port in self._tcp_ports:
+            key = (source, source_port, destination_port)
             if flags & _SYN:
                 old = self._open.get(key)
                 if old is None or old.established or old.ended is not None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 from typing import Optional
 
 from ..truth import Make
-from . import aris, blueview, dvl, m3, micron, oculus, ping, waterlinked
+from . import aris, blueview, dvl, m3, micron, norbit, oculus, ping, waterlinked
 
-MAKES = (oculus.OCULUS, blueview.BLUEVIEW, ping.NUMBERED, ping.UNNUMBERED, m3.M3, micron.MICRON, dvl.DVL, aris.ARIS,
-         waterlinked.WATERLINKED)
+MAKES = (oculus.OCULUS, blueview.BLUEVIEW, ping.NUMBERED, ping.UNNUMBERED, ping.SURVEYOR, m3.M3, micron.MICRON,
+         norbit.NORBIT, dvl.DVL, aris.ARIS, waterlinked.WATERLINKED)
 
 
 def make_of(profile: str) -> Optional[Make]:

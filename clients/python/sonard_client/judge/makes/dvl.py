@@ -6,7 +6,7 @@ import struct
 import zlib
 from typing import FrozenSet, List, Optional, Tuple
 
-from ..truth import Make, TruePing
+from ..truth import LOOKS_DOWN, Make, TruePing
 
 _LONGEST = 1 << 16
 _VALUES = ("vx", "vy", "vz", "altitude")
@@ -50,5 +50,4 @@ class DvlReader:
         return found
 
 
-LOOKS_DOWN = {"mount": {"frame": "FRD", "xyz_m": [0, 0, 0], "rpy_deg": [0, -90, 0]}}
 DVL = Make(("dvl",), DvlReader, needs_request=False, numbered=False, sonar=LOOKS_DOWN)

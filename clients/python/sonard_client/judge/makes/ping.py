@@ -3,9 +3,9 @@ from __future__ import annotations
 
 import struct
 import zlib
-from typing import Dict, Iterator, Optional
+from typing import Dict, Iterator, Mapping, Optional
 
-from ..truth import Make, TruePing, WholeMessages
+from ..truth import LOOKS_DOWN, Make, TruePing, WholeMessages
 
 # Messages that have what a driver publishes, and where in the payload a number of the ping stands.
 _NUMBER_AT: Dict[int, Optional[int]] = {1300: 8, 1308: 0, 1223: None, 2198: None, 2300: None, 2301: None, 3012: 20}
@@ -33,8 +33,10 @@ class PingReader(WholeMessages):
         yield TruePing(number, frozenset({zlib.crc32(payload)}), 1, len(payload), begin, begin + len(message))
 
 
-def _make(*profiles: str, numbered: bool) -> Make:
-    return Make(profiles, PingReader, lambda: PingReader(is_stream=False), lambda sent: sent[:2] == b"BR", numbered=numbered)
+def _make(*profiles: str, numbered: bool, sonar: Mapping[str, object]) -> Make:
+    return Make(profiles, PingReader, lambda: PingReader(is_stream=False), lambda sent: sent[:2] == b"BR", numbered=numbered, sonar=sonar)
 
 
-NUMBERED, UNNUMBERED = _make("ping1d", "s500", "surveyor", numbered=True), _make("ping360", "omniscan", numbered=False)
+NUMBERED = _make("ping1d", "s500", numbered=True, sonar={})
+UNNUMBERED = _make("ping360", "omniscan", numbered=False, sonar={})
+SURVEYOR = _make("surveyor", numbered=True, sonar=LOOKS_DOWN)  # its messages have the points of a floor
