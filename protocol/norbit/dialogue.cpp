@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/text/format.hpp"
+#include "core/text/printable.hpp"
 #include "protocol/norbit/messages.hpp"
 #include "protocol/norbit/settings.hpp"
 
@@ -148,8 +149,9 @@ class CommandDialogue final : public protocol::Dialogue {
     if (known != commands.end()) return set(*known, given, reaction);
     const std::string fixed = fixed_values(name, device_);
     if (fixed.empty()) {
-      notice("unknown command " + printable(name), reaction);
-      return say(printable(name) + " # unknown command", reaction);
+      const std::string shown = text::printable(name.substr(0, 40));
+      notice("unknown command " + shown, reaction);
+      return say(shown + " # unknown command", reaction);
     }
     say(std::string(name) + " " + fixed + (given.empty() ? "" : " # fixed"), reaction);
   }
@@ -176,11 +178,6 @@ class CommandDialogue final : public protocol::Dialogue {
     say(std::string(command.name) + " " + command.values(s) + " # " + comment, reaction);
   }
 
-  static std::string printable(std::string_view word) {
-    std::string text;
-    for (const char c : word.substr(0, 40)) text += c > ' ' && c <= '~' ? c : '?';
-    return text;
-  }
   static void notice(std::string text, Reaction& reaction) { reaction.events.emplace_back(protocol::Notice{std::move(text)}); }
   static void say(std::string text, Reaction& reaction) {
     text += "\r\n";

@@ -83,9 +83,11 @@ class NorbitHost final : public protocol::Host {
         parts.bathymetry = std::move(bathymetry);
         parts.bathymetry_size = whole->bytes.size();
         on_part(number, actions);
-      } else if (const auto column = read_column(whole->bytes)) {
+      } else if (auto column = read_column(whole->bytes)) {
         const std::uint32_t number = column->front.ping;
-        parts_[number].column = std::move(whole->bytes);
+        Parts& parts = parts_[number];
+        parts.column_bytes = std::move(whole->bytes);  // a move keeps the bytes in their place
+        parts.column = std::move(column);
         on_part(number, actions);
       } else if (port == 1) {  // others may hold replies to commands: a recording is one stream
         counts_.junk_bytes += whole->bytes.size();
@@ -101,12 +103,13 @@ class NorbitHost final : public protocol::Host {
   struct Parts {
     std::optional<Bathymetry> bathymetry;
     std::size_t bathymetry_size = 0;
-    Bytes column;
+    Bytes column_bytes;
+    std::optional<Column> column;  // reads column_bytes
   };
   /// A ping is whole with both; one whose other packet does not come is shown as it is.
   void on_part(std::uint32_t number, HostActions& actions) {
     ++counts_.messages;
-    const bool is_whole = parts_[number].bathymetry && !parts_[number].column.empty();
+    const bool is_whole = parts_[number].bathymetry && parts_[number].column;
     while (parts_.size() > most_parts || (is_whole && !parts_.empty() && parts_.begin()->first <= number)) {
       emit(parts_.begin()->second, actions);
       parts_.erase(parts_.begin());
@@ -135,8 +138,8 @@ class NorbitHost final : public protocol::Host {
           seen.points.empty() ? "no bottom" : format("%zu points from %.2f to %.2f m", seen.points.size(), nearest_m, farthest_m);
     }
     std::optional<PolarImage> image;
-    if (!parts.column.empty()) {
-      const Column column = *read_column(parts.column);
+    if (parts.column) {
+      const Column& column = *parts.column;
       const ColumnFront& front = column.front;
       ping.facts.number = front.ping;
       ping.facts.beams = front.beams;
@@ -144,7 +147,7 @@ class NorbitHost final : public protocol::Host {
       ping.facts.row_m = column.sample_m();
       ping.facts.range_m = (front.first_sample - 0.5 + static_cast<double>(front.samples)) * column.sample_m();
       ping.facts.frequency_hz = 1e3 * static_cast<double>(front.frequency_khz);
-      ping.facts.message_size += parts.column.size();
+      ping.facts.message_size += parts.column_bytes.size();
       ping.fired_s = front.time_s;
       image = image_of(column);
       if (!image) ping.errors.emplace_back("the directions of the beams do not rise, or its samples have no range");
