@@ -30,12 +30,6 @@ class NorbitVendor final : public protocol::Vendor {
                                                Time now) const override {
     return make_dialogue(port, device, now);
   }
-  std::shared_ptr<const Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
-    Bytes both = encode_bathymetry(ping, device);
-    const Bytes column = encode_column(ping, device);
-    both.insert(both.end(), column.begin(), column.end());
-    return std::make_shared<const Bytes>(std::move(both));
-  }
   std::vector<Bytes> datagrams(const protocol::Port& port, const Ping& ping, const protocol::DeviceState& device) const override {
     if (port.number == bathymetry_port) return {encode_bathymetry(ping, device)};
     if (port.number == column_port) return {encode_column(ping, device)};

@@ -32,11 +32,9 @@ std::shared_ptr<const Outbox::Shape> pauses_between(const std::vector<protocol::
 
 FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping)
     : vendor_(vendor), state_(state), ping_(ping) {
-  if (!vendor.has_several_streams()) {
-    bytes_ = vendor.frame(ping, state);
-    return;
-  }
-  // The parts make up the whole, so that the ping is encoded once.
+  bytes_ = vendor.frame(ping, state);
+  if (bytes_ != nullptr || !vendor.has_several_streams()) return;
+  // The parts of the ports make up the whole, so that the ping is encoded once.
   auto whole = std::make_shared<Bytes>();
   for (const protocol::Port& port : vendor.ports())
     if (port.kind == protocol::Port::Kind::tcp_stream)

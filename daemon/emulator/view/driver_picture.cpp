@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "daemon/emulator/sonar/delivery.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
 
 namespace sonar {
@@ -11,7 +12,7 @@ constexpr float dimmed = 0.4f;  // brightness of parts that the messages do not 
 
 /// The messages of a ping, over TCP or as datagrams.
 std::vector<protocol::Bytes> messages_of(const Ping& ping, const protocol::Vendor& vendor, const protocol::DeviceState& state) {
-  if (const auto framed = vendor.frame(ping, state)) return {*framed};
+  if (const auto framed = FramedPing(vendor, state, ping).bytes()) return {*framed};
   for (const auto kind : {protocol::Port::Kind::udp_stream, protocol::Port::Kind::udp_dialogue})
     if (const protocol::Port* const port = vendor.port(kind)) return vendor.datagrams(*port, ping, state);
   return {};
