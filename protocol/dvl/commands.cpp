@@ -19,18 +19,6 @@ std::string time_text(Time at) {
                       static_cast<int>(s % 60));
 }
 
-/// The answer to get_version_info. The version names sonard, so that a log shows what it came from.
-Json version_info(const protocol::DeviceState& device) {
-  return {{"chipid", text::format("0x%014x", unsigned{device.id})},
-          {"hardware_revision", 4},
-          {"product_id", device.model->part_number},
-          {"product_name", device.model->name},
-          {"variant", "standard"},
-          {"version_short", version},
-          {"version", std::string(version) + " (sonard)"},
-          {"is_ready", true}};
-}
-
 Json time_status(const protocol::DeviceState& device, Time now, const Settings& settings) {
   return {{"system_time", time_text(now)},
           {"ntp_synced", true},
@@ -87,6 +75,17 @@ Outcome set_config(const Json& parameters, Settings& settings) {
 }
 
 }  // namespace
+
+Json version_info(const protocol::DeviceState& device) {
+  return {{"chipid", text::format("0x%014x", unsigned{device.id})},
+          {"hardware_revision", 4},
+          {"product_id", device.model->part_number},
+          {"product_name", device.model->name},
+          {"variant", "standard"},
+          {"version_short", version},
+          {"version", std::string(version) + " (sonard)"},
+          {"is_ready", true}};
+}
 
 std::optional<Outcome> carry_out(const std::string& command, const Json& parameters, const protocol::DeviceState& device,
                                  Time now, Settings& settings) {

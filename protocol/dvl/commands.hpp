@@ -1,4 +1,4 @@
-// Carries out the commands of clients, except trigger_ping, which is part of the dialogue.
+// Carries out the commands of clients, except trigger_ping, which is part of the session.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -17,6 +17,8 @@ struct Outcome {
 /// Carries out a command, and changes `settings` if it sets some. nullopt: there is no such command.
 std::optional<Outcome> carry_out(const std::string& command, const Json& parameters, const protocol::DeviceState& device,
                                  Time now, Settings& settings);
+/// The answer to get_version_info. The version names sonard, so that a log shows what it came from.
+Json version_info(const protocol::DeviceState& device);
 protocol::Bytes response_line(const std::string& to, const Outcome& outcome);
 
 }  // namespace sonar::dvl

@@ -2,9 +2,8 @@
 
 #include <utility>
 
-#include "protocol/dvl/commands.hpp"
 #include "protocol/dvl/reports.hpp"
-#include "protocol/held_settings.hpp"
+#include "protocol/dvl/session.hpp"
 
 namespace sonar::dvl {
 namespace {
@@ -12,9 +11,7 @@ namespace {
 using protocol::Reaction;
 
 constexpr std::size_t longest_command = 4096;
-constexpr int deepest_command = 8, most_waiting = 15;  // nested braces (chosen); triggered pings that may wait (DOC)
-constexpr std::chrono::nanoseconds report_period = std::chrono::milliseconds(200);
-constexpr auto longest_wait = std::chrono::seconds(2);  // after that a triggered ping counts as lost and is requested again
+constexpr int deepest_command = 8;  // nested braces (chosen)
 
 /// Finds the JSON objects in a stream by counting braces. Lines do not separate them: libwaterlinked sends no line ends.
 class ObjectSplitter {
@@ -57,11 +54,9 @@ class ObjectSplitter {
   std::size_t junk_ = 0;
 };
 
-/// One client's conversation. Every client gets all reports. With acoustics enabled the device pings by itself and trigger_ping
-/// is refused; with acoustics disabled it pings only for triggers, which each client queues for itself (`waiting_`).
-class DvlDialogue final : public protocol::Dialogue {
+class JsonDialogue final : public Session {
  public:
-  DvlDialogue(const protocol::DeviceState& device, Time now) : device_(device), due_(next_report_after(now)) {}
+  using Session::Session;
 
   Reaction on_bytes(BytesView received, Time now) override {
     Reaction reaction;
@@ -72,37 +67,8 @@ class DvlDialogue final : public protocol::Dialogue {
     return reaction;
   }
 
-  Reaction on_tick(Time now, bool ping_pending) override {
-    Reaction reaction;
-    if (now < due_) return reaction;
-    due_ = next_report_after(now);
-    reaction.replies.push_back(position_line(extrapolated(settings().reckoning, now), now));
-    if (waiting_ > 0 && now - requested_at_ > longest_wait && !ping_pending) {
-      requested_at_ = now;
-      reaction.events.emplace_back(protocol::RequestPing{});
-    }
-    return reaction;
-  }
-  Time next_tick() const override { return due_; }
-  void on_ping_queued(Time) override {}
-  // Every client gets every ping, also those that another client has triggered; each counts them for its own triggers.
-  protocol::Delivery on_ping(const VendorSettings*, std::size_t, Time now) override {
-    protocol::Delivery delivery{{Bytes{}}, {}};
-    if (waiting_ > 0 && --waiting_ > 0) {
-      requested_at_ = now;
-      delivery.events.emplace_back(protocol::RequestPing{});
-    }
-    return delivery;
-  }
-
  private:
-  /// Reports of dead reckoning come at multiples of the period, so that all clients get them at the same times.
-  static Time next_report_after(Time now) { return now - now.time_since_epoch() % report_period + report_period; }
-  Settings settings() const { return settings_from(device_.settings.get()); }
-  /// The settings after the changes of this call, which the daemon has not made yet.
-  Settings settings_after(const Reaction& reaction) const {
-    return settings_from(protocol::settings_after(reaction, device_.settings.get()));
-  }
+  Bytes position_report(Time now) const override { return position_line(extrapolated(settings().reckoning, now), now); }
 
   void on_object(const std::string& object, Time now, Reaction& reaction) {
     const Json message = Json::parse(object, nullptr, false);
@@ -112,44 +78,18 @@ class DvlDialogue final : public protocol::Dialogue {
       return;
     }
     const std::string command = named->get<std::string>();
-    Settings s = settings_after(reaction);
-    const auto before = s.configured();
-    if (command == "trigger_ping") return trigger(std::move(s), now, reaction);
     const auto parameters = message.find("parameters");
-    const auto outcome = carry_out(command, parameters != message.end() ? *parameters : Json(), device_, now, s);
-    if (s.configured() != before || command == "reset_dead_reckoning") reaction.events.emplace_back(change_to(s, device_));
-    if (s.acoustics) waiting_ = 0;  // enabled acoustics end the triggers
+    const auto outcome = obey(command, parameters != message.end() ? *parameters : Json(), now, reaction);
     reaction.replies.push_back(response_line(command, outcome.value_or(Outcome{.error = "there is no such command"})));
   }
 
-  void trigger(Settings s, Time now, Reaction& reaction) {
-    const auto answer = [&](std::string error) {
-      reaction.replies.push_back(response_line("trigger_ping", {.error = std::move(error)}));
-    };
-    if (s.acoustics) return answer("acoustic_enabled must be false");
-    if (waiting_ >= most_waiting) return answer("the queue is full");
-    if (!s.is_triggered) {  // the rate of the settings is 0 while acoustics are disabled; a triggered ping needs another one
-      s.is_triggered = true;
-      reaction.events.emplace_back(change_to(s, device_));
-    }
-    if (++waiting_ == 1) {
-      requested_at_ = now;
-      reaction.events.emplace_back(protocol::RequestPing{});
-    }
-    answer({});
-  }
-
-  const protocol::DeviceState& device_;
   ObjectSplitter splitter_;
-  Time due_;             // time of the next report of dead reckoning
-  int waiting_ = 0;      // pings that this client has triggered and not got yet
-  Time requested_at_{};  // when the first of them was requested
 };
 
 }  // namespace
 
-std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now) {
-  return std::make_unique<DvlDialogue>(device, now);
+std::unique_ptr<protocol::Dialogue> converse_in_json(const protocol::DeviceState& device, Time now) {
+  return std::make_unique<JsonDialogue>(device, now);
 }
 
 }  // namespace sonar::dvl

@@ -5,6 +5,9 @@
 
 namespace sonar::dvl {
 
-std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now);
+/// Over TCP.
+std::unique_ptr<protocol::Dialogue> converse_in_json(const protocol::DeviceState& device, Time now);
+/// On the serial line.
+std::unique_ptr<protocol::Dialogue> converse_in_sentences(const protocol::DeviceState& device, Time now);
 
 }  // namespace sonar::dvl

@@ -8,12 +8,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double nsd_dbm = -90;  // DOC: -88 to -97 in its example; unknown: assumed the same for all
-
-std::int64_t microseconds(Time at) {
-  return std::chrono::duration_cast<std::chrono::microseconds>(at.time_since_epoch()).count();
-}
-
 Bytes line_of(const Json& message) { return dvl::line_of(message.dump()); }
 
 /// A member of an object. nullopt: there is none, or it is no finite number below 1e18, so that conversions cannot overflow.
@@ -56,6 +50,12 @@ std::optional<VelocityReport> velocity_from(const Json& message) {
 
 }  // namespace
 
+std::int64_t microseconds(Time at) {
+  return std::chrono::duration_cast<std::chrono::microseconds>(at.time_since_epoch()).count();
+}
+
+RollPitchYaw angles_of(const Reckoning& r) { return rpy_from_quat(conjugate(r.first) * r.last); }
+
 Bytes line_of(std::string text) {
   text += line_end;
   const auto bytes = std::as_bytes(std::span(text));
@@ -91,7 +91,7 @@ Bytes velocity_line(const Measurement& m, std::chrono::nanoseconds since_last, T
 }
 
 Bytes position_line(const Reckoning& r, Time at) {
-  const RollPitchYaw angles = rpy_from_quat(conjugate(r.first) * r.last);
+  const RollPitchYaw angles = angles_of(r);
   return line_of({{"ts", 1e-6 * static_cast<double>(microseconds(at))},
                   {"x", r.position_m.x},
                   {"y", r.position_m.y},

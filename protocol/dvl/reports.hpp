@@ -14,6 +14,12 @@ using protocol::BytesView;
 inline constexpr std::string_view format_name = "json_v3.3", line_end = "\r\n";
 inline constexpr std::size_t longest_line = 16384;
 
+inline constexpr double nsd_dbm = -90;  // DOC: -88 to -97 in its example; unknown: assumed the same for all
+
+/// Unix time, as the reports have it.
+std::int64_t microseconds(Time at);
+/// Those of the vehicle since the start of dead reckoning.
+RollPitchYaw angles_of(const Reckoning& reckoning);
 /// The text as bytes, with the end of a line.
 Bytes line_of(std::string text);
 Bytes velocity_line(const Measurement& measured, std::chrono::nanoseconds since_last, Time sent_at);

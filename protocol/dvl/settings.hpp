@@ -21,10 +21,14 @@ struct Reckoning {
   double std_m = 0, fom = 0;  // fom: by which std_m grows [m/s]
 };
 
+/// The reports on the serial line, by the numbers of the command that selects them.
+enum class SerialOutput { none = 0, old_and_new = 1, new_ones = 3 };
+
 struct Settings {
   double speed_of_sound_mps = 1475, mounting_rotation_deg = 0;
   bool acoustics = true, dark = false, cycles = true;
   std::string range_mode = "auto", ntp_address = "auto";
+  SerialOutput serial_output = SerialOutput::old_and_new;    // unknown: assumed
   int lowest_mode = 0, highest_mode = range_mode_count - 1;  // that range_mode allows
   bool is_triggered = false;                                 // a client has requested a ping while acoustics are off
 
@@ -33,7 +37,8 @@ struct Settings {
 
   /// The values that clients set.
   auto configured() const {
-    return std::tuple(speed_of_sound_mps, mounting_rotation_deg, acoustics, dark, cycles, range_mode, ntp_address, is_triggered);
+    return std::tuple(speed_of_sound_mps, mounting_rotation_deg, acoustics, dark, cycles, range_mode, ntp_address, serial_output,
+                      is_triggered);
   }
 };
 /// Pings with these settings are range images.

@@ -1,13 +1,14 @@
-"""An emulated DVL A50 as its drivers meet it: lines of JSON over TCP."""
+"""An emulated DVL A50 as its drivers meet it: lines of JSON over TCP, and sentences on a serial line."""
 import json
 import math
 import socket
 import time
 import unittest
 
+from pseudo_terminal import PseudoTerminal
 from running_sonard import Sonard
 
-PORT, PATIENCE_S = 16171, 120
+PORT, SERIAL_PORT, PATIENCE_S = 16171, 4001, 120
 DOWN = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}"
 ORBIT_MPS, RADIUS_M = 0.5, 7
 IDS = {(-1, 1): 0, (-1, -1): 1, (1, -1): 2, (1, 1): 3}  # of beams, by the signs of forward and starboard
@@ -46,6 +47,39 @@ class Driver:
 
     def velocity(self):
         return self.next("velocity", lambda report: report["velocity_valid"])
+
+
+def crc8(data):
+    crc = 0
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x107 if crc & 0x80 else 0)) & 0x1FF
+    return crc
+
+
+class SerialDriver:
+    """The fields of sentences, whose checksums must be right."""
+
+    def __init__(self, line):
+        self.line, self.waiting = line, b""
+
+    def next(self, kind):
+        end = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end:
+            while b"\r\n" not in self.waiting:
+                self.waiting += self.line.read(4096)
+            sentence, self.waiting = self.waiting.split(b"\r\n", 1)
+            body, _, checksum = sentence.rpartition(b"*")
+            assert b"%02x" % crc8(body) == checksum, sentence
+            name, *fields = body.decode().split(",")
+            if name == kind:
+                return fields
+        raise AssertionError(f"no {kind} within {PATIENCE_S} s")
+
+    def ask(self, sentence, kind):
+        self.line.write(sentence.encode() + b"\r\n")
+        return self.next(kind)
 
 
 class Velocity(unittest.TestCase):
@@ -105,6 +139,28 @@ class Velocity(unittest.TestCase):
         while self.driver.velocities < before + 3:
             self.driver.next("velocity")
         self.assertFalse(self.driver.command("get_config")["result"]["acoustic_enabled"])
+
+    def test_a_serial_line_has_the_same_through_a_pseudo_terminal(self):
+        with PseudoTerminal(self.daemon.address, SERIAL_PORT, PATIENCE_S) as line:
+            driver = SerialDriver(line)
+            self.assertEqual(driver.ask("wcw", "wrw")[0], "dvl-a50")
+            self.assertEqual(driver.ask("wcp,3", "wra"), [])
+            self.assertEqual(driver.ask("wcc", "wrc"), ["1475", "0", "y", "n", "auto", "y"])
+            fields = driver.next("wrz")
+            while fields[3] != "y":
+                fields = driver.next("wrz")
+            beams = [driver.next("wru") for _ in range(4)]
+            self.assertAlmostEqual(float(fields[0]), 0, delta=0.03)
+            self.assertAlmostEqual(float(fields[1]), ORBIT_MPS, delta=0.04)
+            self.assertEqual([beam[0] for beam in beams], ["0", "1", "2", "3"])
+            over_tcp = self.driver.next("velocity", lambda report: report["time_of_validity"] > int(fields[7]))
+            again = driver.next("wrz")
+            while int(again[7]) < over_tcp["time_of_validity"]:
+                again = driver.next("wrz")
+            self.assertEqual(int(again[7]), over_tcp["time_of_validity"], "the same ping")
+            self.assertAlmostEqual(float(again[1]), over_tcp["vy"], delta=0.001)
+            self.assertEqual(len(driver.next("wrp")), 9)
+            self.assertEqual(driver.ask("wcp,1", "wra"), [])
 
 
 if __name__ == "__main__":

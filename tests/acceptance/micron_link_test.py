@@ -1,18 +1,14 @@
 """An emulated Micron as its drivers meet it, over TCP and a pseudo-terminal, decoded from the tables of docs/protocols/micron.md."""
-import os
 import pathlib
-import pty
 import re
-import selectors
 import socket
 import struct
 import tempfile
-import threading
-import tty
 import unittest
 
 import tshark as shark
 from pcap_writer import Capture
+from pseudo_terminal import PseudoTerminal
 from running_sonard import ROOT, SONARCTL, Sonard, run
 
 PORT, PATIENCE_S = 4001, 120
@@ -94,41 +90,6 @@ class Link:
         self.socket.close()
 
 
-class Terminal:
-    """A pseudo-terminal whose other end is the connection, as socat makes it."""
-
-    def __init__(self, address):
-        self.socket = socket.create_connection((address, PORT), timeout=PATIENCE_S)
-        self.master, self.slave = pty.openpty()
-        tty.setraw(self.slave)
-        self.wake = os.pipe()
-        self.thread = threading.Thread(target=self.carry)
-
-    def carry(self):
-        with selectors.DefaultSelector() as ready:
-            for end in (self.master, self.socket, self.wake[0]):
-                ready.register(end, selectors.EVENT_READ)
-            while True:
-                ends = [key.fileobj for key, _ in ready.select()]
-                if self.wake[0] in ends:
-                    return
-                if self.master in ends:
-                    self.socket.sendall(os.read(self.master, 4096))
-                if self.socket in ends:
-                    os.write(self.master, self.socket.recv(4096))
-
-    def __enter__(self):
-        self.thread.start()
-        return Driver(lambda count: os.read(self.slave, count), lambda data: os.write(self.slave, data))
-
-    def __exit__(self, *_):
-        os.write(self.wake[1], b".")
-        self.thread.join()
-        self.socket.close()
-        for end in (self.master, self.slave, *self.wake):
-            os.close(end)
-
-
 def sonar(**more):
     return Sonard(scene="l-targets.yaml", profile="micron", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}", **more)
 
@@ -159,7 +120,8 @@ class MicronLink(unittest.TestCase):
             self.assertEqual(driver.next(ALIVE)[-1], 0x5D)
 
     def test_the_same_through_a_pseudo_terminal(self):
-        with sonar() as daemon, Terminal(daemon.address) as driver:
+        with sonar() as daemon, PseudoTerminal(daemon.address, PORT, PATIENCE_S) as line:
+            driver = Driver(line.read, line.write)
             driver.write(command(-30, 30))
             self.expect_targets(driver.scan(100))
 

@@ -35,13 +35,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const protocol::Vendor& vendor = dvl::vendor();
   protocol::ChangeSettings change = vendor.initial_settings(device);
   device.settings = change.vendor_settings;
-  const auto client = vendor.converse(vendor.ports().front(), device, Time{});
-  std::size_t answered = 0;
   const std::size_t half = size / 2;
-  for (const protocol::BytesView part : {protocol::BytesView(bytes).first(half), protocol::BytesView(bytes).subspan(half)})
-    apply(client->on_bytes(part, Time{}), device, answered);
-  require(answered <= 400 * (size + 1));  // an object has two bytes
-  for (int tick = 0; tick < 4; ++tick) apply(client->on_tick(client->next_tick(), false), device, answered);
+  for (const protocol::Port& port : vendor.ports()) {
+    const auto client = vendor.converse(port, device, Time{});
+    std::size_t answered = 0;
+    for (const protocol::BytesView part : {protocol::BytesView(bytes).first(half), protocol::BytesView(bytes).subspan(half)})
+      apply(client->on_bytes(part, Time{}), device, answered);
+    require(answered <= 400 * (size + 1));  // an object has two bytes
+    for (int tick = 0; tick < 4; ++tick) apply(client->on_tick(client->next_tick(), false), device, answered);
+  }
   dvl::read_line(bytes);
 
   Ping ping;
@@ -51,7 +53,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   ping.samples = bytes;
   const dvl::Measurement m = dvl::measure(ping);
   require(std::isfinite(m.fom) && is_finite(m.velocity_mps) && std::isfinite(m.altitude_m));
-  vendor.frame(ping, device);
+  for (const protocol::Port& port : vendor.ports()) vendor.datagrams(port, ping, device);
   require(vendor.after_ping(ping, device).has_value());
   return 0;
 }

@@ -17,16 +17,6 @@ using namespace tests;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
-std::string text_of(BytesView bytes) {
-  std::string text;
-  for (const std::byte b : bytes) text += static_cast<char>(b);
-  return text;
-}
-Bytes bytes_of(std::string_view text) {
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
-}
-
 constexpr std::array<double, beam_count> level{2, 2, 2, 2};
 
 /// The velocity of a ping of a vehicle that moves so in its own axes: x forward, y to starboard, z down.

@@ -1,9 +1,22 @@
 #pragma once
 
+#include <string>
+#include <string_view>
+
 #include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/measure.hpp"
 
 namespace sonar::dvl::tests {
+
+inline std::string text_of(protocol::BytesView bytes) {
+  std::string text;
+  for (const std::byte b : bytes) text += static_cast<char>(b);
+  return text;
+}
+inline protocol::Bytes bytes_of(std::string_view text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
 
 inline protocol::DeviceState device(std::size_t model = 0) {
   protocol::DeviceState state;

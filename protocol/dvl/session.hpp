@@ -1,0 +1,44 @@
+// The part that the conversations in JSON and on the serial line share: commands, triggered pings and the times of reports.
+#pragma once
+
+#include "protocol/dvl/commands.hpp"
+#include "protocol/held_settings.hpp"
+
+namespace sonar::dvl {
+
+/// Every client gets all reports. With acoustics enabled the device pings by itself and trigger_ping is refused; with acoustics
+/// disabled it pings only for triggers, which each client queues for itself.
+class Session : public protocol::Dialogue {
+ public:
+  /// `device` outlives it.
+  Session(const protocol::DeviceState& device, Time now) : device_(device), due_(next_report_after(now)) {}
+
+  protocol::Reaction on_tick(Time now, bool ping_pending) override;
+  Time next_tick() const override { return due_; }
+  void on_ping_queued(Time) override {}
+  protocol::Delivery on_ping(const VendorSettings*, std::size_t, Time now) override;
+
+ protected:
+  /// The report of dead reckoning. Empty: none.
+  virtual protocol::Bytes position_report(Time now) const = 0;
+
+  const protocol::DeviceState& device() const { return device_; }
+  Settings settings() const { return settings_from(device_.settings.get()); }
+  /// The settings after the changes of this call, which the daemon has not made yet.
+  Settings settings_after(const protocol::Reaction& reaction) const {
+    return settings_from(protocol::settings_after(reaction, device_.settings.get()));
+  }
+  /// Carries out a command, and adds the events that follow. nullopt: there is no such command.
+  std::optional<Outcome> obey(const std::string& command, const Json& parameters, Time now, protocol::Reaction& reaction);
+
+ private:
+  static Time next_report_after(Time now);
+  Outcome trigger(Settings s, Time now, protocol::Reaction& reaction);
+
+  const protocol::DeviceState& device_;
+  Time due_;             // time of the next report of dead reckoning
+  int waiting_ = 0;      // pings that this client has triggered and not got yet
+  Time requested_at_{};  // when the first of them was requested
+};
+
+}  // namespace sonar::dvl
