@@ -242,7 +242,7 @@ listenToKeys([
   [['f'], 'f', 'hold the picture, or go on', freeze],
   [['s'], 's', 'save the picture as PNG', () => fan.save()],
   [['g'], 'g', 'range rings', () => fan.toggleRings()],
-  [['1', '2', '0'], '1 2 0', 'fan alone, scene alone, both', (key) => maximise(key)],
+  [['1', '2', '0'], '1 2 0', 'picture alone, scene alone, both', (key) => maximise(key)],
   [['e'], 'e', 'to the faults', () => (showTab('faults'), document.querySelector('#troubles button:not(:disabled)')?.focus())],
   [['r'], 'r', 'to the settings, range first', toSettings],
   [['t'], 't', 'light or dark', toggleTheme],

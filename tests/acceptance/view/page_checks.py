@@ -42,6 +42,8 @@ NAMELESS_CONTROLS = """[...document.querySelectorAll('button, input, select, can
   && !(e.getAttribute('aria-label') || e.labels?.length || /\\w/.test(e.textContent) && e.tagName === 'BUTTON')).map((e) => e.outerHTML.slice(0, 80))"""
 SMALL_TARGETS = """[...document.querySelectorAll('button:not(.link), select')].filter((e) => e.offsetWidth && (e.offsetHeight < 44 || e.offsetWidth < 44))
   .map((e) => `${e.id || e.className} ${e.offsetWidth} x ${e.offsetHeight}`)"""
+CUT_WORDS = """[...document.querySelectorAll('button, .chip, h2')].filter((e) => e.offsetWidth && !e.closest('.unseen') && e.scrollWidth > e.clientWidth + 1)
+  .map((e) => `${e.id || e.className}: ${e.innerText}`)"""
 WIDER_THAN = """[...document.querySelectorAll('main *, header *, nav *')].filter((e) => e.offsetWidth && !e.closest('#fan-glass, .unseen')
   && e.getBoundingClientRect().right > WIDTH + 1).map((e) => e.id || e.className || e.tagName)"""
 
@@ -124,13 +126,14 @@ class PageChecks:
         self.assertGreater(difference(mirrored(width, height, ours), theirs)[0], 2)
 
     def assert_fits(self, page, width, name=""):
-        """No sideways scrolling in any pane."""
+        """No sideways scrolling in any pane, and no words that are cut."""
         for tab in TABS if width < 820 else TABS[:1]:
             if width < 820:
                 page.click(f"#tabs [data-tab={tab}]")
                 time.sleep(0.5)
             self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
             self.assertEqual(page.run(WIDER_THAN.replace("WIDTH", str(width))), [], tab)
+            self.assertEqual(page.run(CUT_WORDS), [], tab)
             self.picture(page, f"{name}{width}-{tab}")
 
     def assert_quiet(self, page, url):
