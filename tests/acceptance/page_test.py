@@ -22,8 +22,7 @@ from sonard_client import OculusClient  # noqa: E402  pylint: disable=wrong-impo
 BUDGET_BYTES = 190_000
 MOUNT = "{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}"
 STATES = {  # of the mock -> the page's name of it, what the user reads, the button
-    "no client": ("no-client", "No driver is connected. Nothing is simulated without one. Point a driver at 127.0.0.2.",
-                  "Preview at 5 Hz"),
+    "no client": ("no-client", "No driver is connected. Nothing is simulated without one. Point a driver at 127.0.0.2.", "Preview"),
     "standby": ("standby", "Standby: 192.0.2.7 set the rate to 0.", "Ask for 10 Hz"),
     "stepped": ("stepped-waits", "Time stands still at 41.600 s: it moves when 127.0.0.1:40122 has taken ping 12 896", ""),
     "lockstep": ("lockstep-waits", "Time stands still at 41.600 s", "Step 0.1 s"),

@@ -87,9 +87,9 @@ export class Facts {
   get linesByPing() {
     return ['sweep', 'waterfall'].includes(this.pictureKind);
   }
-  /// The measured rate of the pings; of previews from their numbers, before the next status.
+  /// The measured rate of the pings that the page shows; of previews from their numbers, before the next status. Older daemons send none.
   get madeRate() {
-    return this.preview ? this.numbered.rate : this.sonarStatus?.figures?.made_hz;
+    return this.preview ? this.numbered.rate : this.sonarStatus?.figures?.made_hz ?? this.rate;
   }
   get rateUnit() {
     return this.linesByPing ? 'lines/s' : 'Hz';

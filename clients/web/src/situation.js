@@ -50,7 +50,7 @@ export function situationOf(facts, connection) {
       kind: 'no-client',
       picture: 'old',
       text: `No driver is connected. Nothing is simulated without one. Point a driver at ${whereToConnect(sonar)}.`,
-      button: facts.parameters.has(`/${sonar.name}/preview`) ? { label: 'Preview at 5 Hz', parameter: `/${sonar.name}/preview`, value: true } : undefined,
+      button: facts.parameters.has(`/${sonar.name}/preview`) ? { label: 'Preview', parameter: `/${sonar.name}/preview`, value: true } : undefined,
     };
   }
   const standing = stands(facts);
@@ -81,7 +81,7 @@ export function badgesOf(facts) {
   }
   const wanted = facts.wantedRate;
   if (sonar.pinging && facts.isSlow && sonar.figures?.simulation_ms > 900 / wanted)
-    out.push({ text: `${short(facts.rate, 1)} of ${short(wanted, 1)} ${facts.rateUnit}: computing takes ${short(sonar.figures.simulation_ms, 0)} ms`, level: 'warning', title: 'the engine is slower than the rate asked for' });
+    out.push({ text: `${short(facts.madeRate, 1)} of ${short(wanted, 1)} ${facts.rateUnit}: computing takes ${short(sonar.figures.simulation_ms, 0)} ms`, level: 'warning', title: 'the engine is slower than the rate asked for' });
   const age_s = facts.ping ? now_s() - facts.ping.at : 0;
   if (sonar.pinging && wanted > 0 && facts.ping && age_s > Math.max(1, 2 / wanted) && facts.realtime)
     out.push({ text: `picture is ${fixed(age_s, 1)} s old`, level: 'warning', title: '' });

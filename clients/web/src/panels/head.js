@@ -12,7 +12,7 @@ function rateOf(facts) {
   if (!facts.listened) return { word: 'no driver', dot: 'warning', rate: '' };
   if (sonar.rate_hz === 0) return { word: 'standby', dot: 'warning', rate: '' };
   if (!sonar.pinging) return { word: 'silent', dot: 'warning', rate: dash };
-  return { word: 'pinging', dot: facts.isSlow ? 'warning' : 'ok', rate: measured(facts.rate) };
+  return { word: 'pinging', dot: facts.isSlow ? 'warning' : 'ok', rate: measured(facts.madeRate) };
 }
 
 /// The product's short name: "oculus-m1200d" -> "M1200d".
