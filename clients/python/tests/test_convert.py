@@ -481,9 +481,18 @@ class Corrupted(WithFolder):
             with self.subTest(data[:8]), self.assertRaisesRegex(ConvertError, said):
                 format_of(self.file(data))
 
+    def test_frames_without_times(self):
+        frames = b"".join(made.mavlink_frame("ATTITUDE", (100 * i, 0, 0, 0, 0, 0, 0)) for i in range(3))
+        for name in ("raw.mavlink", "raw.tlog"):
+            with self.assertRaisesRegex(ConvertError, "MAVLink frames without times; give the telemetry log"):
+                format_of(self.file(frames, name))
+
     def test_results_of_a_download_that_went_wrong(self):
         for name, content, says in (("a.tlog", b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
-                                    ("a.db3", b"<!DOCTYPE html><html>", "a web page")):
+                                    ("a.db3", b"<!DOCTYPE html><html>", "a web page"),
+                                    ("a.gpx", b"<?xml version=\"1.0\"?><gpx/>", "GPX and KML, without attitudes"),
+                                    ("a.pcap", b"\xd4\xc3\xb2\xa1", "a capture of packets"),
+                                    ("a.bin.xz", b"\xfd7zXZ\x00", "unxz -k")):
             with self.assertRaisesRegex(ConvertError, says):
                 format_of(self.file(content, name))
 

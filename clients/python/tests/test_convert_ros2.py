@@ -23,6 +23,30 @@ class RecordingsOfRos2(WithFolder):
         with self.assertRaisesRegex(ConvertError, r"no poses on topic '/pose'; topics with poses: '/odom' \(5 poses\)"):
             convert(path, topic="/pose")
 
+    def test_topics_that_are_there_are_listed_if_none_has_poses(self):
+        topics = [("/image", "sensor_msgs/msg/Image", [(100, b"not read")]), ("/imu", "sensor_msgs/msg/Imu", [])]
+        wanted = r"its topics: '/image' \(sensor_msgs/msg/Image\), '/imu' \(sensor_msgs/msg/Imu\)$"
+        with self.assertRaisesRegex(ConvertError, wanted):
+            convert(made.db3(self.folder / "a.db3", topics))
+        with self.assertRaisesRegex(ConvertError, wanted):
+            self.convert(made.mcap([(topic, "cdr", kind, logged) for topic, kind, logged in topics]))
+        with self.assertRaisesRegex(ConvertError, r"its topics: '/fix' \(sensor_msgs/NavSatFix\)$"):
+            self.convert(made.bag([("/fix", "sensor_msgs/NavSatFix", [(1, b"")])]))
+        many = [(f"/{number}", "cdr", "std_msgs/msg/String", [(1, b"")]) for number in range(30)]
+        with self.assertRaisesRegex(ConvertError, "and 10 more$"):
+            self.convert(made.mcap(many))
+
+    def test_poses_without_a_header_have_the_time_of_the_recording(self):
+        messages = [(100 + made.moment(i)[0], made.Cdr().put("d", *made.enu_moment(i)[1], *made.enu_moment(i)[2]).done())
+                    for i in range(5)]
+        track = self.convert(made.mcap([("/pose", "cdr", "geometry_msgs/msg/Pose", messages)]))
+        self.assert_track(track, range(5), t0=100, metres=1e-9, radians=1e-6)
+
+    def test_a_clock_that_goes_back_for_good_is_named(self):
+        messages = [(100 + i, made.odometry(i)) for i in range(5)] + [(105 + i, made.odometry(i, t0=1)) for i in range(20)]
+        self.assertEqual(len(self.convert(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", messages)])).rows), 5)
+        self.assertRegex(self.warned[0], r"omitted .*: 20; the clock went back by 99\.4 s at pose 6: split the recording there$")
+
     def folder_of(self, *names):
         folder = self.folder / "recording"
         folder.mkdir()

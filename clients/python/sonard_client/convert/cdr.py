@@ -58,13 +58,15 @@ def _pose(reader: Reader) -> Pose:
 
 
 def decode(kind: str, data: bytes, ros1: bool) -> List[Tuple[str, float, Pose]]:
-    """Returns for each pose of a message: suffix of the topic's name, timestamp [s], pose."""
+    """Returns for each pose of a message: suffix of the topic's name, timestamp [s] or 0 if it has none, pose."""
     reader = Reader(data, ros1)
     if kind == "TFMessage":
         (count,) = reader.numbers("I")
         return [_transform(reader, ros1) for _ in range(int(count))]
     if kind == "TransformStamped":
         return [_transform(reader, ros1)]
+    if kind == "Pose":
+        return [("", 0.0, _pose(reader))]
     stamp, _ = _header(reader, ros1)
     if kind == "Odometry":
         reader.text()
@@ -78,7 +80,7 @@ def _transform(reader: Reader, ros1: bool) -> Tuple[str, float, Pose]:
 
 
 # Supported types, in order of preference.
-KINDS = ("Odometry", "PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "TFMessage")
+KINDS = ("Odometry", "PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "TFMessage", "Pose")
 PACKAGES = ("nav_msgs", "geometry_msgs", "tf2_msgs", "tf")
 
 

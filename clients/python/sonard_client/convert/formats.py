@@ -25,12 +25,20 @@ _OTHERS = (
     (b"\x28\xb5\x2f\xfd", "compressed by zstd; unpack it first: zstd -d {}"),
     (b"\x1f\x8b", "compressed by gzip; unpack it first: gunzip -k {}"),
     (b"BZh", "compressed by bzip2; unpack it first: bunzip2 -k {}"),
+    (b"\xfd7zXZ\x00", "compressed by xz; unpack it first: unxz -k {}"),
+    (b"7z\xbc\xaf", "a 7z archive; unpack it first: 7z x {}"),
     (b"PK\x03\x04", "a ZIP archive; unpack it first: unzip {}"),
     (b"#ROSBAG V1", "a ROS 1 bag of an old format; rewrite it: rosbag migrate {} NEW.bag"),
     (b"FMT, 128, ", "a dataflash log as text; give the .bin file that it was made from"),
     (b"\x89HDF\r\n", "HDF5, as .mat files of MATLAB 7.3 are; write its poses as CSV (docs/poses.md)"),
     (b"version https://git-lfs", "a pointer of Git LFS, not the file itself; fetch that: git lfs pull"),
     (b"<!DOCTYPE html", "a web page, not the file itself; was the download refused? Fetch it again"),
+    (b"<?xml", "XML, such as GPX and KML, without attitudes; write poses as CSV (docs/poses.md)"),
+    (b"CDF", "NetCDF; write its poses as CSV (docs/poses.md)"),
+    (b"\xd4\xc3\xb2\xa1", "a capture of packets; give the log of the vehicle"),
+    (b"\n\r\r\n", "a capture of packets; give the log of the vehicle"),
+    (b"{", "JSON; write its poses as CSV (docs/poses.md)"),
+    (b"\xff\xfe", "text in UTF-16; save it as UTF-8"),
     (b"MATLAB 5.0", "a MATLAB file; write its poses as CSV (docs/poses.md)"),
 )
 
@@ -40,6 +48,10 @@ def _described(path: pathlib.Path, head: bytes) -> str:
     for magic, text in _OTHERS:
         if head.startswith(magic):
             return text.format(path)
+    frame = frame_length(head, 0)
+    if frame is not None and frame_length(head, frame) is not None:
+        return ("MAVLink frames without times; give the telemetry log of a ground station (.tlog) or the autopilot's own log "
+                "(.bin), or send the frames to a running sonard (docs/poses.md)")
     first = next((line for line in head.split(b"\n") if line.strip() and not line.startswith(b"#")), head)
     if all(9 <= byte < 128 for byte in head) and (set(first) <= set(b"0123456789+-.eE, \t\r") or first[:1] in b"tT"):
         return ("text; sonard plays CSV with a header, TUM, EuRoC and KITTI as they are: name the file in `trajectory:` "

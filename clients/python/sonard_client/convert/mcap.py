@@ -120,12 +120,14 @@ class _Reader:
             inner = begin + length
 
 
-def mcap_messages(path: pathlib.Path, warn: Warn) -> List[Recorded]:
+def mcap_messages(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> List[Recorded]:
+    """seen: receives the types of all topics."""
     reader = _Reader(str(path), warn)
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise ConvertError(f"{path}: at byte 0: not an MCAP file: the magic bytes are missing")
         messages = list(reader.records(file, path.stat().st_size))
+    seen.update((channel.topic, channel.schema) for channel in reader.channels.values())
     if reader.refused and not messages:
         raise ConvertError(f"{path}: {reader.why}")
     if reader.refused:
@@ -135,4 +137,5 @@ def mcap_messages(path: pathlib.Path, warn: Warn) -> List[Recorded]:
 
 def read_mcap(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
     """Reads the poses of one topic; ROS and foxglove use ENU_FLU."""
-    return track_from(mcap_messages(path, warn), str(path), warn, topic)
+    seen: Dict[str, str] = {}
+    return track_from(mcap_messages(path, warn, seen), str(path), warn, topic, seen)

@@ -1,11 +1,14 @@
 """Makes the track of one body from the messages of a recording (MCAP or bag): selects the topic, drops decreasing times."""
 from __future__ import annotations
 
-from typing import Dict, Iterable, List, NamedTuple, Optional
+from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional
 
 from .cdr import Broken
 from .messages import Found, may_hold_poses, poses_in
 from .track import ConvertError, Row, Stream, Track, Warn, rising
+
+
+CLOCK_RESET_S = 1.0
 
 
 class Recorded(NamedTuple):
@@ -24,15 +27,22 @@ class _Topic:
         self.rows: Stream[Found] = []
 
 
-def _choice(topics: Dict[str, _Topic], wanted: Optional[str], name: str) -> str:
+def _others(seen: Mapping[str, str]) -> str:
+    """The topics of a recording without poses, with their types."""
+    most = 20
+    listed = [f"{topic!r} ({kind or 'no type'})" for topic, kind in sorted(seen.items())]
+    return ", ".join(listed[:most]) + (f" and {len(listed) - most} more" if len(listed) > most else "") or "none"
+
+
+def _choice(topics: Dict[str, _Topic], wanted: Optional[str], name: str, seen: Mapping[str, str]) -> str:
     listed = ", ".join(f"{topic!r} ({len(t.rows)} poses)" for topic, t in sorted(topics.items()))
     if wanted is not None:
         if wanted not in topics:
             raise ConvertError(f"{name}: no poses on topic {wanted!r}; topics with poses: {listed or 'none'}")
         return wanted
     if not topics:
-        raise ConvertError(f"{name}: no poses found: expected nav_msgs/Odometry, geometry_msgs/PoseStamped, a transform, or "
-                           "JSON with position and orientation")
+        raise ConvertError(f"{name}: no poses found: expected nav_msgs/Odometry, geometry_msgs/PoseStamped or Pose, a transform, "
+                           f"or JSON with position and orientation; its topics: {_others(seen)}")
     best = min(t.rank for t in topics.values())
     candidates = [topic for topic, t in topics.items() if t.rank == best]
     if len(candidates) > 1:
@@ -40,7 +50,15 @@ def _choice(topics: Dict[str, _Topic], wanted: Optional[str], name: str) -> str:
     return candidates[0]
 
 
-def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optional[str] = None) -> Track:
+def _clock_reset(rows: Stream[Found]) -> str:
+    """Advice if the clock went back for good, after which all poses are omitted until it has caught up."""
+    back_s, number = max(((a[0] - b[0], i) for i, (a, b) in enumerate(zip(rows, rows[1:]), 1)), default=(0.0, 0))
+    return "" if back_s < CLOCK_RESET_S else f"; the clock went back by {back_s:.1f} s at pose {number + 1}: split the recording there"
+
+
+def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optional[str] = None,
+               seen: Mapping[str, str] = {}) -> Track:
+    """seen: the types of all topics of the recording."""
     topics: Dict[str, _Topic] = {}
     faults: List[str] = []
     for message in messages:
@@ -56,9 +74,10 @@ def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optio
             there.rows.append((message.logged_s if pose.t_s is None else pose.t_s, pose))
     if faults:
         warn(f"{faults[0]}" + f"; messages omitted: {len(faults)}")
-    chosen = _choice(topics, topic, name)
+    chosen = _choice(topics, topic, name, seen)
     selected = topics[chosen]
     rows = rising(selected.rows)
     if len(rows) < len(selected.rows):
-        warn(f"poses of {chosen} omitted because their time does not increase: {len(selected.rows) - len(rows)}")
+        warn(f"poses of {chosen} omitted because their time does not increase: {len(selected.rows) - len(rows)}" +
+             _clock_reset(selected.rows))
     return Track(selected.frame, chosen, [Row(t, f.position_m, f.orientation) for t, f in rows])

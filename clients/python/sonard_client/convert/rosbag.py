@@ -95,4 +95,4 @@ def read_rosbag(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> 
         raise ConvertError(f"{path}: {bag.unreadable}")
     if bag.unreadable:
         warn(bag.unreadable)
-    return track_from(messages, str(path), warn, topic)
+    return track_from(messages, str(path), warn, topic, dict(bag.connections.values()))

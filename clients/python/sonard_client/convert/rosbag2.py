@@ -71,11 +71,13 @@ class _Base:
                 if hidden.get(column, 0):
                     raise sqlite3.DatabaseError(f"column {column} of {table} is not stored")
 
-    def rows(self, warn: Warn) -> Iterator[Recorded]:
+    def rows(self, warn: Warn, seen: Dict[str, str]) -> Iterator[Recorded]:
         self._check()
         topics = {}
         for number, *texts in self.base.execute(f"SELECT {', '.join(COLUMNS['topics'])} FROM topics"):
             topic, schema, encoding = map(str, texts)
+            if len(seen) < MOST_TOPICS:
+                seen[topic] = schema
             if isinstance(number, int) and may_hold_poses(encoding, schema):
                 topics[number] = topic, encoding, schema
             if len(topics) > MOST_TOPICS:
@@ -99,11 +101,11 @@ class _Base:
                  f"{count}")
 
 
-def _rows(path: pathlib.Path, warn: Warn) -> Iterator[Recorded]:
+def _rows(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> Iterator[Recorded]:
     unmerged = _unmerged(path.resolve())
     with contextlib.closing(_Base(path, unmerged)) as base:
         try:
-            yield from base.rows(warn)
+            yield from base.rows(warn, seen)
         except sqlite3.Error as error:
             if unmerged and not base.exceeded:
                 raise ConvertError(f"{path}: its writer did not end as it should: {unmerged.name} belongs to it, and the two "
@@ -116,10 +118,11 @@ def _rows(path: pathlib.Path, warn: Warn) -> Iterator[Recorded]:
                                "recording of ROS 2")
 
 
-def db3_messages(path: pathlib.Path, warn: Warn) -> List[Recorded]:
+def db3_messages(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> List[Recorded]:
+    """seen: receives the types of all topics."""
     found: List[Recorded] = []
     try:
-        for message in _rows(path, warn):
+        for message in _rows(path, warn, seen):
             if message.data.startswith(ZSTD_MAGIC):
                 raise ConvertError(f"{path}: its messages are compressed one by one; write them without compression: ros2 bag "
                                    "convert -i RECORDING -o options.yaml, with `output_bags: [{uri: plain, storage_id: mcap}]`")
@@ -173,8 +176,9 @@ def recording_at(path: pathlib.Path) -> pathlib.Path:
 def read_rosbag2(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
     """Reads the poses of one topic of a file or a folder, ENU_FLU."""
     messages: List[Recorded] = []
+    seen: Dict[str, str] = {}
     for file in files_of(path, warn) if path.is_dir() else [path]:
         with file.open("rb") as opened:
             is_mcap = opened.read(len(MCAP_MAGIC)) == MCAP_MAGIC
-        messages += mcap_messages(file, warn) if is_mcap else db3_messages(file, warn)
-    return track_from(messages, str(path), warn, topic)
+        messages += mcap_messages(file, warn, seen) if is_mcap else db3_messages(file, warn, seen)
+    return track_from(messages, str(path), warn, topic, seen)
