@@ -21,7 +21,7 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   static const std::array<std::shared_ptr<const SonarModel>, 1> built = [] {
     SonarModel model;
     model.profile = "waterlinked-3d15";
-    model.name = "WaterLinked Sonar 3D-15";
+    model.name = "Sonar 3D-15";
     model.part_number = 21045;  // DOC: product_id
     model.max_rate_hz = 20;
     for (const ModeRow& row : mode_rows()) {

@@ -4,6 +4,7 @@ its picture, of the product's own kind, with nothing over it, and all its contro
 The page's part is skipped without browser or page. SONARD_SHOTS names a folder for pictures.
 """
 import pathlib
+import re
 import subprocess
 import sys
 import time
@@ -34,6 +35,15 @@ UNCOVERED = """(() => {
     return over?.closest('#fan-glass');
   }) && !document.querySelector('#notice').offsetWidth;
 })()"""
+# The width that the names of the sonars need, beyond what they have.
+LACKING_PX = """((e) => {
+  const whole = e.cloneNode(true);
+  whole.style.cssText = 'position: absolute; max-width: none; width: max-content';
+  e.after(whole);
+  const lacking = whole.offsetWidth - e.offsetWidth;
+  whole.remove();
+  return lacking;
+})(document.querySelector('#sonar'))"""
 # Controls that can be used now, by how a test names them.
 CONTROLS = """[...document.querySelectorAll('button, select, input, summary, [tabindex="0"]')]
   .filter((e) => e.offsetWidth && !e.disabled && e.tabIndex >= 0).map((e) => e.id || e.name || e.dataset.trouble || e.dataset.tab || e.className + e.textContent)"""
@@ -130,7 +140,8 @@ class Pages(PageChecks, unittest.TestCase):
 
     def test_each_demo(self):
         for maker, (kind, _, _) in DEMOS.items():
-            with demo(maker):
+            with demo(maker) as daemon:
+                product = re.search(r"^sonar +front +(.+?)  ", daemon.log(), re.MULTILINE).group(1)
                 for width, height, theme in ((1600, 1000, "light"), (390, 844, "dark")):
                     with self.subTest(demo=maker, width=width):
                         page = self.opened(self.browser.open(f"http://{HTTP}:8088/", width, height, touch=width < 800, theme=theme))
@@ -141,6 +152,8 @@ class Pages(PageChecks, unittest.TestCase):
                         page.wait(UNCOVERED)
                         print(f"\n  {maker}, {width} wide: picture after {took_s:.1f} s", end="", file=sys.stderr)
                         self.assertLess(took_s, 30)
+                        self.assertEqual(page.run("document.querySelector('#sonar').selectedOptions[0].textContent"), f"front · {product}")
+                        self.assertLessEqual(page.run(LACKING_PX), 0)
                         word = "pinging" if maker == "3d15" else "preview"  # which has a multicast group to send to
                         page.wait(f"document.querySelector('#rate-word').textContent === '{word}'")
                         self.every_control_can_be_reached(page, width)

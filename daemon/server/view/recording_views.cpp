@@ -143,7 +143,8 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   std::shared_ptr<Work> work_ = std::make_shared<Work>();
   std::optional<motion::Playback> playback_;  // once the length is known
   // Results of the last job:
-  std::string failure_, profile_;
+  std::string failure_;
+  std::shared_ptr<const SonarModel> model_;  // null: no message names it
   Time begin_{};
   std::uint64_t count_ = 0;
   protocol::PingFacts facts_;
@@ -198,7 +199,7 @@ void RecordingViews::Seen::take() {
   if (!connection || connection->over()) return;
   Work& work = *work_;
   behind_ = work.is_behind || !work.is_measured;
-  if (work.player && work.player->by().sender.names_model) profile_ = work.player->by().sender.model->profile;
+  if (work.player && work.player->by().sender.names_model) model_ = work.player->by().sender.model;
   if (!work.failure.empty() && std::exchange(failure_, work.failure).empty()) {
     connection->viewer().say(server_info());
     connection->wake();
@@ -268,6 +269,7 @@ std::string RecordingViews::Seen::server_info() const {
                    {"sonard.clock", "realtime"},
                    {"sonard.may_steer", "true"}};
   if (!failure_.empty()) info.metadata["sonard.recording_failure"] = failure_;
+  if (model_) info.metadata["sonard.product." + model_->profile] = model_->name;
   info.session = "recording " + of_.file.filename().string();
   return foxglove::text_of(info);
 }
@@ -279,7 +281,7 @@ ViewPayloadPointer RecordingViews::Seen::status() const {
   status.set_clock("realtime");
   v1::SonarStatus& sonar = *status.add_sonars();
   sonar.set_name(sonar_name);
-  sonar.set_profile(profile_);
+  if (model_) sonar.set_profile(model_->profile);
   sonar.set_transmits(true);
   sonar.set_range_m(facts_.range_m);
   sonar.set_beams(facts_.beams);

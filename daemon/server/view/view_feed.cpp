@@ -106,26 +106,6 @@ std::vector<ViewerFigures> ViewFeed::viewers() const {
   return all;
 }
 
-std::string ViewFeed::server_info(const Viewer& viewer) const {
-  foxglove::ServerInfo info;
-  info.name = "sonard " SONARD_VERSION;
-  info.capabilities = {"parameters", "parametersSubscribe", "services"};
-  const auto watch = watches_.find(viewer.playback());
-  if (of_.clock.stepped() || watch != watches_.end()) info.capabilities.emplace_back("time");
-  if (watch != watches_.end()) {
-    info.capabilities.emplace_back("playbackControl");
-    info.data = {Time{}, watch->second.end()};
-  }
-  info.metadata = {{"sonard.version", SONARD_VERSION},
-                   {"sonard.config", of_.config.source},
-                   {"sonard.scene", of_.config.scene.name()},
-                   {"sonard.clock", std::string(name_of(of_.config.clock))},
-                   {"sonard.previews", of_.config.previews ? "true" : "false"},
-                   {"sonard.may_steer", viewer.may_steer() ? "true" : "false"}};
-  info.session = session_;
-  return foxglove::text_of(info);
-}
-
 const ViewChannel* ViewFeed::channel(std::uint32_t id) const {
   const auto found = channels_.find(id);
   return found == channels_.end() ? nullptr : &found->second;

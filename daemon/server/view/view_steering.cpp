@@ -34,6 +34,28 @@ constexpr std::array<ServiceRow, 14> service_table{{{"set_sonar", "sonar", "SetS
 
 }  // namespace
 
+std::string ViewFeed::server_info(const Viewer& viewer) const {
+  foxglove::ServerInfo info;
+  info.name = "sonard " SONARD_VERSION;
+  info.capabilities = {"parameters", "parametersSubscribe", "services"};
+  const auto watch = watches_.find(viewer.playback());
+  if (of_.clock.stepped() || watch != watches_.end()) info.capabilities.emplace_back("time");
+  if (watch != watches_.end()) {
+    info.capabilities.emplace_back("playbackControl");
+    info.data = {Time{}, watch->second.end()};
+  }
+  info.metadata = {{"sonard.version", SONARD_VERSION},
+                   {"sonard.config", of_.config.source},
+                   {"sonard.scene", of_.config.scene.name()},
+                   {"sonard.clock", std::string(name_of(of_.config.clock))},
+                   {"sonard.previews", of_.config.previews ? "true" : "false"},
+                   {"sonard.may_steer", viewer.may_steer() ? "true" : "false"}};
+  for (const Device& device : of_.fleet.devices())
+    info.metadata["sonard.product." + device.config().profile.model->profile] = device.config().profile.model->name;
+  info.session = session_;
+  return foxglove::text_of(info);
+}
+
 std::string ViewFeed::services_word() {
   std::vector<foxglove::Service> services;
   for (const ServiceRow& row : service_table)

@@ -15,8 +15,8 @@ function rateOf(facts) {
   return { word: 'pinging', dot: facts.isSlow ? 'warning' : 'ok', rate: measured(facts.madeRate) };
 }
 
-/// The product's short name: "oculus-m1200d" -> "M1200d".
-const product = (profile) => profile.replace(/^(oculus|blueview)-/, '').replace(/^aris-/, 'ARIS ').replace('waterlinked-3d15', 'Sonar 3D-15').replace(/^./, (c) => c.toUpperCase());
+/// The product as people name it, such as "Oculus M1200d". Older daemons send only the name in a configuration.
+const product = (facts, profile) => facts.info?.metadata?.[`sonard.product.${profile}`] ?? profile;
 
 /// Returns the time in UTC, or a dash for files without times.
 const recordedTime = (ns) => (ns > 1e17 ? new Date(ns / 1e6).toISOString().slice(0, 19).replace('T', ' ') : dash);
@@ -24,8 +24,8 @@ const recordedTime = (ns) => (ns > 1e17 ? new Date(ns / 1e6).toISOString().slice
 export function drawHead(facts) {
   const sonars = facts.status?.sonars ?? [];
   const select = $('sonar');
-  showList(select, sonars.map((s) => [s.name, s.profile]), () =>
-    sonars.map((s) => make('option', { value: s.name }, [s.name, product(s.profile)].filter(Boolean).join(' · '))));
+  showList(select, sonars.map((s) => [s.name, product(facts, s.profile)]), () =>
+    sonars.map((s) => make('option', { value: s.name }, [s.name, product(facts, s.profile)].filter(Boolean).join(' · '))));
   if (select.value !== facts.sonar) select.value = facts.sonar;
   setHidden(select, sonars.length === 0);
   const { word, dot, rate } = rateOf(facts);
