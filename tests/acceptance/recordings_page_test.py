@@ -90,7 +90,12 @@ class Recordings(PageChecks, unittest.TestCase):
                     self.look(viewer, kind)
                     self.assertIn("open      http://127.0.0.1:8088", replay.text())
                     with urllib.request.urlopen("http://127.0.0.1:8088/healthz", timeout=PATIENCE_S) as answer:  # doctor asks for it
-                        self.assertEqual(answer.read(), b"ok\n")
+                        self.assertEqual(answer.read(), f"ok: replays {path.name}\n".encode())
+                    if maker == "oculus":
+                        said = run(SONARCTL, "doctor").stdout
+                        self.assertIn(f"returns ok: replays {path.name}", said)
+                        self.assertNotIn("simulation", said, "a recording has its own rate")
+                        self.assertNotIn("control stream", said, "and no control stream")
                     if maker not in ("blueview", "ping360", "micron", "norbit"):
                         done = run(SONARCTL, "listen", f"{replay.address}:{port}", "--quiet", "--pings", 2)
                         self.assertIn("pings 2", done.stdout, "the driver is served beside it: " + done.stderr)

@@ -344,6 +344,16 @@ TEST(Doctor, ExpectsControlWhereADaemonIs) {
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("warn  that sonard does not serve 127.0.0.2"));
 }
 
+TEST(Doctor, KnowsThatARecordingHasItsOwnRateAndNoControl) {
+  Facts facts = healthy();
+  facts.control.status.reset();
+  facts.control.error = "no answer";
+  facts.http.text = "ok: replays run.mcap";
+  facts.sonars[0].stream.rate_hz = 5;
+  expect(line(facts, "rate"), Level::ok, "rate 5.0 Hz (asked 10)", "");
+  EXPECT_THAT(text_from(run_checks(facts)), AllOf(HasSubstr(", as in the recording\n"), Not(HasSubstr("no answer"))));
+}
+
 TEST(Doctor, SaysWhatTheDaemonNotedAndNotThatAllIsWellWithThoseVehicles) {
   Facts facts = healthy();
   daemon_in(facts).MergeFrom(control::message_from<v1::DaemonStatus>(

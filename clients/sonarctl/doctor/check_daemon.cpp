@@ -24,8 +24,8 @@ void check_control(const Facts& facts, std::vector<Finding>& findings) {
     const bool ours = std::any_of(facts.sonars.begin(), facts.sonars.end(), [](const SonarFacts& s) {
       return s.on_this_host && (s.stream.outcome == StreamFacts::Outcome::pings || !s.clients.empty());
     });
-    if (!control.given && !ours && !control.token_required)
-      return;  // a sonar of another computer, or none: no daemon is expected here
+    if (!control.given && !control.token_required && (!ours || is_replay(facts.http)))
+      return;  // a sonar of another computer, none, or a recording: no daemon is expected here
     if (control.token_required)
       findings.push_back({Level::warn, "control",
                           at + " requires a token, and none was given: poses, clients and engine were not checked",

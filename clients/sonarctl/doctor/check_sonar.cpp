@@ -71,6 +71,8 @@ class SonarChecks {
   /// No client connects for images by UDP, so only the status of the daemon shows them.
   void check_images() {
     const std::string at = "http at " + sonar_.at.host;
+    if (!sonar_.reported && is_replay(facts_.http))
+      return add(Level::ok, "ping", at + ": sends a recording to the receiver that a driver names", "");
     if (!sonar_.reported) return add(Level::warn, "ping", at + ": no daemon tells whether images are sent", "");
     if (!sonar_.reported->pinging()) {
       const std::string& who = sonar_.reported->asked_by();
@@ -217,6 +219,8 @@ class SonarChecks {
 
   /// Names an address where a sonar does listen.
   std::string where_else() const {
+    if (facts_.daemons.empty() && is_replay(facts_.http))
+      return "sonard replay shows this recording only on its page, http://" + text_from(facts_.http.at);
     std::string others;
     for (const PortHolder& daemon : facts_.daemons) others += (others.empty() ? "" : ", ") + daemon.at;
     if (!others.empty())
@@ -362,6 +366,7 @@ class SonarChecks {
     const bool slow = expected_hz > 0 && s.rate_hz < 0.85 * expected_hz;
     if (too_slow_for(slow || sonar_.make->each_ping_requested ? expected_hz : fastest_hz))
       text += ", " + computing_text(computing_ms());
+    if (slow && !sonar_.reported && is_replay(facts_.http)) return add(Level::ok, "rate", text + ", as in the recording", "");
     if (slow) return add(Level::warn, "rate", text + ": the simulation is slower than the rate", less_to_compute);
     if (s.missing > 0)
       return add(Level::warn, "rate", text + ", " + std::to_string(s.missing) + " pings missing",

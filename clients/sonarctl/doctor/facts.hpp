@@ -92,6 +92,8 @@ struct HttpFacts {
   int code = 0;  // 0 = no answer
   std::string text;
 };
+/// Whether a recording is sent: it has its own rate, and no control stream.
+inline bool is_replay(const HttpFacts& http) { return http.text.starts_with("ok: replays "); }
 /// A sonar that answered a search.
 struct FoundSonar {
   const protocol::Make* make = nullptr;

@@ -122,7 +122,20 @@ class Gathering {
       search.receive_answers(facts_.found, Steady::now());
       for (const FoundSonar& found : facts_.found) add_sonar(*parse_endpoint(found.at, {}), "");
     }
+    if (facts_.sonars.empty()) add_daemons_sonars(given.host);
     if (facts_.sonars.empty()) add_sonar(with_port(given), "");
+  }
+
+  /// Those that a sonard of this computer serves without a control stream, such as a recording. `usual`: the address to look at
+  /// if it serves all.
+  void add_daemons_sonars(const std::string& usual) {
+    for (const PortHolder& daemon : facts_.daemons) {
+      auto at = parse_endpoint(daemon.at, {});
+      const Make* const make = at ? make_at(at->port) : nullptr;
+      if (make == nullptr || make->ports.front().number != at->port) continue;
+      if (at->host == "0.0.0.0") at->host = usual;
+      add_sonar(*at, "");
+    }
   }
 
   static std::uint16_t port_of(const v1::SonarStatus& s) {

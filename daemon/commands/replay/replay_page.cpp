@@ -28,7 +28,8 @@ asio::awaitable<HttpOutcome> ReplayPage::answer(const HttpRequest& request, Http
   }
   if (std::holds_alternative<HelpAction>(routed.action))
     co_return HttpAnswer{200, "sonard replay: open this address in a browser\n", "text/plain"};
-  if (std::holds_alternative<HealthAction>(routed.action)) co_return HttpAnswer{200, "ok\n", "text/plain"};
+  if (std::holds_alternative<HealthAction>(routed.action))  // doctor tells by it that a recording is sent
+    co_return HttpAnswer{200, "ok: replays " + of_.file.filename().string() + "\n", "text/plain"};
   co_return answer_of(404, control::StatusCode::unsupported, "sonard replay has its page only");
 }
 
