@@ -33,8 +33,9 @@ std::string rate_text(const v1::SonarStatus& s) {
 }
 
 std::string settings_text(const v1::SonarStatus& s) {
-  std::string text = text::frequency_text(s.frequency_hz()) + format("  %g m", s.range_m());
-  text += "  " + rate_text(s) + format("  gain %.3g dB  %u beams x %u rows", s.gain_db(), s.beams(), s.rows());
+  std::string text = text::frequency_text(s.frequency_hz()) + format("  %.4g m", s.range_m());
+  text += "  " + rate_text(s) +
+          format("  gain %.3g dB  %u beam%s x %u rows", s.gain_db(), s.beams(), s.beams() == 1 ? "" : "s", s.rows());
   if (!s.transmits()) text += "  transmitter off";
   return text + (s.pinging() ? "" : "  not pinging");
 }
@@ -86,8 +87,8 @@ std::string recording_text(const v1::RecordingStatus& r) {
 }
 
 std::string event_text(const v1::PingEvent& e) {
-  return format("ping %u  %s  %g m  %u beams x %u rows  %.1f ms  %u client%s", e.number(), e.sonar().c_str(), e.range_m(),
-                e.beams(), e.rows(), e.simulation_ms(), e.clients(), e.clients() == 1 ? "" : "s");
+  return format("ping %u  %s  %.4g m  %u beam%s x %u rows  %.1f ms  %u client%s", e.number(), e.sonar().c_str(), e.range_m(),
+                e.beams(), e.beams() == 1 ? "" : "s", e.rows(), e.simulation_ms(), e.clients(), e.clients() == 1 ? "" : "s");
 }
 std::string event_text(const v1::ClientEvent& e) {
   return "client " + e.client() + (e.connected() ? " connected to " : " left ") + e.sonar() +
