@@ -63,13 +63,20 @@ class PowerHost final : public PingHost {
         refusable_(wanted.request_id),
         other_(other),
         settings_(settings.settings) {}
-  std::string about() const override { return std::string(title_); }
+  /// Both products until the sonar shows which one it is: they share the port.
+  std::string about() const override {
+    return shown_.empty() ? std::string(title_) + " or " + std::string(other_.title) : std::string(shown_);
+  }
 
  private:
-  /// The request was refused: the sonar is perhaps the other product. Its request is sent once; a second refusal is an error.
+  /// The request was refused: the sonar is perhaps the other product. Its request is sent once; a second refusal is an error. A
+  /// recording holds refusals of another host's request, which are ignored.
   bool on_nack(Id refused, HostActions& actions) override {
-    if (!asks() || refused != refusable_ || title_ == other_.title) return false;
-    title_ = other_.title;
+    const bool has_switched = title_ == other_.title;
+    if (refused != refusable_ && refused != other_.request_id) return false;
+    if (!asks() || refused != (has_switched ? other_.request_id : refusable_)) return true;
+    if (has_switched) return false;
+    title_ = shown_ = other_.title;
     actions.emplace_back(protocol::HostSend{0, other_.request(settings_)});
     return true;
   }
@@ -83,6 +90,7 @@ class PowerHost final : public PingHost {
     if (!rest) return std::nullopt;
     Line powers = powers_in(*rest, data.results, data.lowest_db, data.highest_db);
     const double row_m = 1e-3 * data.length_mm / std::max<double>(data.results, 1);
+    shown_ = title_of(data);
     HostPing found = ping_of(data.ping, data.start_mm, row_m, powers.size(), hz_of(data), title_of(data));
     if (powers.empty()) return found;
     found.facts.note = note_of(data, powers, row_m);
@@ -104,6 +112,7 @@ class PowerHost final : public PingHost {
   }
 
   std::string_view title_;  // the product whose request was sent last
+  std::string_view shown_;  // the product that refused the other's request, or whose ping came; empty: not known
   Id refusable_;
   const Product& other_;
   protocol::SettingsOverride settings_;

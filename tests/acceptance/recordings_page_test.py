@@ -100,6 +100,14 @@ class Recordings(PageChecks, unittest.TestCase):
                         done = run(SONARCTL, "listen", f"{replay.address}:{port}", "--quiet", "--pings", 2)
                         self.assertIn("pings 2", done.stdout, "the driver is served beside it: " + done.stderr)
 
+    def test_a_recorded_refusal_of_another_request_stops_no_host(self):
+        """A host that does not know which product is at the port asks the other first; the recording holds the refusal."""
+        with demo("s500"):
+            self.assertEqual(run(SONARCTL, "record", "--mcap", "run.mcap", "--seconds", 3).returncode, 0)
+        with Replay(pathlib.Path("run.mcap")) as replay:
+            done = run(SONARCTL, "listen", f"{replay.address}:51200", "--quiet", "--pings", 2)
+            self.assertIn("pings 2", done.stdout, done.stderr)
+
     def test_only_files_of_the_folder(self):
         pathlib.Path("sonard-recordings").mkdir()
         pathlib.Path("sonard-recordings/broken.mcap").write_bytes(b"nothing")
