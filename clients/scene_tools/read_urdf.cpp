@@ -30,6 +30,7 @@ class UrdfReader {
     world_.name = plain(root_.attribute("name"));
     world_.format = "URDF";
     world_.models.push_back({world_.name.empty() ? "robot" : world_.name, {}, false, root_.place()});
+    refuse_xacro(root_);
     for (const Element& element : root_.children()) sort(element);
     hang_links();
     for (const Element& link : root_.children("link")) read_link(link);
@@ -42,6 +43,12 @@ class UrdfReader {
     std::string parent, child;
   };
 
+  void refuse_xacro(const Element& element) {
+    if (element.name().starts_with("xacro:"))
+      return findings_.fail(element.place(), "this is xacro, not yet URDF; expand it first: xacro FILE.xacro > FILE.urdf");
+    for (const Element& child : element.children()) refuse_xacro(child);
+  }
+
   void sort(const Element& element) {
     const std::string_view kind = element.name();
     if (kind == "link") {
@@ -49,8 +56,6 @@ class UrdfReader {
         findings_.fail(element.place(), called(element) + ": a name used twice");
     } else if (kind == "joint") {
       read_joint(element);
-    } else if (kind.starts_with("xacro:")) {
-      findings_.fail(element.place(), "this is xacro, not yet URDF; expand it first: xacro FILE.xacro > FILE.urdf");
     } else if (kind != "material") {
       findings_.leave_out(element.place(), called(element));
     }

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <utility>
 
 #include "clients/scene_tools/fuel.hpp"
 
@@ -60,6 +61,12 @@ fs::path child_of(const fs::path& folder, const std::string& name) {
   return {};
 }
 
+/// "1.10" is later than "1.9".
+std::pair<int, int> sdf_version(std::string_view text) {
+  const std::size_t dot = std::min(text.find('.'), text.size());
+  return {version_number(text.substr(0, dot)), dot < text.size() ? version_number(text.substr(dot + 1)) : 0};
+}
+
 /// Returns the SDF in the folder of a model: the newest one that model.config names.
 fs::path model_in(const fs::path& folder) {
   const fs::path config = folder / "model.config";
@@ -68,13 +75,22 @@ fs::path model_in(const fs::path& folder) {
   const auto file = text ? parse_xml(*text, config, "model.config") : tl::make_unexpected(text.error());
   fs::path best = is_file(folder / "model.sdf") ? folder / "model.sdf" : fs::path();
   if (!file) return best;
-  double newest = -1;
+  std::pair newest{-1, -1};
   for (const Element& sdf : (*file)->root().children("sdf")) {
-    const double version = std::atof(std::string(sdf.attribute("version")).c_str());
+    const std::pair version = sdf_version(sdf.attribute("version"));
     const fs::path named = folder / fs::path(std::string(sdf.text()));
     if (version > newest && is_file(named)) best = named, newest = version;
   }
   return best;
+}
+
+/// Whether a folder is the ROS package of that name. Repositories often name the folder otherwise.
+bool is_package(const fs::path& folder, std::string_view name) {
+  const fs::path manifest = folder / "package.xml";
+  if (name.empty() || !is_file(manifest)) return false;
+  const auto text = read_text(manifest);
+  const auto file = text ? parse_xml(*text, manifest, "package.xml") : tl::make_unexpected(text.error());
+  return file && (*file)->root().child("name").text() == name;
 }
 
 /// The file itself, or the model in a folder, or the newest version in the folder; if a version is given (not -1), only that one.
@@ -114,11 +130,39 @@ fs::path look_around(const fs::path& wanted, const fs::path& from_file, const st
   for (int up = 0; up < 8 && !above.empty(); ++up, above = above.parent_path()) {
     for (const fs::path& place : {above / wanted, above / "models" / wanted})
       if (const fs::path found = file_at(place, version); !found.empty()) return found;
-    if (!first.empty() && (above.filename() == first || (up < 4 && !model_in(above).empty())))
+    if (!first.empty() && (above.filename() == first || (up < 4 && !model_in(above).empty()) || is_package(above, first)))
       if (const fs::path found = file_at(above / wanted.lexically_relative(first), version); !found.empty()) return found;
     if (above == above.parent_path()) break;
   }
   return {};
+}
+
+/// A file of a ROS package in one of the folders that is named otherwise than the package.
+fs::path find_in_packages(const fs::path& wanted, const std::vector<fs::path>& folders) {
+  const std::string package = wanted.empty() ? std::string() : wanted.begin()->string();
+  for (const fs::path& folder : folders) {
+    std::error_code error;
+    int seen = 0;
+    for (const auto& entry : fs::directory_iterator(folder, error))
+      if (++seen > most_looked_at)
+        break;
+      else if (is_package(entry.path(), package))
+        if (fs::path found = file_at(entry.path() / wanted.lexically_relative(package)); !found.empty()) return found;
+  }
+  return {};
+}
+
+/// The folders in an environment variable, between colons.
+std::vector<fs::path> folders_of(const char* variable) {
+  std::vector<fs::path> folders;
+  const char* value = std::getenv(variable);
+  std::string_view rest = value ? value : "";
+  while (!rest.empty()) {
+    const std::string_view one = rest.substr(0, rest.find(':'));
+    rest.remove_prefix(std::min(rest.size(), one.size() + 1));
+    if (!one.empty()) folders.emplace_back(one);
+  }
+  return folders;
 }
 
 /// The folders in which both generations of Gazebo keep downloads.
@@ -160,15 +204,9 @@ fs::path find_in_fuel_caches(const FuelAddress& address) {
 
 std::vector<fs::path> resource_folders(const std::vector<fs::path>& given) {
   std::vector<fs::path> folders = given;
-  for (const char* variable : {"GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "IGN_GAZEBO_RESOURCE_PATH", "ROS_PACKAGE_PATH"}) {
-    const char* value = std::getenv(variable);
-    std::string_view rest = value ? value : "";
-    while (!rest.empty()) {
-      const std::string_view one = rest.substr(0, rest.find(':'));
-      rest.remove_prefix(std::min(rest.size(), one.size() + 1));
-      if (!one.empty()) folders.emplace_back(one);
-    }
-  }
+  for (const char* variable : {"GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "IGN_GAZEBO_RESOURCE_PATH", "ROS_PACKAGE_PATH"})
+    for (fs::path& folder : folders_of(variable)) folders.push_back(std::move(folder));
+  for (const fs::path& prefix : folders_of("AMENT_PREFIX_PATH")) folders.push_back(prefix / "share");  // installed ROS 2 packages
   if (const char* home = std::getenv("HOME"); home && *home) folders.push_back(fs::path(home) / ".gazebo/models");
   return folders;
 }
@@ -192,8 +230,10 @@ fs::path find_resource(std::string_view uri, const fs::path& from_file, const st
     return look_around(name, from_file, folders, version);
   }
   const fs::path wanted = fs::path(path).lexically_normal();
-  if (scheme == "model" || scheme == "package")
-    return wanted.is_absolute() ? fs::path() : look_around(wanted, from_file, folders);
+  if (scheme == "model" || scheme == "package") {
+    fs::path found = wanted.is_absolute() ? fs::path() : look_around(wanted, from_file, folders);
+    return found.empty() && scheme == "package" ? find_in_packages(wanted, folders) : found;
+  }
   if (wanted.is_absolute()) return file_at(wanted);
   if (const fs::path beside = file_at((from_file.parent_path() / wanted).lexically_normal()); !beside.empty()) return beside;
   return look_around(wanted, from_file, folders);

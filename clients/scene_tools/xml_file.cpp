@@ -148,7 +148,8 @@ std::vector<double> read_numbers(std::string_view text, std::size_t count, const
     double value = 0;
     const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (code != std::errc() || end != digits.data() + digits.size() || !std::isfinite(value) || std::abs(value) > 1e9) {
-      findings.fail(at, wanted + "\"" + plain(word) + "\" is not a number that a scene can hold");
+      findings.fail(at, wanted + "\"" + plain(word) + "\" is not a number that a scene can hold" +
+                            (word.find('$') == word.npos ? "" : "; is it xacro? Expand it first: xacro FILE.xacro > FILE.urdf"));
       return std::vector<double>(count, 0.0);
     }
     numbers.push_back(value);

@@ -78,7 +78,7 @@ void add_import(CLI::App& scene, SceneArguments& a) {
       "  sonarctl scene import tank.sdf --out tank.yaml --collision --material walls=concrete --offset 0,0,-5\n"
       "models are looked for in --model-path, GZ_SIM_RESOURCE_PATH, GAZEBO_MODEL_PATH, IGN_GAZEBO_RESOURCE_PATH, "
       "ROS_PACKAGE_PATH,\n"
-      "beside the file and, for addresses of Fuel, in Gazebo's caches (~/.gz/fuel, ~/.ignition/fuel)\n"
+      "AMENT_PREFIX_PATH, beside the file and, for addresses of Fuel, in Gazebo's caches (~/.gz/fuel, ~/.ignition/fuel)\n"
       "what a scene cannot hold is listed, and named in the comments of the file that is written");
   ImportOptions& o = a.import;
   command.add_option("FILE", a.file, "an .sdf, .world or .urdf")->required();

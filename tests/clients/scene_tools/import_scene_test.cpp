@@ -63,7 +63,7 @@ TEST_F(ImportScene, ModelsAreFoundBesideTheFileInGivenFoldersAndInTheEnvironment
   folder_of("elsewhere/given");
   folder_of("third/gz");
   write("elsewhere/versions/model.config",
-        "<model><sdf version='1.5'>old.sdf</sdf><sdf version='1.9'>new.sdf</sdf><sdf version='2.0'>gone.sdf</sdf></model>");
+        "<model><sdf version='1.9'>old.sdf</sdf><sdf version='1.10'>new.sdf</sdf><sdf version='2.0'>gone.sdf</sdf></model>");
   write("elsewhere/versions/old.sdf", "<sdf><model name='old'/></sdf>");
   write("elsewhere/versions/new.sdf", std::string("<sdf><model name='new'>") + link("l") + "</model></sdf>");
   options.model_folders = {files.path("elsewhere")};
@@ -94,6 +94,29 @@ struct Environment {
   const char* variable_;
   std::optional<std::string> before_;
 };
+
+TEST_F(ImportScene, FilesOfRosPackagesAreFound) {
+  write("src/rov_description/package.xml", "<package><name>rov</name></package>");  // its folder has another name
+  write("src/rov_description/meshes/a.stl", triangle);
+  write("installed/share/hulls/meshes/a.stl", triangle);
+  const auto urdf = [&](const std::string& file) {
+    return run(
+        "<robot name='r'><link name='l'><visual><geometry><mesh filename='" + file + "'/></geometry></visual></link></robot>",
+        "src/rov_description/urdf/r.urdf");
+  };
+  const auto own = urdf("package://rov/meshes/a.stl");
+  EXPECT_TRUE(own) << own.error().text;
+  EXPECT_FALSE(urdf("package://other/meshes/a.stl"));
+  write("repository/cage_description/package.xml", "<package><name>cage</name></package>");
+  write("repository/cage_description/meshes/a.stl", triangle);
+  options.model_folders = {files.path("repository")};
+  const auto given = urdf("package://cage/meshes/a.stl");
+  EXPECT_TRUE(given) << given.error().text;
+  EXPECT_FALSE(urdf("package://hulls/meshes/a.stl"));
+  const Environment prefix("AMENT_PREFIX_PATH", files.path("none").string() + ":" + files.path("installed").string());
+  const auto installed = urdf("package://hulls/meshes/a.stl");
+  EXPECT_TRUE(installed) << installed.error().text;
+}
 
 /// Both generations of Gazebo store HOST/OWNER/models/NAME/VERSION in small letters.
 TEST_F(ImportScene, FuelModelsAreFoundInTheCachesOfGazebo) {

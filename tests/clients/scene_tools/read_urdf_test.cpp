@@ -56,6 +56,8 @@ TEST(ReadUrdf, MistakesAreToldWithFileAndLine) {
   EXPECT_THAT(r.error(robot(part("a") + part("a"))), HasSubstr("used twice"));
   EXPECT_THAT(r.error(robot(part("a", "<origin xyz='1 2'/>"))), HasSubstr("origin xyz: 3 numbers are needed here, not 2"));
   EXPECT_THAT(r.error("<robot name='x' xmlns:xacro='u'>\n<xacro:arm/></robot>"), HasSubstr("w.sdf:2: this is xacro"));
+  EXPECT_THAT(r.error(robot(part("a", "<xacro:shape/>"))), HasSubstr("this is xacro"));
+  EXPECT_THAT(r.error(robot(part("a", "<origin xyz='${x} 0 0'/>"))), HasSubstr("is it xacro? Expand it first: xacro"));
   EXPECT_THAT(r.error(robot("<joint name='j' type='fixed'><parent/></joint>")), HasSubstr("needs <parent"));
 }
 
