@@ -112,6 +112,7 @@ Columns Columns::euroc(std::size_t words) {
   Columns c;
   // Time [ns], position [m], quaternion with w first, velocity [m/s].
   c.put(std::array{t_ns, x, y, z, qw, qx, qy, qz});
+  c.power_ = 0;
   if (words > c.count_) c.put(std::array{vx, vy, vz});
   // The biases of an IMU are counted, not read.
   c.count_ = std::max(c.count_, words);
@@ -136,7 +137,8 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
       out.power_ = name == "t_ms" ? 6 : 3;
       name = "t_s";
     }
-    out.says_unit_ = out.says_unit_ || name == "t_s";
+    if (name == "t_ns") out.power_ = 0;
+    out.says_unit_ = out.says_unit_ || name == "t_s" || name == "t_ns";
     std::size_t c = 0;
     while (c < columns && name != long_names[c] && name != short_names[c]) ++c;
     if (c == columns) return "unknown column " + in_quotes(header[i]) + text::suggestion(name, long_names, "columns");
@@ -181,17 +183,26 @@ void Columns::guess_unit(const Words& words) {
   const std::string_view text = word(words, t);
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return;
   // True for times after 1973; seconds with so many digits are beyond every stamp.
-  if (text.size() >= 12) power_ = text.size() <= 14 ? 6 : text.size() <= 17 ? 3 : 0;
+  if (text.size() < 12) return;
+  power_ = text.size() <= 14 ? 6 : text.size() <= 17 ? 3 : 0;
+  says_unit_ = true;
+}
+
+bool Columns::peek(const Words& words, double& stamp, Vec3d& position_m, std::string_view& of) const {
+  const auto t_number = number(word(words, has(t) ? t : t_ns));
+  if (!t_number || refuse_vector(words, x, "", position_m)) return false;
+  stamp = *t_number;
+  of = has(body) ? word(words, body) : std::string_view();
+  return true;
 }
 
 std::string_view Columns::unit() const {
-  const int power = has(t_ns) ? 0 : power_;
-  return std::find_if(units.begin(), units.end(), [&](const auto& unit) { return unit.first == power; })->second;
+  return std::find_if(units.begin(), units.end(), [&](const auto& unit) { return unit.first == power_; })->second;
 }
 
 Complaint Columns::refuse_stamp(const Words& words, Row& out) const {
   const std::string_view text = word(words, has(t) ? t : t_ns);
-  const auto stamp = nanoseconds_of(text, has(t) ? power_ : 0);
+  const auto stamp = nanoseconds_of(text, power_);
   if (!stamp) return not_a_number(text, ("a time in " + std::string(unit())).c_str());
   out.stamp_ns = *stamp;
   return std::nullopt;

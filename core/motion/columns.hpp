@@ -41,6 +41,12 @@ class Columns {
   /// Unless the header names the unit: whole numbers too large for seconds are taken as milliseconds, microseconds or nanoseconds
   /// since 1970. `words`: the first line with values.
   void guess_unit(const Words& words);
+  /// False while the unit is only the usual one of the format, 10^power() ns.
+  bool says_unit() const { return says_unit_ || matrix_; }
+  int power() const { return power_; }
+  void set_power(int power) { power_ = power; }
+  /// A line before its unit is known: its stamp as it is written, its position, its body. False if they are no numbers.
+  bool peek(const Words& words, double& stamp, Vec3d& position_m, std::string_view& of) const;
   /// Unit of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
   std::string_view unit() const;
   bool has_body() const { return has(body); }
@@ -64,7 +70,7 @@ class Columns {
   std::string_view word(const Words& words, Column c) const { return words[static_cast<std::size_t>(place_[c])]; }
 
   std::array<int, columns> place_{};
-  int power_ = 9;  // a stamp of column t is a number of 10^power_ ns
+  int power_ = 9;  // a stamp is a number of 10^power_ ns
   bool says_unit_ = false;
   std::size_t count_ = 0;
   bool matrix_ = false;

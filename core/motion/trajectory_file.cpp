@@ -9,6 +9,7 @@
 #include "core/base/regular_file.hpp"
 #include "core/motion/columns.hpp"
 #include "core/motion/stamp.hpp"
+#include "core/motion/stamp_unit.hpp"
 #include "core/text/file_kind.hpp"
 #include "core/text/nearest.hpp"
 
@@ -80,11 +81,12 @@ class Reader {
 
   Result<TrajectoryFile> run(std::string_view text) {
     if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
-    const char line_end = text.find('\n') == std::string_view::npos ? '\r' : '\n';
+    line_end_ = text.find('\n') == std::string_view::npos ? '\r' : '\n';
     // Reads up to the first error, because later errors mostly follow from it.
     for (std::size_t at = 0; at < text.size() && wrong_.empty();) {
-      const std::size_t end = std::min(text.find(line_end, at), text.size());
+      const std::size_t end = std::min(text.find(line_end_, at), text.size());
       ++line_;
+      from_here_ = text.substr(at);
       take(trimmed(text.substr(at, end - at)));
       at = end + 1;
     }
@@ -112,7 +114,7 @@ class Reader {
     }
     if (words_.size() != columns_->count())
       return set_error(std::to_string(words_.size()) + " values instead of " + std::to_string(columns_->count()));
-    if (rows_ == 0) columns_->guess_unit(words_);
+    if (rows_ == 0) guess_unit();
     Row row;
     if (const auto wrong = columns_->refuse(words_, row)) return set_error(*wrong);
     if (format_ == Format::kitti) {
@@ -123,6 +125,34 @@ class Reader {
     }
     keep(row);
     ++rows_;
+  }
+
+  void guess_unit() {
+    columns_->guess_unit(words_);
+    if (columns_->says_unit()) return;
+    constexpr std::size_t most_lines = 1000;
+    FirstLines first;
+    Words words;
+    std::string_view of;
+    for (std::size_t at = 0; at < from_here_.size() && first.stamps.size() < most_lines;) {
+      const std::size_t end = std::min(from_here_.find(line_end_, at), from_here_.size());
+      const std::string_view line = trimmed(from_here_.substr(at, end - at));
+      at = end + 1;
+      if (line.empty() || is_comment(line)) continue;
+      split(line, between_, words);
+      double stamp = 0;
+      Vec3d position_m;
+      std::string_view body;
+      if (words.size() != columns_->count() || !columns_->peek(words, stamp, position_m, body)) break;
+      if (first.stamps.empty()) of = body;
+      if (body != of) continue;
+      first.stamps.push_back(stamp);
+      first.positions.push_back(position_m);
+    }
+    if (first.stamps.empty()) return;
+    const int power = unit_by_steps(first, columns_->power());
+    unit_by_steps_ = power != columns_->power();
+    columns_->set_power(power);
   }
 
   /// Sets the columns. True if the line was a header; else it is a line of numbers, or there is an error.
@@ -242,6 +272,7 @@ class Reader {
     file.duration = last - first;
     file.replaced = replaced_;
     file.unit = columns_->unit();
+    file.unit_by_steps = unit_by_steps_;
     for (Track& t : tracks_) {
       for (Ns& at : t.points.times) at -= first;
       // Converts to ENU and FLU, which all other code uses (docs/glossary.md).
@@ -262,7 +293,9 @@ class Reader {
   Format format_;
   std::optional<Frame> frame_;
   std::optional<Columns> columns_;
-  char between_ = ' ';
+  char between_ = ' ', line_end_ = '\n';
+  std::string_view from_here_;  // the text from the line that is taken
+  bool unit_by_steps_ = false;
   Words words_;
   std::size_t line_ = 0, rows_ = 0, last_ = 0, replaced_ = 0;
   std::vector<Track> tracks_;

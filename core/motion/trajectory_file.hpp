@@ -38,6 +38,7 @@ struct TrajectoryFile {
   Ns duration{0};                     // time from the earliest to the latest stamp
   std::size_t replaced = 0;           // poses that were replaced by a later line with the same stamp
   std::string_view unit = "seconds";  // of the stamps in the file
+  bool unit_by_steps = false;         // neither the file nor its format names the unit: it is guessed from the steps
 };
 
 /// A comment in the file can state the frame: `# frame: NED_FRD`. Errors: "name:line: reason".

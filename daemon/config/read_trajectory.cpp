@@ -79,7 +79,8 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
   plan.file = file.text(1024);
   plan.about = text::format("%s: %s, %s, %zu poses, %.3f s", plan.file.c_str(), std::string(name_of(f.format)).c_str(),
                             std::string(name_of(f.frame)).c_str(), (*way)->size(), seconds((*way)->duration()));
-  if (f.unit != "seconds") plan.about += ", stamps in " + std::string(f.unit);
+  if (f.unit != "seconds" || f.unit_by_steps) plan.about += ", stamps in " + std::string(f.unit);
+  if (f.unit_by_steps) plan.about += " by their steps (a first line of names says otherwise: t_s x y z qx qy qz qw)";
   if (f.replaced > 0)
     plan.about += text::format(", %zu pose%s replaced by the next of the same stamp", f.replaced, f.replaced == 1 ? "" : "s");
   return plan;

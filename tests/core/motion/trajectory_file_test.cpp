@@ -74,6 +74,38 @@ TEST(TrajectoryFile, AFirstStampBeyondSecondsTellsTheUnit) {
   EXPECT_THAT(refusal("t_s,x,y,z\n1305031102175,1,2,3\n"), HasSubstr("\"1305031102175\" is not a time in seconds"));
 }
 
+TEST(TrajectoryFile, StepsTellTheUnitOfStampsThatBeginAtZero) {
+  /// Lines of a body at `m_s`, `steps_s` apart, with stamps in units of `unit_s`.
+  const auto lines = [](double step_s, double unit_s, double m_s, bool euroc = false) {
+    std::ostringstream out;
+    out.precision(15);
+    for (int i = 0; i < 50; ++i) {
+      const double t = i * step_s / unit_s, x = i * step_s * m_s;
+      euroc ? out << t << ',' << x << ",0,-3,1,0,0,0,0,0,0\n" : out << t << ' ' << x << " 0 -3 0 0 0 1\n";
+    }
+    return out.str();
+  };
+  const auto expect = [](const std::string& text, std::string_view unit, milliseconds duration, bool guessed) {
+    const TrajectoryFile file = parsed(text);
+    EXPECT_EQ(file.unit, unit) << text.substr(0, 80);
+    EXPECT_EQ(std::chrono::round<milliseconds>(file.duration), duration) << text.substr(0, 80);
+    EXPECT_EQ(file.unit_by_steps, guessed) << text.substr(0, 80);
+  };
+  for (const auto& [unit_s, unit] :
+       {std::pair{1e-3, "milliseconds"}, std::pair{1e-6, "microseconds"}, std::pair{1e-9, "nanoseconds"}}) {
+    expect(lines(0.1, unit_s, 0.5), unit, milliseconds(4900), true);
+    expect(lines(0.04, unit_s, 0.05), unit, milliseconds(1960), true);
+    expect("timestamp x y z qx qy qz qw\n" + lines(0.1, unit_s, 0.5), unit, milliseconds(4900), true);
+    expect("t_s x y z qx qy qz qw\n" + lines(0.1, 1e-3, 0.5), "seconds", seconds(4900), false);
+    expect(lines(0.1, unit_s, 0.5, true), unit, milliseconds(4900), unit_s != 1e-9);
+  }
+  expect(lines(0.1, 1, 0.5, true), "seconds", milliseconds(4900), true);  // EuRoC's own unit is the nanosecond
+  expect(lines(0.1, 1, 0.5), "seconds", milliseconds(4900), false);
+  expect(lines(60, 1, 0.5), "seconds", seconds(49 * 60), false);  // the corners of a course
+  expect(lines(60, 1, 0), "seconds", seconds(49 * 60), false);
+  expect("0 0 0 -3 0 0 0 1\n", "seconds", milliseconds(0), false);
+}
+
 TEST(TrajectoryFile, WhatOtherProgramsWriteIsRead) {
   for (const char* text :
        {"T_S;X_M;Y_M;Z_M;\n10.5;1;2;3;\n11;1;2;4;\n", "\"timestamp\",\"tx\",\"ty\",\"tz\"\n10.5,1,2,3\n11,1,2,4\n",
