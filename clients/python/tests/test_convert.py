@@ -462,6 +462,13 @@ class Corrupted(WithFolder):
                 with self.subTest(kind, length=length):
                     self.outcome(kind, log[:length])
 
+    def test_chunks_within_chunks(self):
+        nested = b""
+        for _ in range(2000):
+            size = ("size", len(nested).to_bytes(4, "little"))
+            nested = made.bag_record([("op", b"\x05"), ("compression", b"none"), size], nested)
+        self.outcome("rosbag", b"#ROSBAG V2.0\n" + nested)
+
     def test_changed_bytes(self):
         draw = random.Random(1)
         for kind, log in self.LOGS.items():

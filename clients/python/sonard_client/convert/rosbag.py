@@ -60,6 +60,8 @@ class _Bag:
     def messages(self, data: bytes, begin: int, outer: Optional[int] = None) -> Iterator[Recorded]:
         try:
             for at, header, content in _records(data, begin):
+                if outer is not None and _number(header, "op") == CHUNK:
+                    raise Broken("contains another chunk")
                 yield from self._one(header, content, at if outer is None else outer)
         except Broken as error:
             self.warn(str(error) if outer is None else f"at byte {outer}: a chunk: {error}")
