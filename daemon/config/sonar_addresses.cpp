@@ -62,11 +62,13 @@ struct Listening {
   Endpoint at;
   bool udp, tcp;
   bool gives_way = false;  // a default, which is left out when its port is taken
+  bool is_shared = false;  // with others that share it
 };
 /// Returns whether two listeners would use the same port. 0.0.0.0 uses the port at all addresses.
 bool meet(const Listening& a, const Listening& b) {
   const bool same_ip = a.at.ip == b.at.ip || a.at.ip == Ipv4{} || b.at.ip == Ipv4{};
-  return same_ip && a.at.port == b.at.port && ((a.udp && b.udp) || (a.tcp && b.tcp));
+  const bool same_kind = (a.udp && b.udp && !(a.is_shared && b.is_shared)) || (a.tcp && b.tcp);
+  return same_ip && a.at.port == b.at.port && same_kind;
 }
 std::vector<Listening> listening_of(const Config& c) {
   std::vector<Listening> all;
@@ -81,12 +83,14 @@ std::vector<Listening> listening_of(const Config& c) {
   return all;
 }
 
-/// Adds the TCP ports of a sonar. Sonars share UDP ports where the protocol requires it.
-void add_tcp_ports(std::vector<Listening>& all, const SonarConfig& sonar) {
+/// Adds the ports of a sonar. Sonars share the UDP ports at which hosts look for them (udp_answer).
+void add_ports(std::vector<Listening>& all, const SonarConfig& sonar) {
   using Kind = protocol::Port::Kind;
-  for (const protocol::Port& port : sonar.profile.vendor->ports())
-    if (port.kind == Kind::tcp_stream || port.kind == Kind::http)
-      all.push_back({"sonar \"" + sonar.name + "\"", {sonar.bind_ip, port.number}, false, true});
+  for (const protocol::Port& port : sonar.profile.vendor->ports()) {
+    const bool shared = port.kind == Kind::udp_answer, udp = shared || port.kind == Kind::udp_dialogue;
+    const bool tcp = port.kind == Kind::tcp_stream || port.kind == Kind::http;
+    if (tcp || udp) all.push_back({"sonar \"" + sonar.name + "\"", {sonar.bind_ip, port.number}, udp, tcp, false, shared});
+  }
   if (sonar.max_observers > 0 && sonar.observer_port != 0)
     all.push_back({"observers.port of sonar \"" + sonar.name + "\"", {sonar.bind_ip, sonar.observer_port}, false, true});
 }
@@ -114,7 +118,7 @@ Result<void> check_apart(const Config& moved, const Config& unmoved) {
 
 Result<void> check_ports_apart(const Config& config) {
   std::vector<Listening> all;
-  for (const SonarConfig& sonar : config.sonars) add_tcp_ports(all, sonar);
+  for (const SonarConfig& sonar : config.sonars) add_ports(all, sonar);
   for (Listening& listening : listening_of(config)) all.push_back(std::move(listening));
   for (auto b = all.begin(); b != all.end(); ++b)
     for (auto a = all.begin(); a != b; ++a)

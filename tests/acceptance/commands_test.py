@@ -211,6 +211,12 @@ class CheckAndRun(unittest.TestCase):
         same = "poses: {json: \"127.0.0.1:15771\"}\ncontrol: {http: \"127.0.0.1:15771\"}\n"
         self.refused(GOOD + same, 78, "poses.json and control.http would both listen at 127.0.0.1:15771")
         self.refused(GOOD + "poses: {json: \"127.0.0.2:52100\"}\n", 78, 'sonar "front" and poses.json would both listen')
+        host = GOOD.replace("bind_ip: 127.0.0.2}", "bind_ip: 127.0.0.2}, {name: altimeter, profile: ping1d, bind_ip: 127.0.0.4}")
+        self.refused(host + "poses: {mavlink: \"udpin:127.0.0.4:9090\"}\n", 78, 'sonar "altimeter" and poses.mavlink would both listen')
+        scanner = GOOD.replace("oculus-m1200d", "ping360")
+        self.refused(scanner + "poses: {mavlink: \"udpin:127.0.0.2:30303\"}\n", 78, 'sonar "front" and poses.mavlink would both listen')
+        shared = scanner.replace("bind_ip: 127.0.0.2}", "bind_ip: 127.0.0.2}, {name: rear, profile: ping360, bind_ip: 127.0.0.3}")
+        self.assertEqual(check(shared).returncode, 0, "sonars share the port at which hosts look for them")
         two = GOOD.replace("bind_ip: 127.0.0.2}", "bind_ip: 127.0.0.2}, {name: rear, profile: oculus-m750d, bind_ip: 0.0.0.0, advertise_ip: 127.0.0.3}")
         self.refused(two, 78, 'sonar "front" and sonar "rear" would both listen at 0.0.0.0:52100')
 
