@@ -3,6 +3,8 @@
 #include <csignal>
 #include <cstdlib>
 
+#include "daemon/config/receiver_rules.hpp"
+#include "daemon/emulator/connections/outbox.hpp"
 #include "daemon/server/http/http_rules.hpp"
 #include "daemon/server/system/listen.hpp"
 #include "daemon/server/time/clock.hpp"
@@ -33,16 +35,14 @@ ReplayServer::ReplayServer(asio::io_context& io, recording::RecordingReader& rea
 
 Result<void> ReplayServer::open() {
   at_ = options_.at;
+  network_.bind_ip = network_.advertise_ip = at_.ip;
+  derive_addresses(network_);
   if (!device_.is_only_seen.empty()) return {};
   if (device_.http() != nullptr) return open_http();
   if (Result<void> listening = listen_tcp(acceptor_, at_); !listening) return listening;
   error_code ec;
   at_.port = acceptor_.local_endpoint(ec).port();
-  SonarConfig network;  // mask and broadcast address as a configured sonar has them
-  network.advertise_ip = at_.ip;
-  derive_addresses(network);
-  mask_ = network.netmask;
-  for (const Endpoint& to : options_.status_to.empty() ? network.status_to : options_.status_to)
+  for (const Endpoint& to : options_.status_to.empty() ? network_.status_to : options_.status_to)
     if (device_.status_port() != 0) status_to_.emplace_back(address_of(to.ip), to.port == 0 ? device_.status_port() : to.port);
   if (Result<void> bound = bind_udp(status_, {at_.ip, 0}, true); !bound) return bound;
   send_multicast_from(status_, at_.ip);
@@ -62,7 +62,7 @@ Result<void> ReplayServer::open_http() {
       io_, limits_, admission_, log_, device_.name(), [] { return std::vector<std::string>{}; }, answer);
   if (Result<void> listening = http_->open(at_); !listening) return listening;
   at_ = http_->at();
-  client_ = std::make_shared<Client>(tcp::socket(io_));
+  client_ = std::make_shared<Client>(tcp::socket(io_), limits_);
   client_->name = "http";
   if (Result<void> bound = bind_udp(status_, {at_.ip, 0}, true); !bound) return bound;
   send_multicast_from(status_, at_.ip);
@@ -151,7 +151,7 @@ asio::awaitable<void> ReplayServer::accept() {
       co_await pause.async_wait(into(ec));
       continue;
     }
-    const auto client = std::make_shared<Client>(std::move(socket));
+    const auto client = std::make_shared<Client>(std::move(socket), limits_);
     const tcp::endpoint peer = client->socket.remote_endpoint(ec);
     if (ec) continue;
     client->name = peer.address().to_string() + ":" + std::to_string(peer.port());
@@ -274,11 +274,20 @@ asio::awaitable<void> ReplayServer::send_replies(ClientPointer client) {
   }
 }
 
-/// Requests of a host decide where frames go, and from when on.
+/// Requests of a host decide where frames go, and from when on. A host that reads none of the answers is disconnected, as a sonar
+/// of sonard does it.
 void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
   client.heard = Steady::now();
   const protocol::Reaction reaction = client.dialogue->on_bytes(bytes, {});
   for (const protocol::Bytes& reply : reaction.replies) client.replies.insert(client.replies.end(), reply.begin(), reply.end());
+  if (client.replies.size() > Outbox::most_reply_bytes) {
+    ++figures_.greedy;
+    log_limited(log_, notice_limit_, LogLevel::warning, "client closed: it asks faster than it reads the answers",
+                {{"client", client.name}});
+    error_code ignored;
+    client.socket.close(ignored);
+    return;
+  }
   for (const protocol::Event& event : reaction.events) apply(client, event);
   client.wake.cancel();
 }
@@ -286,9 +295,17 @@ void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
 /// Carries out what a request of the host means for the replay: whether and where frames are sent. All other settings have no
 /// effect.
 void ReplayServer::apply(Client& client, const protocol::Event& event) {
-  const auto send_to = [&client](const protocol::SetReceivers& set) {
+  const protocol::Port* const stream = device_.vendor->port(protocol::Port::Kind::udp_stream);
+  const auto send_to = [&](const protocol::SetReceivers& set) {
     client.receivers.clear();
-    for (const Endpoint& to : set.to) client.receivers.emplace_back(address_of(to.ip == Ipv4{} ? client.ip : to.ip), to.port);
+    for (const Endpoint& to : set.to) {
+      const Ipv4 ip = to.ip == Ipv4{} ? client.ip : to.ip;
+      if (stream != nullptr && may_receive(ip, *stream, network_))
+        client.receivers.emplace_back(address_of(ip), to.port);
+      else
+        log_limited(log_, unsent_limit_, LogLevel::warning, "no frames are sent to a broadcast address or a group of others",
+                    {{"to", text_of(ip)}});
+    }
   };
   error_code ec;
   if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
@@ -298,7 +315,7 @@ void ReplayServer::apply(Client& client, const protocol::Event& event) {
   } else if (const auto* set = std::get_if<protocol::SetReceivers>(&event)) {
     send_to(*set);
   } else if (const auto* notice = std::get_if<protocol::Notice>(&event)) {
-    log_.warning(notice->text, {{"client", client.name}});
+    log_limited(log_, notice_limit_, LogLevel::warning, notice->text, {{"client", client.name}});
   } else if (std::holds_alternative<protocol::Close>(event)) {
     client.socket.close(ec);
   }
@@ -312,10 +329,12 @@ void ReplayServer::end_if_silent() {
   if (limit && Steady::now() - client_->heard > *limit) client_->socket.close(ec);
 }
 
-/// A client's bytes have no effect; they are read so that the client can continue to send.
+/// Most bytes of a client have no effect; they are read so that the client can continue to send, at the rate of
+/// limits.input_bytes_per_s.
 asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
   std::array<std::byte, 4096> ignored;
   HttpDetector http;
+  asio::steady_timer pause(io_);
   bool logged = false;
   while (true) {
     error_code ec;
@@ -325,6 +344,8 @@ asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
     if (http.speaks_http(std::span(ignored).first(n))) break;
     if (client->dialogue) on_client_bytes(*client, protocol::BytesView(ignored).first(n));
     if (!std::exchange(logged, true)) log_.info("settings of a client have no effect on a recording", {{"client", client->name}});
+    pause.expires_after(client->input.pause_after(n, Steady::now()));
+    co_await pause.async_wait(into(ec));
   }
   client->gone = true;
   client->wake.cancel();
@@ -342,7 +363,7 @@ asio::awaitable<void> ReplayServer::send_status() {
   bool logged = false;
   while (!over_) {
     end_if_silent();
-    const protocol::Bytes status = device_.status_at(at_.ip, mask_, client_ ? client_->ip : Ipv4{});
+    const protocol::Bytes status = device_.status_at(at_.ip, network_.netmask, client_ ? client_->ip : Ipv4{});
     error_code ec;
     for (const udp::endpoint& to : status_to_) {
       co_await status_.async_send_to(asio::buffer(status), to, into(ec));

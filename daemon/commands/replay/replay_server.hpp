@@ -9,6 +9,7 @@
 
 #include "daemon/commands/replay/replay_device.hpp"
 #include "daemon/commands/replay/replay_pace.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/sonars/sonar_http.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
@@ -30,6 +31,7 @@ class ReplayServer {
  public:
   struct Figures {
     std::uint64_t clients = 0, refused = 0, messages = 0, bytes = 0, times_through = 0, client_bytes = 0;
+    std::uint64_t greedy = 0;  // clients that were closed because they read no answers
   };
 
   /// `reader` must be at its start. All arguments must outlive io.run().
@@ -50,12 +52,14 @@ class ReplayServer {
  private:
   using Steady = std::chrono::steady_clock;
   struct Client {
-    explicit Client(tcp::socket s) : socket(std::move(s)), wake(socket.get_executor()) {}
+    Client(tcp::socket s, const LimitConfig& limits)
+        : socket(std::move(s)), wake(socket.get_executor()), input(limits.input_bytes_per_s) {}
     tcp::socket socket;
     asio::steady_timer wake;  // ended early when the client goes
     Ipv4 ip{};
     std::string name;
     bool gone = false;
+    InputRate input;
     // For a sonar that sends pings on request:
     std::unique_ptr<protocol::Dialogue> dialogue;
     protocol::Bytes replies;  // replies that are not sent yet
@@ -92,7 +96,7 @@ class ReplayServer {
   ReplayOptions options_;
   Log& log_;
   Endpoint at_;
-  Ipv4 mask_{};
+  SonarConfig network_;  // mask and broadcast address as a configured sonar has them
   std::vector<udp::endpoint> status_to_;
   tcp::acceptor acceptor_;
   udp::socket status_;
@@ -102,7 +106,7 @@ class ReplayServer {
   Admission admission_{limits_, log_};
   std::unique_ptr<SonarHttp> http_;  // for a device with settings over HTTP; then nothing else listens
   ClientPointer client_;
-  LogLimiter refused_limit_, unsent_limit_;
+  LogLimiter refused_limit_, unsent_limit_, notice_limit_;
   Figures figures_;
   Result<void> outcome_;
   bool stopping_ = false, over_ = false, damage_logged_ = false;

@@ -1,7 +1,7 @@
 // The hosts that a Device sends datagrams to: hosts of dialogues (ports of kind udp_dialogue), receivers of streams (udp_stream).
 #include <algorithm>
 
-#include "daemon/config/addresses.hpp"
+#include "daemon/config/receiver_rules.hpp"
 #include "daemon/server/sonars/device.hpp"
 
 namespace sonar {
@@ -11,17 +11,6 @@ constexpr std::chrono::seconds closed_for{2};  // then a receiver whose port was
 constexpr std::uint16_t discard = 9;           // a port that programs leave closed (RFC 863)
 constexpr std::size_t most_closed = 64;
 
-bool is_multicast(const Ipv4& ip) { return ip[0] >> 4 == 0xE; }
-
-bool is_broadcast(const Ipv4& ip, const SonarConfig& sonar) {
-  constexpr unsigned first_reserved = 240;  // addresses from here on belong to no single computer
-  if (ip[0] >= first_reserved || ip == Ipv4{127, 255, 255, 255}) return true;
-  bool broadcast = sonar.netmask != Ipv4{255, 255, 255, 255};
-  for (std::size_t i = 0; i < ip.size(); ++i)
-    broadcast = broadcast && ip[i] == static_cast<std::uint8_t>(sonar.bind_ip[i] | static_cast<std::uint8_t>(~sonar.netmask[i]));
-  return broadcast;
-}
-
 }  // namespace
 
 /// Receivers that clients asked for. Left out are group addresses that neither the product nor the configuration names, and
@@ -30,12 +19,8 @@ std::vector<Endpoint> Device::receivers(ConnectionId stream) {
   const Connection* const connection = sonar_.connections().find(stream);
   std::vector<Endpoint> all = sonar_.receivers(stream);
   if (connection == nullptr || connection->role != Role::stream) return all;
-  const auto& groups = config().groups;
   std::erase_if(all, [&](const Endpoint& to) {
-    const bool multicast = is_multicast(to.ip);
-    if (!multicast && !is_broadcast(to.ip, config())) return false;
-    if (to.ip == connection->port->group.ip || (multicast && connection->port->any_group)) return false;
-    if (std::find(groups.begin(), groups.end(), to.ip) != groups.end()) return false;
+    if (may_receive(to.ip, *connection->port, config())) return false;
     on_send_error(to, "a broadcast or multicast address, which sonars.groups of the configuration does not name");
     return true;
   });

@@ -1,0 +1,137 @@
+// Hostile clients of a replay: what they cost in memory and in lines of the log, and where they may send its datagrams.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <atomic>
+#include <future>
+
+#include "daemon/commands/replay/replay_server.hpp"
+#include "protocol/ping/messages.hpp"
+#include "protocol/ping/ping_log.hpp"
+#include "protocol/waterlinked/messages.hpp"
+#include "protocol/waterlinked/rip.hpp"
+
+namespace sonar::replay_strangers_test {
+namespace {
+
+using recording::Bytes;
+using std::chrono::milliseconds;
+constexpr milliseconds patience{20000};
+
+/// A replay server in a thread of its own; it counts the lines of its log.
+struct Replay {
+  explicit Replay(Bytes file) : log(counted()) {
+    auto opened = recording::open_recording(recording::source_from("recording", std::move(file)));
+    if (!opened) throw std::runtime_error(opened.error().text);
+    recording = std::move(*opened);
+    auto device = find_replay_device(*recording.reader, "recording", 1042);
+    if (!device) throw std::runtime_error(device.error().text);
+    ReplayOptions options;
+    options.at = {{127, 0, 0, 2}, 0};
+    options.loop = true;
+    server = std::make_unique<ReplayServer>(io, *recording.reader, *device, options, log);
+    if (const auto listening = server->open(); !listening) throw std::runtime_error(listening.error().text);
+    server->start();
+    done = std::async(std::launch::async, [this] { io.run(); });
+  }
+  ~Replay() { stop(); }
+  void stop() {
+    asio::post(io, [this] { server->stop(); });
+    done.wait();
+  }
+  tcp::endpoint at() const { return {asio::ip::address_v4(server->at().ip), server->at().port}; }
+  LogOptions counted() {
+    LogOptions options;
+    options.sink = [this](LogLevel, const std::string&) { ++lines; };
+    return options;
+  }
+
+  std::atomic<int> lines{0};
+  Log log;
+  asio::io_context io;
+  recording::Recording recording;
+  std::unique_ptr<ReplayServer> server;
+  std::future<void> done;
+};
+
+Bytes ping_log() {
+  Bytes file;
+  const auto writer = recording::write_ping_log(recording::sink_into(file));
+  EXPECT_TRUE(writer->write({{},
+                             recording::Origin::device,
+                             recording::Carrier::stream,
+                             ping::framed_message(ping::Id::atof_point_data, 0, ping::AtofPointData{})}));
+  EXPECT_TRUE(writer->close());
+  return file;
+}
+
+TEST(ReplayBesideStrangers, AHostThatReadsNoAnswersIsClosedAndFillsNoLog) {
+  Replay replay(ping_log());
+  asio::io_context io;
+  tcp::socket host(io);
+  host.open(tcp::v4());
+  host.set_option(asio::socket_base::receive_buffer_size(2048));  // so that the kernel holds few answers
+  host.connect(replay.at());
+  Bytes refused;  // each is refused, with an answer and a line for the log
+  for (int i = 0; i < 200; ++i) {
+    const Bytes frame = ping::framed(static_cast<ping::Id>(9999), 0, {});
+    refused.insert(refused.end(), frame.begin(), frame.end());
+  }
+  error_code ec;
+  for (int i = 0; i < 1000 && !ec; ++i) asio::write(host, asio::buffer(refused), ec);
+  pollfd closed{host.native_handle(), POLLRDHUP, 0};
+  EXPECT_GT(::poll(&closed, 1, static_cast<int>(patience.count())), 0) << "all requests were taken, and their answers kept";
+  replay.stop();
+  EXPECT_EQ(replay.server->figures().greedy, 1u);
+  EXPECT_LT(replay.lines, 100) << "of 200,000 messages that were refused";
+}
+
+Bytes sonar_file() {
+  Bytes file;
+  waterlinked::Shot shot;
+  shot.at = Time(std::chrono::seconds(1'700'000'000));
+  shot.sequence = 1;
+  for (const Bytes& content : {waterlinked::packet_of(waterlinked::RangeMessage{shot, 0.001f, {1, 2, 3}}),
+                               waterlinked::packet_of(waterlinked::StrengthMessage{shot, {4, 5, 6}})}) {
+    const Bytes packet = waterlinked::rip_packet(content);
+    file.insert(file.end(), packet.begin(), packet.end());
+  }
+  return file;
+}
+
+TEST(ReplayBesideStrangers, NoFramesGoToABroadcastAddress) {
+  Replay replay(sonar_file());
+  asio::io_context io;
+  udp::socket images(io, udp::endpoint(asio::ip::address_v4::any(), 0));
+  const auto post = [&](const std::string& path, const std::string& body) {
+    tcp::socket socket(io);
+    socket.connect(replay.at());
+    const std::string request =
+        "POST /api/v1/integration" + path +
+        " HTTP/1.1\r\nHost: 127.0.0.2\r\nContent-Type: application/json\r\nContent-Length: " + std::to_string(body.size()) +
+        "\r\n\r\n" + body;
+    asio::write(socket, asio::buffer(request));
+    std::string answer(12, '\0');
+    asio::read(socket, asio::buffer(answer));
+    return answer;
+  };
+  const auto receive_at = [&](const std::string& ip) {
+    const std::string port = std::to_string(images.local_endpoint().port());
+    return post("/udp", R"({"mode":"unicast","unicast_destination_ip":")" + ip + R"(","unicast_destination_port":)" + port + "}");
+  };
+  ASSERT_EQ(receive_at("127.255.255.255"), "HTTP/1.1 204");
+  ASSERT_EQ(post("/acoustics/enabled", "true"), "HTTP/1.1 204");
+  std::array<char, 2000> datagram;
+  std::atomic<bool> any{false};
+  images.async_receive(asio::buffer(datagram), [&](const error_code& ec, std::size_t) { any = !ec; });
+  io.run_for(milliseconds(500));  // a shot is sent at once where one is sent at all
+  EXPECT_FALSE(any) << "a frame was broadcast";
+  ASSERT_EQ(receive_at("127.0.0.1"), "HTTP/1.1 204");
+  io.restart();
+  io.run_for(patience);
+  EXPECT_TRUE(any) << "a computer gets frames";
+}
+
+}  // namespace
+}  // namespace sonar::replay_strangers_test
