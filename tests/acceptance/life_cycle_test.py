@@ -15,6 +15,7 @@ import threading
 import time
 import unittest
 
+from foxglove_viewer import Viewer
 from oculus_reader import Client, fire_message
 from running_sonard import ROOT, SONARCTL, SONARD, Sonard, eventually, run
 
@@ -105,6 +106,12 @@ class Started:
         return self.process.wait(20)
 
 
+def worked_s(daemon):
+    """Seconds of a processor."""
+    fields = pathlib.Path(f"/proc/{daemon.process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 class Stop(unittest.TestCase):
     def test_terminate_gives_readers_their_message_whole_and_resets_the_deaf(self):
         with Sonard(mount=FOUR_CLIENTS) as daemon:
@@ -162,6 +169,20 @@ class Stop(unittest.TestCase):
             self.assertEqual(code, 0, daemon.log())
             self.assertLess(seconds, 2 * ROOM)
             self.assertIn("run.oculus", daemon.log())
+
+    def test_terminate_while_a_viewer_searches_a_recording(self):
+        """Behind the last ping are zeros, as after a power cut: more than can be read in the time."""
+        with tempfile.TemporaryDirectory() as folder, Sonard(more=f"recording: {{folder: {folder}}}") as daemon:
+            file = pathlib.Path(folder, "cut.oculus")
+            self.assertEqual(daemon.ctl("listen", "--record", file, "--pings", "3", "--seconds", "60", "--quiet").returncode, 0)
+            os.truncate(file, 1 << 40)
+            viewer = Viewer(daemon.address, path="/?recording=cut.oculus").greeted()
+            before = worked_s(daemon)
+            eventually(lambda: worked_s(daemon) > before + 0.2)  # it searches; nothing else is to be done
+            code, seconds = daemon.stop(60)
+            viewer.socket.close()
+            self.assertEqual(code, 0, daemon.log())
+            self.assertLess(seconds, ROOM)
 
     def test_a_second_terminate_ends_at_once(self):
         with Sonard(mount=FOUR_CLIENTS) as daemon:

@@ -41,6 +41,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
     add(status_channel, "", "sonar.v1.DaemonStatus", ViewChannel::Kind::last_value, 0);
   }
 
+  const ViewerLeft& left() const { return left_; }
   void begin(const std::shared_ptr<ViewConnection>& connection) {
     connection_ = connection;
     Viewer& viewer = connection->viewer();
@@ -48,7 +49,11 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
     std::vector<foxglove::Channel> channels;
     for (const auto& [id, channel] : channels_) channels.push_back(channel.advertised);
     viewer.greet(foxglove::advertise(channels));
-    post([file = of_.file, sonar = of_.sonar, rate_hz = of_.rate_hz](Work& work) { open(work, file, sonar, rate_hz); });
+    post([of = of_, left = left_](Work& work) {
+      auto pings = open_pings(of, left);
+      if (!pings) return static_cast<void>(work.failure = pings.error().text);
+      work.player.emplace(*std::move(pings), nanoseconds_from(1 / of.rate_hz));
+    });
   }
 
   const ViewChannel* channel(std::uint32_t id) const override {
@@ -84,14 +89,6 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
     protocol::PingFacts facts;
   };
 
-  static void open(Work& work, const std::filesystem::path& file, const std::string& sonar, double rate_hz) {
-    auto opened = recording::open_recording(file, sonar);
-    auto pings = opened ? recording::RecordedPings::open(std::move(opened->reader)) : tl::make_unexpected(opened.error());
-    if (!pings)
-      work.failure = opened ? file.filename().string() + " " + pings.error().text : pings.error().text;
-    else
-      work.player.emplace(*std::move(pings), nanoseconds_from(1 / rate_hz));
-  }
   static void go_on(Work& work, RecordingPlayer::Ns at);
   static void draw(Work& work, const RecordingPlayer::Shown& shown);
 
@@ -138,6 +135,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   asio::io_context& io_;
   asio::thread_pool& thread_;
   PlayedRecording of_;
+  ViewerLeft left_ = std::make_shared<std::atomic<bool>>(false);
   std::weak_ptr<ViewConnection> connection_;
   std::map<std::uint32_t, ViewChannel> channels_;
   std::shared_ptr<Work> work_ = std::make_shared<Work>();
@@ -373,6 +371,7 @@ RecordingViews::RecordingViews(asio::io_context& io, Log& log) : io_(io), log_(l
 }
 
 RecordingViews::~RecordingViews() {
+  for (const Viewing& one : viewings_) *one.left = true;
   thread_.stop();
   thread_.join();
 }
@@ -381,18 +380,20 @@ std::shared_ptr<HttpTakeover> RecordingViews::open(ConnectionServices& services,
                                                    ViewWelcome welcome, const PlayedRecording& wanted) {
   welcome.may_steer = true;  // only its own time line can be steered
   const auto seen = std::make_shared<Seen>(io_, thread_, wanted);
+  // The connection owns the function below, and with it this: the end of the connection is the end of the work.
+  const std::shared_ptr<void> connected(nullptr, [left = seen->left()](void*) { *left = true; });
   return std::make_shared<ViewConnection>(
-      services, from, *seen, request, welcome, [this, seen, wanted](const std::shared_ptr<ViewConnection>& viewer) {
-        std::erase_if(connections_, [](const auto& one) { return one.expired(); });
-        connections_.push_back(viewer);
+      services, from, *seen, request, welcome, [this, seen, wanted, connected](const std::shared_ptr<ViewConnection>& viewer) {
+        std::erase_if(viewings_, [](const Viewing& one) { return one.connection.expired(); });
+        viewings_.push_back({viewer, seen->left()});
         log_.info("viewer plays a recording", {{"file", wanted.file.filename().string()}, {"from", viewer->viewer().who()}});
         seen->begin(viewer);
       });
 }
 
 int RecordingViews::count() const {
-  return static_cast<int>(std::count_if(connections_.begin(), connections_.end(), [](const auto& weak) {
-    const auto connection = weak.lock();
+  return static_cast<int>(std::count_if(viewings_.begin(), viewings_.end(), [](const Viewing& one) {
+    const auto connection = one.connection.lock();
     return connection && !connection->over();
   }));
 }

@@ -3,27 +3,18 @@
 // thread only. ViewFeed and `sonard replay` own it.
 #pragma once
 
-#include <filesystem>
-#include <functional>
 #include <memory>
-#include <string>
 #include <vector>
 
+#include "daemon/server/view/played_recording.hpp"
 #include "daemon/server/view/view_connection.hpp"
 
 namespace sonar {
 
-/// The recording that is played.
-struct PlayedRecording {
-  std::filesystem::path file;
-  std::string sonar = {};  // one of several in it, as --sonar of `sonard replay`
-  double rate_hz = 10;     // rate of files that store no times
-};
-
 class RecordingViews {
  public:
   RecordingViews(asio::io_context& io, Log& log);
-  /// Waits for the present slice.
+  /// Ends the present slice, and waits for it.
   ~RecordingViews();
   RecordingViews(const RecordingViews&) = delete;
   RecordingViews& operator=(const RecordingViews&) = delete;
@@ -35,10 +26,14 @@ class RecordingViews {
 
  private:
   class Seen;
+  struct Viewing {
+    std::weak_ptr<ViewConnection> connection;
+    ViewerLeft left;
+  };
 
   asio::io_context& io_;
   Log& log_;
-  std::vector<std::weak_ptr<ViewConnection>> connections_;
+  std::vector<Viewing> viewings_;
   asio::thread_pool thread_{1};
 };
 
