@@ -212,7 +212,11 @@ Actions Sonar::on_bytes(ConnectionId id, protocol::BytesView bytes, Time now) {
     audience_.end_by_fault(*from, verdict, actions);
     return actions;
   }
-  audience_.guarded(*from, actions, [&] { handle(*from, from->dialogue->on_bytes(bytes, data_.unskipped(now)), now, actions); });
+  audience_.guarded(*from, actions, [&] {
+    protocol::Reaction reaction = from->dialogue->on_bytes(bytes, data_.unskipped(now));
+    reactions_ += reaction.events.size() + reaction.replies.size();
+    handle(*from, std::move(reaction), now, actions);
+  });
   return actions;
 }
 

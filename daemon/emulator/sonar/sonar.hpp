@@ -40,6 +40,8 @@ class Sonar {
   /// Another host takes over the dialogue at a port of kind udp_dialogue.
   void hand_over(ConnectionId id, Peer to) { audience_.hand_over(id, std::move(to)); }
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
+  /// Answers and requests that bytes of clients have caused since the last call.
+  std::size_t take_reactions() { return std::exchange(reactions_, 0); }
   /// Returns the next message to write; empty if there is none, or while one is being written.
   Outbox::Message next_message(ConnectionId id, Time now) { return delivery_.next_message(id, now); }
   /// Reports `bytes` of it as sent; after the last one on_written() follows.
@@ -156,6 +158,7 @@ class Sonar {
   Faults faults_;
   PingSource source_;
   Delivery delivery_;
+  std::size_t reactions_ = 0;
 };
 
 }  // namespace sonar

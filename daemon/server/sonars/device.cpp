@@ -202,8 +202,9 @@ Device::StreamPointer Device::stream_of(ConnectionId id) const {
   return it == streams_.end() ? nullptr : *it;
 }
 
-void Device::on_bytes(ConnectionId from, protocol::BytesView bytes) {
+std::size_t Device::on_bytes(ConnectionId from, protocol::BytesView bytes) {
   perform(sonar_.on_bytes(from, bytes, network_.clock.now()));
+  return work::of_reaction * sonar_.take_reactions();
 }
 
 void Device::on_written(ConnectionId to, const Outbox::Message& message) {
@@ -257,10 +258,7 @@ void Device::arm() {
   const auto at = next ? std::optional(network_.clock.timer_at(*next)) : std::nullopt;
   if (at == timer_at_) return;
   timer_at_ = at;
-  if (!at) {
-    timer_.cancel();
-    return;
-  }
+  if (!at) return static_cast<void>(timer_.cancel());
   timer_.expires_at(*at);
   timer_.async_wait([this](const error_code& ec) {
     if (ec || stopping_) return;
@@ -284,9 +282,12 @@ void Device::carry_out(const Serve& action) {
   auto arrived = arrived_.extract(action.connection);
   if (arrived.empty()) return;
   Arrived& from = arrived.mapped();
-  const Session::Setup setup{action.connection, network_.digest && from.role == Role::client, limits_, from.place};
+  const Connection& served = *sonar_.connections().find(action.connection);
+  const std::string& peer = served.peer.name;
+  const auto rest =
+      newcomers_.pause_after(text_of(served.peer.ip), Session::at_once, limits_.input_bytes_per_s, WorkRate::Steady::now());
+  const Session::Setup setup{action.connection, network_.digest && from.role == Role::client, limits_, from.place, rest};
   const auto session = std::make_shared<Session>(*this, std::move(from.socket), setup);
-  const std::string& peer = sonar_.connections().find(action.connection)->peer.name;
   if (from.role == Role::client) {
     report_visit(from.role, VisitLog::Kind::connected, "client connected", {{"client", peer}});
     parent_.on_client(*this, peer, true, {});

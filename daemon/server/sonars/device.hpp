@@ -17,6 +17,7 @@
 #include "daemon/emulator/sonar/sonar.hpp"
 #include "daemon/emulator/view/preview.hpp"
 #include "daemon/server/connections/listener.hpp"
+#include "daemon/server/connections/work_rate.hpp"
 #include "daemon/server/engine/simulator.hpp"
 #include "daemon/server/recording/recording_file.hpp"
 #include "daemon/server/sonars/beacon.hpp"
@@ -133,7 +134,7 @@ class Device final : public SessionParent {
   /// listener may be ready before the reader of the closed connection.
   void forget_who_left();
 
-  void on_bytes(ConnectionId from, protocol::BytesView bytes) override;
+  std::size_t on_bytes(ConnectionId from, protocol::BytesView bytes) override;
   Outbox::Message next_message(ConnectionId to) override { return sonar_.next_message(to, network_.clock.now()); }
   std::vector<Endpoint> receivers(ConnectionId stream) override;
   void on_sent(ConnectionId to, std::size_t bytes) override { sonar_.on_sent(to, bytes); }
@@ -218,6 +219,7 @@ class Device final : public SessionParent {
 
   bool started_ = false, stopping_ = false;
   std::array<LogLimiter, static_cast<std::size_t>(Report::Topic::topics)> limiters_;
+  WorkRate newcomers_;  // connecting again and again gains no work at once
   LogLimiter faults_, observer_visits_, send_errors_;
   VisitLog visits_;
   std::vector<StreamDigest> digests_;

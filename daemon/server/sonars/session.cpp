@@ -14,6 +14,7 @@ namespace {
 
 // Bytes the kernel may hold that are not yet on the wire. More would only make a slow client's picture older.
 constexpr int unsent_limit_bytes = 256 * 1024;
+constexpr std::size_t piece_bytes = 1024;  // of what a client sends, passed on at a time
 constexpr auto idle_watch = std::chrono::seconds(1);
 constexpr auto delivery_watch = std::chrono::milliseconds(1), fin_watch = std::chrono::milliseconds(50);
 
@@ -50,6 +51,8 @@ Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
       wake_watch_(socket_.get_executor()),
       pause_(socket_.get_executor()) {
   prepare(socket_, setup_.limits);
+  const std::size_t per_s = setup_.limits.input_bytes_per_s;
+  input_rate_.pause_after(per_s - std::min(per_s, at_once), connected_at_);
 }
 
 // Three coroutines on the I/O thread: read() passes bytes to the sonar, write() takes messages from the outbox, watch() ends the
@@ -75,6 +78,7 @@ void Session::spawn(asio::awaitable<void> (Session::*part)()) {
 
 asio::awaitable<void> Session::read() {
   const auto self = shared_from_this();
+  if (setup_.rest.count() > 0) co_await rest(Steady::now() + setup_.rest);
   while (!over_) {
     error_code ec;
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(received_), into(ec));
@@ -89,9 +93,18 @@ asio::awaitable<void> Session::read() {
     received_at_ = Steady::now();
     // Its bytes must not act, and it must not hold a driver's slot.
     if (http_.speaks_http(std::span(received_).first(n))) co_return over("it speaks HTTP");
-    parent_.on_bytes(setup_.id, std::span(received_).first(n));
-    const auto pause = input_rate_.pause_after(n, Steady::now());
-    if (pause.count() > 0 && !finishing_) co_await rest(Steady::now() + pause);
+    co_await pass_on(std::span(received_).first(n));
+  }
+}
+
+/// Passes bytes to the sonar in small pieces, so that a client whose requests cost too much waits before the next ones act.
+asio::awaitable<void> Session::pass_on(protocol::BytesView bytes) {
+  while (!bytes.empty() && !over_) {
+    const auto piece = bytes.first(std::min(bytes.size(), piece_bytes));
+    bytes = bytes.subspan(piece.size());
+    const std::size_t work = piece.size() + parent_.on_bytes(setup_.id, piece);
+    const auto pause = input_rate_.pause_after(work, Steady::now());
+    if (pause.count() > 0 && !finishing_ && !over_) co_await rest(Steady::now() + pause);
   }
 }
 

@@ -25,7 +25,8 @@ namespace sonar {
 class SessionParent {
  public:
   virtual ~SessionParent() = default;
-  virtual void on_bytes(ConnectionId from, protocol::BytesView bytes) = 0;
+  /// Returns the work that the bytes caused beside their number, counted in bytes (connections/work_rate.hpp).
+  virtual std::size_t on_bytes(ConnectionId from, protocol::BytesView bytes) = 0;
   /// Returns the next message to write; empty if there is none.
   virtual Outbox::Message next_message(ConnectionId to) = 0;
   /// Returns the destinations of the messages of a stream.
@@ -53,13 +54,16 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   struct Setup {
     ConnectionId id = 0;
-    bool digest = false;                // compute the SHA-256 of the sent bytes
-    LimitConfig limits;                 // limits for one client
-    std::shared_ptr<const void> place;  // kept as long as the session lives
+    bool digest = false;                         // compute the SHA-256 of the sent bytes
+    LimitConfig limits;                          // limits for one client
+    std::shared_ptr<const void> place;           // kept as long as the session lives
+    std::chrono::steady_clock::duration rest{};  // before the first bytes of the client are read
   };
   /// Limit for a client to take its last message after finish(); then it is reset. If its computer has acknowledged everything,
   /// the limit for its own FIN is `fin_limit`.
   static constexpr std::chrono::milliseconds finish_limit{800}, fin_limit{400};
+  /// Work of a new client that is done at once. More would reward connecting again and again.
+  static constexpr std::size_t at_once = 4096;
   /// Limit after a fault ended the stream; it is longer, so that a client that ignores the end can be observed.
   static constexpr std::chrono::milliseconds fault_fin_limit{1500};
 
@@ -94,6 +98,7 @@ class Session : public std::enable_shared_from_this<Session> {
   using Steady = std::chrono::steady_clock;
 
   asio::awaitable<void> read();
+  asio::awaitable<void> pass_on(protocol::BytesView bytes);
   asio::awaitable<void> rest(Steady::time_point until);
   asio::awaitable<void> write();
   asio::awaitable<void> watch();

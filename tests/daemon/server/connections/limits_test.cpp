@@ -71,6 +71,23 @@ TEST(Limits, AClientThatSendsTooMuchIsReadSlowlyAndLosesNothing) {
   EXPECT_EQ(ids.skipped_ids(), 0u) << "the neighbour does not notice";
 }
 
+TEST(Limits, RequestsOfASonarsClientCountAsMoreThanTheirBytes) {
+  DaemonSetup setup;
+  setup.more = "limits: {input_bytes_per_s: 65536}\n";
+  Daemon daemon(setup);
+  Client talks(daemon.address());
+  const auto begin = Steady::now();
+  for (int i = 0; i < 900; ++i) talks.fire(fire_at(PingRate::hz10, 2));  // hardly more bytes than may come at once
+  talks.fire(fire_at(PingRate::hz10, 3));
+  while (true) {
+    const auto ping = talks.next_ping();
+    ASSERT_TRUE(ping);
+    if (ping->head.fixed.fire.range == 3) break;
+    ASSERT_LT(Steady::now() - begin, 3 * patience);
+  }
+  EXPECT_GT(Steady::now() - begin, milliseconds(2000));
+}
+
 TEST(Limits, AccountsBalanceWhateverClientsDo) {
   DaemonSetup setup;
   setup.sonar_lines = "    clients: {max: 3}\n";

@@ -13,7 +13,7 @@ using ::testing::HasSubstr;
 
 struct ThrowingParent final : QuietParent {
   std::string fault;
-  void on_bytes(ConnectionId, protocol::BytesView) override { throw std::runtime_error("no such luck"); }
+  std::size_t on_bytes(ConnectionId, protocol::BytesView) override { throw std::runtime_error("no such luck"); }
   void on_fault(const std::string& what) override { fault = what; }
 };
 

@@ -14,7 +14,7 @@ namespace sonar::testing_daemon {
 struct QuietParent : SessionParent {
   std::string why;  // empty: it goes on
   bool client_left = false;
-  void on_bytes(ConnectionId, protocol::BytesView) override {}
+  std::size_t on_bytes(ConnectionId, protocol::BytesView) override { return 0; }
   Outbox::Message next_message(ConnectionId) override { return {}; }
   std::vector<Endpoint> receivers(ConnectionId) override { return {}; }
   void on_sent(ConnectionId, std::size_t) override {}
