@@ -133,7 +133,9 @@ class CommandDialogue final : public protocol::Dialogue {
     const std::string line = std::exchange(line_, {});
     ends_at_ = Time::max();
     const auto words = words_of(line);
-    if (!words.empty() && reaction.events.size() < events_per_call) run(words, reaction);
+    if (words.empty()) return;
+    if (reaction.events.size() < events_per_call) return run(words, reaction);
+    if (reaction.events.size() == events_per_call) notice("too many commands at once: the rest is ignored", reaction);
   }
 
   void run(const std::vector<std::string_view>& words, Reaction& reaction) {
