@@ -3,7 +3,8 @@
 
 usage: run_programs.py BUILD_FOLDER NAME...        --list KIND... [--without KIND...] prints their names instead
 The names are of BUILD_FOLDER/tests/programs, which CMake writes: its kinds, then the program and its arguments (tests/CMakeLists.txt).
-A GoogleTest program is run in parts, by GTEST_TOTAL_SHARDS. The tests that failed are added to the file that SONARD_FAILED names.
+A GoogleTest program is run in parts, by GTEST_TOTAL_SHARDS, and before the others, which are short: so no processor is idle at the end.
+The tests that failed are added to the file that SONARD_FAILED names.
   SONARD_TEST_JOBS      programs at once (a processor's each)
   SONARD_TEST_SECONDS   the longest a program may take (1800)
 """
@@ -18,6 +19,7 @@ import tempfile
 import time
 
 JOBS = int(os.environ.get("SONARD_TEST_JOBS") or os.cpu_count())
+PARTS_A_JOB = 4  # parts of a program differ: one may take five times another
 LONGEST_S = float(os.environ.get("SONARD_TEST_SECONDS") or 1800)
 
 
@@ -57,7 +59,8 @@ def run(command, part, parts):
 
 def run_all(programs):
     """Runs the parts of all programs; the tests that failed, each after its program."""
-    parts_of = {name: JOBS if "GTEST" in kinds else 1 for name, (kinds, _) in programs.items()}
+    parts_of = {name: PARTS_A_JOB * JOBS if "GTEST" in kinds else 1 for name, (kinds, _) in programs.items()}
+    programs = dict(sorted(programs.items(), key=lambda program: -parts_of[program[0]]))  # stable
     failed, left, seconds = [], dict(parts_of), dict.fromkeys(programs, 0.0)
     broken = set()
 
@@ -77,7 +80,7 @@ def run_all(programs):
                 broken.add(name)
             elif left[name] == 0 and name not in broken:
                 print(f"{seconds[name]:6.1f} s  {name} passed", flush=True)
-    return failed
+    return list(dict.fromkeys(failed))  # parts that name no case name the program
 
 
 def main():
