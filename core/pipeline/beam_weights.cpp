@@ -63,6 +63,12 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
     }
   }
 
+  // A ping of several forms only some beams. Without weights beyond each beam's own band, it can leave out columns between them.
+  const bool own_bands = !alike && mode.interleaved_pings > 1;
+  std::vector<int> half_bands(beam_sines.size(), c.half_band);
+  for (std::size_t j = 0; own_bands && j < half_bands.size(); ++j)
+    half_bands[j] = band_of(pattern[j], columns, options.dropped_energy).half;
+
   const int beams = static_cast<int>(beam_sines.size());
   const auto nearest_column = [&](int beam) {
     return (columns.first_sine - beam_sines[static_cast<std::size_t>(beam)]) / columns.spacing;
@@ -82,7 +88,8 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
       for (int k = start; k < stop; ++k)
         for (int j = first; j < first + 4; ++j) {
           const auto beam = static_cast<std::size_t>(j);
-          const double w = j <= last ? pattern[beam](columns.sine(k) - beam_sines[beam]) : 0.0;
+          const bool is_heard = j <= last && (!own_bands || std::abs(k - std::lround(nearest_column(j))) <= half_bands[beam]);
+          const double w = is_heard ? pattern[beam](columns.sine(k) - beam_sines[beam]) : 0.0;
           c.weights.push_back(static_cast<float>(squared ? w * w : w));
         }
     } else {

@@ -11,6 +11,12 @@ namespace sonar {
 
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
                 BeamSignals& out) {
+  const ColumnRange all{0, columns.columns};
+  form_beams(columns, beam_weights, {}, {&all, 1}, kernels, scratch, out);
+}
+
+void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, BeamChoice wanted,
+                std::span<const ColumnRange> heard, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out) {
   // A window of complex samples of all columns: two floats per sample.
   const int floats = static_cast<int>(out.stride), first_sample = out.first_sample;
   // Eq. 9 for all beams at once: a convolution over columns that are uniform in u = sin(azimuth) (beam_transform.hpp).
@@ -22,14 +28,24 @@ void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, c
   }
   // Copies samples side by side, because the records of columns are too far apart to stay in cache together.
   scratch.window.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>(columns.columns));
-  for (int k = 0; k < columns.columns; ++k) {
-    const float* from = columns.first_sample(k) + 2 * first_sample;
-    std::copy(from, from + floats, scratch.window.data() + static_cast<std::ptrdiff_t>(k) * floats);
+  const auto place_of = [&](int k) { return scratch.window.begin() + static_cast<std::ptrdiff_t>(k) * floats; };
+  int done = 0;
+  for (const ColumnRange& range : heard) {
+    // Panels read the others with weights of 0, but these columns may have any values.
+    std::fill(place_of(done), place_of(range.first), 0.0f);
+    for (int k = range.first; k < range.last; ++k) {
+      const float* from = columns.first_sample(k) + 2 * first_sample;
+      std::copy(from, from + floats, place_of(k));
+    }
+    done = range.last;
   }
+  std::fill(place_of(done), place_of(columns.columns), 0.0f);
   // Eq. 9 as a banded product: four beams per panel, over the columns within half_band of them.
-  for (const BeamPanel& panel : beam_weights.panels)
+  for (const BeamPanel& panel : beam_weights.panels) {
+    if (!wanted.is_all() && wanted.next(panel.first_beam) >= panel.first_beam + 4) continue;
     kernels.form_beam_panel(scratch.window.data() + static_cast<std::ptrdiff_t>(panel.first_column) * floats, floats,
                             beam_weights.weights.data() + panel.weights, panel.count, out.beam(panel.first_beam), floats);
+  }
 }
 
 SampledPulse place_pulse(const PointEcho& point, const PingPlan& plan, int from, int to) {

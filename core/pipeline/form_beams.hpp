@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/pipeline/interleaved_pings.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/signals.hpp"
 
@@ -19,6 +20,9 @@ struct BeamScratch {
 /// Fills the window of samples for which `out` has been shaped.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
                 BeamSignals& out);
+/// The same for some beams; the others are undefined. `heard`: columns_of() these beams; no other column is read.
+void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, BeamChoice wanted,
+                std::span<const ColumnRange> heard, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out);
 
 /// The part of the point's pulse that lies within the samples [from, to).
 SampledPulse place_pulse(const PointEcho& point, const PingPlan& plan, int from, int to);

@@ -1,10 +1,12 @@
-// Pictures whose neighbouring beams come from successive pings (docs/acoustics.md, section 6): the requests of these pings, and
-// the picture that they make.
+// Pictures whose neighbouring beams come from successive pings (docs/acoustics.md, section 6): the requests of these pings, the
+// beams that each of them forms, and the picture that they make. A beam hears columns far beyond its own, so that a ping can
+// leave out few of them: half, if its beams are eight apart, hardly any, if they are three apart.
 #pragma once
 
 #include <span>
 #include <vector>
 
+#include "core/pipeline/ping_plan.hpp"
 #include "core/sonar/ping.hpp"
 
 namespace sonar {
@@ -14,6 +16,26 @@ int pings_in(const PingRequest& picture);
 /// The requests of a picture's pings in the order of firing, each with its own time, pose, and number, which is a key of the
 /// noise.
 std::vector<PingRequest> pings_of(const PingRequest& picture);
+
+/// Beams first, first + step, ..
+struct BeamChoice {
+  int first = 0, step = 1;
+  bool is_all() const { return step == 1; }
+  bool has(int beam) const { return next(beam) == beam; }
+  /// The first of them from `beam` on.
+  int next(int beam) const { return beam <= first ? first : first + (beam - first + step - 1) / step * step; }
+};
+/// The beams of ping `p` of a picture.
+BeamChoice beams_of(const PingRequest& picture, std::size_t p);
+
+/// Columns [first, last).
+struct ColumnRange {
+  int first = 0, last = 0;
+};
+/// The columns that have a weight in these beams, in rising order and apart. Where beams take part of each other's signals
+/// (crosstalk, mixed beams), or a transform forms them all, these are all columns.
+std::vector<ColumnRange> columns_of(const PingPlan& plan, BeamChoice beams);
+
 /// The picture, with its own request; each beam is from its ping. `pings` are the results of pings_of(), in the same order.
 Ping interleaved(const PingRequest& picture, std::span<Ping> pings);
 

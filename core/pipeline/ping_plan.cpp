@@ -307,7 +307,9 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
   if (bearing_scale != 1) scale_beam_sines(p);
   p.beam_pattern = receive_patterns(mode, p.beam_sine.size());
-  p.beam_weights = make_beam_weights(mode, p.columns, p.beam_sine, p.expected_power);
+  FrequencyMode formed = mode;  // as one ping, if all beams are from one
+  if (!switches.interleave) formed.interleaved_pings = 1;
+  p.beam_weights = make_beam_weights(formed, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);
   p.fan = make_fan(mode, settings, p.pulse_width_m, switches.side_lobes);
   lay_out_fixed_fan(p);

@@ -156,14 +156,18 @@ simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& s, cons
   return g;
 }
 
-void sort_tiles(const std::vector<PreparedTile>& tiles, int group_columns, int groups,
+void sort_tiles(const std::vector<PreparedTile>& tiles, std::span<const ColumnRange> groups,
                 std::vector<std::vector<std::uint32_t>>& by_group) {
-  by_group.resize(static_cast<std::size_t>(groups));
+  by_group.resize(groups.size());
   // A tile that overlaps several groups is in the list of each; tiles keep their order.
   for (auto& wanted : by_group) wanted.clear();
-  for (std::size_t i = 0; i < tiles.size(); ++i)
-    for (int g = tiles[i].first_column / group_columns; g * group_columns < tiles[i].last_column && g < groups; ++g)
-      by_group[static_cast<std::size_t>(g)].push_back(static_cast<std::uint32_t>(i));
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const PreparedTile& tile = tiles[i];
+    const auto ends_before = [](int column, const ColumnRange& group) { return column < group.last; };
+    const auto from = std::upper_bound(groups.begin(), groups.end(), tile.first_column, ends_before);
+    for (auto g = static_cast<std::size_t>(from - groups.begin()); g < groups.size() && groups[g].first < tile.last_column; ++g)
+      by_group[g].push_back(static_cast<std::uint32_t>(i));
+  }
 }
 
 std::size_t scatter(const std::vector<PreparedTile>& tiles, std::span<const std::uint32_t> wanted, std::size_t from,

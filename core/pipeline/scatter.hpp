@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/pipeline/hidden_tiles.hpp"
+#include "core/pipeline/interleaved_pings.hpp"
 #include "core/pipeline/ping_context.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/ping_scalars.hpp"
@@ -35,8 +36,8 @@ void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in
 /// View of columns [first, last); the map may have more columns.
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen, int first, int last);
 
-/// For each group of `group_columns` columns, the tiles that reach into it, in order.
-void sort_tiles(const std::vector<PreparedTile>& tiles, int group_columns, int groups,
+/// For each group of columns, the tiles that reach into it, in order. Groups are in rising order, without overlaps.
+void sort_tiles(const std::vector<PreparedTile>& tiles, std::span<const ColumnRange> groups,
                 std::vector<std::vector<std::uint32_t>>& by_group);
 
 /// Appends the echoes of tiles[wanted[from, ...)] until all are done or `echoes` is full; returns the next index into `wanted`.

@@ -62,12 +62,12 @@ class CpuEngine final : public ChangingEngine, private Interruption {
     std::vector<Ping> pings;
     std::vector<PingRequest> room;
     for (const PingRequest& request : in_water(wanted, *scene_, room)) {
-      pings.push_back(run(request));
+      pings.push_back(run(request, beams_of(picture, pings.size())));
       add(statistics, work_[0].statistics());
     }
     return interleaved(picture, pings);
   }
-  Ping run(const PingRequest& request) {
+  Ping run(const PingRequest& request, BeamChoice beams) {
     const CellFields fields{request.switches.texture, request.switches.grain};
     if (!cells_ || !cells_->serves(request.seed, fields))
       cells_ = std::make_shared<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, fields);
@@ -75,20 +75,21 @@ class CpuEngine final : public ChangingEngine, private Interruption {
     std::shared_ptr<PingLabels> labels;
     if (request.switches.keep_labels && why_unlabelled(request, *scene_).empty())
       labels = std::make_shared<PingLabels>(no_labels(request, *scene_));
-    Ping ping = under_way_.request != nullptr ? simulate(rays_, *cells_, request, kernels_, work_[1], pool_, labels.get())
-                                              : run_outer(request, labels.get());
+    if (labels) beams = {};
+    Ping ping = under_way_.request != nullptr ? simulate(rays_, *cells_, request, kernels_, work_[1], pool_, labels.get(), beams)
+                                              : run_outer(request, labels.get(), beams);
     ping.labels = std::move(labels);
     return ping;
   }
   /// The ping between whose parts other pings may run.
-  Ping run_outer(const PingRequest& request, PingLabels* labels) {
+  Ping run_outer(const PingRequest& request, PingLabels* labels, BeamChoice beams) {
     under_way_ = {&request, cells_, 0};
     struct Finish {
       UnderWay& ping;
       ~Finish() { ping = {}; }
     } finish{under_way_};
     work_[0].set_between(interruption_ ? this : nullptr);
-    return simulate(rays_, *under_way_.cells, request, kernels_, work_[0], pool_, labels);
+    return simulate(rays_, *under_way_.cells, request, kernels_, work_[0], pool_, labels, beams);
   }
   void place_bodies(const PingRequest& request) {
     if (!scene_->bodies_in_world.empty())

@@ -95,7 +95,7 @@ class Stopwatch {
 class PingSimulation {
  public:
   PingSimulation(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
-                 Workspace& work, Parallel& pool, PingLabels* labels)
+                 Workspace& work, Parallel& pool, PingLabels* labels, BeamChoice beams)
       : scene_(scene),
         cells_(cells),
         request_(request),
@@ -103,6 +103,7 @@ class PingSimulation {
         w_(*work.buffers_),
         pool_(pool),
         labels_(labels),
+        beams_(beams),
         prepared_(w_.prepared.prepared_for(request, scene.scene(), pool)),
         plan_(prepared_.plan),
         scalars_(make_scalars(plan_, request, scene.origin())),
@@ -110,10 +111,14 @@ class PingSimulation {
         leak_(plan_, request.switches),
         crosstalk_(plan_, request.switches),
         bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world),
-        context_{scene, cells, bodies_, w_.laws, w_.turned_away, plan_, scalars_, kernels, pool} {
+        context_{scene, cells, bodies_, w_.laws, w_.turned_away, plan_, scalars_, kernels, pool},
+        heard_(columns_of(plan_, beams)) {
     // Buffers keep their memory from ping to ping; values of an earlier ping are never read.
     w_.columns.shape(plan_.columns.count, plan_.samples, plan_.taps);
     group_columns_ = group_columns();
+    for (const ColumnRange& range : heard_)
+      for (int first = range.first; first < range.last; first += group_columns_)
+        groups_.push_back({first, std::min(first + group_columns_, range.last)});
     w_.workers.resize(static_cast<std::size_t>(pool.threads()));
     w_.statistics = {};
     w_.first_hits.assign(request.switches.keep_truth ? static_cast<std::size_t>(plan_.columns.count) : 0, BeamTruth{});
@@ -137,10 +142,9 @@ class PingSimulation {
     return (plan_.columns.count + parts - 1) / parts;
   }
   int group_columns() const;
-  int groups() const { return (plan_.columns.count + group_columns_ - 1) / group_columns_; }
-  void simulate_group(int first, int last, Workspace::Buffers::PerWorker& mine);
+  void simulate_group(std::size_t group, Workspace::Buffers::PerWorker& mine);
   void scatter_hits_of(int first, int last, Workspace::Buffers::PerWorker& mine, Stopwatch& watch);
-  void scatter_cells_of(int first, int last, Workspace::Buffers::PerWorker& mine, Stopwatch& watch);
+  void scatter_cells_of(std::size_t group, Workspace::Buffers::PerWorker& mine, Stopwatch& watch);
   void sum_pulses(int first, Workspace::Buffers::PerWorker& mine);
   void image_rows(int first, int last, Workspace::Buffers::PerWorker& mine, Ping& ping);
 
@@ -151,6 +155,7 @@ class PingSimulation {
   Workspace::Buffers& w_;
   Parallel& pool_;
   PingLabels* labels_;  // null = not wanted
+  BeamChoice beams_;
   PreparedSettings& prepared_;
   const PingPlan& plan_;
   PingScalars scalars_;
@@ -159,7 +164,8 @@ class PingSimulation {
   Crosstalk crosstalk_;
   std::span<const Pose> bodies_;
   const PingContext context_;
-  int group_columns_ = 0;
+  std::vector<ColumnRange> heard_, groups_;  // columns that the beams hear; the same in parts that a worker computes at once
+  int group_columns_ = 0;                    // most columns of a group
   std::vector<PointEcho> points_;
   std::vector<ReceivedPulse> other_sonars_;
   std::vector<float> shared_noise_;  // noise that the channels share in this ping
@@ -205,7 +211,7 @@ void PingSimulation::find_echo_sources() {
   const std::vector<TileInView>& in_view = cells_.in_view(view, pool_);
   watch.lap(cells_.built_last_time() > 0 ? Stage::build_cells : Stage::cull);
   prepare_tiles(context_, in_view, cells_.sonar_from_objects(), w_.tiles);
-  sort_tiles(w_.tiles, group_columns_, groups(), w_.tiles_by_group);
+  sort_tiles(w_.tiles, groups_, w_.tiles_by_group);
   if (labels_) w_.labels.begin(context_, w_.tiles, w_.tiles_by_group, group_columns_);
   watch.lap(Stage::cull);
   w_.statistics.tiles = in_view.size();
@@ -224,18 +230,17 @@ void PingSimulation::find_multipath_echoes() {
 /// Computes rays, echoes, pulses and noise, one group of columns at a time.
 void PingSimulation::simulate_columns() {
   // All groups at once, or when an interruption is likely, as many as there are threads between two yield points.
-  const auto all = static_cast<std::size_t>(groups());
+  const std::size_t all = groups_.size();
   const std::size_t at_once = w_.between && w_.between->expected() ? static_cast<std::size_t>(pool_.threads()) : all;
   for (std::size_t from = 0; from < all; from += at_once) {
     if (from > 0) w_.between->run_other();
-    pool_.for_each(std::min(at_once, all - from), [&](std::size_t g, int worker) {
-      const int first = static_cast<int>(from + g) * group_columns_;
-      simulate_group(first, std::min(first + group_columns_, plan_.columns.count), w_.workers[static_cast<std::size_t>(worker)]);
-    });
+    pool_.for_each(std::min(at_once, all - from),
+                   [&](std::size_t g, int worker) { simulate_group(from + g, w_.workers[static_cast<std::size_t>(worker)]); });
   }
 }
 
-void PingSimulation::simulate_group(int first, int last, Workspace::Buffers::PerWorker& mine) {
+void PingSimulation::simulate_group(std::size_t group, Workspace::Buffers::PerWorker& mine) {
+  const auto [first, last] = groups_[group];
   Stopwatch watch(w_.now_s, mine.statistics);
   // Draws depend only on (seed, sonar, ping, column), so that they are equal for every number of threads.
   const PingNoise draws{prepared_.one_table() ? &prepared_.noise : &prepared_.grains, request_.sonar_id,
@@ -249,7 +254,7 @@ void PingSimulation::simulate_group(int first, int last, Workspace::Buffers::Per
     if (ray_is_scatterer())
       scatter_hits_of(first, last, mine, watch);
     else
-      scatter_cells_of(first, last, mine, watch);
+      scatter_cells_of(group, mine, watch);
   }
   if (plan_.spectral) plan_.spectral->finish(first, last, mine.spectral, w_.columns);
   if (request_.switches.multipath && !request_.blank && !ray_is_scatterer()) add_multipath(w_.multipath, first, last, w_.columns);
@@ -273,7 +278,8 @@ void PingSimulation::scatter_hits_of(int first, int last, Workspace::Buffers::Pe
   watch.lap(Stage::synthesize);
 }
 
-void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::PerWorker& mine, Stopwatch& watch) {
+void PingSimulation::scatter_cells_of(std::size_t number, Workspace::Buffers::PerWorker& mine, Stopwatch& watch) {
+  const auto [first, last] = groups_[number];
   // A moving sonar may receive an echo in another column than that of the ray.
   const int beside = scalars_.columns_turned(plan_);
   const int map_first = std::max(first - beside, 0), map_last = std::min(last + beside, plan_.columns.count);
@@ -293,8 +299,7 @@ void PingSimulation::scatter_cells_of(int first, int last, Workspace::Buffers::P
   watch.lap(Stage::trace);
   const simd::GroupView group = make_group_view(plan_, scalars_, mine.seen, first, last);
   mine.farthest.shape(mine.seen);
-  mine.farthest.leave_out_hidden(w_.tiles, w_.tiles_by_group[static_cast<std::size_t>(first / group_columns_)], group,
-                                 mine.in_sight);
+  mine.farthest.leave_out_hidden(w_.tiles, w_.tiles_by_group[number], group, mine.in_sight);
   if (labels_) w_.labels.begin_group(group);
   // scatter() stops when its buffer is full; the tiles' order stays.
   for (std::size_t next = 0; next < mine.in_sight.size();) {
@@ -344,7 +349,7 @@ void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWork
   const int per_row = plan_.settings.samples_per_row;
   // A window is 64 samples of whole rows: its beams stay in cache until they are codes.
   mine.beams.shape(plan_.settings.beam_count, first * per_row, (last - first) * per_row);
-  form_beams(w_.columns, plan_.beam_weights, kernels_, mine.beam_scratch, mine.beams);
+  form_beams(w_.columns, plan_.beam_weights, beams_, heard_, kernels_, mine.beam_scratch, mine.beams);
   // Points and pulses of other sonars are added to the beams at their exact directions; then the beams are mixed. The pulse of
   // another sonar does not come from the range of its rows, so it is not blurred.
   add_points(points_, plan_, mine.beams);
@@ -359,9 +364,9 @@ void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWork
 }
 
 Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
-              Workspace& work, Parallel& pool, PingLabels* labels) {
+              Workspace& work, Parallel& pool, PingLabels* labels, BeamChoice beams) {
   if (const RangeImageSettings* const image = range_image_of(request)) return make_range_image(scene, request, *image, pool);
-  PingSimulation ping(scene, cells, request, kernels, work, pool, labels);
+  PingSimulation ping(scene, cells, request, kernels, work, pool, labels, beams);
   ping.find_echo_sources();  // surface cells in view and point echoes
   ping.simulate_columns();   // per column: depth map, echoes (eq. 6), pulses (eq. 8), receiver noise
   return ping.image();       // form_beams: columns to beams; receive: envelope, TVG, samples

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/base/parallel.hpp"
+#include "core/pipeline/interleaved_pings.hpp"
 #include "core/pipeline/labels.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/simd/kernels.hpp"
@@ -32,8 +33,9 @@ class Workspace {
 };
 
 /// `cells` must belong to the scene of `scene` and to the request's seed; bodies must have been placed. If `labels` is not
-/// null, it is filled; the ping does not depend on it.
+/// null, it is filled; the ping does not depend on it. If `beams` are not all, the samples and the truth of the others are
+/// undefined, and labels must be null.
 Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
-              Workspace& work, Parallel& pool, PingLabels* labels = nullptr);
+              Workspace& work, Parallel& pool, PingLabels* labels = nullptr, BeamChoice beams = {});
 
 }  // namespace sonar

@@ -74,7 +74,7 @@ void for_each_tile(const Case& c, const Pose& pose, int first, int last, const F
     FarthestSeen farthest;
     farthest.shape(map);
     std::vector<std::vector<std::uint32_t>> by_group;
-    sort_tiles(tiles, plan.columns.count, 1, by_group);
+    sort_tiles(tiles, std::vector<ColumnRange>{{0, plan.columns.count}}, by_group);
     std::vector<std::uint32_t> in_sight;
     farthest.leave_out_hidden(tiles, by_group[0], group, in_sight);
     EXPECT_TRUE(std::is_sorted(in_sight.begin(), in_sight.end()));

@@ -84,6 +84,64 @@ TEST(InterleavedPings, EachBeamIsAsItsOwnPingFoundIt) {
   }
 }
 
+/// Beams of widths of their own, of eight pings: between a ping's beams there are columns that none of them hears.
+Sounding of_eight_pings(int threads) {
+  FrequencyMode mode = p900();
+  mode.interleaved_pings = 8;
+  mode.beam_spacing = BeamSpacing::listed;
+  mode.pattern.azimuth_taper = Taper::hann;
+  for (int j = 0; j < beams; ++j) {
+    const double x = 1 - (2.0 * j + 1) / beams;
+    mode.beam_azimuths_rad.push_back(rad_from_deg(43 * x - 3 * x * x * x));
+    mode.beam_widths_rad.push_back(static_cast<float>(rad_from_deg(86.0 / beams * (1 - 0.2 * x * x))));
+  }
+  PingSettings settings = default_rows(6, rows);
+  settings.beam_count = beams;
+  settings.ping_interval_s = interval_s;
+  SceneMaker scene;
+  scene.add(height_field(-1, 8, -8, 8, 1, [](double x, double) { return 0.1 * std::sin(3 * x); }), -27);
+  scene.add(box({0.2, 0.2, 0.5}), -15, {4, 0.3, 0.5});
+  Sounding s(scene.make(), mode, settings, {threads, {}});
+  s.request.sonar_in_world = {{0, 0, 2}, quat_from_rpy({0, 0.4, 0})};
+  s.request.sonar_moves = {{0.8, 0.4, 0}, {0, 0, 0.3}};
+  s.request.switches.interleave = s.request.switches.noise = true;
+  s.request.switches.keep_beams = s.request.switches.keep_truth = true;
+  return s;
+}
+
+TEST(InterleavedPings, LeaveOutWhatTheirBeamsDoNotHear) {
+  Sounding all = of_eight_pings(2);
+  all.request.switches.keep_labels = true;  // these are of whole pings
+  all.ping();
+  for (const int threads : {1, 3}) {
+    Sounding some = of_eight_pings(threads);
+    some.ping();
+    EXPECT_EQ(some.last().samples, all.last().samples);
+    EXPECT_EQ(some.last().pressure_upa, all.last().pressure_upa);
+    EXPECT_EQ(some.last().beam_signal_upa, all.last().beam_signal_upa);
+    for (std::size_t j = 0; j < std::size_t{beams}; ++j)
+      EXPECT_EQ(some.last().truth[j].range_m, all.last().truth[j].range_m) << j;
+    EXPECT_LT(some.engine().statistics().echoes, all.engine().statistics().echoes / 2);
+  }
+}
+
+/// A beam's band holds all of its energy but 1e-4; one ping's beams have weights beyond it.
+TEST(InterleavedPings, BeamsOfTheFirstPingAreThoseOfOnePing) {
+  Sounding s = of_eight_pings(2);
+  s.request.switches.noise = false;
+  const Ping picture = s.ping();
+  s.request.switches.interleave = false;
+  const Ping& one = s.ping();
+  double error = 0, power = 0;
+  for (std::size_t i = 0; i < picture.beam_signal_upa.size(); ++i) {
+    if ((beams - 1 - static_cast<int>(i % beams)) % 8 != 0) continue;
+    error += static_cast<double>(std::norm(picture.beam_signal_upa[i] - one.beam_signal_upa[i]));
+    power += static_cast<double>(std::norm(one.beam_signal_upa[i]));
+  }
+  EXPECT_LT(error, 2e-4 * power);
+  EXPECT_GT(error, 0);
+}
+
 TEST(InterleavedPings, AtRestWithoutNoiseAreOnePing) {
   Sounding s = over_bed(pings), one = over_bed(1);
   EXPECT_EQ(s.ping().samples, one.ping().samples);
