@@ -70,7 +70,7 @@ class Vendor {
       if (port.kind == kind) return &port;
     return nullptr;
   }
-  /// Whether the bytes of a ping are spread over several TCP ports.
+  /// Whether each of several TCP ports sends bytes of its own for a ping.
   bool has_several_streams() const { return std::ranges::count(ports(), Port::Kind::tcp_stream, &Port::kind) > 1; }
   virtual std::span<const Option> options() const { return {}; }
   virtual int default_max_clients() const = 0;
@@ -137,13 +137,13 @@ class Vendor {
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
   virtual PingsBy pings_by() const { return PingsBy::stream; }
   /// Encodes a ping for all connections, under the settings of the ping (PingRequest::vendor_settings). Called once per ping.
-  /// Null: its pings are datagrams only.
+  /// Null: its pings are datagrams, or the parts of several TCP ports together.
   virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const {
     static_cast<void>(ping), static_cast<void>(device);
     return nullptr;
   }
   /// The datagrams of a ping in order, at most 65,507 bytes each, for a port of kind udp_stream with receivers, or udp_dialogue.
-  /// For one of kind tcp_stream: the parts of frame() between which it pauses; of several such ports each has its own part.
+  /// For one of kind tcp_stream: the parts of frame() between which it pauses; several such ports each have their own bytes.
   virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};
