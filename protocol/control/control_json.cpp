@@ -7,6 +7,7 @@
 #include <set>
 
 #include "protocol/control/control.hpp"
+#include "protocol/control/json_mistake.hpp"
 #include "protocol/control/messages.hpp"
 #include "protocol/control/refused.hpp"
 
@@ -15,8 +16,6 @@ namespace {
 
 using google::protobuf::Message;
 constexpr std::size_t deepest_request = 16, most_values = 4096;  // chosen: the longest request has some dozen values
-
-std::string in_quotes(const std::string& name) { return '"' + name.substr(0, 64) + '"'; }
 
 /// The name in the form in which protobuf compares names: "range_m" and "rangeM" are the same field.
 std::string as_protobuf_reads(const std::string& name) {
@@ -77,35 +76,6 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
   std::size_t values_ = 0;
 };
 
-/// The kind of value that a protobuf type expects. Empty: protobuf's own text is clear enough.
-std::string kind_of(const std::string& type) {
-  if (type == "DOUBLE" || type == "FLOAT") return "a number";
-  if (type == "BOOL") return "true or false";
-  if (type.starts_with("UINT")) return "a whole number from 0 on";
-  if (type.starts_with("INT")) return "a whole number";
-  return type == "STRING" ? "a text in quotes" : "";
-}
-
-/// Makes a sentence of protobuf's text, such as "(mount.xyz_m): Cannot find field." or "(range_m.value): invalid value \"far\"
-/// for type TYPE_DOUBLE". The text may have a word in front, may lack the brackets, and may go on with lines that show the place.
-std::string sentence_from(const std::string& words) {
-  std::string what = words.substr(0, words.find('\n'));
-  const auto colon = what.find(": ");
-  if (colon == std::string::npos) return what;
-  std::string key = what.substr(0, colon);
-  what.erase(0, colon + 2);
-  if (const auto space = key.rfind(' '); space != std::string::npos) key.erase(0, space + 1);
-  if (key.starts_with('(') && key.ends_with(')')) key = key.substr(1, key.size() - 2);
-  if (key.ends_with(".value")) key.resize(key.size() - 6);  // wrappers such as DoubleValue
-  if (what == "Cannot find field.") what = "unknown key";
-  if (const auto type = what.find(" for type TYPE_"); type != std::string::npos) {
-    const std::string expected = kind_of(what.substr(type + std::string(" for type TYPE_").size()));
-    what.resize(type);
-    if (!expected.empty()) what += ", expected " + expected;
-  }
-  return in_quotes(key) + ": " + what;
-}
-
 /// Sets the name that the path of the request has. False: the message has another name, or none can be set.
 bool set_name(Message& message, const std::string& name) {
   const auto& of = *message.GetDescriptor();
@@ -133,7 +103,10 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
     return refused("not a JSON object: write {...}");
   const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()},
                                                                   message.GetReflection()->MutableMessage(&message, field));
-  if (!status.ok()) return refused(sentence_from(std::string(status.message())));
+  if (!status.ok()) {
+    const std::string mistake = mistake_in(json, *field->message_type()), words(status.message());
+    return refused(!mistake.empty() ? mistake : "protobuf refuses it: " + words.substr(0, words.find('\n')));
+  }
   if (!name.empty() && !set_name(*message.GetReflection()->MutableMessage(&message, field), std::string(name)))
     return refused("the path names " + in_quotes(std::string(name)) + ", but the message names another");
   auto request = from(message);
