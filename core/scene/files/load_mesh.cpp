@@ -10,6 +10,7 @@
 
 #include "core/base/child_process.hpp"
 #include "core/base/confined_reads.hpp"
+#include "core/base/letters.hpp"
 #include "core/base/load_step.hpp"
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
@@ -113,7 +114,9 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
       if (mesh) mesh->lost = stl->bytes_behind / bytes_of_stl_triangle;
       return mesh;
     }
-    if (begin.find("solid") == std::string::npos)
+    // A text has no zero bytes; binary files may begin with the word, too.
+    const std::string more = read_regular(request.file, 512).value_or("");
+    if (small_letters(begin).find("solid") == std::string::npos || more.find('\0') != std::string::npos)
       return bad_mesh(request,
                       "is no STL, or cut short: a text begins with the word solid, and a binary file has 84 bytes and 50 for "
                       "each triangle that its header counts; export it again");

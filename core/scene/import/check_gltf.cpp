@@ -32,18 +32,26 @@ class GltfWalk final : public Json::json_sax_t {
   };
   std::map<std::string, Accessor> accessors;
   std::vector<std::string> required, used;  // extensions
+  bool is_morphed = false;                  // a weight of a morph target, which moves vertices, is not 0
 
   bool null() override { return value({}); }
   bool boolean(bool) override { return value({}); }
-  bool number_integer(number_integer_t v) override { return value(std::to_string(v)); }
+  bool number_integer(number_integer_t v) override {
+    note_weight(static_cast<double>(v));
+    return value(std::to_string(v));
+  }
   bool number_unsigned(number_unsigned_t v) override {
+    note_weight(static_cast<double>(v));
     if (is_at(3, "accessors", "count")) accessors[levels_[1].name()].count = v;
     if (is_at(3, "accessors", "componentType")) accessors[levels_[1].name()].type = v;
     if (levels_.size() == 1 && levels_[0].key == "scene") scene = v;
     if (Primitive* p = primitive(); p && levels_.size() == 5 && levels_[4].key == "mode") p->mode = v;
     return value(std::to_string(v));
   }
-  bool number_float(number_float_t, const string_t&) override { return value({}); }
+  bool number_float(number_float_t v, const string_t&) override {
+    note_weight(v);
+    return value({});
+  }
   bool string(string_t& v) override { return value(v); }
   bool binary(binary_t&) override { return true; }
   bool start_object(std::size_t) override { return open(false); }
@@ -67,6 +75,7 @@ class GltfWalk final : public Json::json_sax_t {
   bool is_at(std::size_t depth, const char* top, const char* last) const {
     return levels_.size() == depth && levels_[0].key == top && !levels_[2].array && levels_[2].key == last;
   }
+  void note_weight(double v) { is_morphed |= v != 0 && (is_at(4, "meshes", "weights") || is_at(4, "nodes", "weights")); }
   /// The primitive that is being read.
   Primitive* primitive() {
     if (levels_.size() < 5 || levels_[0].key != "meshes" || levels_[2].key != "primitives" || !levels_[3].array) return nullptr;
@@ -138,6 +147,8 @@ MeshFault unread_extension(const GltfWalk& walk) {
       return unread(name);
   if (std::find(walk.used.begin(), walk.used.end(), "EXT_mesh_gpu_instancing") != walk.used.end())
     return unread("EXT_mesh_gpu_instancing");
+  if (walk.is_morphed)
+    return "is shaped by morph targets (its weights are not 0), which are not read; apply them, then export it again";
   constexpr std::uint64_t floating = 5126;
   for (const auto& [name, primitives] : walk.primitives)
     for (const GltfWalk::Primitive& p : primitives)

@@ -20,6 +20,7 @@ struct ListedFaces {
 };
 
 /// `head`: the beginning of a file of `file_bytes`, with at least the whole header.
+/// Words may be in capitals.
 MeshFault check_ply(std::string_view head, std::uint64_t file_bytes);
 /// Text or binary (GLB), version 1 or 2.
 MeshFault check_gltf(std::string_view file, ListedFaces* faces = nullptr);
@@ -29,6 +30,8 @@ MeshFault glb_fault(std::string_view file);
 
 /// Number of faces in the header of a PLY file, or number of facets in a text STL file.
 std::uint64_t faces_of_ply(std::string_view head);
+/// Bytes of the header of a PLY file with its last line end; 0 if it is not whole.
+std::uint64_t bytes_of_ply_head(std::string_view head);
 std::uint64_t facets_of_stl(std::string_view file);
 
 constexpr std::size_t ply_head_bytes = 64 << 10;

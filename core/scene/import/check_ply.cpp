@@ -2,6 +2,7 @@
 #include <charconv>
 #include <sstream>
 
+#include "core/base/letters.hpp"
 #include "core/scene/import/check_mesh.hpp"
 
 namespace sonar {
@@ -17,12 +18,19 @@ std::uint64_t bytes_of(std::string_view type) {
 
 }  // namespace
 
-MeshFault check_ply(std::string_view head, std::uint64_t file_bytes) {
+std::uint64_t bytes_of_ply_head(std::string_view head) {
+  const std::size_t end = small_letters(head).find("end_header");
+  return same_letters(head.substr(0, 3), "ply") && end != std::string::npos && head.find('\n', end) != std::string::npos
+             ? head.find('\n', end) + 1
+             : 0;
+}
+
+MeshFault check_ply(std::string_view file_head, std::uint64_t file_bytes) {
   // Assimp 5.2 never returns if a header does not end.
-  const std::size_t end = head.find("end_header");
-  if (!head.starts_with("ply") || end == std::string_view::npos || head.find('\n', end) == std::string_view::npos)
-    return "cannot be read: not a PLY file with a whole header";
-  std::istringstream lines{std::string(head.substr(0, end))};
+  const std::size_t end = bytes_of_ply_head(file_head);
+  if (end == 0) return "cannot be read: not a PLY file with a whole header, of lines that end with a line feed; export it again";
+  const std::string head = small_letters(file_head.substr(0, end));
+  std::istringstream lines(head);
   bool ascii = false;
   std::string element;
   std::uint64_t count = 0, least = 0, all = 0;  // bytes: `least` of one such element, `all` of the elements before it
@@ -57,7 +65,7 @@ MeshFault check_ply(std::string_view head, std::uint64_t file_bytes) {
 }
 
 std::uint64_t faces_of_ply(std::string_view head) {
-  std::istringstream lines{std::string(head.substr(0, head.find("end_header")))};
+  std::istringstream lines(small_letters(head.substr(0, bytes_of_ply_head(head))));
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);
     std::string word, type;

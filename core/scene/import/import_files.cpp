@@ -1,5 +1,7 @@
 #include "core/scene/import/import_files.hpp"
 
+#include <assimp/DefaultIOStream.h>
+
 #include <assimp/IOStream.hpp>
 
 #include <algorithm>
@@ -7,8 +9,10 @@
 #include <cstring>
 #include <memory>
 
+#include "core/base/letters.hpp"
 #include "core/base/regular_file.hpp"
 #include "core/scene/files/mesh_steps.hpp"
+#include "core/scene/import/check_mesh.hpp"
 
 namespace sonar {
 namespace {
@@ -192,6 +196,36 @@ class ObjStream final : public Assimp::IOStream {
   ObjText text_;
 };
 
+/// The text at the beginning of a file as the importer knows it: in small letters, without blank lines before it.
+struct PlainText {
+  std::size_t blank_bytes = 0, text_bytes = 0;
+};
+
+class PlainStream final : public Assimp::DefaultIOStream {
+ public:
+  PlainStream(OpenFile file, const std::string& name, PlainText text) : DefaultIOStream(file.release(), name), text_(text) {}
+
+  std::size_t Read(void* to, std::size_t size, std::size_t count) override {
+    const std::size_t from = Tell(), n = DefaultIOStream::Read(to, size, count);
+    char* const bytes = static_cast<char*>(to);
+    for (std::size_t i = 0; i < n * size && from + i < text_.text_bytes; ++i)
+      bytes[i] = from + i < text_.blank_bytes ? ' ' : small_letter(bytes[i]);
+    return n;
+  }
+
+ private:
+  PlainText text_;
+};
+
+/// The header of a PLY file, or all of a text STL file; binary STL files on disk do not get here.
+PlainText plain_text_of(const std::filesystem::path& file, std::uintmax_t bytes) {
+  const std::string head = read_regular(file, ply_head_bytes).value_or("");
+  if (mesh_extension(file) == ".ply") return {0, bytes_of_ply_head(head)};
+  const std::size_t word = head.find_first_not_of(" \t\r\n");
+  return word != head.npos && same_letters(head.substr(word, 5), "solid") ? PlainText{word, static_cast<std::size_t>(bytes)}
+                                                                          : PlainText();
+}
+
 }  // namespace
 
 ImportFiles::ImportFiles(const MeshFile& request, std::optional<Error>& fault, std::function<void(std::uintmax_t)> opened)
@@ -250,6 +284,8 @@ Assimp::IOStream* ImportFiles::Open(const char* file, const char* mode) {
     }
     opened_(bytes_);
   }
+  if (const std::string kind = mesh_extension(place); is_mesh && (kind == ".ply" || kind == ".stl"))
+    return new PlainStream(std::move(*opened), place.string(), plain_text_of(place, bytes));
   if (is_mesh && is_obj_) return new ObjStream(std::move(*opened), bytes, without_objects_, bad_faces_);
   return DefaultIOSystem::Open(place.c_str(), mode);
 }

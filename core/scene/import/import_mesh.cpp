@@ -13,6 +13,7 @@
 #include "core/scene/import/check_mesh.hpp"
 #include "core/scene/import/import_files.hpp"
 #include "core/scene/import/node_graph.hpp"
+#include "core/scene/import/skins.hpp"
 #include "core/scene/shapes/polygon.hpp"
 
 namespace sonar {
@@ -42,13 +43,14 @@ std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint
 
 // Transforms of nodes are in double, so that vertices far from the origin are exact to millimetres.
 // A face with missing vertices is left out.
-void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<double>& parent, unsigned depth,
-                   const TriangleSink& take) {
+void each_triangle(const aiScene& scene, const std::vector<std::vector<Vec3d>>& skins, const aiNode& node,
+                   const aiMatrix4x4t<double>& parent, unsigned depth, const TriangleSink& take) {
   if (depth > NodeGraph::deepest) return;
   const aiMatrix4x4t<double> here = parent * aiMatrix4x4t<double>(node.mTransformation);
   std::vector<Vec3d> polygon;
   for (unsigned m = 0; m < node.mNumMeshes; ++m) {
     const aiMesh& mesh = *scene.mMeshes[node.mMeshes[m]];
+    const std::vector<Vec3d>& skin = skins[node.mMeshes[m]];
     const auto material = static_cast<std::uint16_t>(std::min(mesh.mMaterialIndex, 65535u));
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
@@ -57,6 +59,10 @@ void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<
       const bool whole =
           std::all_of(face.mIndices, face.mIndices + face.mNumIndices, [&](unsigned index) { return index < mesh.mNumVertices; });
       for (unsigned k = 0; whole && k < face.mNumIndices; ++k) {
+        if (!skin.empty() && is_finite(skin[face.mIndices[k]])) {
+          polygon.push_back(skin[face.mIndices[k]]);
+          continue;
+        }
         const aiVector3D& p = mesh.mVertices[face.mIndices[k]];
         const aiVector3t<double> v = here * aiVector3t<double>(p.x, p.y, p.z);
         polygon.push_back({v.x, v.y, v.z});
@@ -70,7 +76,7 @@ void each_triangle(const aiScene& scene, const aiNode& node, const aiMatrix4x4t<
         take(std::array{polygon[triangle[0]], polygon[triangle[1]], polygon[triangle[2]]}, material);
     }
   }
-  for (unsigned c = 0; c < node.mNumChildren; ++c) each_triangle(scene, *node.mChildren[c], here, depth + 1, take);
+  for (unsigned c = 0; c < node.mNumChildren; ++c) each_triangle(scene, skins, *node.mChildren[c], here, depth + 1, take);
 }
 
 /// The text of a mesh, or its first `most` bytes.
@@ -81,6 +87,7 @@ Result<std::string> text_of(const MeshFile& request, std::size_t most) {
 
 /// Why the importer cannot read the file, if this check has a better reason than the importer.
 std::string better_reason(const MeshFile& request, const std::string& extension, std::string reason) {
+  if (extension == ".stl") return reason + "; is it cut short? Export it again";
   if (extension != ".glb" && extension != ".gltf") return reason;
   const auto text = text_of(request, max_mesh_bytes);
   if (extension == ".gltf")
@@ -157,13 +164,15 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
   }
   const std::uint64_t triangles = triangles_of_nodes(*scene->mRootNode, triangles_of_meshes(*scene));
   const std::uint64_t listed = std::max(faces.shown, triangles_listed(request, extension, *files, *scene, triangles));
+  const auto skins = skins_of(*scene);
   std::uint64_t taken = 0;
   auto mesh = finish_mesh(request, y_up_by_default, triangles, std::move(names), [&](const TriangleSink& take) {
     taken = 0;
-    each_triangle(*scene, *scene->mRootNode, aiMatrix4x4t<double>(), 0, [&](std::span<const Vec3d, 3> p, std::uint16_t material) {
-      ++taken;
-      take(p, material);
-    });
+    each_triangle(*scene, skins, *scene->mRootNode, aiMatrix4x4t<double>(), 0,
+                  [&](std::span<const Vec3d, 3> p, std::uint16_t material) {
+                    ++taken;
+                    take(p, material);
+                  });
   });
   if (mesh && listed > taken) mesh->lost = listed - taken;
   if (mesh) mesh->hidden = faces.hidden;

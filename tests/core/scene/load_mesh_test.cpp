@@ -283,6 +283,41 @@ TEST_F(LoadMesh, BinaryStlMayHaveBytesBehindItsTriangles) {
     EXPECT_THAT(refusal("short.stl", text), HasSubstr("is no STL, or cut short"));
 }
 
+TEST_F(LoadMesh, PlyHeadersMayHaveCapitalsAndOtherLineEnds) {
+  const std::size_t end = ply.find("end_header") + 11;
+  const std::string head = ply.substr(0, end), body = ply.substr(end);
+  const auto with_ends = [](std::string text, const std::string& line_end) {
+    for (std::size_t at = 0; (at = text.find('\n', at)) != text.npos; at += line_end.size()) text.replace(at, 1, line_end);
+    return text;
+  };
+  std::string binary;
+  for (const std::array<float, 3>& v : {std::array{0.f, 0.f, 0.f}, {2.f, 0.f, 0.f}, {0.f, 1.f, 0.f}, {0.f, 0.f, 3.f}})
+    binary.append(reinterpret_cast<const char*>(v.data()), sizeof v);
+  for (const std::array<int, 3>& t : {std::array{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}})
+    binary.append(1, 3).append(reinterpret_cast<const char*>(t.data()), sizeof t);
+  std::string binary_head = head;
+  binary_head.replace(head.find("ascii"), 5, "binary_little_endian");
+  for (const bool capitals : {false, true})
+    for (const char* line_end : {"\n", "\r\n"}) {
+      const auto shaped = [&](std::string text) {
+        if (capitals)
+          for (char& c : text) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c;
+        return with_ends(text, line_end);
+      };
+      expect_extent(good("t.ply", shaped(head) + with_ends(body, line_end)), {0, 0, 0}, {2, 1, 3});
+      expect_extent(good("b.ply", shaped(binary_head) + binary), {0, 0, 0}, {2, 1, 3});
+    }
+}
+
+TEST_F(LoadMesh, TextStlMayHaveCapitalsAndBlankLinesFirst) {
+  std::string capitals = stl;
+  for (char& c : capitals) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c;
+  for (const std::string& text : {capitals, "\n\r\n  " + stl, "\t" + capitals})
+    expect_extent(good("t.stl", text), {0, 0, 0}, {2, 1, 3});
+  EXPECT_THAT(refusal("cut.stl", binary_stl().substr(0, 200)), HasSubstr("is no STL, or cut short"));  // begins with "solid", too
+  EXPECT_THAT(refusal("cut.stl", stl.substr(0, 60)), HasSubstr("is it cut short? Export it again"));
+}
+
 TEST_F(LoadMesh, OtherKindsOfFilesAreNamed) {
   EXPECT_THAT(refusal("a.obj", "<!DOCTYPE html>"), HasSubstr("a.obj: is a web page"));
   EXPECT_THAT(refusal("a.stl", "version https://git-lfs.github.com/spec/v1\n"), HasSubstr("git lfs pull"));
@@ -374,6 +409,50 @@ TEST_F(LoadMesh, GltfExtensionsThatMoveSurfacesAreRefusedByName) {
   whole_numbers.replace(whole_numbers.find("5126"), 4, "5122");
   EXPECT_THAT(refusal("a.gltf", whole_numbers), HasSubstr("(KHR_mesh_quantization), which are not read"));
   EXPECT_THAT(refusal("b.gltf", glb()), HasSubstr("is a GLB file; name it .glb"));
+}
+
+TEST_F(LoadMesh, GltfMorphTargetsThatMoveVerticesAreRefused) {
+  const auto with_weights = [&](const std::string& weights) {
+    return gltf(R"({"mesh":0,"weights":[)" + weights + "]}", R"({"nodes":[0]})");
+  };
+  for (const char* moved : {"0,1", "0.5", "-1"})
+    EXPECT_THAT(refusal("a.gltf", with_weights(moved)), HasSubstr("is shaped by morph targets")) << moved;
+  EXPECT_EQ(good("a.gltf", with_weights("0,0.0")).centred.mesh.triangles.size(), 2u);
+}
+
+/// A COLLADA file of a square whose corners follow one bone, which is at `bone`; the node of the skin is elsewhere.
+std::string skinned_collada(const std::string& bone) {
+  const auto source = [](const char* id, const char* kind, int count, const std::string& values, int stride, const char* type) {
+    return std::string("<source id='") + id + "'><" + kind + "_array id='" + id + "a' count='" + std::to_string(count) + "'>" +
+           values + "</" + kind + "_array><technique_common><accessor source='#" + id + "a' count='" +
+           std::to_string(count / stride) + "' stride='" + std::to_string(stride) + "'><param name='" +
+           (stride == 3 ? "X" : "TRANSFORM") + "' type='" + type + "'/>" +
+           (stride == 3 ? "<param name='Y' type='float'/><param name='Z' type='float'/>" : "") +
+           "</accessor></technique_common></source>";
+  };
+  const std::string one = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1";
+  return "<COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' version='1.4.1'><asset><up_axis>Z_UP</up_axis></asset>"
+         "<library_geometries><geometry id='g'><mesh>" +
+         source("p", "float", 12, "0 0 0 1 0 0 1 1 0 0 1 0", 3, "float") +
+         "<vertices id='v'><input semantic='POSITION' source='#p'/></vertices><triangles count='2'><input semantic='VERTEX' "
+         "source='#v' offset='0'/><p>0 1 2 0 2 3</p></triangles></mesh></geometry></library_geometries><library_controllers>"
+         "<controller id='c'><skin source='#g'><bind_shape_matrix>" +
+         one + "</bind_shape_matrix>" + source("j", "Name", 1, "bone", 1, "name") +
+         source("i", "float", 16, one, 16, "float4x4") + source("w", "float", 1, "1", 1, "float") +
+         "<joints><input semantic='JOINT' source='#j'/><input semantic='INV_BIND_MATRIX' source='#i'/></joints><vertex_weights "
+         "count='4'><input semantic='JOINT' source='#j' offset='0'/><input semantic='WEIGHT' source='#w' offset='1'/><vcount>1 1 "
+         "1 1</vcount><v>0 0 0 0 0 0 0 0</v></vertex_weights></skin></controller></library_controllers><library_visual_scenes>"
+         "<visual_scene id='s'><node id='bone' sid='bone' type='JOINT'><translate>" +
+         bone +
+         "</translate></node><node><translate>100 0 0</translate><instance_controller url='#c'><skeleton>#bone</skeleton>"
+         "</instance_controller></node></visual_scene></library_visual_scenes><scene><instance_visual_scene url='#s'/></scene>"
+         "</COLLADA>";
+}
+
+TEST_F(LoadMesh, SkinsFollowTheirBonesAtRest) {
+  const Extent there = extent(good("a.dae", skinned_collada("0 7 -3")).centred);
+  EXPECT_LT(length(there.low - Vec3d{0, 7, -3}), 1e-5) << there.low.x << " " << there.low.y << " " << there.low.z;
+  EXPECT_LT(length(there.high - Vec3d{1, 8, -3}), 1e-5);
 }
 
 TEST_F(LoadMesh, TrianglesOutsideOfTheSceneOfACollada) {

@@ -1,0 +1,18 @@
+// The text of TIFF tag 42112, in which GDAL keeps the unit, the scale and the offset of a band.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace sonar {
+
+/// Facts that the file states about its first band. A height is scale * value + offset.
+struct GdalMetadata {
+  std::optional<std::uint16_t> height_unit = {};  // code of the unit of length; other units, as of a sensor, are ignored
+  double scale = 1, offset = 0;                   // NaN if they are not finite numbers
+};
+
+GdalMetadata gdal_metadata_of(std::string_view text);
+
+}  // namespace sonar

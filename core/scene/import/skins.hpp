@@ -1,0 +1,16 @@
+// Places the vertices of meshes with bones, as a viewer shows them at rest.
+#pragma once
+
+#include <vector>
+
+#include "core/base/geometry.hpp"
+
+struct aiScene;
+
+namespace sonar {
+
+/// For each mesh of the scene: its vertices in the coordinates of the scene, with NaN for those that no bone moves; empty if it
+/// has no bones. Bones replace the transform of the node that shows the mesh.
+std::vector<std::vector<Vec3d>> skins_of(const aiScene& scene);
+
+}  // namespace sonar
