@@ -185,7 +185,6 @@ void Columns::guess_unit(const Words& words) {
   // True for times after 1973; seconds with so many digits are beyond every stamp.
   if (text.size() < 12) return;
   power_ = text.size() <= 14 ? 6 : text.size() <= 17 ? 3 : 0;
-  says_unit_ = true;
 }
 
 bool Columns::peek(const Words& words, double& stamp, Vec3d& position_m, std::string_view& of) const {

@@ -36,7 +36,8 @@ int unit_by_steps(const FirstLines& lines, int usual) {
   const double speed = speed_of(lines);
   if (usual == in_nanoseconds) {
     constexpr double least_step_ns = 5e5;  // 2000 lines a second
-    if (step >= least_step_ns) return usual;
+    constexpr double least_since_1970_ns = 1e17;
+    if (step >= least_step_ns || lines.stamps.front() >= least_since_1970_ns) return usual;
     return step < 5 ? in_seconds : step < 1000 ? in_milliseconds : in_microseconds;
   }
   constexpr double longest_step_s = 4, longest_wait_s = 1e5, slowest_m_s = 0.005, fastest_m_s = 20;

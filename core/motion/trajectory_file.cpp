@@ -128,7 +128,6 @@ class Reader {
   }
 
   void guess_unit() {
-    columns_->guess_unit(words_);
     if (columns_->says_unit()) return;
     constexpr std::size_t most_lines = 1000;
     FirstLines first;
@@ -149,10 +148,10 @@ class Reader {
       first.stamps.push_back(stamp);
       first.positions.push_back(position_m);
     }
-    if (first.stamps.empty()) return;
-    const int power = unit_by_steps(first, columns_->power());
+    const int power = first.stamps.empty() ? columns_->power() : unit_by_steps(first, columns_->power());
     unit_by_steps_ = power != columns_->power();
     columns_->set_power(power);
+    if (!unit_by_steps_) columns_->guess_unit(words_);
   }
 
   /// Sets the columns. True if the line was a header; else it is a line of numbers, or there is an error.

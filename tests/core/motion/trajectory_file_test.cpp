@@ -104,6 +104,9 @@ TEST(TrajectoryFile, StepsTellTheUnitOfStampsThatBeginAtZero) {
   expect(lines(60, 1, 0.5), "seconds", seconds(49 * 60), false);  // the corners of a course
   expect(lines(60, 1, 0), "seconds", seconds(49 * 60), false);
   expect("0 0 0 -3 0 0 0 1\n", "seconds", milliseconds(0), false);
+  expect("5000000000000 0 0 -3 0 0 0 1\n5000100000000 0.05 0 -3 0 0 0 1\n", "nanoseconds", milliseconds(100),
+         true);  // since a start
+  expect("1.403636580838555e+18,0,0,0,1,0,0,0\n1.403636580838556e+18,1,0,0,1,0,0,0\n", "nanoseconds", milliseconds(0), false);
 }
 
 TEST(TrajectoryFile, WhatOtherProgramsWriteIsRead) {
