@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "daemon/server/connections/work_rate.hpp"
 #include "daemon/server/system/listen.hpp"
 
 namespace sonar {
@@ -282,12 +283,9 @@ void Device::carry_out(const Serve& action) {
   auto arrived = arrived_.extract(action.connection);
   if (arrived.empty()) return;
   Arrived& from = arrived.mapped();
-  const Connection& served = *sonar_.connections().find(action.connection);
-  const std::string& peer = served.peer.name;
-  const auto rest =
-      newcomers_.pause_after(text_of(served.peer.ip), Session::at_once, limits_.input_bytes_per_s, WorkRate::Steady::now());
-  const Session::Setup setup{action.connection, network_.digest && from.role == Role::client, limits_, from.place, rest};
+  const Session::Setup setup{action.connection, network_.digest && from.role == Role::client, limits_, from.place};
   const auto session = std::make_shared<Session>(*this, std::move(from.socket), setup);
+  const std::string& peer = sonar_.connections().find(action.connection)->peer.name;
   if (from.role == Role::client) {
     report_visit(from.role, VisitLog::Kind::connected, "client connected", {{"client", peer}});
     parent_.on_client(*this, peer, true, {});

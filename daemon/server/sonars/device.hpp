@@ -17,7 +17,6 @@
 #include "daemon/emulator/sonar/sonar.hpp"
 #include "daemon/emulator/view/preview.hpp"
 #include "daemon/server/connections/listener.hpp"
-#include "daemon/server/connections/work_rate.hpp"
 #include "daemon/server/engine/simulator.hpp"
 #include "daemon/server/recording/recording_file.hpp"
 #include "daemon/server/sonars/beacon.hpp"
@@ -219,7 +218,6 @@ class Device final : public SessionParent {
 
   bool started_ = false, stopping_ = false;
   std::array<LogLimiter, static_cast<std::size_t>(Report::Topic::topics)> limiters_;
-  WorkRate newcomers_;  // connecting again and again gains no work at once
   LogLimiter faults_, observer_visits_, send_errors_;
   VisitLog visits_;
   std::vector<StreamDigest> digests_;

@@ -14,7 +14,7 @@ namespace {
 
 // Bytes the kernel may hold that are not yet on the wire. More would only make a slow client's picture older.
 constexpr int unsent_limit_bytes = 256 * 1024;
-constexpr std::size_t piece_bytes = 1024;  // of what a client sends, passed on at a time
+constexpr std::size_t piece_bytes = 256;  // of what a client sends, passed on at a time
 constexpr auto idle_watch = std::chrono::seconds(1);
 constexpr auto delivery_watch = std::chrono::milliseconds(1), fin_watch = std::chrono::milliseconds(50);
 
@@ -78,7 +78,6 @@ void Session::spawn(asio::awaitable<void> (Session::*part)()) {
 
 asio::awaitable<void> Session::read() {
   const auto self = shared_from_this();
-  if (setup_.rest.count() > 0) co_await rest(Steady::now() + setup_.rest);
   while (!over_) {
     error_code ec;
     const std::size_t n = co_await socket_.async_read_some(asio::buffer(received_), into(ec));

@@ -54,10 +54,9 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   struct Setup {
     ConnectionId id = 0;
-    bool digest = false;                         // compute the SHA-256 of the sent bytes
-    LimitConfig limits;                          // limits for one client
-    std::shared_ptr<const void> place;           // kept as long as the session lives
-    std::chrono::steady_clock::duration rest{};  // before the first bytes of the client are read
+    bool digest = false;                // compute the SHA-256 of the sent bytes
+    LimitConfig limits;                 // limits for one client
+    std::shared_ptr<const void> place;  // kept as long as the session lives
   };
   /// Limit for a client to take its last message after finish(); then it is reset. If its computer has acknowledged everything,
   /// the limit for its own FIN is `fin_limit`.
