@@ -86,19 +86,20 @@ class Levels {
 void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
   const Levels levels(ping, image.full());
   const double most_m = ping.request.settings.range_m;
-  const std::size_t from = static_cast<std::size_t>(fault.number("fraction") * static_cast<double>(image.rows()));
+  // Read once: a parameter is found by its name, which takes longer than a sample.
+  const double fraction = fault.number("fraction"), factor = fault.number("factor");
+  const std::size_t from = static_cast<std::size_t>(fraction * static_cast<double>(image.rows()));
   using E = FaultEffect;
   switch (fault.kind->effect) {
     case E::gain_step:
       return image.fill([&](std::size_t row, std::size_t beam) {
         const std::uint32_t code = image.get(row, beam);
-        return row < from ? code : levels.with(code, scaled(levels.of(code), fault.number("factor"), levels.full()));
+        return row < from ? code : levels.with(code, scaled(levels.of(code), factor, levels.full()));
       });
     case E::missing_rows:
       if (levels.are_of_ranges())
-        return image.fill([&](std::size_t row, std::size_t beam) {
-          return levels.at_range(image.get(row, beam), 1, most_m * fault.number("fraction"));
-        });
+        return image.fill(
+            [&](std::size_t row, std::size_t beam) { return levels.at_range(image.get(row, beam), 1, most_m * fraction); });
       return image.fill([&](std::size_t row, std::size_t beam) { return row < from ? image.get(row, beam) : 0; });
     case E::mirror: {
       Ping before = ping;
@@ -108,14 +109,11 @@ void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
     }
     case E::scale_range: {
       if (levels.are_of_ranges())
-        return image.fill([&](std::size_t row, std::size_t beam) {
-          return levels.at_range(image.get(row, beam), fault.number("factor"), most_m);
-        });
+        return image.fill(
+            [&](std::size_t row, std::size_t beam) { return levels.at_range(image.get(row, beam), factor, most_m); });
       Ping before = ping;
       const Image old(before);
-      const auto source_of = [&](std::size_t row) {
-        return static_cast<std::size_t>((static_cast<double>(row) + 0.5) / fault.number("factor"));
-      };
+      const auto source_of = [&](std::size_t row) { return static_cast<std::size_t>((static_cast<double>(row) + 0.5) / factor); };
       image.move_signal([&](std::size_t row, std::size_t beam) { return std::pair(source_of(row), beam); });
       return image.fill([&](std::size_t row, std::size_t beam) {
         const std::size_t source = source_of(row);
