@@ -9,6 +9,7 @@
 
 #include "core/text/format.hpp"
 #include "daemon/emulator/connections/metrics.hpp"
+#include "tests/is_sanitized.hpp"
 #include "tests/load/ping_reader.hpp"
 #include "tests/reliability/record.hpp"
 
@@ -16,12 +17,8 @@ namespace sonar::load {
 
 /// A few seconds each, with the same assertions but those that only hold on a quiet machine; set by --quick.
 inline bool quick = false;
-inline constexpr std::chrono::seconds patience{20};  // for anything that must happen
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-inline constexpr bool memory_is_ours = false;  // the sanitizer keeps what was freed
-#else
-inline constexpr bool memory_is_ours = true;
-#endif
+inline constexpr std::chrono::seconds patience{20};          // for anything that must happen
+inline constexpr bool memory_is_ours = !test::is_sanitized;  // a sanitizer keeps what was freed
 
 using text::format;
 

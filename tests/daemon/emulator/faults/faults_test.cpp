@@ -8,6 +8,7 @@
 
 #include "daemon/config/fault_support.hpp"
 #include "tests/daemon/emulator/sonar/virtual_time.hpp"
+#include "tests/is_sanitized.hpp"
 
 namespace sonar {
 namespace {
@@ -269,8 +270,9 @@ TEST(FaultJournals, NameTheFirstByteThatDiffersAThousandTimes) {
       {"D28", {}}};
   Played undisturbed(std::nullopt);
   const protocol::Bytes expected = undisturbed.bytes();
+  constexpr int wanted = test::is_sanitized ? 100 : 1000;
   int injections = 0;
-  for (int seed = 1; injections < 1000; ++seed) {
+  for (int seed = 1; injections < wanted; ++seed) {
     const auto& [kind, with] = kinds[static_cast<std::size_t>(seed) % kinds.size()];
     FaultRecord fault = at_ping(kind, 2 + static_cast<std::uint64_t>(seed) % 20, with);
     fault.lasts.pings = 1;
@@ -404,7 +406,7 @@ TEST(Faults, HeldPingsComeInOrderAndAreCounted) {
 TEST(Faults, AThousandOfEveryKindLeaveNothing) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 4}\n")));
   for (const std::string& code : codes_of_oculus()) {
-    for (int i = 0; i < 1000; ++i) {
+    for (int i = 0; i < (test::is_sanitized ? 200 : 1000); ++i) {
       time.add_fault("front", record(code));
       if (i % 100 == 0) {
         const ConnectionId client = time.connect("front");
