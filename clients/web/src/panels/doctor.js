@@ -20,7 +20,7 @@ function item(finding, clear) {
 /// `steering.clear(fault)` ends it.
 export function drawDoctor(facts, steering) {
   const findings = facts.connection === 'open' ? facts.findings : null;
-  setText($('checked'), findings ? `checked ${Math.max(0, Math.round(now_s() - facts.checkedAt))} s ago` : dash);
+  setText($('checked'), findings ? `${Math.max(0, Math.round(now_s() - facts.checkedAt))} s ago` : dash);
   const noted = (findings ?? []).filter((f) => f.level !== 0).sort((a, b) => b.level - a.level);
   const faults = facts.connection !== 'open' ? [] : activeTroubles(facts).filter((f) => !f.waiting).map((f) => (
     { level: 2, check: 'fault', text: `A fault acts on ${f.sonar || 'every sonar'}: ${titleOf(f.trouble)}.`, cure: f.ends_ns ? 'It ends by itself, or' : '' }));
