@@ -26,6 +26,9 @@ HTTP = "http://127.0.0.1:8088/"
 VIEWS = {"aris": ("aris", "2.6,2.9,-3.2", "0,0,214.5", ()),
          "ping360": ("ping360", "0,0.6,-4.4", "0,0,0", ("--range", "8")),
          "sonar-3d15": ("3d15", "-7,0,-3", "0,0,0", ())}
+# What the page shows on an idle computer: the rate that the driver asked for, and no warning above the picture.
+IDLE = "parseFloat(document.querySelector('#rate').textContent) > 9.5 && !document.querySelector('#badges').children.length"
+IDLE_WITHIN_S = 60
 WIDTH = 360
 PAIR = (580, 163, 1160, 326)  # of the contact sheet: a ping beside its labels
 
@@ -47,12 +50,17 @@ def page(path, width, height):
     """The demo with one driver at 10 Hz, after ten seconds."""
     with Daemon(None, str(SONARD)), Browser() as browser, \
             subprocess.Popen([SONARCTL, "listen", "--rate", "10", "--quiet"], stdout=subprocess.DEVNULL) as driver:
-        opened = browser.open(HTTP, width, height, scale=2, touch=width < 800)  # the scene of a software renderer has half the pixels
-        shown(opened)
-        time.sleep(10)
-        opened.picture(path)
-        opened.close()
-        driver.terminate()
+        try:
+            opened = browser.open(HTTP, width, height, scale=2, touch=width < 800)  # the scene of a software renderer has half the pixels
+            shown(opened)
+            time.sleep(10)
+            opened.wait(IDLE, IDLE_WITHIN_S)
+            opened.picture(path)
+            opened.close()
+        except AssertionError:
+            raise SystemExit(f"{path}: the computer is busy, and the page shows {opened.text('#rate')}: repeat it later") from None
+        finally:
+            driver.terminate()
     keep(Image.open(path).resize((width, height), Image.Resampling.LANCZOS), path, 256)
 
 
