@@ -15,7 +15,7 @@ struct Kind {
   std::string_view begins, says;
 };
 
-constexpr std::array<Kind, 14> kinds{
+constexpr std::array<Kind, 16> kinds{
     {{"\x1f\x8b"sv, "is compressed with gzip; unpack it (gunzip)"},
      {"PK\x03\x04"sv, "is a zip archive; unpack it (unzip)"},
      {"BZh"sv, "is compressed with bzip2; unpack it (bunzip2)"},
@@ -27,6 +27,8 @@ constexpr std::array<Kind, 14> kinds{
      {"\x89HDF"sv, "is HDF5 (NetCDF-4 and BAG are, too); convert it: gdal_translate -of GTiff IN OUT.tif"},
      {"CDF\x01"sv, "is NetCDF; convert it: gdal_translate -of GTiff IN OUT.tif"},
      {"CDF\x02"sv, "is NetCDF; convert it: gdal_translate -of GTiff IN OUT.tif"},
+     {"CDF\x05"sv, "is NetCDF; convert it: gdal_translate -of GTiff IN OUT.tif"},
+     {"LASF"sv, "is a cloud of points (LAS, LAZ); make a grid or a mesh of it"},
      {"%PDF"sv, "is a PDF document"},
      {"\xff\xfe"sv, "is text in UTF-16; save it as UTF-8"},
      {"\xfe\xff"sv, "is text in UTF-16; save it as UTF-8"},

@@ -99,7 +99,11 @@ class WktReader {
         begin(upper(word));
         word.clear();
       } else if (c == ',' || c == ']' || c == ')') {
-        if (open_.empty()) break;
+        if (open_.empty() && c != ',') break;
+        if (open_.empty()) {  // ESRI appends the vertical system
+          word.clear();
+          continue;
+        }
         Open& last = open_.back();
         if (last.commas == 1 || last.commas == 2) last.values[last.commas - 1u] = word;
         ++last.commas;
@@ -138,7 +142,8 @@ class WktReader {
     if (open_.empty() || open_.back().commas > 0) return;
     Open& last = open_.back();
     last.name = name;
-    if (system_.geographic && open_.size() == system_at_ + 1) name_ = given.substr(0, longest_name);
+    const bool is_system = is_one_of(last.word, in_lengths) || is_one_of(last.word, in_degrees);
+    if (is_system && system_.geographic && open_.size() == system_at_ + 1) name_ = given.substr(0, longest_name);
     if (!system_.utm && (open_.size() == 1 || is_one_of(last.word, in_lengths))) system_.utm = utm_of_name(name);
     if (last.word == "PROJECTION" || last.word == "METHOD") {
       last.name = without_blanks(last.name);
@@ -150,6 +155,10 @@ class WktReader {
     const Open unit = open_.back();
     open_.pop_back();
     const auto first = height_number(unit.values[0]), second = height_number(unit.values[1]);
+    const bool of_vertical = !open_.empty() && is_one_of(open_.back().word, of_heights);
+    const bool downwards = unit.word == "AXIS" ? upper(unit.values[0]) == "DOWN"
+                                               : unit.word == "PARAMETER" && unit.name == "DIRECTION" && first.value_or(1) < 0;
+    if (of_vertical && downwards) system_.depths = open_.back().name;
     if (unit.word == "PARAMETER" && first) take_parameter(unit.name, *first);
     if ((unit.word == "SPHEROID" || unit.word == "ELLIPSOID") && first && second) modern_ = is_modern_ellipsoid(*first, *second);
     if (unit.word != "UNIT" && unit.word != "LENGTHUNIT") return;

@@ -20,26 +20,40 @@ class Words {
   explicit Words(std::string text)
       : text_(std::move(text)), at_(text_.starts_with(byte_order_mark) ? byte_order_mark.size() : 0) {}
   std::string_view next() {
-    while (at_ < text_.size() && is_space(text_[at_])) line_ += text_[at_++] == '\n';
+    while (at_ < text_.size() && is_between(text_[at_])) line_ += text_[at_++] == '\n';
     const std::size_t from = at_;
-    while (at_ < text_.size() && !is_space(text_[at_])) ++at_;
+    while (at_ < text_.size() && !is_between(text_[at_])) ++at_;
     return std::string_view(text_).substr(from, at_ - from);
   }
   std::size_t line() const { return line_; }
-  void rewind(std::string_view word) { at_ -= word.size(); }
+  /// The heights begin with this word, the last one that was read.
+  void end_header(std::string_view word) { at_ -= word.size(), in_header_ = false; }
 
  private:
-  static bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+  /// Some programs write "ncols = 4" or "ncols: 4".
+  bool is_between(char c) const {
+    return c == ' ' || c == '\t' || c == '\n' || c == '\r' || (in_header_ && (c == '=' || c == ':'));
+  }
   std::string text_;
   std::size_t at_, line_ = 1;
+  bool in_header_ = true;
 };
 
 struct Header {
   std::size_t columns = 0, rows = 0;
-  double x = 0, y = 0, cell_x = 0, cell_y = 0;
-  bool centred = false;  // xllcenter rather than xllcorner
+  double x = 0, y = 0, cell_x = 0, cell_y = 0;  // x, y: the middle of the cell in the south-west
+  bool has_place = true;
   std::string no_data = "-9999";
 };
+
+/// The word as this reader names it: without regard to capitals, "_" and the British spelling.
+std::string key_of(std::string_view word) {
+  std::string key = small_letters(word.substr(0, 20));
+  std::erase(key, '_');
+  if (key.starts_with("nodata")) return "nodata_value";
+  if (key.ends_with("centre")) key.replace(key.size() - 2, 2, "er");
+  return key;
+}
 
 Result<Header> read_header(Words& words) {
   std::map<std::string, double> found;
@@ -53,15 +67,14 @@ Result<Header> read_header(Words& words) {
         found.contains("ncols") && found.contains("nrows") && (found.contains("cellsize") || found.contains("dy"));
     const bool is_name = !word.empty() && ((word[0] | 32) >= 'a' && (word[0] | 32) <= 'z');
     if (word.empty() || height_number(word) || (is_whole && !is_name)) {
-      words.rewind(word);
+      words.end_header(word);
       break;
     }
-    std::string key = small_letters(word.substr(0, 20));
-    if (key == "nodata") key = "nodata_value";
+    const std::string key = key_of(word);
     static constexpr std::array<const char*, 10> keys{"ncols",     "nrows",    "xllcorner", "yllcorner", "xllcenter",
                                                       "yllcenter", "cellsize", "dx",        "dy",        "nodata_value"};
     if (std::none_of(keys.begin(), keys.end(), [&](const char* k) { return key == k; })) {
-      return bad(word_text(key) + " is not a header word of an ESRI ASCII grid");
+      return bad(word_text(key) + " is not a header word of an ESRI ASCII grid; others: gdal_translate -of AAIGrid IN OUT.asc");
     }
     const std::string_view value = words.next();
     const auto number = height_number(value);
@@ -74,10 +87,15 @@ Result<Header> read_header(Words& words) {
   for (const char* key : {"ncols", "nrows", cell_x, "dy"}) {
     if (!found.contains(key)) return bad(std::string(key) + " is missing in the header");
   }
-  h.centred = found.contains("xllcenter") || found.contains("yllcenter");
-  h.x = h.centred ? found["xllcenter"] : found["xllcorner"];
-  h.y = h.centred ? found["yllcenter"] : found["yllcorner"];
   h.cell_x = found["dx"], h.cell_y = found["dy"];
+  const bool has_x = found.contains("xllcorner") || found.contains("xllcenter"),
+             has_y = found.contains("yllcorner") || found.contains("yllcenter");
+  if (has_x != has_y) return bad(std::string(has_x ? "y" : "x") + "llcorner is missing in the header");
+  h.has_place = has_x;
+  const auto middle_of_first = [&](const char* corner, const char* centre, double cell) {
+    return found.contains(centre) ? found[centre] : found[corner] + 0.5 * cell;
+  };
+  h.x = middle_of_first("xllcorner", "xllcenter", h.cell_x), h.y = middle_of_first("yllcorner", "yllcenter", h.cell_y);
   const double columns = found["ncols"], rows = found["nrows"];
   const bool whole = columns == std::floor(columns) && rows == std::floor(rows);
   if (!whole || columns < 2 || rows < 2 || columns * rows > static_cast<double>(max_mesh_triangles) / 2) {
@@ -117,13 +135,14 @@ Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const He
   }
   if (!words.next().empty()) return bad("more heights than ncols x nrows");
 
-  raw.turn_rows(columns);                          // the file starts in the north, the grid in the south
-  const double first = header->centred ? 0 : 0.5;  // a corner is half a cell from the first height
-  for (std::size_t i = 0; i < columns; ++i) raw.x.push_back(header->x + (static_cast<double>(i) + first) * header->cell_x);
-  for (std::size_t j = 0; j < rows; ++j) raw.y.push_back(header->y + (static_cast<double>(j) + first) * header->cell_y);
+  raw.turn_rows(columns);  // the file starts in the north, the grid in the south
+  for (std::size_t i = 0; i < columns; ++i) raw.x.push_back(header->x + static_cast<double>(i) * header->cell_x);
+  for (std::size_t j = 0; j < rows; ++j) raw.y.push_back(header->y + static_cast<double>(j) * header->cell_y);
   raw.fill_values = values.fill_values();
   auto grid = finish_heights(std::move(raw), options);
   if (!grid) return bad(grid.error().text);
+  if (!header->has_place && !options.centred)
+    grid->notes.push_back("its header has neither xllcorner nor yllcorner; they are taken as 0");
   return grid;
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <set>
 
+#include "core/base/letters.hpp"
+
 namespace sonar {
 namespace {
 
@@ -26,9 +28,10 @@ enum Key : std::uint16_t {
   false_northing = 3083,
   natural_origin_scale = 3092,
   vertical_system = 4096,
+  vertical_citation = 4097,
   vertical_units = 4099,
 };
-constexpr std::uint16_t projected = 1, geographic = 2, geocentric = 3, degree = 9102, user_defined = 32767;
+constexpr std::uint16_t projected = 1, geographic = 2, geocentric = 3, degree = 9102, other_degree = 9122, user_defined = 32767;
 constexpr std::uint16_t web_mercator = 3857, old_web_mercator = 3785, transverse_mercator = 1;
 constexpr std::uint16_t numbers_tag = 34736, texts_tag = 34737;
 
@@ -42,7 +45,7 @@ Result<double> length_unit(std::optional<std::uint16_t> key) {
       return 0.3048;
     case unit_us_survey_foot:
       return 1200.0 / 3937;
-    case 9036:
+    case unit_kilometre:
       return 1000;
     default:
       return failure(ErrorKind::bad_data,
@@ -57,6 +60,13 @@ std::optional<std::uint16_t> unit_of_height_system(std::uint16_t system) {
   if (in_feet.contains(system)) return unit_foot;
   if (in_us_survey_feet.contains(system)) return unit_us_survey_foot;
   return std::nullopt;
+}
+
+/// Whether a height system counts downwards; from the EPSG data set 10.0.
+bool counts_downwards(std::uint16_t system) {
+  static const std::set<std::uint16_t> depths{5336, 5612, 5614, 5706, 5715, 5734, 5739, 5789, 5831, 5861, 5862, 5863, 5864, 5865,
+                                              5866, 5867, 5873, 6357, 6358, 6359, 7976, 8051, 8053, 8358, 9287, 9288, 9672};
+  return depths.contains(system);
 }
 
 std::optional<std::uint16_t> code_of(const GeoKeys& keys, std::uint16_t key) {
@@ -119,12 +129,14 @@ std::string GeoKeys::text_of(std::uint16_t key) const {
 
 Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::uint16_t> height_unit) {
   CoordinateSystem system;
-  const auto model = keys.value_of(model_type);
+  auto model = keys.value_of(model_type);
+  if (!model && code_of(keys, projected_system)) model = projected;  // some programs state only the system itself
+  if (!model && code_of(keys, geographic_system)) model = geographic;
   if (model == geocentric)
     return failure(ErrorKind::bad_data, "has geocentric coordinates; convert them to degrees: gdalwarp -t_srs EPSG:4326");
   if (model == geographic) {
     system.geographic = true;
-    if (const auto unit = keys.value_of(angular_units); unit.value_or(degree) != degree)
+    if (const auto unit = keys.value_of(angular_units).value_or(degree); unit != degree && unit != other_degree)
       return failure(ErrorKind::bad_data, "has angles that are not in degrees; convert it to degrees: gdalwarp -t_srs EPSG:4326");
     system.other_datum = !has_modern_datum(keys).value_or(true);
     if (system.other_datum) system.name = name_by(code_of(keys, geographic_system), keys, geographic_citation);
@@ -136,6 +148,10 @@ Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::
     const bool is_named = code || keys.value_of(method) || !keys.text_of(projected_citation).empty();
     if (is_named && !system.utm && !system.web_mercator) system.name = name_by(code, keys, projected_citation);
   }
+  const auto vertical = code_of(keys, vertical_system);
+  const std::string vertical_name = keys.text_of(vertical_citation);
+  if (vertical ? counts_downwards(*vertical) : small_letters(vertical_name).find("depth") != vertical_name.npos)
+    system.depths = name_by(vertical, keys, vertical_citation);
   if (!height_unit) height_unit = keys.value_of(vertical_units);
   if (!height_unit) height_unit = unit_of_height_system(keys.value_of(vertical_system).value_or(0));
   const auto of_heights = length_unit(height_unit);

@@ -39,6 +39,6 @@ class GeoKeys {
 Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::uint16_t> height_unit);
 
 /// Codes of units of length.
-enum : std::uint16_t { unit_metre = 9001, unit_foot = 9002, unit_us_survey_foot = 9003 };
+enum : std::uint16_t { unit_metre = 9001, unit_foot = 9002, unit_us_survey_foot = 9003, unit_kilometre = 9036 };
 
 }  // namespace sonar

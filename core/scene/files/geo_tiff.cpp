@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <memory>
 #include <set>
 #include <span>
@@ -13,6 +14,7 @@
 
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
+#include "core/scene/files/gdal_metadata.hpp"
 #include "core/scene/files/geo_keys.hpp"
 #include "core/scene/files/height_values.hpp"
 #include "core/text/format.hpp"
@@ -87,26 +89,13 @@ struct Georeference {
   double x = 0, y = 0, step_x = 0, step_y = 0;
 };
 
-/// GDAL's unit of a band. Other units, such as those of a sensor, are ignored.
-std::optional<std::uint16_t> unit_of_band(std::string_view metadata) {
-  const std::string_view begin = "role=\"unittype\">";
-  const std::size_t at = metadata.find(begin);
-  if (at == metadata.npos) return std::nullopt;
-  const std::string_view word = metadata.substr(at + begin.size(), metadata.find('<', at) - at - begin.size());
-  if (word == "ft" || word == "foot" || word == "feet" || word == "international foot") return unit_foot;
-  if (word == "US survey foot" || word == "ftUS" || word == "us-ft") return unit_us_survey_foot;
-  return word == "m" || word == "metre" || word == "meter" || word == "metres" || word == "meters"
-             ? std::optional<std::uint16_t>(unit_metre)
-             : std::nullopt;
-}
-
-/// Whether an item of that role has another value than the neutral one, which changes no height.
-bool has_other(std::string_view metadata, std::string_view role, double neutral) {
-  for (std::size_t at = metadata.find(role); at != metadata.npos; at = metadata.find(role, at + 1)) {
-    const std::size_t from = at + role.size();
-    if (height_number(metadata.substr(from, metadata.find('<', from) - from)) != neutral) return true;
-  }
-  return false;
+/// The name of a compression that is not read; its code if the name is unknown.
+std::string name_of_compression(std::uint16_t code) {
+  static const std::map<std::uint16_t, const char*> names{
+      {6, "JPEG"},        {7, "JPEG"},        {34712, "JPEG 2000"},           {34887, "LERC"}, {34925, "LZMA"}, {50001, "WebP"},
+      {50002, "JPEG XL"}, {52546, "JPEG XL"}, {COMPRESSION_ZSTD, "Zstandard"}};
+  const auto name = names.find(code);
+  return name != names.end() ? name->second : "code " + std::to_string(code);
 }
 
 class GeoTiffReader {
@@ -199,8 +188,8 @@ class GeoTiffReader {
     static const std::set<std::uint16_t> codecs{COMPRESSION_NONE,    COMPRESSION_LZW,      COMPRESSION_ADOBE_DEFLATE,
                                                 COMPRESSION_DEFLATE, COMPRESSION_PACKBITS, COMPRESSION_ZSTD};
     if (!codecs.contains(compression) || !TIFFIsCODECConfigured(compression))
-      return bad("compressed in a way that is not read here (code " + std::to_string(compression) +
-                 "); write it otherwise: gdal_translate -co COMPRESS=DEFLATE");
+      return bad("compressed in a way that is not read here (" + name_of_compression(compression) +
+                 "); write it otherwise: gdal_translate -co COMPRESS=DEFLATE IN OUT.tif");
     const std::uint64_t block = TIFFIsTiled(tiff_) ? TIFFTileSize64(tiff_) : TIFFScanlineSize64(tiff_);
     if (block == 0 || block > most_block_bytes || (!TIFFIsTiled(tiff_) && TIFFStripSize64(tiff_) > 4 * most_block_bytes))
       return bad("its blocks have more than 64 MiB; write it in tiles: gdal_translate -co TILED=YES");
@@ -209,14 +198,16 @@ class GeoTiffReader {
 
   Result<Georeference> read_georeference() {
     const auto more = values_of<char>(tiff_, gdal_metadata, TIFF_ASCII);
-    const std::string_view metadata(more.data(), more.size());
-    // With a scale or an offset, the values of cells are not heights. Without this error they would be silently wrong.
-    if (has_other(metadata, "role=\"scale\">", 1) || has_other(metadata, "role=\"offset\">", 0))
-      return bad("stores heights with a scale or an offset; write the heights themselves: gdal_translate -unscale -ot Float32");
+    const GdalMetadata metadata = gdal_metadata_of(std::string_view(more.data(), more.size()));
+    raw_.scale = metadata.scale, raw_.offset = metadata.offset;
+    if (!(std::abs(raw_.scale) > 0 && std::abs(raw_.scale) <= 1000 && std::abs(raw_.offset) <= 1e7))
+      return bad(
+          "stores heights with a scale or an offset that is no number or too large; write the heights themselves: "
+          "gdal_translate -unscale -ot Float32 IN OUT.tif");
     const auto texts = values_of<char>(tiff_, key_texts, TIFF_ASCII);
     const GeoKeys keys(values_of<std::uint16_t>(tiff_, key_directory, TIFF_SHORT),
                        values_of<double>(tiff_, key_numbers, TIFF_DOUBLE), std::string(texts.begin(), texts.end()));
-    auto system = system_of_keys(keys, unit_of_band(metadata));
+    auto system = system_of_keys(keys, metadata.height_unit);
     if (!system) return tl::make_unexpected(system.error());
     raw_.system = *std::move(system);
 
@@ -227,7 +218,9 @@ class GeoTiffReader {
     if (scale.size() >= 2 && tie.size() >= 6) {
       place = {tie[3] - tie[0] * scale[0], tie[4] + tie[1] * scale[1], scale[0], -scale[1]};
     } else if (matrix.size() == 16) {
-      if (matrix[1] != 0 || matrix[4] != 0) return bad("is rotated against its axes; straighten it: gdalwarp");
+      constexpr double rounding = 1e-7;  // it moves no cell by a tenth of its size
+      if (std::abs(matrix[1]) > rounding * std::abs(matrix[0]) || std::abs(matrix[4]) > rounding * std::abs(matrix[5]))
+        return bad("is rotated against its axes; straighten it: gdalwarp IN OUT.tif");
       place = {matrix[3], matrix[7], matrix[0], matrix[5]};
     } else if (const auto beside = world_file()) {
       if (!raw_.system.geographic) raw_.system = system_by_prj(file_);

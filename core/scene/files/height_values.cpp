@@ -126,6 +126,24 @@ std::string note_of_system(const CoordinateSystem& system) {
                    "longitude: gdalwarp -t_srs EPSG:4326 IN OUT.tif";
 }
 
+/// Turns stored values into heights. Fill values are stored ones and must have become NaN before.
+void apply_scale(RawHeights& raw, std::vector<std::string>& notes) {
+  if (raw.scale == 1 && raw.offset == 0) return;
+  for (float& z : raw.z) z = static_cast<float>(raw.scale * static_cast<double>(z) + raw.offset);
+  notes.push_back(
+      text::format("its heights are %.9g times the stored values, plus %.9g, as the file says", raw.scale, raw.offset));
+}
+
+/// A note about a vertical system that counts downwards. Its values decide, because many files only copy the system's name.
+void note_depths(const RawHeights& raw, double z_scale, std::vector<std::string>& notes) {
+  if (raw.system.depths.empty() || z_scale < 0) return;
+  const auto positive = std::count_if(raw.z.begin(), raw.z.end(), [](float z) { return z > 0; }),
+             negative = std::count_if(raw.z.begin(), raw.z.end(), [](float z) { return z < 0; });
+  notes.push_back(
+      "its vertical system, " + text::printable(raw.system.depths) + ", counts depths downwards" +
+      (positive > negative ? ": set z_scale: -1" : ", but its values are negative, as heights below the surface are"));
+}
+
 std::string place_text(const Geodetic& place) {
   return text::format("latitude %.6f, longitude %.6f", deg_from_rad(place.latitude_rad), deg_from_rad(place.longitude_rad));
 }
@@ -275,6 +293,7 @@ void RawHeights::turn_rows(std::size_t columns) {
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) {
   HeightGrid grid;
   take_out_fills(raw, grid.notes);
+  apply_scale(raw, grid.notes);
   if (raw.system.web_mercator && options.geographic.value_or(true)) convert_web_mercator(raw, grid.notes);
   const bool said = options.geographic.has_value() || raw.system.geographic.has_value();
   const bool geographic = options.geographic.value_or(raw.system.geographic.value_or(!said && shows_degrees(raw)));
@@ -296,6 +315,7 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
     return failure(ErrorKind::bad_data,
                    "origin is for a grid in degrees or UTM; write geographic: true or utm: 33N (its zone) if it is one, else "
                    "remove it");
+  note_depths(raw, options.z_scale, grid.notes);
   const auto holes = static_cast<std::size_t>(std::count_if(raw.z.begin(), raw.z.end(), [](float z) { return std::isnan(z); }));
   if (holes > 0)
     grid.notes.push_back(text::format("%zu of its %zu heights (%.2g %%) are no data: holes in the ground", holes, raw.z.size(),

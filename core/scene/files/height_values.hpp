@@ -44,6 +44,7 @@ struct CoordinateSystem {
   std::optional<UtmZone> utm = {};
   /// The name that the file gives it; empty for systems without a name, and for local coordinates.
   std::string name = {};
+  std::string depths = {};   // the name of a vertical system that counts downwards; empty for all others
   bool other_datum = false;  // degrees that may be some 100 m from those of WGS 84
 };
 
@@ -58,6 +59,7 @@ struct RawHeights {
   std::vector<float> z = {};           // [y][x], NaN: no data
   std::size_t fill_values = 0;         // number of undeclared fill values beyond every height, which have become NaN
   CoordinateSystem system = {};
+  double scale = 1, offset = 0;  // a height is scale * z + offset
 
   /// Reverses the order of the rows, for files that begin in the north. `columns`: those of `z`.
   void turn_rows(std::size_t columns);

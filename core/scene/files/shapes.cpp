@@ -46,8 +46,12 @@ std::string grid_by_content(const std::filesystem::path& file) {
     if (head->starts_with(magic)) return ".tif";
   if (head->starts_with(byte_order_mark)) head->erase(0, byte_order_mark.size());
   head->erase(0, head->find_first_not_of(" \t\r\n"));
-  const std::string word = small_letters(head->substr(0, 6));
-  return word == "ncols " || word == "ncols\t" ? ".asc" : "";
+  const std::string word = small_letters(head->substr(0, head->find_first_of(" \t\r\n=:")));
+  static constexpr std::array<std::string_view, 8> header_words{"ncols",     "nrows",     "xllcorner", "yllcorner",
+                                                                "xllcenter", "yllcenter", "cellsize",  "nodata_value"};
+  if (std::find(header_words.begin(), header_words.end(), word) != header_words.end()) return ".asc";
+  const bool is_number = !word.empty() && word.find_first_not_of("0123456789+-.,;e") == word.npos;
+  return is_number && mesh_extension(file) == ".asc" ? ".xyz" : "";  // points, as some programs name them
 }
 
 constexpr std::uint64_t memory_of_a_height = 64;  // bytes, while a grid becomes a mesh
@@ -212,23 +216,26 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   std::error_code no_size;
   const std::uintmax_t bytes = std::filesystem::file_size(path, no_size);
   begin_load_step("reading " + path.filename().string(), no_size ? 0 : bytes / 4);
+  const auto is_usable = [&] {
+    const auto begin = read_regular(path, text::kind_bytes);
+    const auto kind = text::unusable_kind(begin ? *begin : std::string_view());
+    if (!kind.empty()) file.fail(path.filename().string() + ": " + std::string(kind));
+    return kind.empty();
+  };
   if (extension == ".png") {
     const auto size = keys.required("size_m").numbers<2>(a_size);
     const auto height = keys.required("height_m").numbers<2>(Range::between(-1e5, 1e5));
-    if (size[0] <= 0 || size[1] <= 0) return {};
+    if (size[0] <= 0 || size[1] <= 0 || !is_usable()) return {};
     return from_grid(read_png_heights(path, size[0], size[1], height[0], height[1]), material, file, false);
   }
   using Read = Result<HeightGrid> (*)(const std::filesystem::path&, const HeightOptions&);
   static const std::map<std::string, Read> readers{
       {".asc", read_esri_heights}, {".xyz", read_xyz_heights}, {".tif", read_geo_tiff_heights}, {".tiff", read_geo_tiff_heights}};
-  const auto begin = read_regular(path, text::kind_bytes);
-  if (const auto kind = text::unusable_kind(begin ? *begin : std::string_view()); !kind.empty())
-    return file.fail(path.filename().string() + ": " + std::string(kind)), Shape{};
-  if (!readers.contains(extension)) {
-    static constexpr std::array<std::string_view, 4> of_tables{".csv", ".txt", ".dat", ".pts"};  // points, unless it is a grid
-    const bool table = std::find(of_tables.begin(), of_tables.end(), extension) != of_tables.end();
-    if (extension = grid_by_content(path); extension.empty() && table) extension = ".xyz";
-  }
+  if (!is_usable()) return {};
+  static constexpr std::array<std::string_view, 4> of_tables{".csv", ".txt", ".dat", ".pts"};  // points, unless it is a grid
+  const bool table = std::find(of_tables.begin(), of_tables.end(), extension) != of_tables.end();
+  if (const std::string by_content = grid_by_content(path); !by_content.empty() || !readers.contains(extension))
+    extension = by_content.empty() && table ? ".xyz" : by_content;
   if (const auto reader = readers.find(extension); reader != readers.end()) {
     HeightOptions options{.z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000))};
     const bool centred = options.centred = keys.optional("centred").boolean_or(false);
@@ -247,11 +254,16 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
       for (const std::string& note : grid->notes) scene.notes.push_back(path.filename().string() + ": " + note);
     return from_grid(grid, material, file, centred);
   }
+  static constexpr std::array<std::string_view, 8> pictures{".pgm", ".ppm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif", ".webp"};
+  const std::string own = mesh_extension(path), name = path.filename().string(), stem = path.stem().string();
+  if (std::find(pictures.begin(), pictures.end(), own) != pictures.end())
+    return file.fail("a picture whose format is not read; convert it: gdal_translate -of PNG " + name + " " + stem + ".png"),
+           Shape{};
   if (file.present() && !path.filename().empty())
     file.fail(
         "unknown height format; use a grey .png, an ESRI ASCII grid (.asc), .xyz or GeoTIFF (.tif); others, such as NetCDF "
         "and BAG: gdal_translate -of GTiff " +
-        path.filename().string() + " " + path.stem().string() + ".tif");
+        name + " " + stem + ".tif");
   return {};
 }
 

@@ -68,6 +68,18 @@ std::size_t index_on(const std::vector<double>& axis, double v) {
   return static_cast<std::size_t>(std::clamp(std::round((v - axis.front()) / (axis.back() - axis.front()) * last), 0.0, last));
 }
 
+/// Splits a line of column names, which may have blanks in them if there are commas, semicolons or tabs between them.
+std::size_t split_names(std::string_view line, Line& words) {
+  for (const char between : {';', ',', '\t'}) {
+    if (line.find(between) == line.npos) continue;
+    const std::size_t count = split(line, words, std::string_view(&between, 1));
+    for (std::size_t k = 0; k < count; ++k)
+      words[k].remove_prefix(std::min(words[k].find_first_not_of(" \t\""), words[k].size()));
+    return count;
+  }
+  return split(line, words);
+}
+
 /// Indices of the words of a line for east, north and height.
 struct Order {
   std::size_t x = 0, y = 1, z = 2;
@@ -93,7 +105,7 @@ Order order_by(const Line& names, std::size_t count) {
   if (order.z == count) order.z = count == 3 ? 3 - order.x - order.y : 2;
   const bool distinct = order.x != order.y && order.x != order.z && order.y != order.z && order.last() < count;
   if (!distinct) return {};
-  order.depth = small_letter(names[order.z].front()) == 'd';
+  order.depth = same_letters(names[order.z].substr(0, 1), "d");
   return order;
 }
 
@@ -111,10 +123,11 @@ bool has_decimal_commas(std::string_view line) {
 Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values, Order& order) {
   std::vector<Point> points;
   Line words;
-  std::size_t line = 0;
+  std::size_t line = 0, first_count = 0;
+  const char line_end = text.find('\n') == text.npos ? '\r' : '\n';
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::size_t end = std::min(text.find(line_end, at), text.size());
     const std::string_view this_line = text.substr(at, end - at);
     const std::size_t count = split(this_line, words);
     at = end + 1, ++line;
@@ -123,10 +136,13 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
       return failure(ErrorKind::bad_data, "line " + std::to_string(line) + ": " + what);
     };
     if (points.empty() && count >= 3 && !height_number(words[0]) && !height_number(words[1])) {
-      order = order_by(words, count);
+      const std::size_t names = split_names(this_line, words);
+      order = order_by(words, names);
       continue;
     }
-    if (points.empty() && has_decimal_commas(this_line)) return bad("numbers have a decimal comma; write points");
+    if (points.empty()) first_count = count;  // another number of words can come of decimal commas
+    if ((points.empty() || count != first_count) && has_decimal_commas(this_line))
+      return bad("numbers have a decimal comma; write points");
     if (count <= order.last()) return bad("three numbers are needed, x y z");
     const auto x = height_number(words[order.x]), y = height_number(words[order.y]), z = height_number(words[order.z]);
     if (!x || !y || !z) return bad("three numbers are needed, x y z");

@@ -17,7 +17,7 @@ namespace {
 using ::testing::HasSubstr;
 using tests::TemporaryFiles;
 
-/// A little-endian TIFF of one strip, from the format's description: field by field.
+/// A TIFF of one strip, from the format's description: field by field.
 struct TiffFile {
   struct Field {
     std::uint16_t tag, type;
@@ -92,19 +92,25 @@ struct TiffFile {
     }
     return out + more;
   }
-  std::string bytes() const {
+  /// `big`: the numbers of the directory are big-endian; `heights` stay as they are.
+  std::string bytes(bool big = false) const {
     std::vector<Field> sorted = fields;
     std::sort(sorted.begin(), sorted.end(), [](const Field& a, const Field& b) { return a.tag < b.tag; });
-    const auto word = [](std::uint32_t v) { return bytes_of(std::vector<std::uint32_t>{v}); };
-    const auto half = [](std::uint16_t v) { return bytes_of(std::vector<std::uint16_t>{v}); };
+    const auto ordered = [&](std::string numbers, std::size_t size) {
+      for (std::size_t at = 0; big && at < numbers.size(); at += size)
+        std::reverse(numbers.begin() + static_cast<std::ptrdiff_t>(at), numbers.begin() + static_cast<std::ptrdiff_t>(at + size));
+      return numbers;
+    };
+    const auto word = [&](std::uint32_t v) { return ordered(bytes_of(std::vector<std::uint32_t>{v}), 4); };
+    const auto half = [&](std::uint16_t v) { return ordered(bytes_of(std::vector<std::uint16_t>{v}), 2); };
     const std::size_t directory = 8 + heights.size() + heights.size() % 2;
-    std::string out = "II*" + std::string(1, '\0') + word(static_cast<std::uint32_t>(directory)) + heights, more;
+    std::string out = (big ? "MM" : "II") + half(42) + word(static_cast<std::uint32_t>(directory)) + heights, more;
     out.resize(directory);
     out += half(static_cast<std::uint16_t>(sorted.size()));
     const std::size_t behind = directory + 2 + 12 * sorted.size() + 4;
     for (const Field& f : sorted) {
       out += half(f.tag) + half(f.type) + word(f.count);
-      std::string value = f.value;
+      std::string value = ordered(f.value, f.value.size() / f.count);
       if (value.size() > 4) {
         out += word(static_cast<std::uint32_t>(behind + more.size()));
         more += value + std::string(value.size() % 2, '\0');
@@ -174,6 +180,68 @@ TEST_F(GeoTiff, HeightsInFeetBecomeMetresWhereverTheFileSaysIt) {
   ASSERT_TRUE(lengths);
   EXPECT_NEAR(lengths->z_m[3], -1, 1e-6);
   EXPECT_THAT(lengths->notes, ::testing::ElementsAre(HasSubstr("set z_scale: 0.304801 if they are")));
+}
+
+TEST_F(GeoTiff, StoredValuesAreScaledByTheFilesOwnNumbers) {
+  TiffFile tiff = TiffFile::of(3, 2, std::vector<std::int16_t>{900, 800, 700, 600, -32768, -1}).at(0, 100, 10, 10);
+  tiff.text(42113, "-1");
+  tiff.text(42112,
+            "<GDALMetadata>\n  <Item name=\"OFFSET\" sample=\"0\" role=\"offset\">-100</Item>\n"
+            "  <Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.1</Item>\n"
+            "  <Item name=\"SCALE\" sample=\"1\" role=\"scale\">7</Item>\n</GDALMetadata>");
+  const auto grid = read(tiff);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_FLOAT_EQ(grid->z_m[3], -10);
+  EXPECT_FLOAT_EQ(grid->z_m[0], -40);
+  EXPECT_TRUE(std::isnan(grid->z_m[1])) << "a fill value is a stored one";
+  EXPECT_TRUE(std::isnan(grid->z_m[2]));
+  EXPECT_THAT(grid->notes, ::testing::Contains(HasSubstr("0.1 times the stored values, plus -100")));
+}
+
+TEST_F(GeoTiff, ASystemOfDepthsIsNoted) {
+  const auto notes = [&](double sign, std::uint16_t system, double z_scale = 1) {
+    std::vector<float> heights;
+    for (const float z : {1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f}) heights.push_back(static_cast<float>(sign) * z);
+    const auto grid =
+        read(TiffFile::of(3, 2, heights).at(0, 100, 10, 10).keys({{{1024, 1}, {4096, system}}}), {.z_scale = z_scale});
+    return grid ? grid->notes : std::vector<std::string>{grid.error().text};
+  };
+  for (const std::uint16_t system : {std::uint16_t{5715}, std::uint16_t{5831}, std::uint16_t{5861}, std::uint16_t{9672}}) {
+    EXPECT_THAT(notes(1, system),
+                ::testing::ElementsAre(HasSubstr(std::to_string(system) + ", counts depths downwards: set z_scale: -1")));
+    EXPECT_THAT(notes(-1, system), ::testing::ElementsAre(HasSubstr("but its values are negative")));
+    EXPECT_THAT(notes(1, system, -1), ::testing::IsEmpty());
+  }
+  EXPECT_THAT(notes(1, 5714), ::testing::IsEmpty());  // heights above mean sea level
+}
+
+/// A stream of zlib with one block that is not compressed.
+std::string zlib_of(const std::string& data) {
+  std::uint32_t a = 1, b = 0;
+  for (const char c : data) a = (a + static_cast<unsigned char>(c)) % 65521, b = (b + a) % 65521;
+  const auto size = static_cast<std::uint16_t>(data.size()), not_size = static_cast<std::uint16_t>(~data.size());
+  std::string sum{static_cast<char>(b >> 8), static_cast<char>(b), static_cast<char>(a >> 8), static_cast<char>(a)};
+  return "\x78\x01\x01" + TiffFile::bytes_of(std::vector{size, not_size}) + data + sum;
+}
+
+TEST_F(GeoTiff, FloatingPointPredictorInBothByteOrders) {
+  const std::vector<float> heights{-1, -2.5f, -3, -1000.25f, -5, -6};
+  std::string predicted;
+  for (std::size_t row = 0; row < 2; ++row) {
+    std::string planes;  // all first bytes of a row, then all second ones; the first have the sign and the exponent
+    for (std::size_t k = 4; k-- > 0;)
+      for (std::size_t i = 0; i < 3; ++i) planes += TiffFile::bytes_of(heights)[4 * (3 * row + i) + k];
+    for (std::size_t i = planes.size(); i-- > 1;) planes[i] = static_cast<char>(planes[i] - planes[i - 1]);
+    predicted += planes;
+  }
+  TiffFile tiff = TiffFile::of(3, 2, heights).at(0, 100, 10, 10).without(259).without(279);
+  tiff.heights = zlib_of(predicted);
+  tiff.shorts(259, {8}), tiff.shorts(317, {3}), tiff.longs(279, {static_cast<std::uint32_t>(tiff.heights.size())});
+  for (const bool big : {false, true}) {
+    const auto grid = read_geo_tiff_heights(files.write("g.tif", tiff.bytes(big)), {});
+    ASSERT_TRUE(grid) << big << grid.error().text;
+    EXPECT_EQ(grid->z_m, (std::vector<float>{-1000.25f, -5, -6, -1, -2.5f, -3})) << big;
+  }
 }
 
 TEST_F(GeoTiff, WebMercatorHasItsLengthsOnTheGround) {
@@ -292,9 +360,15 @@ TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
   TiffFile jpeg = good().without(259);
   jpeg.shorts(259, {7});
   EXPECT_THAT(refusal(jpeg), HasSubstr("COMPRESS=DEFLATE"));
-  TiffFile scaled = good();
-  scaled.text(42112, R"(<GDALMetadata><Item name="SCALE" sample="0" role="scale">0.1</Item></GDALMetadata>)");
-  EXPECT_THAT(refusal(scaled), HasSubstr("gdal_translate -unscale"));
+  EXPECT_THAT(refusal(jpeg), HasSubstr("(JPEG)"));
+  TiffFile lerc = good().without(259);
+  lerc.shorts(259, {34887});
+  EXPECT_THAT(refusal(lerc), HasSubstr("(LERC); write it otherwise: gdal_translate -co COMPRESS=DEFLATE IN OUT.tif"));
+  for (const char* scale : {"0", "x", "1e9", "nan"}) {
+    TiffFile scaled = good();
+    scaled.text(42112, R"(<GDALMetadata><Item name="SCALE" sample="0" role="scale">)" + std::string(scale) + "</Item>");
+    EXPECT_THAT(refusal(scaled), HasSubstr("gdal_translate -unscale")) << scale;
+  }
   TiffFile unscaled = good();
   unscaled.text(42112, R"(<GDALMetadata><Item name="OFFSET" sample="0" role="offset">0</Item>)"
                        R"(<Item name="SCALE" sample="0" role="scale">1</Item></GDALMetadata>)");
@@ -303,6 +377,9 @@ TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
   TiffFile turned = TiffFile::of(3, 2, six);
   turned.doubles(34264, {10, 1, 0, 0, 1, -10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1});
   EXPECT_THAT(refusal(turned), HasSubstr("gdalwarp"));
+  TiffFile rounded = TiffFile::of(3, 2, six);
+  rounded.doubles(34264, {10, 1e-12, 0, 0, -1e-12, -10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1});
+  EXPECT_EQ(refusal(rounded), "accepted");
   EXPECT_THAT(refusal(TiffFile::of(3, 2, six).at(0, 0, 0, 10)), HasSubstr("cells whose sizes are not"));
   EXPECT_THAT(refusal(TiffFile::of(2, 2, std::vector<float>{1e9f, 1, 2, 3}).at(0, 0, 1, 1)),
               HasSubstr("row 1, column 1 is beyond 1e7 m"));

@@ -208,6 +208,20 @@ objects:
     files.write(other, "Ncols 2\nnrows 2\nxllcorner 1\nyllcorner 1\ncellsize 1\n1 2\n3 4\n");
     EXPECT_NEAR(parsed(object(grid), files.folder())->objects[0].in_world.position_m.x, 2, 1e-9);
   }
+  files.write("g.dat", "cellsize=1\nnrows=2\nncols=2\nxllcorner=1\nyllcorner=1\n1 2\n3 4\n");
+  files.write("points.asc", "1.5 1.5 3\n2.5 1.5 4\n1.5 2.5 1\n2.5 2.5 2\n");
+  for (const char* other : {"g.dat", "points.asc"})
+    EXPECT_NEAR(parsed(object("type: heightmap, material: sand, file: " + std::string(other)), files.folder())
+                    ->objects[0]
+                    .in_world.position_m.x,
+                2, 1e-9)
+        << other;
+  files.write("g.pgm", "P2\n");
+  files.write("lfs.png", "version https://git-lfs.github.com/spec/v1\n");
+  EXPECT_THAT(refusal(object("type: heightmap, file: lfs.png, material: sand, size_m: [1, 1], height_m: [0, 1]"), files.folder()),
+              HasSubstr("git lfs pull"));
+  EXPECT_THAT(refusal(object("type: heightmap, file: g.pgm, material: sand"), files.folder()),
+              HasSubstr("gdal_translate -of PNG g.pgm g.png"));
   files.write("g.bin", std::string("II*\0", 4));
   EXPECT_THAT(refusal(object("type: heightmap, file: g.bin, material: sand"), files.folder()),
               ::testing::Not(HasSubstr("unknown height format")));

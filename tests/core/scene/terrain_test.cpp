@@ -115,6 +115,27 @@ TEST(EsriGrid, KeepsFarCoordinatesInTheCentre) {
   EXPECT_FLOAT_EQ(read_esri_heights(files.write("g.asc", small_grid), {.z_scale = -1})->z_m[6], -1);
 }
 
+TEST(EsriGrid, HeadersOfOtherProgramsSayTheSame) {
+  TemporaryFiles files;
+  const std::string heights = "-1 -2 -3\n-4 -5 -9999\n";
+  for (const char* header : {"ncols = 3\nnrows = 2\nxllcorner = 100\nyllcorner = 200\ncellsize = 10\nNODATA_value = -9999\n",
+                             "NCOLS: 3\r\nNROWS: 2\r\nXLLCORNER: 100\r\nYLLCORNER: 200\r\nCELLSIZE: 10\r\nNODATA: -9999\r\n",
+                             "NoData_Value -9999\nCellSize 10\nYLLCENTRE 205\nXLLCENTRE 105\nNRows=2\nNCols=3\n",
+                             "nrows 2\nncols 3\nxllcorner 100\nyllcenter 205\ndx 10\ndy 10\n"}) {
+    const auto grid = read_esri_heights(files.write("g.asc", header + heights), {});
+    ASSERT_TRUE(grid) << header << grid.error().text;
+    EXPECT_EQ(grid->x, (std::vector<double>{105, 115, 125})) << header;
+    EXPECT_EQ(grid->y, (std::vector<double>{205, 215})) << header;
+    EXPECT_FLOAT_EQ(grid->z_m[3], -1) << header;
+    EXPECT_TRUE(std::isnan(grid->z_m[2])) << header;
+  }
+  const std::string placeless = "ncols 3\nnrows 2\ncellsize 10\n";
+  EXPECT_THAT(read_esri_heights(files.write("g.asc", placeless + heights), {})->notes,
+              ::testing::Contains(HasSubstr("neither xllcorner nor yllcorner")));
+  EXPECT_THAT(read_esri_heights(files.write("g.asc", "xllcorner 1\n" + placeless + heights), {}).error().text,
+              HasSubstr("yllcorner is missing"));
+}
+
 TEST(EsriGrid, WrongFilesAreRefusedWithTheirLine) {
   TemporaryFiles files;
   const auto refusal = [&](const std::string& text) {
@@ -186,7 +207,9 @@ TEST(EsriGrid, KnowsNoDataInEveryForm) {
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -32768", "-9999"), true), "1");
   // Ground deeper than 9999 m is none.
   const auto trench = read_esri_heights(
-      files.write("g.asc", "ncols 2\nnrows 2\ncellsize 100\nNODATA_value -32768\n-9999 -9998 -9950 -10010\n"), {});
+      files.write("g.asc",
+                  "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 100\nNODATA_value -32768\n-9999 -9998 -9950 -10010\n"),
+      {});
   ASSERT_TRUE(trench);
   EXPECT_TRUE(trench->notes.empty()) << trench->notes[0];
   EXPECT_FLOAT_EQ(trench->z_m[2], -9999);
@@ -442,6 +465,7 @@ TEST(XyzGrid, ColumnsAreFoundByTheirNames) {
   const auto read = [&](const std::string& text) { return read_xyz_heights(files.write("p.csv", text), {}); };
   for (const char* text :
        {"id,x,y,z\n1,0,0,-1\n2,10,0,-2\n3,0,20,-3\n4,10,20,-4\n", "// by hand\nz;x;y\n-1;0;0\n-2;10;0\n-3;0;20\n-4;10;20\n",
+        "Easting (m), Northing (m), Depth below water (m)\r0,0,-1\r10,0,-2\r0,20,-3\r10,20,-4\r",
         "\"Northing\",\"Easting\",\"Elevation\"\n0,0,-1\n0,10,-2\n20,0,-3\n20,10,-4\n",
         "0 0 -1 9 9\n10 0 -2 9 9\n0 20 -3 9 9\n10 20 -4 9 9\n"}) {
     const auto grid = read(text);
@@ -455,6 +479,7 @@ TEST(XyzGrid, ColumnsAreFoundByTheirNames) {
   EXPECT_THAT(depths->notes, ::testing::ElementsAre(HasSubstr("set z_scale: -1")));
   for (const char* text : {"0,5 0,5 -1,5\n", "0,5;0,5;-1,5\n", "500000,5\t0\t-1\n"})
     EXPECT_THAT(read(text).error().text, HasSubstr("line 1: numbers have a decimal comma")) << text;
+  EXPECT_THAT(read("0 0 -1\n10 0 -2\n0 20 -3,5\n").error().text, HasSubstr("line 3: numbers have a decimal comma"));
   EXPECT_TRUE(read("0, 0, -1\n10, 0, -2\n0, 20, -3\n10, 20, -4\n")) << "commas between numbers";
 }
 
@@ -535,6 +560,28 @@ TEST(EsriGrid, LengthsOfItsPrjBecomeMetres) {
   EXPECT_NEAR(grid->x.back(), 1010e3, 1e-6);
   EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("in units of 1000 m, become metres"), HasSubstr("of P, are taken"),
                                                   HasSubstr("are no data")));
+}
+
+TEST(EsriGrid, VerticalSystemsOfItsPrjAreRead) {
+  TemporaryFiles files;
+  const auto read = [&](const std::string& prj, const std::string& heights = "3 4\n5 6\n") {
+    files.write("g.prj", prj);
+    return read_esri_heights(files.write("g.asc", "ncols 2\nnrows 2\nxllcenter 0\nyllcenter 0\ncellsize 10\n" + heights), {});
+  };
+  const std::string lengths = "PROJCS[\"P\",GEOGCS[\"G\",UNIT[\"Degree\",0.0174]],UNIT[\"Meter\",1]]";
+  const auto depths = HasSubstr(", counts depths downwards: set z_scale: -1");
+  for (const std::string& vertical :
+       {"COMPD_CS[\"C\"," + lengths + ",VERT_CS[\"MSL depth\",UNIT[\"metre\",1],AXIS[\"Depth\",DOWN]]]",
+        lengths + ",VERTCS[\"MSL_Depth\",PARAMETER[\"Vertical_Shift\",0.0],PARAMETER[\"Direction\",-1.0],UNIT[\"Meter\",1.0]]",
+        "COMPOUNDCRS[\"C\"," + lengths + ",VERTCRS[\"d\",CS[vertical,1],AXIS[\"depth (D)\",down,LENGTHUNIT[\"metre\",1]]]]"}) {
+    EXPECT_THAT(read(vertical)->notes, ::testing::Contains(depths)) << vertical;
+    EXPECT_THAT(read(vertical, "-3 -4\n-5 -6\n")->notes, ::testing::Contains(HasSubstr("but its values are negative")))
+        << vertical;
+  }
+  const std::string feet = lengths + ",VERTCS[\"H\",PARAMETER[\"Direction\",1.0],UNIT[\"Foot\",0.3048]]";
+  EXPECT_THAT(read(feet)->notes, ::testing::Not(::testing::Contains(depths)));
+  EXPECT_NEAR(read(feet)->z_m[2], 3 * 0.3048, 1e-6);
+  EXPECT_THAT(read(feet)->notes, ::testing::Contains(HasSubstr("its coordinates, of P, are taken")));
 }
 
 TEST(HeightGrid, TooManyTrianglesAreRefused) {
