@@ -148,10 +148,10 @@ class Reader {
       first.stamps.push_back(stamp);
       first.positions.push_back(position_m);
     }
-    const int power = first.stamps.empty() ? columns_->power() : unit_by_steps(first, columns_->power());
-    unit_by_steps_ = power != columns_->power();
-    columns_->set_power(power);
-    if (!unit_by_steps_) columns_->guess_unit(words_);
+    const int usual = columns_->power(), by_steps = first.stamps.empty() ? usual : unit_by_steps(first, usual);
+    columns_->guess_unit(words_);  // by the digits of the first stamp
+    unit_by_steps_ = by_steps != usual && by_steps != columns_->power();
+    if (unit_by_steps_) columns_->set_power(by_steps);
   }
 
   /// Sets the columns. True if the line was a header; else it is a line of numbers, or there is an error.
