@@ -1,5 +1,5 @@
-// Bytes of a sonar of any make to its host. The first byte chooses the make; then pieces: port, length in two bytes, bytes. At
-// a port of kind http a piece is the body of a reply.
+// Bytes of a sonar to the hosts of every make: each input to each of them. Pieces: port, length in two bytes, bytes. At a port of
+// kind http a piece is the body of a reply.
 #include <cstdlib>
 
 #include "core/image/draw_picture.hpp"
@@ -24,16 +24,12 @@ void check(const protocol::HostActions& actions, std::size_t ports) {
   }
 }
 
-}  // namespace
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  if (size == 0) return 0;
-  const protocol::Make& make = protocol::makes()[data[0] % protocol::makes().size()];
+void converse(const protocol::Make& make, const std::uint8_t* data, std::size_t size) {
   const auto host = *make.host({});
   const std::vector<std::uint16_t> own(make.ports.size(), 40000);
   Time now(std::chrono::seconds(1'700'000'000));
   check(host->on_open(own, now), own.size());
-  for (std::size_t at = 1; at + 3 <= size;) {
+  for (std::size_t at = 0; at + 3 <= size;) {
     const std::size_t port = data[at] % own.size(), stated = data[at + 1] + 256u * data[at + 2];
     at += 3;
     protocol::Bytes piece;
@@ -50,5 +46,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     check(host->on_demand(now), own.size());
   }
   check(host->on_leave(), own.size());
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  for (const protocol::Make& make : protocol::makes()) converse(make, data, size);
   return 0;
 }
