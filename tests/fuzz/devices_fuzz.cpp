@@ -1,5 +1,5 @@
-// Bytes of a driver to the sonars of every make: each input to each of them, at every port. No byte may crash it, be answered by much
-// more than was sent, or lead to settings that no ping can have.
+// Bytes of a driver to the sonars of every make: each input to each of them, at every port. No byte may crash it, be answered by
+// much more than was sent, or lead to settings that no ping can have.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -69,9 +69,12 @@ void request(const protocol::Vendor& vendor, const protocol::Port& port, const s
   protocol::DeviceState device = state_of(vendor);
   const std::size_t end = std::min(text.find('\n'), text.size());
   for (const char* method : {"POST", "GET"}) {
-    const protocol::ResourceRequest request{
-        method, "/api/v1/integration" + text.substr(0, end), "", "application/json", text.substr(std::min(end + 1, text.size())),
-        {127, 0, 0, 1}};
+    const protocol::ResourceRequest request{method,
+                                            "/api/v1/integration" + text.substr(0, end),
+                                            "",
+                                            "application/json",
+                                            text.substr(std::min(end + 1, text.size())),
+                                            {127, 0, 0, 1}};
     carry_out(vendor.on_http(port, request, device, Time{} + std::chrono::hours(1)).events, device);
   }
 }
