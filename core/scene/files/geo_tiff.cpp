@@ -274,12 +274,23 @@ class GeoTiffReader {
   /// Sparse files do not contain blocks without data.
   bool is_left_out(std::uint32_t block) { return TIFFGetStrileByteCount(tiff_, block) == 0; }
 
+  /// Unpacks whole strips: some writers pack a run of equal bytes across the end of a row.
   Result<void> read_strips() {
-    std::vector<std::byte> line(static_cast<std::size_t>(TIFFScanlineSize64(tiff_)));
-    for (std::uint32_t row = 0; row < picture_.rows; ++row) {
-      if (is_left_out(TIFFComputeStrip(tiff_, row, 0))) continue;
-      if (TIFFReadScanline(tiff_, line.data(), row, 0) != 1) return unreadable();
-      if (auto r = take(line, 0, row, picture_.columns); !r) return r;
+    std::uint32_t height = 0;
+    TIFFGetFieldDefaulted(tiff_, TIFFTAG_ROWSPERSTRIP, &height);
+    const auto row_bytes = static_cast<std::size_t>(TIFFScanlineSize64(tiff_));
+    std::vector<std::byte> strip(static_cast<std::size_t>(TIFFStripSize64(tiff_)));
+    if (height == 0) return unreadable();
+    for (std::uint32_t row = 0, rows = 0; row < picture_.rows; row += rows) {
+      rows = std::min(height, picture_.rows - row);
+      const std::uint32_t number = TIFFComputeStrip(tiff_, row, 0);
+      if (is_left_out(number)) continue;
+      const std::size_t size = rows * row_bytes;
+      if (size > strip.size() ||
+          TIFFReadEncodedStrip(tiff_, number, strip.data(), static_cast<tmsize_t>(size)) != static_cast<tmsize_t>(size))
+        return unreadable();
+      for (std::uint32_t j = 0; j < rows; ++j)
+        if (auto r = take(std::span<const std::byte>(strip).subspan(j * row_bytes), 0, row + j, picture_.columns); !r) return r;
     }
     return {};
   }

@@ -244,6 +244,18 @@ TEST_F(GeoTiff, FloatingPointPredictorInBothByteOrders) {
   }
 }
 
+TEST_F(GeoTiff, PackedRunsMayCrossTheEndsOfRows) {
+  TiffFile tiff = TiffFile::of(3, 2, std::vector<std::uint8_t>{1, 2, 2, 2, 2, 3}).at(0, 100, 10, 10).without(259).without(279);
+  tiff.heights = {0, 1, -3, 2, 0, 3};  // one byte, four equal ones, one byte
+  tiff.shorts(259, {32773}), tiff.longs(279, {static_cast<std::uint32_t>(tiff.heights.size())});
+  const auto grid = read(tiff);
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->z_m, (std::vector<float>{2, 2, 3, 1, 2, 2}));
+  tiff.heights.resize(4);
+  tiff.without(279).longs(279, {4});
+  EXPECT_FALSE(read(tiff)) << "two cells are missing";
+}
+
 TEST_F(GeoTiff, WebMercatorHasItsLengthsOnTheGround) {
   const std::vector<float> whole(6, -5);
   // Cells of 100 "m" at 60 degrees north are 50 m wide.
