@@ -218,10 +218,7 @@ void RecordingViews::Seen::take() {
     give(connection->viewer(), channel, payload);
   }
   connection->wake();
-  if (behind_)
-    tick();
-  else
-    arm();
+  behind_ ? tick() : arm();
 }
 
 void RecordingViews::Seen::arm() {
