@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/paper/paper_engine.hpp"
 #include "core/sonar/water.hpp"
 #include "daemon/commands/render/render_job.hpp"
 
