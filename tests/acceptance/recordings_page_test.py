@@ -86,7 +86,8 @@ class Recordings(PageChecks, unittest.TestCase):
                 path = record(maker, max(pings + 10, 5))
                 with demo("oculus"), Viewer(HTTP, path=f"/?recording={path.name}") as viewer:
                     self.look(viewer, kind)
-                with Replay(path) as replay, Viewer(HTTP) as viewer:
+                # On a slow machine doctor and listen may take the whole recording, which ends a replay without --loop.
+                with Replay(path, "--loop") as replay, Viewer(HTTP) as viewer:
                     self.look(viewer, kind)
                     self.assertIn("open      http://127.0.0.1:8088", replay.text())
                     with urllib.request.urlopen("http://127.0.0.1:8088/healthz", timeout=PATIENCE_S) as answer:  # doctor asks for it
@@ -104,7 +105,7 @@ class Recordings(PageChecks, unittest.TestCase):
         """A host that does not know which product is at the port asks the other first; the recording holds the refusal."""
         with demo("s500"):
             self.assertEqual(run(SONARCTL, "record", "--mcap", "run.mcap", "--seconds", 3).returncode, 0)
-        with Replay(pathlib.Path("run.mcap")) as replay:
+        with Replay(pathlib.Path("run.mcap"), "--loop") as replay:
             done = run(SONARCTL, "listen", f"{replay.address}:51200", "--quiet", "--pings", 2)
             self.assertIn("pings 2", done.stdout, done.stderr)
 
