@@ -200,9 +200,10 @@ class CountingVendor final : public protocol::DelegatingVendor {
   }
   std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
     ++messages;
-    return DelegatingVendor::frame(ping, device);
+    return frames ? DelegatingVendor::frame(ping, device) : nullptr;
   }
   bool is_request(const protocol::Port&, protocol::BytesView) const override { return true; }
+  bool frames = true;  // false: the parts of its TCP ports make up a ping
   mutable int messages = 0;
   mutable std::map<const protocol::Port*, int> datagrams_of;
 };
@@ -258,11 +259,19 @@ struct FramedPings : ::testing::Test {
 
 TEST_F(FramedPings, AreFramedOnceAPort) {
   const auto messages = ping();
-  EXPECT_EQ(vendor.messages, 0) << "the parts of its TCP ports make up the whole";
+  EXPECT_EQ(vendor.messages, 1);
   EXPECT_EQ(vendor.datagrams_of[tcp], 1);
   EXPECT_EQ(vendor.datagrams_of[udp], 1);
   ASSERT_TRUE(messages[0].datagrams && messages[2].bytes);
   EXPECT_EQ(messages[0].datagrams, messages[1].datagrams) << "shared, not copied";
+  EXPECT_EQ(messages[2].bytes, messages[3].bytes);
+}
+
+TEST_F(FramedPings, ArePartsOfTheTcpPortsWithoutAFrame) {
+  vendor.frames = false;
+  const auto messages = ping();
+  EXPECT_EQ(vendor.datagrams_of[tcp], 1) << "the parts make up the whole, too";
+  ASSERT_TRUE(messages[2].bytes);
   EXPECT_EQ(messages[2].bytes, messages[3].bytes);
 }
 
