@@ -23,7 +23,7 @@ namespace sonar {
 /// Directions of the rays: angles about the array axis, and the tangent axis of the depth map.
 struct Fan {
   double half_angle_rad = 0;  // half the angle of the main part; the fixed fan and mirror paths cover only this part
-  double reach_rad = 0;       // with the side lobes
+  double reach_rad = 0;       // half the angle with the side lobes
   TangentAxis axis{};
   int bins = 0;
   std::vector<float> tangent;        // tangents of the lower edge of every bin, and of the end: bins + 1
@@ -48,18 +48,18 @@ struct BeamPanel {
 };
 /// How beams are made of columns.
 struct BeamWeightOptions {
-  double dropped_energy = 1e-4;  // part of the energy outside the band: -40 dB
-  bool transform = true;  // if beams allow it, use a transform in place of a band that would be wider than the transform is long
+  double dropped_energy = 1e-4;  // energy that is left outside the band: -40 dB
+  bool transform = true;         // use a transform in place of a band if the beams allow it and it costs less
 };
 struct BeamWeights {
   int half_band = 0;  // number of columns on either side that a beam sums
   std::vector<BeamPanel> panels;
   std::vector<float> weights;
-  std::shared_ptr<const BeamTransformTables> transform;  // if set, it gives the result of panels over all columns at less cost
+  std::shared_ptr<const BeamTransformTables> transform;  // if set, replaces panels: sums all columns at less cost
   double weight_energy = 1;                              // sum_k W_jk^2 of a beam of the pattern's width
 };
 
-/// Power of a column's noise at a sample over column_noise_upa squared: far + near_less_far decay (docs/acoustics.md, section 5).
+/// Noise power of a column at a sample / column_noise_upa^2: far + near_less_far * decay (docs/acoustics.md, section 5).
 struct NoiseProfile {
   std::vector<float> far, near_less_far;  // [columns]; empty = uniform
   std::vector<float> decay;               // [samples], up to the last one that is not negligible
@@ -80,7 +80,7 @@ struct PingPlan {
   BeamWeights beam_weights;
   double bearing_scale = 1;                  // bearing_scale_of() the request
   std::vector<float> beam_azimuth_rad;       // reported
-  std::vector<double> beam_sine;             // true directions, like all sines here except in tables by reported sine
+  std::vector<double> beam_sine;             // true, as are all sines here except in tables by reported sine
   std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
@@ -90,10 +90,10 @@ struct PingPlan {
   double sample_offset = 0.5;  // start_samples plus the sample's position in its spacing, see PingSettings::row_centre
   double sample_time_s = 0;    // 2 sample_spacing_m / the device's sound speed
   Pulse pulse_shape;
-  double pulse_width_m = 0;       // -3 dB, metres as the device computes them: from the settings, or from a measured pulse
+  double pulse_width_m = 0;       // -3 dB, from the settings or from a measured pulse; in metres as the device computes them
   std::vector<float> pulse_rows;  // simd::PulseRows
   int taps = 8, pulse_steps = 256;
-  double envelope_hz = 0;                           // b of the Gaussian of that width
+  double envelope_hz = 0;                           // b of the Gaussian of pulse_width_m
   std::shared_ptr<const SpectralColumns> spectral;  // if set, it is used in place of pulse_rows
 
   std::vector<CellLevel> levels;    // coarsest first
@@ -117,8 +117,8 @@ struct PingPlan {
   /// A cell is visible up to this distance behind the depth map, because the map is straight between rays.
   float depth_tolerance_m() const { return depth_tolerance_in_pulses * static_cast<float>(pulse_width_m); }
   static constexpr float depth_tolerance_in_pulses = 1.5f;  // docs/acoustics.md, section 3
-  /// Largest angle about the array's axis in a fan with this half angle. With flat beams it is larger than the half angle,
-  /// because away from the middle an elevation is a larger angle about the axis.
+  /// Largest angle about the array's axis in a fan with this half angle. With flat beams it exceeds the half angle:
+  /// away from the middle, the same elevation is a larger angle about the axis.
   double widest_about_axis_rad(double half_angle_rad) const;
   /// The column that is traced for a column in the side lobes.
   int side_column(int k) const { return std::min(k - k % side_columns + side_columns / 2, columns.count - 1); }
@@ -129,7 +129,7 @@ struct PingPlan {
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
 };
 
-/// The same for any number of threads.
+/// Its result does not depend on the number of threads.
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool,
                    double bearing_scale = 1);
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, double bearing_scale = 1);

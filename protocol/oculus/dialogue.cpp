@@ -25,8 +25,8 @@ constexpr auto greeting_after = std::chrono::seconds(2);  // known drivers send 
 /// One client's conversation (docs/protocols/oculus.md, section 1). Three states:
 /// - Before the first valid fire message the device sends a dummy after each period of silence. A client that stays silent gets
 ///   the log text of section 6.1.
-/// - While it pings it sends no dummy, however long a ping takes. With network trigger it sends dummies while no ping is
-///   requested.
+/// - While the device pings it sends no dummy, however long a ping takes. With network trigger it sends dummies while no ping
+///   is requested.
 /// - In standby (ping rate 5) it sends a dummy at once, then one after each period of silence.
 class OculusDialogue final : public protocol::Dialogue {
  public:
@@ -124,8 +124,8 @@ class OculusDialogue final : public protocol::Dialogue {
     }
   }
 
-  /// A client that waits for pings is sent no dummy, however long they take: the driver of ENSTA takes a dummy as the echo of
-  /// standby and stores that as its ping rate. With network trigger the device waits for the client, so dummies are sent. Fire
+  /// A client that waits for pings is sent no dummy, however long they take: ENSTA's driver takes a dummy as confirming standby,
+  /// and stores standby as its ping rate. With network trigger the device waits for the client, so dummies are sent. Fire
   /// messages of an observer change nothing.
   bool expects_pings() const {
     const auto* held = dynamic_cast<const HeldFire*>(device_.settings.get());
@@ -174,13 +174,13 @@ class OculusDialogue final : public protocol::Dialogue {
   const DeviceState& device_;
   Framer framer_{Sender::client};
   protocol::Bytes last_request_;
-  protocol::StoredAddress stored_;  // the device's, read at the start of each call, and changed by writes in it
+  protocol::StoredAddress stored_;  // copied from the device at each call, then changed by writes in that call
   Time dummy_at_{};
   std::shared_ptr<const VendorSettings> fired_;  // settings of the last fire message
   bool is_heard_ = false;                        // the device has used settings of this client at some time
   bool requested_ping_ = false;                  // by network trigger, and the ping has not been sent yet
   std::optional<Time> greeting_at_;
-  bool greets_silent_ = false;  // a fire message, or a ping sent to the client, cancels the text
+  bool greets_silent_ = false;  // a fire message, or a ping to the client, cancels the greeting
   std::size_t notices_ = 0;
 };
 

@@ -56,11 +56,11 @@ int rows_by_resolution(const Extent& extent, const ImageSettings& settings, doub
 }
 
 /// Verified, by a public table of the range and bearing of every pixel of one image (SDK 3.x, 45 degree head, 2 to 15 m
-/// requested, 394 x 480): x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m. So the image ends 70 rows before the sonar, and
-/// pixels are whole numbers of pixels from the origin. Inferred: the image ends at the nearest corners of the sector, start
-/// cos(half of it) ahead, and begins at the stop range; its sides touch the widest points of the sector. Unknown: sector and stop
-/// range of that ping. 20.9 to 21 degrees to each side and 14.54 m give 70 rows and 197 columns if the number of rows below the
-/// image is rounded down. If it is rounded to nearest, no sector gives both.
+/// requested, 394 x 480): x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m. So the image ends 70 rows short of the sonar,
+/// and pixels lie whole rows and columns from it. Inferred: the bottom of the image is at the nearest corners of the sector,
+/// start cos(half the sector) ahead, and its top at the stop range; its sides touch the widest points of the sector. Unknown:
+/// sector and stop range of that ping. With 20.9 to 21 degrees to each side and 14.54 m, rounding the rows below the image down
+/// gives both 70 rows and 197 columns. With rounding to nearest, no sector gives both.
 void plan_xy(const Extent& extent, const ImageSettings& settings, ImageGeometry& g) {
   const double half_deg = std::max(std::abs(static_cast<double>(g.fov_min_deg)), std::abs(static_cast<double>(g.fov_max_deg)));
   const double half_rad = std::min(half_deg, 90.0) / degrees;
@@ -193,7 +193,7 @@ Code Imager::make(const PolarPing& ping, ImageType type, const ImageSettings& se
     static_cast<ImageGeometry&>(image) = geometry;
     image.pixels.assign(geometry.pixel_count(), 0);
     Extent extent = extent_of(ping, settings.sound_speed_override_mps);
-    // If XY rows are coarser than two bins, a row shows the strongest of its bins (chosen). Otherwise echoes would be missed.
+    // If XY rows have two bins or more, a row shows the strongest of its bins (our choice), so that no echo is missed.
     const int pooled =
         type == ImageType::xy ? std::max(1, to_int(std::floor(image.range_resolution_m / extent.bin_m + 1e-9))) : 1;
     const SampleGrid grid(ping, settings.noise_threshold, settings.clipping_threshold, pooled);

@@ -35,7 +35,7 @@ struct DiscoveryObject : Object {
   DiscoveryAgent agent;
 };
 
-/// Image settings of a head. Each ping keeps a copy of those that the head had at its time, for BVTPing_GetImage and related
+/// Image settings of a head. Each ping keeps a copy of them from when it was made, for BVTPing_GetImage and related
 /// functions.
 struct HeadImaging {
   ImageType type = ImageType::xy;

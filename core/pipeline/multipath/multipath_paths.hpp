@@ -1,5 +1,5 @@
 // Paths between the sonar and a place: straight, or via one or two flat mirrors (docs/acoustics.md, section 3). In the
-// image method a path is a straight line to the image of the place, so that each path is a reflection of the sonar's axes.
+// image method a path is a straight line to the image of the place. So a path is stored as a reflection of the sonar's axes.
 #pragma once
 
 #include <vector>
@@ -10,11 +10,11 @@
 
 namespace sonar {
 
-/// Largest number of mirrors in a ping; the largest mirrors that can reflect are used.
+/// At most this many mirrors in a ping: the largest that can reflect.
 inline constexpr int most_mirrors = 16;
 /// A mirror that reflects less than this (pressure, at the angle of incidence) is ignored.
 inline constexpr double least_reflectance = 0.05;
-/// A point, or the sonar, nearer to a mirror than this lies in the mirror.
+/// A point, or the sonar, nearer to a mirror than this counts as lying in it.
 inline constexpr double touching_m = 1e-3;
 
 /// A flat face in one ping, in the axes of PingScalars::seen_from: dot(normal, p) + height_m = 0 on its plane.
@@ -36,7 +36,7 @@ struct Path {
   Rotation turn;                // improper for one bounce
   Vec3d shift_m;
   Vec3d second_normal;       // normal of the second mirror, as seen in the first
-  bool beyond_front = true;  // whether places are on the sonar's side of the last mirror
+  bool beyond_front = true;  // whether it leads to the sonar's side of the last mirror
 
   Vec3d image_of(Vec3d p) const { return turn * p + shift_m; }
 };

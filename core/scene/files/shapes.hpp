@@ -29,9 +29,9 @@ struct ShapeReader {
   std::optional<Geodetic> world_origin = {};      // for grids with latitudes and longitudes
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
   std::set<std::string> noted = {};               // meshes whose lost triangles are in the scene's notes
-  std::map<std::string, Shape> files = {};        // the same with materials; objects with equal keys share one
+  std::map<std::string, Shape> files = {};        // meshes with materials; objects with equal keys share one
 
-  /// Names that `type` may have here, without "point".
+  /// Values of `type` that are allowed here, except "point".
   static const std::vector<std::string_view>& types();
   /// Reads the keys of this type, including `material`.
   Shape read(std::string_view type, text::Map& keys);

@@ -160,7 +160,7 @@ Result<FarmJob> parse_farm_job(const std::string& id, const std::string& text) {
                                           "; submit the job again");
 }
 
-/// Files go into the shared folder, and into the queue if all together are small: workers then need no shared folder.
+/// Files go into the shared folder and, if small in total, also into the queue: workers then need no shared folder.
 Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const path& files, Queue& queue) {
   std::uint64_t bytes = 0;
   std::error_code ec;
@@ -196,7 +196,7 @@ Result<path> receive_files(const FarmJob& record, const path& files, Queue& queu
       if (!piece) return tl::make_unexpected(piece.error());
       if (!*piece) break;
       contents += **piece;
-      // A short piece is the last one. If the size is a multiple of piece_bytes, the next piece is missing instead.
+      // A short piece ends the file. A file of whole pieces has no short one: the next piece is then not there.
       if ((*piece)->size() < piece_bytes || contents.size() > most_in_bucket) break;
     }
     if (digest_of(contents) != f.digest)
