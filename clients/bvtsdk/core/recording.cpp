@@ -14,7 +14,7 @@ constexpr std::uint16_t newest_version = 2;
 constexpr std::size_t file_header_size = 8;
 constexpr std::size_t crc_size = 4;
 constexpr std::size_t index_entry_size = 2 + 4 + 8 + 8;
-constexpr std::size_t most_lanes = 256;                // a damaged index may name any number of heads; add() searches all lanes
+constexpr std::size_t most_lanes = 256;                // limits the search of add(): a damaged index may name any number of heads
 constexpr std::size_t index_tail_size = 8 + crc_size;  // the index frame's own offset, and its checksum
 
 std::uint32_t checksum(BytesView header, BytesView payload) {
@@ -123,7 +123,7 @@ Code RecordingWriter::close() {
   }
   put(index, size_);
   Code code = put_frame(FrameType::index, index, 0, 0);
-  if (code == bad_parameter) code = success;  // more than some three million frames: readers scan the file
+  if (code == bad_parameter) code = success;  // over about three million frames: readers scan the file
   if (file_ && std::fclose(file_.release()) != 0) code = file_write;
   return code;
 }
@@ -148,7 +148,7 @@ Code RecordingReader::open(const std::string& path, std::string* why) {
   File file(std::fopen(path.c_str(), "rb"));
   std::string reason;
   const Code code = file ? open(std::move(file), &reason) : file_open;
-  if (code == file_open) reason = "cannot be opened; check that it exists and that you may read it";
+  if (!file) reason = "cannot be opened; check that it exists and that you may read it";
   if (why && code != success) *why = path + " " + reason;
   return code;
 }

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 #include <zlib.h>
 
 #include <filesystem>
@@ -182,6 +183,11 @@ TEST_F(Recording, IsRefusedWhenItIsNone) {
   EXPECT_EQ(reader.open(path, &why), file_header_bad);
   EXPECT_THAT(why, testing::HasSubstr("proprietary"));
   EXPECT_EQ(reader.open(folder, &why), file_header_bad);
+  int pipe[2];
+  ASSERT_EQ(::pipe(pipe), 0);
+  EXPECT_EQ(reader.open("/proc/self/fd/" + std::to_string(pipe[0]), &why), file_open);
+  EXPECT_THAT(why, testing::HasSubstr("not a regular file"));
+  ::close(pipe[0]), ::close(pipe[1]);
   RecordingWriter writer;
   fill(writer, path);
   ASSERT_EQ(writer.close(), success);
