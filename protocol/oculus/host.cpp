@@ -26,7 +26,7 @@ Result<PolarImage> picture_of(const DecodedPing& ping) {
   for (std::size_t row = 0; row < image.rows; ++row)
     for (std::size_t beam = 0; beam < image.beams; ++beam) image.samples.push_back(static_cast<float>(ping.sample(row, beam)));
   image.full_scale = 254;  // samples of 8 bits saturate there
-  // Wider samples seldom come near their maximum, so the picture would be black.
+  // Wider samples seldom come near their maximum: scaled to it, the picture would be black.
   if (ping.bytes_per_sample() > 1) image.full_scale = image.brightest(999);
   return image;
 }
@@ -43,8 +43,8 @@ protocol::PingFacts facts_of(const DecodedPing& ping) {
           ping.message.size()};
 }
 
-/// Sends a fire message when the connection is open, and again with each ping until the echo agrees with it, as ENS does. Nothing
-/// else is sent: the device pings by itself. `asked` is absent if the sonar's settings are to stay as they are.
+/// Sends a fire message when the connection is open, and again on each ping until the settings that pings state agree with it, as
+/// ENS does. Nothing else is sent: the device pings by itself. `asked` is absent if the sonar's settings are to stay as they are.
 class OculusHost final : public protocol::Host {
  public:
   OculusHost(std::optional<FireRequest> asked, bool triggered) : asked_(std::move(asked)), triggered_(triggered) {}

@@ -28,7 +28,7 @@ double clamped(double value, double low, double high, const char* what, const ch
   return used;
 }
 
-/// Range of row 0 in row spacings. unknown: drivers assume all three of these values, hence option `row_origin`.
+/// Range of row 0 in row spacings. unknown: some driver assumes each of these values, hence option `row_origin`.
 double row_centre(const protocol::OptionValues& options) {
   const std::string_view origin = text_option(options, option_name::row_origin);
   return origin == "near_edge" ? 0 : origin == "far_edge" ? 1 : 0.5;
@@ -60,7 +60,7 @@ double highest_rate_hz(const FireSettings& fire, const PingSettings& settings, c
 
 }  // namespace
 
-/// Exact in the captured pings; the authors of liboculus measured the doubling on an M1200d (docs/protocols/oculus.md, 5.4).
+/// Fits the captured pings exactly; liboculus's authors measured the doubling on an M1200d (docs/protocols/oculus.md, 5.4).
 RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz) {
   RowGrid law{sound_speed_mps / (2 * rate_hz), 1};
   while (range_m / law.spacing_m > row_limit) law.spacing_m *= 2;
@@ -109,7 +109,7 @@ bool asks_for_gain_assist(const FireSettings& fire, std::string_view option) {
   return (option == "flag_set" && bit) || (option == "flag_clear" && !bit);
 }
 
-/// In the high mode the echo of a gain g is 40 + 0.6 g, which ENS inverts. With gain assist the echo repeats the request, as in
+/// In the high mode pings state a gain g as 40 + 0.6 g, which ENS inverts. With gain assist they state the requested gain, as in
 /// the captured pings (docs/protocols/oculus.md, 5.5).
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo) {
   const bool high_frequency = fire.mode == 2;
@@ -159,7 +159,7 @@ ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& d
   const double speed = asked.sound_speed_mps == 0 ? device_sound_speed_mps(device, salinity)
                                                   : clamped(asked.sound_speed_mps, 1300, 1700, "sound speed", "m/s", out.clamped);
   settings.device_sound_speed_mps = static_cast<float>(speed);
-  // The device compensates the absorption for the salinity that the client states, which may differ from that of the water.
+  // The device compensates for the absorption at the salinity that the client states, which may differ from the water's.
   Water believed = device.water;
   believed.salinity_psu = salinity;
   settings.device_absorption_db_per_m = static_cast<float>(absorption_db_per_m(believed, device.depth_m, mode.centre_hz));

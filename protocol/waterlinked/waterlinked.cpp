@@ -10,7 +10,7 @@ namespace sonar::waterlinked {
 namespace {
 
 using PortKind = protocol::Port::Kind;
-// There is no gap between the two images of a shot, because clients pair images that arrive within 25 ms.
+// Port::gap is 0: the two images of a shot follow at once, because clients pair images that arrive within 25 ms.
 constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::http, .number = 80}, {.kind = PortKind::udp_stream, .group = multicast_group}}};
 

@@ -44,7 +44,7 @@ class Handles {
 
   std::mutex mutex_;
   std::vector<Place> places_;
-  std::deque<std::uint32_t> free_;  // the longest free index is used first, so that stale handles are detected for long
+  std::deque<std::uint32_t> free_;  // indices are reused in the order freed, so that stale handles are detected for long
   std::size_t live_ = 0;
 };
 

@@ -86,7 +86,7 @@ int Sonar::open(const std::string& type, const std::string& parameter, int abi) 
   else if (type == "FILE")
     code = open_recording(parameter, source);
   else
-    log(LogLevel::warning, "cannot open type \"" + type + "\": write NET and an address, or FILE and a path");
+    log(LogLevel::warning, "cannot open type \"" + type + "\": pass NET and an address, or FILE and a path");
   if (code != success) return code;
   reset();
   use(std::move(source));

@@ -54,7 +54,7 @@ std::size_t free_place(Scene& scene) {
   return scene.objects.size() - 1;
 }
 
-/// Removes a body to which no object is attached any more. The indices of the bodies after it move up by one.
+/// Removes a body to which no object is attached any more. The index of each body after it decreases by one.
 void remove_body_if_empty(Scene& scene, int body) {
   const auto rides = [body](const auto& thing) { return thing.body == body; };
   if (std::any_of(scene.objects.begin(), scene.objects.end(), rides) ||
@@ -62,12 +62,12 @@ void remove_body_if_empty(Scene& scene, int body) {
     return;
   scene.body_names.erase(scene.body_names.begin() + body);
   scene.bodies_in_world.erase(scene.bodies_in_world.begin() + body);
-  const auto move_up = [body](auto& things) {
+  const auto decrease = [body](auto& things) {
     for (auto& thing : things)
       if (thing.body > body) --thing.body;
   };
-  move_up(scene.objects);
-  move_up(scene.point_targets);
+  decrease(scene.objects);
+  decrease(scene.point_targets);
 }
 
 /// Compares meshes by content, because a reload reads the files again into new meshes.
@@ -90,7 +90,7 @@ const Object* object_named(const Scene& scene, std::string_view name) {
 }
 
 Error no_such_object(const Scene& scene, std::string_view name) {
-  if (is_point(scene, name)) return {ErrorKind::usage, in_quotes(name) + " is a point target: it stays as the scene file has it"};
+  if (is_point(scene, name)) return {ErrorKind::usage, in_quotes(name) + " is a point target: only the scene file can change it"};
   std::vector<std::string_view> names;
   for (const Object& o : scene.objects)
     if (!o.name.empty()) names.push_back(o.name);
@@ -143,7 +143,7 @@ Result<ScenePointer> with_object_set(const Scene& scene, const control::SetObjec
   if (object == nullptr) return tl::make_unexpected(no_such_object(scene, wanted.object));
   const bool moves_by_itself = body_named(scene, wanted.object) >= 0;
   if (wanted.in_world && object->body >= 0 && !moves_by_itself)
-    return refused(in_quotes(wanted.object) + " goes with " +
+    return refused(in_quotes(wanted.object) + " moves with " +
                    in_quotes(scene.body_names[static_cast<std::size_t>(object->body)]) + ": move that one");
   auto changed = copy_of(scene);
   Object& place = changed->objects[static_cast<std::size_t>(object - scene.objects.data())];
@@ -153,8 +153,8 @@ Result<ScenePointer> with_object_set(const Scene& scene, const control::SetObjec
 }
 
 bool is_same(const Scene& a, const Scene& b) {
-  // All members are named, so that this line does not compile after a member is added: compare the new one here. Name and notes
-  // are not compared, because they do not change the pings.
+  // All members are named, so that adding one to Scene breaks this line: then compare the new one here, too. Name and notes are
+  // not compared, because they do not change the pings.
   const auto& [name, materials, objects, point_targets, body_names, bodies_in_world, sea_surface, water_column, other_sonars,
                ray_origin, notes] = a;
   return ray_origin_of(a) == ray_origin_of(b) && materials == b.materials && point_targets == b.point_targets &&

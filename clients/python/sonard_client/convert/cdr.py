@@ -35,7 +35,7 @@ class Reader:
         (length,) = self.numbers("I")
         end = self._at + int(length)
         if end > len(self._data):
-            raise Broken(f"a text of {int(length)} bytes at {self._at}, in a message of {len(self._data)}")
+            raise Broken(f"a text of {int(length)} bytes at {self._at} passes the end of the message at {len(self._data)}")
         raw = self._data[self._at:end]
         self._at = end
         return raw.rstrip(b"\0").decode("utf-8", "replace")
@@ -58,7 +58,7 @@ def _pose(reader: Reader) -> Pose:
 
 
 def decode(kind: str, data: bytes, ros1: bool) -> List[Tuple[str, float, Pose]]:
-    """Returns for each pose of a message: suffix of the topic's name, timestamp [s] or 0 if it has none, pose."""
+    """Returns for each pose of a message: suffix of the topic's name; timestamp [s], 0 if it has none; pose."""
     reader = Reader(data, ros1)
     if kind == "TFMessage":
         (count,) = reader.numbers("I")

@@ -42,7 +42,7 @@ class _Fields:
     def block(self, kind: str) -> bytes:
         length = self.number(kind)
         if self.at + length > len(self.data):
-            raise Broken(f"a field of {length} bytes in a record of {len(self.data)}")
+            raise Broken(f"a field of {length} bytes passes the end of a record of {len(self.data)}")
         self.at += length
         return self.data[self.at - length:self.at]
 
@@ -114,7 +114,7 @@ class _Reader:
             opcode, length = RECORD_HEAD.unpack_from(data, inner)
             begin = inner + RECORD_HEAD.size
             if begin + length > len(data):
-                raise Broken(f"a record of {length} bytes in a chunk of {len(data)}")
+                raise Broken(f"a record of {length} bytes passes the end of a chunk of {len(data)}")
             if opcode in (SCHEMA, CHANNEL, MESSAGE):
                 yield from self._record(opcode, data[begin:begin + length], at)
             inner = begin + length

@@ -78,7 +78,7 @@ TEST(EditScene, ABodyStaysWhileSomethingRidesOnIt) {
   EXPECT_THAT((*less)->body_names, ElementsAre("crate"));
   const auto moved = with_object_set(*scene, {"lamp", {}, Pose{}});
   ASSERT_FALSE(moved);
-  EXPECT_THAT(moved.error().text, HasSubstr("goes with \"crate\""));
+  EXPECT_THAT(moved.error().text, HasSubstr("moves with \"crate\""));
   const auto hidden = with_object_set(*scene, {"lamp", false, {}});
   ASSERT_TRUE(hidden);
   EXPECT_FALSE((*hidden)->objects[3].visible);
