@@ -45,11 +45,11 @@ Result<void> judge(const v1::Status& answer) {
     default:  // UNSUPPORTED, and codes of later versions
       return failure(ErrorKind::unavailable, "this sonard does not know the request" +
                                                  (answer.text().empty() ? "" : " (" + answer.text() + ")") +
-                                                 ": is it of another version? sonard --version and sonarctl --version tell");
+                                                 ": is it of another version? Compare sonard --version and sonarctl --version");
   }
 }
 
-/// The event lives as long as the Response that contains it.
+/// The pointer keeps the whole Response alive.
 std::shared_ptr<const v1::Event> event_of(const ControlClient::Response& response) { return {response, &response->event()}; }
 
 }  // namespace
@@ -62,7 +62,7 @@ Result<ControlClient> ControlClient::open(const ControlOptions& options, bool* t
   auto socket = connect_tcp(*at, options.connect_patience);
   if (!socket && socket.error().kind == ErrorKind::unavailable)
     return failure(ErrorKind::unavailable, "no sonard answers on the control stream, tcp " + text_from(*at) +
-                                               ": is one running there? Its banner names the address (--control HOST:PORT)");
+                                               ": is one running there? Its banner names the HOST:PORT for --control");
   if (!socket) return tl::unexpected(socket.error());
   ControlClient client(std::move(*socket), *at);
   const auto met = client.request(control::Hello{control::protocol_version, "sonarctl", *token}, greeting_patience);
@@ -87,7 +87,7 @@ Result<ControlClient::Response> ControlClient::request(Operation operation, std:
       return tl::unexpected(no_control_stream("no greeting within " + std::to_string(patience.count() / 1000) + " s"));
     if (!*answer)
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " did not answer within " +
-                                                 std::to_string(patience.count() / 1000) + " s: is it busy, or stopped?");
+                                                 std::to_string(patience.count() / 1000) + " s: is it busy, or suspended?");
     const v1::Response& response = **answer;
     if (response.has_event() && response.id() == 0) {
       events_.push_back(event_of(*answer));
@@ -122,9 +122,9 @@ Result<std::shared_ptr<const v1::Event>> ControlClient::next_event(std::chrono::
 
 Error ControlClient::no_control_stream(const std::string& why) const {
   return {ErrorKind::bad_data, "the service at tcp " + text_from(at_) + " is not sonard's control stream (" + why +
-                                   "): something else, or a sonard that is stopped. The control stream is on tcp " +
+                                   "): another service, or a suspended sonard. The control stream is on tcp " +
                                    std::to_string(control_port) +
-                                   " unless configured otherwise; sonard's banner names it: --control HOST:PORT"};
+                                   " unless configured otherwise; sonard's banner names the HOST:PORT for --control"};
 }
 
 /// Returns null when the time is over or, with `until_signal`, after a signal.
@@ -143,7 +143,7 @@ Result<ControlClient::Response> ControlClient::next_message(Clock::time_point de
     if (read.what == Wait::closed)
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " closed the control stream" +
                                                  (read.error.empty() ? "" : ": " + read.error) +
-                                                 "; see its log (a token, a stop)");
+                                                 "; its log says why (a wrong token, or sonard was stopped)");
     if (read.what == Wait::timed_out || (read.what == Wait::interrupted && until_signal)) return nullptr;
     if (read.what != Wait::data) continue;
     const auto received = std::span<const std::byte>(chunk).first(read.size);

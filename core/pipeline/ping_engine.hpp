@@ -49,7 +49,7 @@ class Interruption {
   virtual ~Interruption() = default;
   /// Whether such a ping is likely; the present one is then computed in smaller parts.
   virtual bool expected() const = 0;
-  /// Called between two parts, on the thread of run(). It may call run() of the same engine, which does not call it again.
+  /// Called between two parts, on the thread of run(). It may call run() of the same engine; that run() does not call it.
   virtual void run_other() = 0;
 };
 
@@ -74,17 +74,17 @@ class PingEngine {
     submitted_.pop_front();
     return run(requests);
   }
-  /// Largest number of requests like these two for which one run() is faster than several. 1: it is not faster, or one of the two
-  /// would take much longer together with the other than alone.
+  /// Largest number of requests like these two that one run() computes faster than several runs. 1: it is not faster, or one of
+  /// the two would take much longer than in a run() of its own.
   virtual std::size_t most_together(const PingRequest& a, const PingRequest& b) const {
     return static_cast<void>(a), static_cast<void>(b), 1;
   }
-  /// Engines that cannot be interrupted ignore it. Null = none; no ping may be under way.
+  /// Engines that cannot be interrupted ignore it. Null = none. Not to be called during a ping.
   virtual void set_interruption(Interruption* interruption) { static_cast<void>(interruption); }
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
   /// Statistics of the last ping.
   virtual PingStatistics statistics() const { return {}; }
-  /// Statistics of every ping of the last run() or collect(), in its order.
+  /// Statistics of each ping of the last run() or collect(), in their order.
   virtual std::vector<PingStatistics> statistics_of_each() const { return {statistics()}; }
 
  private:

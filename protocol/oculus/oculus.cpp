@@ -15,8 +15,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Status once a second: the public viewer drops a sonar after 2 s without, another driver after 5 s.
 using PortKind = protocol::Port::Kind;
+// Status once a second: without it, the public viewer gives up after 2 s, another driver after 5 s.
 constexpr std::array<protocol::Port, 2> port_table{{{.kind = PortKind::tcp_stream, .number = tcp_port},
                                                     {.kind = PortKind::udp_beacon, .number = status_port, .period = 1000ms}}};
 

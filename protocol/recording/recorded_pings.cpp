@@ -13,8 +13,8 @@ Result<RecordedPings> RecordedPings::open(std::unique_ptr<RecordingReader> reade
   return pings;
 }
 
-/// The host decodes messages of a recording as it decodes those of a sonar. It sends nothing (as_it_is), and its sequence and
-/// pictures of a scan begin anew with it.
+/// The host decodes messages of a recording as it decodes those of a sonar. Nothing is sent (as_it_is). With a new host the
+/// sequence and the pictures of a scan begin anew.
 Result<void> RecordedPings::make_host() {
   protocol::Wanted wanted;
   wanted.as_it_is = true;

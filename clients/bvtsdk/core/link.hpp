@@ -20,10 +20,10 @@ namespace sonar::bvt {
 
 /// Time limits. Tests shorten them.
 struct Patience {
-  std::chrono::milliseconds connect{5000};    // for each of name lookup, connection and greeting
+  std::chrono::milliseconds connect{5000};    // for name lookup and connection, then for the greeting
   std::chrono::milliseconds request{5000};    // for a reply that needs no ping
-  std::chrono::milliseconds silence{2000};    // a keep-alive is sent after such a time without a message of ours
-  std::chrono::milliseconds lifeless{10000};  // the link is lost after such a time without a byte from the sonar
+  std::chrono::milliseconds silence{2000};    // a keep-alive is sent when we have sent nothing for this long
+  std::chrono::milliseconds lifeless{10000};  // the link is lost when the sonar has sent no byte for this long
 };
 
 class Link {
@@ -38,8 +38,8 @@ class Link {
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  /// Sends a request and waits for its reply. Returns the sonar's code if it refuses, socket_read_timeout without a reply in
-  /// time, and the cause (socket_closed, socket_read_timeout, ...) if the link is lost.
+  /// Sends a request and waits for its reply. Returns the sonar's code if it refuses, socket_read_timeout if no reply comes in
+  /// time, the cause (socket_closed, socket_read_timeout, ...) if the link is lost.
   int ask(FrameType request, const Bytes& payload, Bytes& answer, std::chrono::milliseconds patience);
   int ask(FrameType request, const Bytes& payload, Bytes& answer) { return ask(request, payload, answer, patience_.request); }
 

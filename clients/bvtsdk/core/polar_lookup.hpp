@@ -1,5 +1,5 @@
-// A table of the samples from which each pixel of an XY image is interpolated. It is computed once for a geometry,
-// with all angles and square roots, and used for every ping of that geometry.
+// A table of the samples from which each pixel of an XY image is interpolated. All angles and square roots are computed
+// once for a geometry; the table then serves all pings of that geometry.
 #pragma once
 
 #include <cstdint>
@@ -39,8 +39,8 @@ class PolarLookup {
 
  private:
   struct Entry {
-    std::uint32_t sample;                    // of the four samples: the left one of the two nearer ones
-    std::uint16_t along_range, along_beams;  // weights of the neighbours, 0 to 32768
+    std::uint32_t sample;                    // index of the first of four samples: the near left one
+    std::uint16_t along_range, along_beams;  // weights of the far and the right ones, 0 to 32768
   };
   struct Span {
     std::uint32_t pixel, count;

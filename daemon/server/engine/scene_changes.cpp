@@ -19,7 +19,7 @@ SceneChanges::SceneChanges(asio::io_context& io, Simulator& simulator, ScenePoin
       on_change_(std::move(on_change)),
       pause_(io) {
   asio::post(thread_, [nice_by] {
-    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // costs only smoothness
+    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // a failure costs only smoothness
   });
 }
 
@@ -55,7 +55,7 @@ void SceneChanges::begin() {
   });
 }
 
-/// A bucket of engines: `most_at_once` may be built in a row, then one in each `between_engines`, while drivers are served.
+/// While drivers are served, `most_at_once` engines may be built in a row, then one per `between_engines` (token bucket).
 std::chrono::steady_clock::duration SceneChanges::pause_before_engine() {
   const auto now = std::chrono::steady_clock::now();
   if (!drivers_wait_ || !drivers_wait_()) return {};
@@ -64,7 +64,7 @@ std::chrono::steady_clock::duration SceneChanges::pause_before_engine() {
   return std::max(due - now, std::chrono::steady_clock::duration{});
 }
 
-/// The first waiting change, and those behind it that may share its engine, up to the first that may not.
+/// The first waiting change, and all directly behind it that may share its engine.
 std::vector<SceneChanges::Make> SceneChanges::next_makes() const {
   std::vector<Make> makes;
   for (const Change& change : waiting_) {
@@ -77,7 +77,7 @@ std::vector<SceneChanges::Make> SceneChanges::next_makes() const {
 void SceneChanges::build_next() {
   building_ = true;
   building_since_ = std::chrono::steady_clock::now();
-  // `done` is not passed on, because an object that it holds (such as a connection) must not end on another thread.
+  // `done` is not passed on, because an object that it holds (a connection) must not be destroyed on another thread.
   asio::post(thread_, [this, makes = next_makes(), now = scene_] {
     auto built = std::make_shared<Built>(build(makes, now));
     asio::post(io_, [this, built] { finish(std::move(*built)); });
@@ -92,7 +92,7 @@ auto caught(const Work& work) -> decltype(work()) {
   try {
     return work();
   } catch (const std::bad_alloc&) {
-    return failure(ErrorKind::unavailable, "not enough memory for the changed scene; use a smaller one or free some");
+    return failure(ErrorKind::unavailable, "not enough memory for the changed scene; make it smaller or free memory");
   } catch (const std::exception& e) {
     return failure(ErrorKind::bug, std::string(e.what()) + " (this is a bug, please report it)");
   }
@@ -115,7 +115,7 @@ SceneChanges::Built SceneChanges::build(const std::vector<Make>& makes, const Sc
     built.engine = std::make_shared<std::unique_ptr<PingEngine>>(*std::move(engine));
     return built;
   }
-  // One change may need too much, and the others must not fail with it. So each is then tried alone.
+  // One change may need too much memory; the others must not fail with it. So the first is tried alone.
   if (makes.size() > 1) return build({makes.front()}, now);
   return {now, nullptr, {tl::make_unexpected(engine.error())}};
 }

@@ -31,7 +31,7 @@ _OTHERS = (
     (b"#ROSBAG V1", "a ROS 1 bag of an old format; rewrite it: rosbag migrate {} NEW.bag"),
     (b"FMT, 128, ", "a dataflash log as text; give the .bin file that it was made from"),
     (b"\x89HDF\r\n", "HDF5, as .mat files of MATLAB 7.3 are; write its poses as CSV (docs/poses.md)"),
-    (b"version https://git-lfs", "a pointer of Git LFS, not the file itself; fetch that: git lfs pull"),
+    (b"version https://git-lfs", "a pointer of Git LFS, not the file itself; to fetch the file: git lfs pull"),
     (b"<!DOCTYPE html", "a web page, not the file itself; was the download refused? Fetch it again"),
     (b"<?xml", "XML, such as GPX and KML, without attitudes; write poses as CSV (docs/poses.md)"),
     (b"CDF", "NetCDF; write its poses as CSV (docs/poses.md)"),
@@ -54,13 +54,13 @@ def _described(path: pathlib.Path, head: bytes) -> str:
                 "(.bin), or send the frames to a running sonard (docs/poses.md)")
     first = next((line for line in head.split(b"\n") if line.strip() and not line.startswith(b"#")), head)
     if all(9 <= byte < 128 for byte in head) and (set(first) <= set(b"0123456789+-.eE, \t\r") or first[:1] in b"tT"):
-        return ("text; sonard plays CSV with a header, TUM, EuRoC and KITTI as they are: name the file in `trajectory:` "
+        return ("text; sonard plays TUM, EuRoC, KITTI and CSV with a header unconverted: name the file in `trajectory:` "
                 "(docs/poses.md)")
     return ""
 
 
 def format_of(path: pathlib.Path) -> str:
-    """Returns one of FORMATS, for a folder that of its first recording, or raises ConvertError."""
+    """Returns one of FORMATS (for a folder, that of its first recording), or raises ConvertError."""
     path = recording_at(path)
     if path.is_dir():
         path = files_of(path)[0]
@@ -87,10 +87,9 @@ def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source
             topic: Optional[str] = None, origin: Optional[Geodetic] = None, system: Optional[int] = None,
             assumed: Assumptions = Assumptions(), warn: Warn = lambda text: None, component: Optional[int] = None,
             at: Optional[Place2] = None) -> Track:
-    """Reads the track of one vehicle. kind: one of FORMATS; default: detected. source: messages of a dataflash or telemetry log.
+    """Reads the track of one vehicle. kind: one of FORMATS; default: detected. source: messages of an autopilot's log.
     topic: topic of a recording. system, component: MAVLink system and component of a telemetry log. at: north and east [m]
-    of a vehicle whose log has its depth and no horizontal position. Raises ConvertError and
-    OSError."""
+    of a vehicle whose log has its depth and no horizontal position. Raises ConvertError and OSError."""
     file = recording_at(pathlib.Path(path))
     chosen = kind or format_of(file)
     readers: "dict[str, Callable[[], Track]]" = {
@@ -106,5 +105,5 @@ def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source
     if origin is not None and chosen in RECORDINGS:
         raise ValueError("an origin needs positions in degrees; poses of recordings are in metres")
     if at is not None and chosen not in ("dataflash", "tlog", "ulog"):
-        raise ValueError(f"--at is for logs of autopilots without horizontal position: this is {chosen}")
+        raise ValueError(f"--at is for logs of autopilots without horizontal position, not for {chosen}")
     return readers[chosen]()
