@@ -62,7 +62,7 @@ Result<ControlClient> ControlClient::open(const ControlOptions& options, bool* t
   auto socket = connect_tcp(*at, options.connect_patience);
   if (!socket && socket.error().kind == ErrorKind::unavailable)
     return failure(ErrorKind::unavailable, "no sonard answers on the control stream, tcp " + text_from(*at) +
-                                               ": is one running there? Its banner names the HOST:PORT for --control");
+                                               ": is one running there? Its banner names the address (--control HOST:PORT)");
   if (!socket) return tl::unexpected(socket.error());
   ControlClient client(std::move(*socket), *at);
   const auto met = client.request(control::Hello{control::protocol_version, "sonarctl", *token}, greeting_patience);
@@ -124,7 +124,7 @@ Error ControlClient::no_control_stream(const std::string& why) const {
   return {ErrorKind::bad_data, "the service at tcp " + text_from(at_) + " is not sonard's control stream (" + why +
                                    "): another service, or a suspended sonard. The control stream is on tcp " +
                                    std::to_string(control_port) +
-                                   " unless configured otherwise; sonard's banner names the HOST:PORT for --control"};
+                                   " unless configured otherwise; sonard's banner names it (--control HOST:PORT)"};
 }
 
 /// Returns null when the time is over or, with `until_signal`, after a signal.

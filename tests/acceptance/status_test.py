@@ -117,7 +117,7 @@ class Steering(unittest.TestCase):
                 begin = time.monotonic()
                 result = run(SONARCTL, "status", "--control", f"{self.daemon.address}:{port}")
                 self.assertEqual(result.returncode, 65, result.stderr)
-                for expected in (f"{self.daemon.address}:{port}", what, "something else", "14770"):
+                for expected in (f"{self.daemon.address}:{port}", what, "another service", "14770"):
                     self.assertIn(expected, result.stderr)
                 self.assertLess(time.monotonic() - begin, 20)  # 2 s on a quiet machine; that it waited no longer, the message says
 

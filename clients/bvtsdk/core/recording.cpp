@@ -146,9 +146,8 @@ int RecordingWriter::ping_count(std::int32_t head) const {
 
 Code RecordingReader::open(const std::string& path, std::string* why) {
   File file(std::fopen(path.c_str(), "rb"));
-  std::string reason;
+  std::string reason = "cannot be opened; check that it exists and that you may read it";
   const Code code = file ? open(std::move(file), &reason) : file_open;
-  if (!file) reason = "cannot be opened; check that it exists and that you may read it";
   if (why && code != success) *why = path + " " + reason;
   return code;
 }

@@ -482,7 +482,7 @@ class Corrupted(WithFolder):
     def test_other_files(self):
         for data, said in ((b"", "is empty"), (b"\x7fELF" + bytes(100), "none of dataflash"),
                            (b"time,x,y\n1,2,3\n", "name the file in `traj"),
-                           (b"# frame: ENU_FLU\n1.5 0 0 0 0 0 0 1\n", "sonard plays CSV"), (b"\x1f\x8b\x08", "gunzip -k .*log"),
+                           (b"# frame: ENU_FLU\n1.5 0 0 0 0 0 0 1\n", "sonard plays TUM"), (b"\x1f\x8b\x08", "gunzip -k .*log"),
                            (b"\x28\xb5\x2f\xfd", "zstd -d"), (b"#ROSBAG V1.2\n", "rosbag migrate .*log NEW.bag"),
                            (b"FMT, 128, 89, FMT, BBnNZ, Type\n", "as text; give the .bin"), (b"PK\x03\x04..", "unzip")):
             with self.subTest(data[:8]), self.assertRaisesRegex(ConvertError, said):
