@@ -6,19 +6,15 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/base/trimmed.hpp"
+
 namespace sonar::scene_tools {
 namespace {
 
 constexpr std::size_t most_names = 8;
 constexpr std::string_view blanks = " \t\r\n\f\v";
 
-std::string_view trimmed(const char* text) {
-  if (text == nullptr) return {};
-  std::string_view view(text);
-  const std::size_t begin = view.find_first_not_of(blanks);
-  if (begin == std::string_view::npos) return {};
-  return view.substr(begin, view.find_last_not_of(blanks) - begin + 1);
-}
+std::string_view trimmed_text(const char* text) { return text == nullptr ? std::string_view() : trimmed(text, blanks); }
 
 constexpr int deepest = 100;  // the limit of tinyxml2 before version 10; later versions allow 500
 
@@ -62,8 +58,10 @@ std::string Place::short_text() const {
 }
 
 std::string_view Element::name() const { return xml_ ? std::string_view(xml_->Name()) : std::string_view(); }
-std::string_view Element::text() const { return xml_ ? trimmed(xml_->GetText()) : std::string_view(); }
-std::string_view Element::attribute(const char* name) const { return xml_ ? trimmed(xml_->Attribute(name)) : std::string_view(); }
+std::string_view Element::text() const { return xml_ ? trimmed_text(xml_->GetText()) : std::string_view(); }
+std::string_view Element::attribute(const char* name) const {
+  return xml_ ? trimmed_text(xml_->Attribute(name)) : std::string_view();
+}
 Element Element::child(const char* name) const { return {file_, xml_ ? xml_->FirstChildElement(name) : nullptr}; }
 std::vector<Element> Element::children(const char* name) const {
   std::vector<Element> found;

@@ -1,9 +1,9 @@
 #include "core/scene/files/gdal_metadata.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "core/base/trimmed.hpp"
 #include "core/scene/files/geo_keys.hpp"
 #include "core/scene/files/height_values.hpp"
 
@@ -22,12 +22,6 @@ std::string_view attribute(std::string_view tag, std::string_view name) {
     if ((quote == '"' || quote == '\'') && end != npos) return tag.substr(equals + 2, end - equals - 2);
   }
   return {};
-}
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view blanks = " \t\r\n";
-  const std::size_t from = std::min(text.find_first_not_of(blanks), text.size());
-  return text.substr(from, text.find_last_not_of(blanks) + 1 - from);
 }
 
 std::optional<std::uint16_t> unit_called(std::string_view word) {
@@ -49,7 +43,7 @@ GdalMetadata gdal_metadata_of(std::string_view text) {
     if (close == npos) break;
     const std::string_view tag = text.substr(at + begin.size(), close - at - begin.size());
     const std::string_view sample = attribute(tag, "sample"), role = attribute(tag, "role"),
-                           value = trimmed(text.substr(close + 1, text.find('<', close) - close - 1));
+                           value = trimmed(text.substr(close + 1, text.find('<', close) - close - 1), " \t\r\n");
     if (!sample.empty() && sample != "0") continue;
     const auto number = [&] { return height_number(value).value_or(NAN); };
     if (role == "unittype") metadata.height_unit = unit_called(value);

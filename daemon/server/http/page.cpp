@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/base/letters.hpp"
+#include "core/base/trimmed.hpp"
 
 namespace sonar {
 namespace {
@@ -13,11 +14,7 @@ constexpr const char* policy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
+constexpr std::string_view blanks = " \t";
 
 /// Calls take(name, parameters) for each element of a list such as "text/html;q=0.9, */*", until it returns true.
 template <class Take>
@@ -27,7 +24,8 @@ bool any_of_list(std::string_view list, Take take) {
     const std::string_view element = list.substr(0, comma);
     list.remove_prefix(std::min(comma + 1, list.size()));
     const auto semicolon = std::min(element.find(';'), element.size());
-    if (take(trimmed(element.substr(0, semicolon)), trimmed(element.substr(std::min(semicolon + 1, element.size())))))
+    if (take(trimmed(element.substr(0, semicolon), blanks),
+             trimmed(element.substr(std::min(semicolon + 1, element.size())), blanks)))
       return true;
   }
   return false;
