@@ -3,6 +3,7 @@
 // and carries out the HostActions.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -159,6 +160,7 @@ struct Make {
   PictureKind picture = PictureKind::fan;
 
   std::string_view name() const { return device->name(); }
+  bool has_several_streams() const { return std::ranges::count(ports, HostPort::Kind::tcp, &HostPort::kind) > 1; }
   bool is_by_udp() const { return ports.front().kind == HostPort::Kind::udp; }  // hosts send by UDP
   /// The unit of a rate of pings. In some kinds of pictures a ping is one line.
   std::string_view rate_unit() const {

@@ -35,11 +35,10 @@ Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const Make
                                            ": --mcap and --pcap hold those of every sonar");
   }
   // The bytes of several connections in one stream have lost where they came from.
-  const bool has_several_streams = std::ranges::count(make.ports, protocol::HostPort::Kind::tcp, &protocol::HostPort::kind) > 1;
   const bool has_raw_dumps =
       make.codec.framing != nullptr ||
       std::any_of(kinds.begin(), kinds.end(), [](const recording::FileKind& kind) { return kind.is_raw_dump; });
-  if (!options.raw.empty() && (has_several_streams || !has_raw_dumps))
+  if (!options.raw.empty() && (make.has_several_streams() || !has_raw_dumps))
     return failure(ErrorKind::usage, options.raw.string() + ": a raw dump of " + std::string(make.title) +
                                          " cannot be read back: --mcap and --pcap hold its messages");
   const auto add = [&](const std::filesystem::path& path, const auto& writer_of) {

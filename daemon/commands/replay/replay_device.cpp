@@ -1,7 +1,5 @@
 #include "daemon/commands/replay/replay_device.hpp"
 
-#include <algorithm>
-
 #include "daemon/server/time/clock.hpp"
 #include "protocol/host.hpp"
 #include "protocol/oculus/decode.hpp"
@@ -15,8 +13,7 @@ constexpr std::uint64_t most_looked_at_bytes = 64u << 20;  // a status comes eve
 /// Why pings of that make cannot be served to a driver; empty: they can.
 std::string why_only_seen(const protocol::Make& make) {
   if (make.each_ping_requested || make.scans) return "depend on the requests of its host";
-  const auto streams = std::ranges::count(make.ports, protocol::HostPort::Kind::tcp, &protocol::HostPort::kind);
-  return streams > 1 ? "come by several connections" : "";
+  return make.has_several_streams() ? "come by several connections" : "";
 }
 
 /// A sonar that answers its hosts.
