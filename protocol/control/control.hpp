@@ -24,6 +24,9 @@ class Response;
 
 namespace sonar::control {
 
+/// How the answer of `sonard replay` to GET /healthz begins; the name of the file follows. Doctor recognises a replay by it.
+inline constexpr std::string_view health_of_replay = "ok: replays ";
+
 /// Reads a datagram with a PoseUpdate. A malformed one is refused with one sentence (see checked()).
 Result<PoseSample> decode_pose_datagram(BytesView datagram);
 /// Reads a message of the stream, without its length. The refusal of a message that is not protobuf has id 0.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clients/sonarctl/net.hpp"
+#include "protocol/control/control.hpp"
 #include "protocol/host.hpp"
 
 namespace sonar::v1 {  // from control.pb.h
@@ -92,8 +93,8 @@ struct HttpFacts {
   int code = 0;  // 0 = no answer
   std::string text;
 };
-/// Whether a recording is sent: it has its own rate, and no control stream.
-inline bool is_replay(const HttpFacts& http) { return http.text.starts_with("ok: replays "); }
+/// True for `sonard replay`: a recording has its own rate, and no control stream.
+inline bool is_replay(const HttpFacts& http) { return http.text.starts_with(control::health_of_replay); }
 /// A sonar that answered a search.
 struct FoundSonar {
   const protocol::Make* make = nullptr;

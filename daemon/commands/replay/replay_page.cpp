@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "daemon/server/http/http_router.hpp"
+#include "protocol/control/control.hpp"
 
 namespace sonar {
 
@@ -28,8 +29,8 @@ asio::awaitable<HttpOutcome> ReplayPage::answer(const HttpRequest& request, Http
   }
   if (std::holds_alternative<HelpAction>(routed.action))
     co_return HttpAnswer{200, "sonard replay: open this address in a browser\n", "text/plain"};
-  if (std::holds_alternative<HealthAction>(routed.action))  // doctor tells by it that a recording is sent
-    co_return HttpAnswer{200, "ok: replays " + of_.file.filename().string() + "\n", "text/plain"};
+  if (std::holds_alternative<HealthAction>(routed.action))
+    co_return HttpAnswer{200, std::string(control::health_of_replay) + of_.file.filename().string() + "\n", "text/plain"};
   co_return answer_of(404, control::StatusCode::unsupported, "sonard replay has its page only");
 }
 
