@@ -70,7 +70,7 @@ class Vendor {
       if (port.kind == kind) return &port;
     return nullptr;
   }
-  /// Whether each of several TCP ports sends bytes of its own for a ping.
+  /// True if each of several TCP ports sends bytes of its own for a ping.
   bool has_several_streams() const { return std::ranges::count(ports(), Port::Kind::tcp_stream, &Port::kind) > 1; }
   virtual std::span<const Option> options() const { return {}; }
   virtual int default_max_clients() const = 0;

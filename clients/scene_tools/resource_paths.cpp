@@ -84,7 +84,7 @@ fs::path model_in(const fs::path& folder) {
   return best;
 }
 
-/// Whether a folder is the ROS package of that name. Repositories often name the folder otherwise.
+/// True if a folder is the ROS package of that name. Repositories often name the folder otherwise.
 bool is_package(const fs::path& folder, std::string_view name) {
   const fs::path manifest = folder / "package.xml";
   if (name.empty() || !is_file(manifest)) return false;

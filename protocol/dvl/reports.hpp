@@ -18,7 +18,7 @@ inline constexpr double nsd_dbm = -90;  // DOC: -88 to -97 in its example; unkno
 
 /// Unix time, as the reports have it.
 std::int64_t microseconds(Time at);
-/// Those of the vehicle since the start of dead reckoning.
+/// The angles of the vehicle since the start of dead reckoning.
 RollPitchYaw angles_of(const Reckoning& reckoning);
 /// The text as bytes, with the end of a line.
 Bytes line_of(std::string text);

@@ -28,7 +28,7 @@ class Session : public protocol::Dialogue {
   Settings settings_after(const protocol::Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
-  /// Carries out a command, and adds the events that follow. nullopt: there is no such command.
+  /// Carries out a command, and adds the events that follow. Returns nullopt if there is no such command.
   std::optional<Outcome> obey(const std::string& command, const Json& parameters, Time now, protocol::Reaction& reaction);
 
  private:

@@ -126,8 +126,8 @@ class Gathering {
     if (facts_.sonars.empty()) add_sonar(with_port(given), "");
   }
 
-  /// Those that a sonard of this computer serves without a control stream, such as a recording. `usual`: the address to look at
-  /// if it serves all.
+  /// Adds the sonars that a sonard of this computer serves without a control stream, such as a recording. `usual`: the address
+  /// to look at if it serves all.
   void add_daemons_sonars(const std::string& usual) {
     for (const PortHolder& daemon : facts_.daemons) {
       auto at = parse_endpoint(daemon.at, {});

@@ -62,7 +62,7 @@ std::optional<std::uint16_t> unit_of_height_system(std::uint16_t system) {
   return std::nullopt;
 }
 
-/// Whether a height system counts downwards; from the EPSG data set 10.0.
+/// True if a height system counts downwards; from the EPSG data set 10.0.
 bool counts_downwards(std::uint16_t system) {
   static const std::set<std::uint16_t> depths{5336, 5612, 5614, 5706, 5715, 5734, 5739, 5789, 5831, 5861, 5862, 5863, 5864, 5865,
                                               5866, 5867, 5873, 6357, 6358, 6359, 7976, 8051, 8053, 8358, 9287, 9288, 9672};
