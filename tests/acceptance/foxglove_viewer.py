@@ -36,7 +36,7 @@ class Viewer:
         self.buffer = b""
         self.frames = 0  # of data, received
         self.words, self.messages, self.times = [], [], []
-        self.channels, self.subscriptions, self.info = {}, {}, None
+        self.channels, self.subscriptions, self.info, self.schemas = {}, {}, None, {}
         key = base64.b64encode(os.urandom(16)).decode()
         asked = {"Host": f"{address}:{port}", "Connection": "keep-alive, Upgrade", "Upgrade": "websocket",
                  "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": key, "Sec-WebSocket-Protocol": protocols, **(headers or {})}
@@ -177,6 +177,39 @@ class Viewer:
             new.append({"id": subscription, "channelId": self.channel(topic)})
         self.say(op="subscribe", subscriptions=new)
 
+    def subscribed(self, *topics):
+        """Subscribes, and waits until it is so."""
+        self.subscribe(*topics)
+        self.parameters("subscribed", "/none")  # answered after it
+        return self
+
+    def parameters(self, request="all", *names):
+        """Values by name, of all parameters where none is named."""
+        self.say(op="getParameters", parameterNames=list(names), id=request)
+        return {p["name"]: p.get("value") for p in self._values_for(request)}
+
+    def set(self, name, value):
+        """What holds afterwards; None: there is no such parameter."""
+        self.say(op="setParameters", parameters=[{"name": name, "value": value}], id="set " + name)
+        values = self._values_for("set " + name)
+        return values[0].get("value") if values else None
+
+    def _values_for(self, request):
+        return self.wait_for(lambda kind, word: kind == "word" and word["op"] == "parameterValues" and word.get("id") == request)["parameters"]
+
+    def call(self, name, payload, call=1):
+        """What a service answers or why it does not, and which of both it is."""
+        services = next(word for word in self.words if word["op"] == "advertiseServices")["services"]
+        service = next(s["id"] for s in services if s["name"] == name)
+        self.send_frame(2, struct.pack("<BIII", 2, service, call, 4) + b"json" + payload)
+        kinds = []
+
+        def is_answer(kind, value):
+            kinds.append(kind)
+            return kind == "answer" or (kind == "word" and value["op"] == "serviceCallFailure")
+
+        return self.wait_for(is_answer), kinds[-1]
+
     def first_of(self, topic, patience_s=60):
         """The first message of the channel, decoded; waits for it if there is none yet."""
         found = [payload for name, _, payload in self.messages if name == topic]
@@ -187,7 +220,9 @@ class Viewer:
     def decode(self, topic, payload):
         channel = self.channels[self.channel(topic)]
         assert channel["encoding"] == channel["schemaEncoding"] == "protobuf", channel["encoding"]
-        return Schema(base64.b64decode(channel["schema"])).decode(channel["schemaName"], payload)
+        if channel["schema"] not in self.schemas:
+            self.schemas[channel["schema"]] = Schema(base64.b64decode(channel["schema"]))
+        return self.schemas[channel["schema"]].decode(channel["schemaName"], payload)
 
     def status(self, part="", patience_s=60):
         """The next status word with these words."""

@@ -1,7 +1,10 @@
 """A second reader of the Oculus stream, typed by hand from the sources of docs/protocols/oculus.md. Shares nothing with the C++ code."""
+import contextlib
+import functools
 import math
 import socket
 import struct
+import threading
 import time
 
 HEADER = struct.Struct("<HHHHHIH")  # id, source, destination, type, version, payload size, spare
@@ -45,16 +48,29 @@ class Ping:
         assert self.image_size == self.rows * (self.beams * self.sample_bytes + gain_bytes), "image size"
         assert self.image_offset >= table + 2 * self.beams, "image inside the bearing table"
         self.bearings = struct.unpack_from(f"<{self.beams}h", message, table)
-        self.gains, self.image = [], []
-        at = self.image_offset
+        self.image_bytes = message[self.image_offset:]
+
+    @functools.cached_property
+    def _rows(self):
+        """Of each row its gain, nothing where rows have none, and its samples. Read when they are asked for: it takes a while."""
+        rows, at, width = [], 0, self.sample_bytes
         for _ in range(self.rows):
-            if gain_bytes:
-                self.gains.append(struct.unpack_from("<I", message, at)[0])
+            gain = ()
+            if self.flags & 4:
+                gain = struct.unpack_from("<I", self.image_bytes, at)
                 at += 4
-            row = message[at:at + self.beams * self.sample_bytes]
+            row = self.image_bytes[at:at + self.beams * width]
             at += len(row)
-            width = self.sample_bytes
-            self.image.append([int.from_bytes(row[i:i + width], "little") for i in range(0, len(row), width)])
+            rows.append((gain, list(row) if width == 1 else [int.from_bytes(row[i:i + width], "little") for i in range(0, len(row), width)]))
+        return rows
+
+    @functools.cached_property
+    def gains(self):
+        return [gain for gains, _ in self._rows for gain in gains]
+
+    @functools.cached_property
+    def image(self):
+        return [samples for _, samples in self._rows]
 
     def brightest(self, row_begin=0, row_end=None):
         """Range [m], bearing [deg], value of the largest sample in rows [row_begin, row_end)."""
@@ -119,6 +135,23 @@ class Client:
             if (ping.mode, ping.flags, ping.range) == (wanted[0], wanted[4], wanted[5]):
                 return ping
             self.stale += 1
+
+
+@contextlib.contextmanager
+def reading(client):
+    """It reads as a driver does until the end, when it hangs up."""
+    def read():
+        with contextlib.suppress(OSError):
+            while client.socket.recv(1 << 16):
+                pass
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    try:
+        yield
+    finally:
+        client.socket.shutdown(socket.SHUT_RDWR)
+        reader.join()
 
 
 def expected_bearings(beams, half_aperture_deg):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "clients/python"))
@@ -95,6 +96,11 @@ class Sonard(Daemon):
     def status(self):
         """What sonarctl status says, over the control stream of this address."""
         return json.loads(run(SONARCTL, "status", "--json", "--control", f"{self.address}:14770").stdout)
+
+    def get(self, path):
+        """What HTTP answers."""
+        with urllib.request.urlopen(f"http://{self.address}:8088{path}", timeout=60) as answer:
+            return answer.read().decode()
 
     def ctl_to(self, endpoint, command, *arguments, **options):
         """sonarctl COMMAND ... --to ENDPOINT, for poses."""
