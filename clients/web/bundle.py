@@ -3,8 +3,8 @@
 
 usage: bundle.py ESBUILD THREE_DIR GENERATED_DIR OUT_DIR
 
-THREE_DIR holds three.module.js, GENERATED_DIR generated/colour-maps.js. OUT_DIR gets index.html, app-HASH.js, app-HASH.css and
-icon.svg as they are served, page_files.cpp with their gzip bytes, and sizes.txt. The hash is of the content: names change with it.
+THREE_DIR holds three.module.js, GENERATED_DIR generated/colour-maps.js. OUT_DIR gets index.html, icon.svg
+and app-HASH.js, scene-HASH.js, graphics-HASH.js, app-HASH.css as they are served, page_files.cpp with their gzip bytes, and sizes.txt. The hash is of the content: names change with it.
 """
 import gzip
 import hashlib
@@ -14,6 +14,8 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
+# What is served -> where it begins. The scene has a script of its own, for it is loaded after the first picture.
+SOURCES = {"app.js": "src/main.js", "scene.js": "src/scene/scene.js", "graphics.js": "src/graphics.js", "app.css": "style/app.css"}
 TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8",
          ".svg": "image/svg+xml"}
 
@@ -55,15 +57,15 @@ def main():
         sys.exit(__doc__)
     esbuild, three, generated, out = sys.argv[1], *map(pathlib.Path, sys.argv[2:])
     out.mkdir(parents=True, exist_ok=True)
-    for old in out.glob("app-*"):
+    for old in out.glob("*-??????????.*"):
         old.unlink()
-    script = bundled(esbuild, HERE / "src/main.js", three, generated, "--format=esm")
-    style = bundled(esbuild, HERE / "style/app.css", three, generated)
-    files = {hashed("app.js", script): script, hashed("app.css", style): style, "icon.svg": (HERE / "icon.svg").read_bytes()}
+    files = {}
     html = (HERE / "index.html").read_text(encoding="utf-8")
-    for name in files:
-        html = html.replace(f'"/app{pathlib.Path(name).suffix}"', f'"/{name}"')
-    files = {"index.html": html.encode(), **files}
+    for name, source in SOURCES.items():
+        content = bundled(esbuild, HERE / source, three, generated, *(["--format=esm"] if name.endswith(".js") else []))
+        files[hashed(name, content)] = content
+        html = html.replace(f'"/{name}"', f'"/{hashed(name, content)}"')
+    files = {"index.html": html.encode(), "icon.svg": (HERE / "icon.svg").read_bytes(), **files}
     for name, content in files.items():
         (out / name).write_bytes(content)
     (out / "page_files.cpp").write_text(cpp_of(files), encoding="utf-8")

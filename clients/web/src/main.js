@@ -6,7 +6,6 @@ import { Fan } from './fan/fan.js';
 import { LogPane } from './panels/log.js';
 import { Notice } from './panels/notice.js';
 import { Refusals } from './panels/refusals.js';
-import { Scene } from './scene/scene.js';
 import { Timeline } from './panels/timeline.js';
 import { drawConnections } from './panels/connections.js';
 import { drawDoctor } from './panels/doctor.js';
@@ -61,7 +60,7 @@ const connection = new Connection({
 });
 connection.open();  // its callbacks run only after this script, so they may use everything below
 const refusals = new Refusals();
-const fan = new Fan(facts, test, () => choose());
+const fan = new Fan(facts, test);
 let scene = null;
 
 const steering = {
@@ -109,7 +108,6 @@ function choose() {
   // The daemon does not name the objects that were removed meanwhile.
   if (!document.hidden && !connection.topics.has('/scene')) scene?.removeObjects();
   connection.want(topics);
-  if (connection.subscriptions.size > 0) setTimeout(() => !fan.drawn && fan.prepare());
 }
 
 /// Called once for each sonar that makes range images and each connection.
@@ -147,26 +145,41 @@ function announce() {
   setText($('announce'), text);
 }
 
-/// Starts the scene after the first picture, or when no picture is expected. Its meshes and shaders would delay the first
-/// picture, by seconds with a software renderer.
+/// Starts the scene after the first picture, or when no picture is expected. Its script, the graphics, meshes and shaders would delay
+/// the first picture, by seconds with a software renderer.
 function sceneMayBegin() {
   if (facts.drawnPings > 0) return true;  // the picture was painted before this frame
   if (facts.connection !== 'open' || !facts.status) return false;
   const expected = facts.previews || facts.preview || facts.listened;
   return performance.now() / 1000 - facts.openedAt > (expected ? scene_waits_for_pings_s : scene_waits_s);
 }
-function beginScene() {
-  scene = new Scene(facts, fan);
+
+/// Returns the name of what draws, once the graphics have started; '' if that is not known, null without WebGL2.
+function startGraphics() {
+  return new Promise((done) => {
+    const worker = new Worker(document.body.dataset.graphics);
+    worker.onmessage = ({ data }) => (done(data), worker.terminate());
+    worker.onerror = () => done('');  // no OffscreenCanvas
+  });
+}
+
+let sceneBegun = false;
+async function beginScene() {
+  sceneBegun = true;
+  const [{ Scene }, renderer] = await Promise.all([import(document.body.dataset.scene), startGraphics()]);
+  const software = /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? '');
+  if (renderer !== null && !software) fan.useGraphics();
+  scene = new Scene(facts, fan, software);
   setHidden($('no-scene'), !scene.missing);
   setHidden($('scene'), scene.missing);
   choose();
 }
 
 function frame() {
-  const begins = sceneMayBegin();
+  const begins = !sceneBegun && sceneMayBegin();
   fan.show(facts.ping);
-  if (scene) scene.draw();
-  else if (begins) beginScene();
+  scene?.draw();
+  if (begins) beginScene();
   requestAnimationFrame(frame);
 }
 

@@ -3,6 +3,7 @@ import { $, setClass, setHidden, setText } from '../dom.js';
 import { beamTable, drawnLayout, exactLayout, fittedLayout, polarOf, samplesOf, under } from './layout.js';
 import { bearingText, drawAxes, drawMarks } from './marks.js';
 import { colourTable, mapNames } from './colours.js';
+import { LookupPainter } from './lookup.js';
 import { drawFlat } from './flat.js';
 import { fixed, short, whole } from '../numbers.js';
 import { makeFanPainter } from './shader.js';
@@ -21,15 +22,13 @@ const kinds = {  // names of the pictures that sonard draws
 const empty_grid = { rows: 500, beams: 2, spacing_m: 0.02, start_m: 0, range_m: 10, azimuth_rad: [Math.PI / 6, -Math.PI / 6] };
 
 export class Fan {
-  /// `onMissing` is called if the browser has no WebGL2.
-  constructor(facts, exact, onMissing) {
+  constructor(facts, exact) {
     this.facts = facts;
-    this.onMissing = onMissing;
     this.exact = exact;  // for tests: the layout of `sonarctl view --png --no-rings`, so many pixels wide; else 0
     this.canvas = $('fan');
     this.drawnCanvas = $('drawn');
     this.marks = $('fan-marks');
-    this.painter = undefined;  // until prepare(); null: there is no WebGL2
+    this.painter = (exact && makeFanPainter(this.canvas)) || new LookupPainter(this.canvas);
     this.remembered = makeRemembered('fan', { map: 'copper', rings: true });
     this.gain = 1;
     this.gamma = 1;
@@ -43,17 +42,20 @@ export class Fan {
     this.marks.addEventListener('pointerleave', () => this.point(null));
   }
 
-  /// Starts the graphics of the browser, which can take seconds. Call it after the first picture is requested, so that the daemon
-  /// computes the picture meanwhile.
-  prepare() {
-    if (this.painter !== undefined) return;
-    this.painter = makeFanPainter(this.canvas);
-    if (!this.painter) this.onMissing();
+  /// Draws with the graphics processor from now on. Not with a software renderer: the table is many times faster.
+  useGraphics() {
+    const canvas = this.canvas.cloneNode();  // a canvas keeps the kind of its first context
+    const painter = this.exact ? null : makeFanPainter(canvas);
+    if (!painter) return;
+    this.canvas.replaceWith(canvas);
+    [this.canvas, this.painter, this.layout] = [canvas, painter, null];
+    if (this.polar && this.samples) painter.load(this.ping.image, this.samples, this.table, this.full_scale);
+    this.redraw();
   }
 
-  /// True if sonard draws the picture, because it is no fan or there is no WebGL2.
+  /// True if sonard draws the picture, because it is no fan of one ping.
   get drawn() {
-    return this.painter === null || Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
+    return Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
   }
 
   useMap(name) {
@@ -94,7 +96,6 @@ export class Fan {
       return this.redraw();
     }
     if (ping.about) return this.showDrawn(ping);
-    this.prepare();
     this.shape = '';
     const geometry = ping.geometry;
     if (geometry !== this.geometry) {
@@ -106,7 +107,7 @@ export class Fan {
     if (!this.samples || before?.range_m !== this.polar.range_m || before?.azimuth_rad.length !== this.polar.azimuth_rad.length) this.layout = null;
     const { samples, full_scale } = samplesOf(ping.image);
     [this.samples, this.full_scale] = [samples, full_scale];
-    this.painter?.load(ping.image, samples, this.table, full_scale);
+    this.painter.load(ping.image, samples, this.table, full_scale);
     this.paint();
     this.facts.pingDrawn();
   }
@@ -138,11 +139,15 @@ export class Fan {
     const { layout } = this;  // painting may ask for another
     const marked = { rings: this.rings, cursor: this.cursor, ratio: this.ratio, head_rad: about?.kind === 'sweep' ? about.head_rad : undefined };
     setHidden(this.drawnCanvas, !about);
-    setHidden(this.canvas, Boolean(about) || !this.polar || !this.painter);
+    setHidden(this.canvas, Boolean(about) || !this.polar);
     if (about) drawFlat(this.drawnCanvas, this.ping.image, this.map, this.gain);
-    else if (this.painter && this.polar) this.paintPicture();
-    if (about && !this.polar) drawAxes(this.marks, about, layout, marked);
-    else drawMarks(this.marks, polar, layout, marked);
+    else if (this.polar) this.paintPicture();
+    const marks = JSON.stringify([marked, layout, polar.range_m, polar.azimuth_rad[0], polar.azimuth_rad.at(-1), about && !this.polar ? about : null]);
+    if (marks !== this.markedWith) {  // most pings change none of them
+      if (about && !this.polar) drawAxes(this.marks, about, layout, marked);
+      else drawMarks(this.marks, polar, layout, marked);
+    }
+    this.markedWith = marks;
     this.caption();
   }
 
@@ -151,8 +156,9 @@ export class Fan {
     const image = this.ping?.about && this.ping.image;
     this.layout = image ? drawnLayout(image, this.polar, width, height, margins) : this.exact ? exactLayout(polar, width, 4) : fittedLayout(polar, width, height, margins);
     this.ratio = this.exact ? 1 : Math.min(2, devicePixelRatio || 1);
-    const scale = this.exact ? 1 : this.quality === 0 ? this.ratio / 2 : this.ratio;
+    const scale = this.exact ? 1 : this.quality === 0 ? this.ratio / 2 : this.painter.ratio?.(this.layout, this.ratio) ?? this.ratio;
     this.scale = scale;
+    this.markedWith = '';  // the new size clears the marks
     const { box } = this.layout;
     if (box) for (const side of ['left', 'top', 'width', 'height']) this.drawnCanvas.style[side] = `${box[side]}px`;
     for (const [canvas, s] of [[this.canvas, scale], [this.marks, this.ratio]]) {
@@ -172,7 +178,7 @@ export class Fan {
       apex_y: layout.apex_y * scale,
       metres_per_pixel: layout.metres_per_pixel / scale,
     };
-    const measured = !this.exact && ++this.painted % 8 === 0;
+    const measured = !this.exact && this.painter.finish && ++this.painted % 8 === 0;
     const from = performance.now();
     this.painter.paint(this.polar, scaled, { map: this.map, gain: this.gain, gamma: this.gamma, single: this.quality < 2, outside: background });
     if (!measured) return;

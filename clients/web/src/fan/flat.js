@@ -1,5 +1,4 @@
-// Colours pictures that sonard has drawn (/SONAR/fan, mono8; 0 = outside): those of sonars whose picture is no fan of the last ping, and
-// without WebGL2 those of all sonars.
+// Colours pictures that sonard has drawn (/SONAR/fan, mono8; 0 = outside): those of sonars whose picture is no fan of the last ping.
 
 const outside = new Uint32Array(new Uint8Array([13, 17, 23, 255]).buffer)[0];
 
@@ -9,6 +8,7 @@ export function drawFlat(canvas, image, map, gain) {
   const out = g.createImageData(image.width, image.height);
   const pixels = new Uint32Array(out.data.buffer);
   const colours = new Uint32Array(map.slice().buffer);
-  for (let i = 0; i < pixels.length; i++) pixels[i] = image.data[i] ? colours[Math.min(255, Math.round(image.data[i] * gain))] : outside;
+  const colourOf = Uint32Array.from({ length: 256 }, (_, v) => (v ? colours[Math.min(255, Math.round(v * gain))] : outside));
+  for (let i = 0; i < pixels.length; i++) pixels[i] = colourOf[image.data[i]];
   g.putImageData(out, 0, 0);
 }

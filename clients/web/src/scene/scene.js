@@ -9,20 +9,17 @@ import { readGlb } from './glb.js';
 const water = 0x0b2233;
 const least_interval_ms = 1000 / 15;
 const slow_ms = 60;  // of a frame
+const free_ms = 17;  // a frame's end is noticed one frame of the browser later
+const rest_ms = 100;  // after a press of a button or key: its answer is painted before the next frame
 const click_px = 4;
 
-/// Without a graphics processor smooth edges take two thirds of a frame's time, and clicks wait for frames.
-function isSoftware(gl) {
-  const info = gl?.getExtension('WEBGL_debug_renderer_info');
-  return Boolean(info) && /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(info.UNMASKED_RENDERER_WEBGL));
-}
-
 export class Scene {
-  constructor(facts, fan) {
+  /// `software`: without a graphics processor. Smooth edges take two thirds of a frame's time there, and clicks wait for frames.
+  constructor(facts, fan, software) {
     this.facts = facts;
     this.fan = fan;
     this.canvas = $('scene');
-    const context = this.canvas.getContext('webgl2', { alpha: false, antialias: !isSoftware(fan.canvas.getContext('webgl2')) });
+    const context = this.canvas.getContext('webgl2', { alpha: false, antialias: !software });
     this.missing = !context;
     if (this.missing) return;
     this.renderer = new WebGLRenderer({ canvas: this.canvas, context });
@@ -41,8 +38,9 @@ export class Scene {
     this.vehicles = new Map();
     this.drawnAt = 0;
     this.interval_ms = least_interval_ms;
-    this.count = 0;
-    this.coarse = 1;
+    this.coarse = software ? 0.5 : 1;
+    this.restUntil = 0;
+    for (const kind of ['pointerdown', 'pointerup', 'keydown']) document.addEventListener(kind, () => (this.restUntil = performance.now() + rest_ms), true);
     for (const button of document.querySelectorAll('.camera')) button.onclick = () => this.use(button.dataset.camera);
     this.canvas.addEventListener('pointerdown', (event) => (this.pressed = [event.clientX, event.clientY]));
     this.canvas.addEventListener('click', (event) => this.pick(event));
@@ -165,6 +163,7 @@ export class Scene {
   draw() {
     if (this.missing || document.hidden) return;
     const now = performance.now();
+    if (!this.finished(now) || now < this.restUntil) return;
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
     if (width < 40 || height < 40 || now - this.drawnAt < this.interval_ms) return;
     const resized = width !== this.width || height !== this.height;
@@ -187,19 +186,26 @@ export class Scene {
     this.renderer.render(this.graph, this.camera.camera);
     drawCompass($('compass'), this.camera.view);
     this.caption(vehicle);
-    if (++this.count % 10 === 2) this.measure();
+    const gl = this.renderer.getContext();
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
   }
 
-  /// On slow machines the scene takes half of the pixels, and leaves most of the time to the rest of the page.
-  measure() {
+  /// Whether the last frame is drawn; never waits for it. On slow machines the scene takes half of the pixels, and leaves most of the
+  /// time to the rest of the page.
+  finished(now) {
+    if (!this.fence) return true;
     const gl = this.renderer.getContext();
-    const from = performance.now();
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
-    const cost_ms = performance.now() - from;
+    if (!gl.isContextLost() && gl.getSyncParameter(this.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    gl.deleteSync(this.fence);
+    this.fence = null;
+    const cost_ms = now - this.drawnAt - free_ms;
     this.interval_ms = Math.max(least_interval_ms, 5 * cost_ms);
-    if (cost_ms <= slow_ms || this.coarse === 0.5) return;
-    this.coarse = 0.5;
-    this.width = 0;  // sized anew
+    if (cost_ms > slow_ms && this.coarse === 1) {
+      this.coarse = 0.5;
+      this.width = 0;  // sized anew
+    }
+    return true;
   }
 
   caption(vehicle) {

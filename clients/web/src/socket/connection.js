@@ -127,8 +127,6 @@ export class Connection {
 
   advertise(channel) {
     if (channel.encoding !== 'protobuf') return;
-    const packed = atob(channel.schema);
-    channel.types = readDescriptors(Uint8Array.from(packed, (c) => c.charCodeAt(0)));
     this.channels.set(channel.id, channel);
     this.byTopic.set(channel.topic, channel);
   }
@@ -172,7 +170,10 @@ export class Connection {
     if (frame?.op === 'answer') this.finishCall(frame.call, frame.payload);
     if (frame?.op !== 'data') return;
     const channel = this.subscriptions.get(frame.subscription);
-    if (channel) this.on.message(channel.topic, decode(channel.types, channel.schemaName, frame.payload), frame.ns);
+    if (!channel) return;
+    // Here, for most channels are never subscribed to.
+    channel.types ??= readDescriptors(Uint8Array.from(atob(channel.schema), (c) => c.charCodeAt(0)));
+    this.on.message(channel.topic, decode(channel.types, channel.schemaName, frame.payload), frame.ns);
   }
 
   finishCall(call, answer, refusal) {
