@@ -101,6 +101,17 @@ std::optional<UtmZone> utm_of_keys(const GeoKeys& keys) {
                             number(false_easting), number(false_northing)});
 }
 
+/// The system that ArcGIS, and GDAL for codes of ESRI, write as WKT into a citation if no code names it.
+std::optional<CoordinateSystem> system_of_citation(const GeoKeys& keys) {
+  constexpr std::string_view before_wkt = "ESRI PE String = ";
+  constexpr std::size_t longest_wkt = 8192;
+  for (const std::uint16_t key : {projected_citation, geographic_citation, citation})
+    if (const std::string text = keys.text_of(key, longest_wkt); text.starts_with(before_wkt))
+      if (const CoordinateSystem system = system_of_wkt(std::string_view(text).substr(before_wkt.size())); system.geographic)
+        return system;
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<GeoKeys::Place> GeoKeys::place_of(std::uint16_t key) const {
@@ -119,22 +130,24 @@ std::optional<double> GeoKeys::number_of(std::uint16_t key) const {
   return place && place->tag == numbers_tag && place->at < numbers_.size() ? std::optional(numbers_[place->at]) : std::nullopt;
 }
 
-std::string GeoKeys::text_of(std::uint16_t key) const {
+std::string GeoKeys::text_of(std::uint16_t key, std::size_t longest) const {
   const auto place = place_of(key);
   if (!place || place->tag != texts_tag || place->at >= texts_.size()) return {};
-  constexpr std::size_t longest = 80;
   const std::string text = texts_.substr(place->at, std::min<std::size_t>(place->count, longest));
   return text.substr(0, text.find_first_of(std::string("|\0", 2)));
 }
 
 Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::uint16_t> height_unit) {
   CoordinateSystem system;
-  auto model = keys.value_of(model_type);
+  auto model = code_of(keys, model_type);
   if (!model && code_of(keys, projected_system)) model = projected;  // some programs state only the system itself
-  if (!model && code_of(keys, geographic_system)) model = geographic;
+  const auto cited = model == geographic || code_of(keys, projected_system) ? std::nullopt : system_of_citation(keys);
+  if (!model && !cited && code_of(keys, geographic_system)) model = geographic;
   if (model == geocentric)
     return failure(ErrorKind::bad_data, "has geocentric coordinates; convert them to degrees: gdalwarp -t_srs EPSG:4326");
-  if (model == geographic) {
+  if (cited) {
+    system = *cited;
+  } else if (model == geographic) {
     system.geographic = true;
     if (const auto unit = keys.value_of(angular_units).value_or(degree); unit != degree && unit != other_degree)
       return failure(ErrorKind::bad_data, "has angles that are not in degrees; convert it to degrees: gdalwarp -t_srs EPSG:4326");
@@ -156,10 +169,12 @@ Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::
   if (!height_unit) height_unit = unit_of_height_system(keys.value_of(vertical_system).value_or(0));
   const auto of_heights = length_unit(height_unit);
   if (!of_heights) return tl::make_unexpected(of_heights.error());
+  if (height_unit) system.height_unit_m = *of_heights;
+  if (cited) return system;
   const auto of_lengths = length_unit(model == projected ? keys.value_of(linear_units) : std::nullopt);
   if (!of_lengths) return tl::make_unexpected(of_lengths.error());
   if (*of_lengths != 1) system.utm.reset();  // its parameters, too, are in that unit
-  system.unit_m = *of_lengths, system.height_unit_m = *of_heights;
+  system.unit_m = *of_lengths;
   return system;
 }
 

@@ -23,7 +23,8 @@ class GeoKeys {
 
   std::optional<std::uint16_t> value_of(std::uint16_t key) const;
   std::optional<double> number_of(std::uint16_t key) const;
-  std::string text_of(std::uint16_t key) const;
+  /// At most `longest` letters.
+  std::string text_of(std::uint16_t key, std::size_t longest = 80) const;
 
  private:
   struct Place {

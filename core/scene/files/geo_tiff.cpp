@@ -24,6 +24,7 @@ namespace {
 
 constexpr std::uint64_t most_file_bytes = std::uint64_t{2} << 30, most_block_bytes = 64 << 20;
 constexpr std::uint64_t memory_of_a_cell = 4;
+constexpr std::uint16_t most_bands = 16;
 
 // Tags.
 enum : std::uint32_t {
@@ -82,6 +83,9 @@ std::vector<T> values_of(TIFF* tiff, std::uint32_t tag, TIFFDataType type) {
 struct Picture {
   std::uint32_t columns = 0, rows = 0;
   std::uint16_t bits = 1, format = SAMPLEFORMAT_UINT, samples = 1;
+  std::uint16_t bands = 1;             // values of a cell that lie side by side; the first is the height
+  std::optional<std::uint16_t> alpha;  // the one of them that is 0 where there is no data
+  std::size_t value_bytes() const { return bits / 8u; }
 };
 
 /// Place of the middle of the first cell, and steps; y usually falls.
@@ -181,10 +185,13 @@ class GeoTiffReader {
                              : picture_.format == SAMPLEFORMAT_IEEEFP && (picture_.bits == 32 || picture_.bits == 64);
     const bool grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
     if (grey && picture_.samples == 1 && !known)
-      return bad("has heights of " + std::to_string(picture_.bits) +
+      return bad(std::string("has ") + (whole ? "whole" : "floating-point") + " numbers of " + std::to_string(picture_.bits) +
                  " bits, which are not read; write them otherwise: gdal_translate -ot Float32");
-    if (!grey || !known || (picture_.samples != 1 && planes != PLANARCONFIG_SEPARATE))
+    if (!grey || !known || picture_.samples > most_bands ||
+        (picture_.samples != 1 && picture_.bits == 8 && planes == PLANARCONFIG_CONTIG))
       return bad("not one band of heights but a picture; choose a band of numbers: gdal_translate -b 1 -ot Float32");
+    if (planes == PLANARCONFIG_CONTIG) picture_.bands = picture_.samples;
+    if (auto r = find_alpha(); !r) return r;
     static const std::set<std::uint16_t> codecs{COMPRESSION_NONE,    COMPRESSION_LZW,      COMPRESSION_ADOBE_DEFLATE,
                                                 COMPRESSION_DEFLATE, COMPRESSION_PACKBITS, COMPRESSION_ZSTD};
     if (!codecs.contains(compression) || !TIFFIsCODECConfigured(compression))
@@ -193,6 +200,20 @@ class GeoTiffReader {
     const std::uint64_t block = TIFFIsTiled(tiff_) ? TIFFTileSize64(tiff_) : TIFFScanlineSize64(tiff_);
     if (block == 0 || block > most_block_bytes || (!TIFFIsTiled(tiff_) && TIFFStripSize64(tiff_) > 4 * most_block_bytes))
       return bad("its blocks have more than 64 MiB; write it in tiles: gdal_translate -co TILED=YES");
+    return {};
+  }
+
+  /// Further bands are uncertainties and the like, except the one that says where there are heights.
+  Result<void> find_alpha() {
+    std::uint16_t count = 0;
+    const std::uint16_t* kinds = nullptr;
+    if (TIFFGetField(tiff_, TIFFTAG_EXTRASAMPLES, &count, &kinds) != 1 || count >= picture_.samples) count = 0;
+    for (std::uint16_t k = 0; k < count; ++k)
+      if (kinds[k] != EXTRASAMPLE_UNSPECIFIED) picture_.alpha = static_cast<std::uint16_t>(picture_.samples - count + k);
+    if (picture_.alpha && picture_.bands == 1)
+      return bad("marks cells without data in a band of its own; write them as a value: gdalwarp -dstnodata -9999 IN OUT.tif");
+    const int further_bands = picture_.samples - (picture_.alpha ? 2 : 1);
+    if (further_bands > 0) raw_.notes.push_back(text::format("its heights are the first of %d bands", further_bands + 1));
     return {};
   }
 
@@ -225,6 +246,8 @@ class GeoTiffReader {
     } else if (const auto beside = world_file()) {
       if (!raw_.system.geographic) raw_.system = system_by_prj(file_);
       return check(*beside);
+    } else if (tie.size() > 6) {
+      return bad("has control points instead of a regular grid; make one of them: gdalwarp IN OUT.tif");
     } else {
       return bad("has no coordinates (no GeoTIFF); give it some: gdal_translate -a_ullr WEST NORTH EAST SOUTH");
     }
@@ -257,11 +280,13 @@ class GeoTiffReader {
 
   /// `width` heights of one row, from a block's bytes, to column and row of the grid.
   Result<void> take(std::span<const std::byte> bytes, std::uint32_t column, std::uint32_t row, std::uint32_t width) {
-    const std::size_t size = picture_.bits / 8u;
+    const std::size_t size = picture_.value_bytes() * picture_.bands;
     width = std::min(width, picture_.columns - column);
     if (bytes.size() < size * width) return bad("has blocks that are shorter than its cells");
     for (std::uint32_t i = 0; i < width; ++i) {
-      const double value = value_at(bytes.data() + size * i);
+      const std::byte* const cell = bytes.data() + size * i;
+      if (picture_.alpha && value_at(cell + *picture_.alpha * picture_.value_bytes()) == 0) continue;
+      const double value = value_at(cell);
       const auto height = values_.height_of(value);
       if (!height) return bad(text::format("the height %g in row %u, column %u is beyond 1e7 m", value, row + 1, column + i + 1));
       raw_.z[std::size_t{row} * picture_.columns + column + i] = *height;
@@ -304,7 +329,7 @@ class GeoTiffReader {
     if (width == 0 || height == 0 || row_bytes == 0 || row_bytes * height > tile.size()) return unreadable();
     // Every tile is unpacked as a whole, even if few of its cells lie in the picture.
     if (TIFFNumberOfTiles(tiff_) * std::uint64_t{tile.size()} >
-        most_block_bytes + 4 * std::uint64_t{raw_.z.size()} * (picture_.bits / 8u))
+        most_block_bytes + 4 * std::uint64_t{raw_.z.size()} * picture_.value_bytes() * picture_.bands)
       return bad("its tiles are much larger than the picture; write it without: gdal_translate -co TILED=NO");
     for (std::uint32_t row = 0; row < picture_.rows; row += std::min(height, picture_.rows - row))
       for (std::uint32_t column = 0; column < picture_.columns; column += std::min(width, picture_.columns - column)) {

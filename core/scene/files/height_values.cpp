@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/base/regular_file.hpp"
+#include "core/base/letters.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
 #include "core/text/printable.hpp"
@@ -73,14 +73,19 @@ bool are_arc_seconds(double cell) {
 bool shows_degrees(const RawHeights& raw) {
   const std::size_t columns = raw.x.size();
   const double cell = (raw.x.back() - raw.x.front()) / static_cast<double>(columns - 1);
-  if (!could_be_degrees(raw) || cell >= 0.1) return false;
+  constexpr double small_cell_deg = 0.1, large_cell_deg = 1, steep = 10;
+  if (!could_be_degrees(raw) || cell >= large_cell_deg) return false;
   double rise = 0;
-  std::size_t steps = 0;
+  std::size_t steps = 0, steep_steps = 0;
   for (std::size_t k = 1; k < raw.z.size(); ++k)
-    if (k % columns != 0 && !std::isnan(raw.z[k]) && !std::isnan(raw.z[k - 1]))
-      rise += std::abs(static_cast<double>(raw.z[k]) - static_cast<double>(raw.z[k - 1])), ++steps;
+    if (k % columns != 0 && !std::isnan(raw.z[k]) && !std::isnan(raw.z[k - 1])) {
+      const double step = std::abs(static_cast<double>(raw.z[k]) - static_cast<double>(raw.z[k - 1]));
+      rise += step, ++steps, steep_steps += step > steep * cell;
+    }
+  // Large cells are more likely metres: their steepness must not come from a few false heights.
+  if (cell >= small_cell_deg) return 2 * steep_steps > steps;
   const double slope = steps == 0 ? 0 : rise / static_cast<double>(steps) / cell;
-  return slope > 10 || (slope == 0 && cell < 0.005) || are_arc_seconds(cell);
+  return slope > steep || (slope == 0 && cell < 0.005) || are_arc_seconds(cell);
 }
 
 /// A metre of Web Mercator is shorter on the ground, by the cosine of the latitude.
@@ -116,7 +121,8 @@ void remove_zone_number(RawHeights& raw, UtmZone zone, std::vector<std::string>&
 
 /// A note about a system whose latitudes and longitudes are unknown here, or only roughly known.
 std::string note_of_system(const CoordinateSystem& system) {
-  const std::string name = text::printable(system.name);
+  const bool is_named = !same_letters(system.name, "unknown") && !same_letters(system.name, "unnamed");
+  const std::string name = is_named ? text::printable(system.name) : "a system without a name";
   return system.other_datum
              ? "its degrees, of " + name +
                    ", are taken as those of WGS 84, from which they may be some 100 m away; convert them: gdalwarp "
@@ -292,6 +298,7 @@ void RawHeights::turn_rows(std::size_t columns) {
 
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) {
   HeightGrid grid;
+  grid.notes = std::move(raw.notes);
   take_out_fills(raw, grid.notes);
   apply_scale(raw, grid.notes);
   if (raw.system.web_mercator && options.geographic.value_or(true)) convert_web_mercator(raw, grid.notes);

@@ -60,6 +60,7 @@ struct RawHeights {
   std::size_t fill_values = 0;         // number of undeclared fill values beyond every height, which have become NaN
   CoordinateSystem system = {};
   double scale = 1, offset = 0;  // a height is scale * z + offset
+  std::vector<std::string> notes = {};
 
   /// Reverses the order of the rows, for files that begin in the north. `columns`: those of `z`.
   void turn_rows(std::size_t columns);

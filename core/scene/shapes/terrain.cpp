@@ -66,7 +66,8 @@ Result<CentredMesh> mesh_from_grid(const HeightGrid& grid) {
     low = std::min(low, static_cast<double>(z));
     high = std::max(high, static_cast<double>(z));
   }
-  if (low > high) return failure(ErrorKind::bad_data, "no cell of the grid has a height");
+  if (low > high)
+    return failure(ErrorKind::bad_data, "no cell of the grid has a height; is the value right that it declares as no data?");
   CentredMesh out;
   const PlaneOf place(grid);
   out.centre_m = 0.5 * (place(0, 0, low) + place(columns - 1, rows - 1, high));

@@ -131,5 +131,16 @@ TEST_F(UnknownSystem, EastingsMayBeginWithTheirZone) {
   EXPECT_THAT(said("", options, "33400000"), HasSubstr("not eastings and northings of UTM"));
 }
 
+TEST(UnnamedSystem, CoarseCellsAreDegreesIfMostStepsAreSteep) {
+  TemporaryFiles files;
+  const auto said = [&](const std::string& rows) {
+    const std::string header = "ncols 4\nnrows 3\nxllcorner 4\nyllcorner 52\ncellsize 0.25\n";
+    const auto grid = read_esri_heights(files.write("g.asc", header + rows), {});
+    return !grid ? grid.error().text : grid->origin ? "degrees" : "metres";
+  };
+  EXPECT_EQ(said("-10 -40 -25 -60\n-12 -55 -40 -90\n-30 -35 -70 -20"), "degrees");
+  EXPECT_EQ(said("-10 -10.2 -500 -10.1\n-10 -10.2 -10.3 -10.1\n-10 -10.2 -10.3 -10.1"), "metres") << "one false height";
+}
+
 }  // namespace
 }  // namespace sonar::coordinate_systems_test

@@ -31,8 +31,9 @@ struct TiffFile {
   std::vector<Field> fields;
   std::string heights;
 
-  void shorts(std::uint16_t tag, const std::vector<std::uint16_t>& v) {
+  TiffFile& shorts(std::uint16_t tag, const std::vector<std::uint16_t>& v) {
     fields.push_back({tag, 3, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
+    return *this;
   }
   void longs(std::uint16_t tag, const std::vector<std::uint32_t>& v) {
     fields.push_back({tag, 4, static_cast<std::uint32_t>(v.size()), bytes_of(v)});
@@ -62,6 +63,19 @@ struct TiffFile {
     std::vector<std::uint16_t> words{1, 1, 0, static_cast<std::uint16_t>(keys.size())};
     for (const auto& [key, value] : keys) words.insert(words.end(), {key, 0, 1, value});
     shorts(34735, words);
+    return *this;
+  }
+  /// Keys of which some are texts or numbers of the tags 34737 and 34736.
+  TiffFile& cited(const std::vector<std::array<std::uint16_t, 2>>& keys, std::uint16_t citation, const std::string& value) {
+    std::vector<std::uint16_t> words{1, 1, 0, static_cast<std::uint16_t>(keys.size() + 1)};
+    for (const auto& [key, number] : keys) words.insert(words.end(), {key, 0, 1, number});
+    words.insert(words.end(), {citation, 34737, static_cast<std::uint16_t>(value.size() + 1), 0});
+    shorts(34735, words), text(34737, value + "|");
+    return *this;
+  }
+  /// The same heights with further bands; `extra`: the kind of each, 2 for an alpha band.
+  TiffFile& bands(const std::vector<std::uint16_t>& extra) {
+    without(277).shorts(277, {static_cast<std::uint16_t>(extra.size() + 1)}).shorts(338, extra);
     return *this;
   }
   TiffFile& without(std::uint16_t tag) {
@@ -292,6 +306,52 @@ TEST_F(GeoTiff, BlocksThatAreLeftOutAreHolesAndAMaskIsRefused) {
   EXPECT_THAT(read_geo_tiff_heights(files.write("g.tif", both), {}).error().text, HasSubstr("gdalwarp -dstnodata"));
 }
 
+TEST_F(GeoTiff, TheFirstOfSeveralBandsIsTheHeightAndAnAlphaBandMarksHoles) {
+  // As gdal_translate makes them of a BAG (elevation, uncertainty), and gdalwarp -dstalpha.
+  const std::vector<float> pairs{-1, 0.5f, -2, 0, -3, 0.5f, -4, 0.5f, -5, 0.5f, -6, 0.5f};
+  TiffFile file = TiffFile::of(3, 2, pairs).at(0, 100, 10, 10).bands({0});
+  const auto uncertain = read(file);
+  ASSERT_TRUE(uncertain) << uncertain.error().text;
+  EXPECT_EQ(uncertain->z_m, (std::vector<float>{-4, -5, -6, -1, -2, -3}));
+  EXPECT_THAT(uncertain->notes, ::testing::ElementsAre(HasSubstr("are the first of 2 bands")));
+  const auto with_alpha = read(TiffFile::of(3, 2, pairs).at(0, 100, 10, 10).bands({2}));
+  ASSERT_TRUE(with_alpha) << with_alpha.error().text;
+  EXPECT_TRUE(std::isnan(with_alpha->z_m[4]));
+  EXPECT_FLOAT_EQ(with_alpha->z_m[5], -3);
+  EXPECT_THAT(with_alpha->notes, ::testing::ElementsAre(HasSubstr("1 of its 6 heights")));
+  EXPECT_FALSE(read(TiffFile::of(3, 2, std::vector<std::uint8_t>(12)).at(0, 100, 10, 10).bands({2}))) << "a picture";
+  EXPECT_FALSE(read(TiffFile::of(3, 2, pairs).at(0, 100, 10, 10).bands(std::vector<std::uint16_t>(40)))) << "too short";
+  TiffFile planes = TiffFile::of(3, 2, pairs).at(0, 100, 10, 10).bands({2}).shorts(284, {2});
+  EXPECT_THAT(read(planes).error().text, HasSubstr("band of its own; write them as a value: gdalwarp -dstnodata"));
+}
+
+TEST_F(GeoTiff, ASystemThatIsOnlyCitedIsRead) {
+  const std::string sphere =
+      "GEOGCS[\"GCS_WGS_1984\",DATUM[\"D_WGS_1984\",SPHEROID[\"WGS_1984\",6378137.0,298.257223563]],"
+      "PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]]";
+  const auto system = [&](const std::string& name, const std::string& rest, std::uint16_t model) {
+    return read(TiffFile::of(3, 2, std::vector<float>(6, -5))
+                    .at(500000, 6651500, 100, 100)
+                    .cited({{{1024, model}, {1025, 1}, {3072, 32767}}}, 3073,
+                           "ESRI PE String = PROJCS[\"" + name + "\"," + sphere + rest + "]"));
+  };
+  for (const std::uint16_t model : {std::uint16_t{1}, std::uint16_t{32767}}) {
+    const auto mercator = system("WGS_1984_Web_Mercator_Auxiliary_Sphere", ",PROJECTION[\"Mercator_Auxiliary_Sphere\"]", model);
+    ASSERT_TRUE(mercator) << mercator.error().text;
+    EXPECT_TRUE(mercator->origin);
+    EXPECT_THAT(mercator->notes, ::testing::Contains(HasSubstr("in Web Mercator")));
+    const auto utm = system("WGS_1984_UTM_Zone_33N", ",UNIT[\"Meter\",1.0]", model);
+    ASSERT_TRUE(utm) << utm.error().text;
+    EXPECT_THAT(utm->notes, ::testing::ElementsAre(HasSubstr("UTM zone 33N")));
+    const auto feet = system("Somewhere", ",UNIT[\"Foot_US\",0.304800609601]", model);
+    ASSERT_TRUE(feet) << feet.error().text;
+    EXPECT_NEAR(feet->x[1] - feet->x[0], 100 * 0.304800609601, 1e-9);
+  }
+  const auto nameless = read(TiffFile::of(3, 2, six).at(0, 100, 10, 10).cited({{{1024, 1}, {3075, 1}}}, 1026, "unknown"));
+  ASSERT_TRUE(nameless) << nameless.error().text;
+  EXPECT_THAT(nameless->notes, ::testing::Contains(HasSubstr("of a system without a name, are taken as plain metres")));
+}
+
 TEST_F(GeoTiff, AWorldFileBesideATiffGivesItsPlace) {
   files.write("g.tfw", "10\n0\n0\n-5\n1000\n2000\n");
   files.write("g.prj", "PROJCS[\"x\",GEOGCS[\"y\",UNIT[\"degree\",0.017]],UNIT[\"foot\",0.3048]]");
@@ -363,6 +423,9 @@ TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
   const auto good = [] { return TiffFile::of(3, 2, six).at(0, 100, 10, 10); };
   EXPECT_EQ(refusal(good()), "accepted");
   EXPECT_THAT(refusal(TiffFile::of(3, 2, six)), HasSubstr("gdal_translate -a_ullr"));
+  TiffFile points = TiffFile::of(3, 2, six);
+  points.doubles(33922, {0, 0, 0, 5, 60, 0, 3, 0, 0, 5.1, 60, 0, 0, 2, 0, 5, 59.9, 0});
+  EXPECT_THAT(refusal(points), HasSubstr("has control points instead of a regular grid; make one of them: gdalwarp IN OUT.tif"));
   TiffFile picture = good().without(262).without(277);
   picture.shorts(262, {2}), picture.shorts(277, {3});
   EXPECT_THAT(refusal(picture), HasSubstr("not one band of heights but a picture"));
