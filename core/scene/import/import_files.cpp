@@ -81,7 +81,7 @@ class ObjText {
 };
 
 struct ObjCounts {
-  std::uint64_t objects = 0, triangles = 0;
+  std::uint64_t objects = 0, triangles = 0, free_form = 0;  // free_form: curved surfaces without faces
   std::vector<std::uint64_t> bad_faces;  // numbers of faces with vertices that the file does not have, increasing
 };
 
@@ -90,6 +90,7 @@ class ObjCounter {
  public:
   void take(char c) {
     const ObjText::Step step = text_.next(c);
+    find_surface(c);
     counts_.objects += step.begins_object;
     vertices_ += step.begins_vertex;
     if (!step.is_index) end_corner();  // before the next vertex, because negative numbers count back from here
@@ -116,6 +117,15 @@ class ObjCounter {
   }
 
  private:
+  void find_surface(char c) {
+    static constexpr std::string_view statement = "surf ";
+    if (c == '\n' || c == '\r') {
+      of_statement_ = 0;
+    } else if (of_statement_ < statement.size()) {
+      of_statement_ = c == statement[of_statement_] ? of_statement_ + 1 : statement.size() + 1;
+      counts_.free_form += of_statement_ == statement.size();
+    }
+  }
   static constexpr std::uint64_t most_index = std::uint64_t{1} << 40;
   void end_corner() {
     if (!is_number_) return;
@@ -137,6 +147,7 @@ class ObjCounter {
   ObjCounts counts_;
   std::vector<std::pair<std::uint64_t, std::uint64_t>> later_;  // faces, and the last vertex that they name
   std::uint64_t vertices_ = 0, face_ = 0, corners_ = 0, index_ = 0, furthest_ = 0;
+  std::size_t of_statement_ = 0;  // letters of a line that are those of the statement
   bool is_negative_ = false, is_number_ = false, is_bad_ = false;
 };
 
@@ -245,6 +256,7 @@ ImportFiles::ImportFiles(const MeshFile& request, std::optional<Error>& fault, s
     without_objects_ = counts.objects > most_objects;
     obj_triangles_ = counts.triangles;
     bad_faces_ = std::move(counts.bad_faces);
+    free_form_ = counts.free_form;
   }
 }
 

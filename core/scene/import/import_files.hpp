@@ -24,6 +24,9 @@ class ImportFiles final : public Assimp::DefaultIOSystem {
   /// Number of triangles that an OBJ file lists; nullopt for other formats.
   std::optional<std::uint64_t> obj_triangles() const { return obj_triangles_; }
 
+  /// Number of curved surfaces (surf) of an OBJ file, which the importer does not read.
+  std::uint64_t free_form_surfaces() const { return free_form_; }
+
   bool Exists(const char* file) const override;
   Assimp::IOStream* Open(const char* file, const char* mode) override;
 
@@ -36,6 +39,7 @@ class ImportFiles final : public Assimp::DefaultIOSystem {
   std::optional<Error>& fault_;
   std::function<void(std::uintmax_t)> opened_;
   std::uintmax_t bytes_ = 0;
+  std::uint64_t free_form_ = 0;
   bool is_obj_ = false, without_objects_ = false;
   std::optional<std::uint64_t> obj_triangles_;
   std::vector<std::uint64_t> bad_faces_;  // of an OBJ file: faces that name vertices which it does not have

@@ -144,6 +144,9 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
   Assimp::Importer importer;
   auto* files = new ImportFiles(request, fault, hooks.opened);
   importer.SetIOHandler(files);  // the importer owns `files` from then on
+  if (files->free_form_surfaces() > 0)
+    return bad_mesh(request, "has " + std::to_string(files->free_form_surfaces()) +
+                                 " curved surface(s) (surf), which are not read; export polygons");
   const bool dae = extension == ".dae";
   const bool y_up_by_default = extension == ".gltf" || extension == ".glb" || dae;  // Assimp turns a tagged DAE to y up
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());

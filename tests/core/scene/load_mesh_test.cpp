@@ -536,6 +536,11 @@ TEST_F(LoadMesh, WrongFilesAreRefusedWithOneSentence) {
   EXPECT_THAT(refusal("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
               HasSubstr("flat.obj: has only triangles without area"));
   EXPECT_THAT(refusal("x.xyz", "1 2 3"), HasSubstr("x.xyz: unknown mesh format; use OBJ"));
+  EXPECT_THAT(refusal("x.fbx", "Kaydara"), HasSubstr("assimp export IN OUT.glb"));
+  EXPECT_THAT(
+      refusal("c.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\ncstype bezier\ndeg 1 1\nsurf 0 1 0 1 1 2 3 4\nend\n"),
+      HasSubstr("c.obj: has 1 curved surface(s) (surf), which are not read; export polygons"));
+  EXPECT_EQ(refusal("s.obj", "o surf 1\nv 0 0 0\nv 1 0 0\nv 0 1 0\ng surf \nusemtl surf x\n# surf 1\nf 1 2 3\n"), "accepted");
   for (const char* name : {"e.obj", "e.stl", "e.ply", "e.glb", "e.gltf", "e.dae"}) {
     EXPECT_THAT(refusal(name, ""), HasSubstr(std::string(name) + ": ")) << name;
     EXPECT_THAT(refusal(name, "this is not a mesh"), HasSubstr(std::string(name) + ": ")) << name;
