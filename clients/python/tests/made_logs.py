@@ -201,6 +201,15 @@ def pose_stamped(step, t0=100, **how):
     return Cdr(**how).header(t0 + t if t0 else 0, "map").put("d", *position, *xyzw).done()
 
 
+def path(steps, t0=100, stamped=True, **how):
+    """nav_msgs/Path: a header, and poses with headers."""
+    cdr = Cdr(**how).header(t0 + len(steps), "map").put("I", len(steps))
+    for step in steps:
+        t, position, xyzw = enu_moment(step)
+        cdr.header(t0 + t if stamped else 0, "map").put("d", *position, *xyzw)
+    return cdr.done()
+
+
 def transforms(step, t0=100, **how):
     t, position, xyzw = enu_moment(step)
     cdr = Cdr(**how).put("I", 2)

@@ -9,7 +9,7 @@ from unittest import mock
 import made_logs as made
 from converted import WithFolder
 
-from sonard_client.convert import ConvertError, convert, format_of, rosbag2
+from sonard_client.convert import ConvertError, compression, convert, format_of, rosbag2
 from sonard_client.convert.rosbag2 import files_of
 
 
@@ -183,9 +183,39 @@ class RecordingsOfRos2(WithFolder):
             path.unlink()
 
     def test_messages_compressed_one_by_one(self):
-        path = made.db3(self.folder / "log", [("/odom", "nav_msgs/msg/Odometry", [(1, b"\x28\xb5\x2f\xfd...")])])
-        with self.assertRaisesRegex(ConvertError, "compressed one by one; .*ros2 bag convert"):
+        messages = [(100 + i, compression.ZSTD_MAGIC + made.odometry(i)) for i in range(5)]
+        path = made.db3(self.folder / "log", [("/odom", "nav_msgs/msg/Odometry", messages)])
+        with mock.patch.object(compression, "_module", lambda *names: None), \
+                self.assertRaisesRegex(ConvertError, "compressed one by one: compressed by zstd: install python3-zstandard"):
             convert(path)
+
+        class WithoutMagic:
+            class ZstdDecompressor:
+                eof = True
+
+                @staticmethod
+                def decompress(data, max_length=-1):
+                    return data[4:]
+
+        with mock.patch.object(compression, "_module", lambda *names: WithoutMagic):
+            self.assert_track(convert(path), range(5), t0=100, metres=1e-9, radians=1e-6)
+
+    def test_a_path_is_its_last_message(self):
+        growing = [(100 + n, made.path(range(n + 1))) for n in range(1, 6)]
+        topics = [("/path", "nav_msgs/msg/Path", growing), ("/odom", "nav_msgs/msg/Odometry", [(100, made.odometry(0))] * 2)]
+        of_ros1 = [(100 + n, made.path(range(n + 1), ros1=True)) for n in range(1, 6)]
+        for path in (made.db3(self.folder / "a.db3", topics),
+                     self.file(made.mcap([(topic, "cdr", kind, logged) for topic, kind, logged in topics]), "c.mcap"),
+                     self.file(made.bag([("/path", "nav_msgs/Path", of_ros1)]), "b.bag")):
+            with self.subTest(path.name):
+                self.assert_track(convert(path, topic="/path"), range(6), t0=100, metres=1e-9, radians=1e-6)
+        self.assertEqual(convert(self.folder / "a.db3").source, "/odom")  # a path is rather a plan
+        plan = made.mcap([("/plan", "cdr", "nav_msgs/msg/Path", [(100, made.path(range(4), stamped=False))])])
+        with self.assertRaisesRegex(ConvertError, "the poses of /plan have no times of their own, so they are no track in time"):
+            self.convert(plan)
+        cut = made.mcap([("/path", "cdr", "nav_msgs/msg/Path", [(100, made.path(range(4))[:-9])])])
+        with self.assertRaisesRegex(ConvertError, "no poses found"):
+            self.convert(cut)
 
     def test_another_database(self):
         path = self.folder / "log"

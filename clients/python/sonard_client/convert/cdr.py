@@ -60,6 +60,10 @@ def _pose(reader: Reader) -> Pose:
 def decode(kind: str, data: bytes, ros1: bool) -> List[Tuple[str, float, Pose]]:
     """Returns for each pose of a message: suffix of the topic's name; timestamp [s], 0 if it has none; pose."""
     reader = Reader(data, ros1)
+    if kind == "Path":
+        _header(reader, ros1)
+        (count,) = reader.numbers("I")
+        return [("", _header(reader, ros1)[0], _pose(reader)) for _ in range(int(count))]
     if kind == "TFMessage":
         (count,) = reader.numbers("I")
         return [_transform(reader, ros1) for _ in range(int(count))]
@@ -80,8 +84,13 @@ def _transform(reader: Reader, ros1: bool) -> Tuple[str, float, Pose]:
 
 
 # Supported types, in order of preference.
-KINDS = ("Odometry", "PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "TFMessage", "Pose")
+KINDS = ("Odometry", "PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "TFMessage", "Pose", "Path")
 PACKAGES = ("nav_msgs", "geometry_msgs", "tf2_msgs", "tf")
+
+
+def is_path(schema: str) -> bool:
+    """Whether each message holds a whole track, so that only the last one counts."""
+    return kind_of(schema) == "Path"
 
 
 def kind_of(schema: str) -> str:

@@ -6,6 +6,7 @@ import importlib
 from typing import Any, Callable, Optional
 
 LARGEST_CHUNK = 1 << 30
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
 class Unreadable(Exception):
@@ -61,6 +62,14 @@ def unpack(kind: str, data: bytes, size: int) -> bytes:
     """Returns exactly `size` bytes, or raises Unreadable."""
     if size > LARGEST_CHUNK:
         raise Unreadable(f"a chunk of {size} bytes exceeds the limit of 1 GiB")
+    out = unpack_at_most(kind, data, size)
+    if len(out) != size:
+        raise Unreadable(f"decompresses to {len(out)} of {size} declared bytes")
+    return out
+
+
+def unpack_at_most(kind: str, data: bytes, size: int) -> bytes:
+    """Returns the bytes, whose number is unknown, or raises Unreadable if there are more than `size`."""
     unpacker = _unpacker(kind)
     if unpacker is None:
         package = {"lz4": "python3-lz4", "zstd": "python3-zstandard"}[kind]
@@ -72,6 +81,4 @@ def unpack(kind: str, data: bytes, size: int) -> bytes:
         raise Unreadable(f"its {kind} data cannot be decompressed: {error}") from None
     if len(out) > size:
         raise Unreadable(f"decompresses to more than the declared {size} bytes")
-    if len(out) != size:
-        raise Unreadable(f"decompresses to {len(out)} of {size} declared bytes")
     return out

@@ -12,7 +12,7 @@ from typing import BinaryIO, Dict, Iterator, List, NamedTuple, Optional
 from .cdr import Broken
 from .compression import Unreadable, unpack
 from .messages import may_hold_poses
-from .recording import Recorded, track_from
+from .recording import Kept, Recorded, track_from
 from .track import ConvertError, Track, Warn
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -126,7 +126,7 @@ def mcap_messages(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> List[
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise ConvertError(f"{path}: at byte 0: not an MCAP file: the magic bytes are missing")
-        messages = list(reader.records(file, path.stat().st_size))
+        messages = Kept(reader.records(file, path.stat().st_size))
     seen.update((channel.topic, channel.schema) for channel in reader.channels.values())
     if reader.refused and not messages:
         raise ConvertError(f"{path}: {reader.why}")

@@ -3,12 +3,14 @@ from __future__ import annotations
 
 from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional
 
-from .cdr import Broken
+from .cdr import KINDS, Broken, is_path
+from .compression import ZSTD_MAGIC, Unreadable, unpack_at_most
 from .messages import Found, may_hold_poses, poses_in
 from .track import ConvertError, Row, Stream, Track, Warn, rising
 
 
 CLOCK_RESET_S = 1.0
+MOST_MESSAGE_BYTES = 16 << 20
 
 
 class Recorded(NamedTuple):
@@ -19,6 +21,28 @@ class Recorded(NamedTuple):
     data: bytes
     at: int  # byte offset in the file, for errors
     unit: str = "byte"  # unit of `at`
+
+
+class Kept(List[Recorded]):
+    """The messages of a recording. Of paths, which grow from message to message, only the last one is kept."""
+
+    def __init__(self, messages: Iterable[Recorded] = ()) -> None:
+        super().__init__()
+        self._paths: Dict[str, int] = {}
+        self.extend(messages)
+
+    def append(self, message: Recorded) -> None:
+        if not is_path(message.schema):
+            super().append(message)
+        elif message.topic not in self._paths:
+            self._paths[message.topic] = len(self)
+            super().append(message)
+        elif message.logged_s >= self[self._paths[message.topic]].logged_s:
+            self[self._paths[message.topic]] = message
+
+    def extend(self, messages: Iterable[Recorded]) -> None:
+        for message in messages:
+            self.append(message)
 
 
 class _Topic:
@@ -42,7 +66,7 @@ def _choice(topics: Dict[str, _Topic], wanted: Optional[str], name: str, seen: M
         return wanted
     if not topics:
         raise ConvertError(f"{name}: no poses found: expected nav_msgs/Odometry, geometry_msgs/PoseStamped or Pose, a transform, "
-                           f"or JSON with position and orientation; its topics: {_others(seen)}")
+                           f"nav_msgs/Path, or JSON with position and orientation; its topics: {_others(seen)}")
     best = min(t.rank for t in topics.values())
     candidates = [topic for topic, t in topics.items() if t.rank == best]
     if len(candidates) > 1:
@@ -56,6 +80,16 @@ def _clock_reset(rows: Stream[Found]) -> str:
     return "" if back_s < CLOCK_RESET_S else f"; the clock went back by {back_s:.1f} s at pose {number + 1}: split the recording there"
 
 
+def _unpacked(message: Recorded, name: str) -> bytes:
+    """Some recordings of ROS 2 compress each message."""
+    if message.encoding != "cdr" or not message.data.startswith(ZSTD_MAGIC):
+        return message.data
+    try:
+        return unpack_at_most("zstd", message.data, MOST_MESSAGE_BYTES)
+    except Unreadable as error:
+        raise ConvertError(f"{name}: its messages are compressed one by one: {error}") from None
+
+
 def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optional[str] = None,
                seen: Mapping[str, str] = {}) -> Track:
     """seen: the types of all topics of the recording."""
@@ -64,8 +98,9 @@ def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optio
     for message in messages:
         if not may_hold_poses(message.encoding, message.schema):
             continue
+        data = _unpacked(message, name)
         try:
-            found = poses_in(message.topic, message.encoding, message.schema, message.data)
+            found = poses_in(message.topic, message.encoding, message.schema, data)
         except Broken as error:
             faults.append(f"at {message.unit} {message.at}, topic {message.topic}: {error}")
             continue
@@ -77,6 +112,8 @@ def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optio
     chosen = _choice(topics, topic, name, seen)
     selected = topics[chosen]
     rows = rising(selected.rows)
+    if selected.rank == KINDS.index("Path") and len(rows) == 1 and len(selected.rows) > 1:
+        raise ConvertError(f"{name}: the poses of {chosen} have no times of their own, so they are no track in time")
     if len(rows) < len(selected.rows):
         warn(f"poses of {chosen} omitted because their time does not increase: {len(selected.rows) - len(rows)}" +
              _clock_reset(selected.rows))

@@ -8,7 +8,7 @@ from typing import Dict, Iterator, Optional, Tuple
 from .cdr import Broken
 from .compression import Unreadable, unpack
 from .messages import may_hold_poses
-from .recording import Recorded, track_from
+from .recording import Kept, Recorded, track_from
 from .track import ConvertError, Track, Warn
 
 MAGIC = b"#ROSBAG V2.0\n"
@@ -92,7 +92,7 @@ def read_rosbag(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> 
     if not data.startswith(MAGIC):
         raise ConvertError(f"{path}: at byte 0: not a ROS 1 bag of format 2.0")
     bag = _Bag(warn)
-    messages = list(bag.messages(data, len(MAGIC)))
+    messages = Kept(bag.messages(data, len(MAGIC)))
     if bag.unreadable and not messages:
         raise ConvertError(f"{path}: {bag.unreadable}")
     if bag.unreadable:

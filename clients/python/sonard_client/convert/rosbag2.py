@@ -11,15 +11,13 @@ from urllib.parse import quote
 from .mcap import MAGIC as MCAP_MAGIC
 from .mcap import mcap_messages
 from .messages import may_hold_poses
-from .recording import Recorded, track_from
+from .recording import MOST_MESSAGE_BYTES, Kept, Recorded, track_from
 from .track import ConvertError, Track, Warn
 
 MAGIC = b"SQLite format 3\0"
 METADATA = "metadata.yaml"
-ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 COLUMNS = {"topics": ("id", "name", "type", "serialization_format"), "messages": ("id", "topic_id", "timestamp", "data")}
 MOST_TOPICS = 500  # limit for topics that may hold poses
-MOST_MESSAGE_BYTES = 16 << 20
 ROW_BYTES = 8  # overhead: a stored message takes at least so much more than its data
 STEPS_PER_BYTE = 10  # instructions of SQLite; a scan takes about 20 a row
 _STEPS_AT_ONCE = 100_000
@@ -120,13 +118,9 @@ def _rows(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> Iterator[Reco
 
 def db3_messages(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> List[Recorded]:
     """seen: receives the types of all topics."""
-    found: List[Recorded] = []
+    found = Kept()
     try:
-        for message in _rows(path, warn, seen):
-            if message.data.startswith(ZSTD_MAGIC):
-                raise ConvertError(f"{path}: its messages are compressed one by one; write them without compression: ros2 bag "
-                                   "convert -i RECORDING -o options.yaml, with `output_bags: [{uri: plain, storage_id: mcap}]`")
-            found.append(message)
+        found.extend(_rows(path, warn, seen))
     except (sqlite3.Error, OverflowError, UnicodeError) as error:
         if not found:
             raise ConvertError(f"{path}: not a recording of ROS 2, or damaged: {error}; a damaged one may be repaired by "
@@ -175,10 +169,10 @@ def recording_at(path: pathlib.Path) -> pathlib.Path:
 
 def read_rosbag2(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
     """Reads the poses of one topic of a file or a folder, ENU_FLU."""
-    messages: List[Recorded] = []
+    messages = Kept()
     seen: Dict[str, str] = {}
     for file in files_of(path, warn) if path.is_dir() else [path]:
         with file.open("rb") as opened:
             is_mcap = opened.read(len(MCAP_MAGIC)) == MCAP_MAGIC
-        messages += mcap_messages(file, warn, seen) if is_mcap else db3_messages(file, warn, seen)
+        messages.extend(mcap_messages(file, warn, seen) if is_mcap else db3_messages(file, warn, seen))
     return track_from(messages, str(path), warn, topic, seen)
