@@ -44,10 +44,13 @@ int unit_by_steps(const FirstLines& lines, int usual) {
   const auto moves = [&](double units_in_a_second) {
     return speed * units_in_a_second >= slowest_m_s && speed * units_in_a_second <= fastest_m_s;
   };
-  const bool rests = speed == 0 && step < longest_wait_s;
-  if (step <= longest_step_s || rests || speed >= slowest_m_s) return usual;
-  if (step < 1000) return moves(1e3) ? in_milliseconds : usual;
-  if (step < 5000) return moves(1e3) ? in_milliseconds : in_microseconds;
+  constexpr std::size_t lines_of_a_log = 10;  // nobody writes so many lines by hand for a body that rests
+  const bool is_log = lines.stamps.size() >= lines_of_a_log;
+  const bool waits = speed == 0 && !is_log && step < longest_wait_s;
+  if (step <= longest_step_s || waits || speed >= slowest_m_s) return usual;
+  const bool logs_rest = is_log && speed * 1e3 < slowest_m_s;
+  if (step < 1000) return moves(1e3) || logs_rest ? in_milliseconds : usual;
+  if (step < 5000) return moves(1e3) || speed == 0 ? in_milliseconds : in_microseconds;
   return step < 1e6 || (step < 1e7 && moves(1e6)) ? in_microseconds : in_nanoseconds;
 }
 

@@ -101,8 +101,16 @@ TEST(TrajectoryFile, StepsTellTheUnitOfStampsThatBeginAtZero) {
   }
   expect(lines(0.1, 1, 0.5, true), "seconds", milliseconds(4900), true);  // EuRoC's own unit is the nanosecond
   expect(lines(0.1, 1, 0.5), "seconds", milliseconds(4900), false);
-  expect(lines(60, 1, 0.5), "seconds", seconds(49 * 60), false);  // the corners of a course
-  expect(lines(60, 1, 0), "seconds", seconds(49 * 60), false);
+  expect(lines(60, 1, 0.5), "seconds", seconds(49 * 60), false);                                        // the corners of a course
+  expect("0 0 0 -3 0 0 0 1\n60 0 0 -3 0 0 0 1\n120 0 0 -3 0 0 0 1\n", "seconds", seconds(120), false);  // it waits there
+  for (const double m_s : {0.0, 1e-4})  // a vehicle that stands still or drifts: by the rate of its log
+    for (const double step_s : {0.02, 0.1}) {
+      expect(lines(step_s, 1e-3, m_s), "milliseconds", milliseconds(static_cast<int>(49e3 * step_s + 0.5)), true);
+      expect(lines(step_s, 1e-6, m_s), "microseconds", milliseconds(static_cast<int>(49e3 * step_s + 0.5)), true);
+      expect(lines(step_s, 1, m_s), "seconds", milliseconds(static_cast<int>(49e3 * step_s + 0.5)), false);
+    }
+  expect(lines(1, 1e-3, 0), "milliseconds", seconds(49), true);
+  expect(lines(1, 1, 0), "seconds", seconds(49), false);
   expect("0 0 0 -3 0 0 0 1\n", "seconds", milliseconds(0), false);
   expect("5000000000000 0 0 -3 0 0 0 1\n5000100000000 0.05 0 -3 0 0 0 1\n", "nanoseconds", milliseconds(100),
          true);  // since a start
