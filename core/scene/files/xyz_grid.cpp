@@ -120,6 +120,11 @@ bool has_decimal_commas(std::string_view line) {
   return count >= 3 && std::any_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count), is_decimal);
 }
 
+/// Advice for a file that begins with something else than points.
+std::string way_out(const std::vector<Point>& points) {
+  return points.empty() ? "; other grids: gdal_translate -of GTiff IN OUT.tif" : "";
+}
+
 Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values, Order& order) {
   std::vector<Point> points;
   Line words;
@@ -143,9 +148,9 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
     if (points.empty()) first_count = count;  // another number of words can come of decimal commas
     if ((points.empty() || count != first_count) && has_decimal_commas(this_line))
       return bad("numbers have a decimal comma; write points");
-    if (count <= order.last()) return bad("three numbers are needed, x y z");
+    if (count <= order.last()) return bad("three numbers are needed, x y z" + way_out(points));
     const auto x = height_number(words[order.x]), y = height_number(words[order.y]), z = height_number(words[order.z]);
-    if (!x || !y || !z) return bad("three numbers are needed, x y z");
+    if (!x || !y || !z) return bad("three numbers are needed, x y z" + way_out(points));
     if (!(std::abs(*x) <= 1e8 && std::abs(*y) <= 1e8)) return bad("the point is farther than 1e8 m away");
     const auto height = values.height_of(*z);
     if (!height) return bad("the height " + std::string(words[order.z].substr(0, 40)) + " is beyond 1e7 m");
@@ -175,6 +180,7 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
   };
   raw.x = axis_of(&Point::x), raw.y = axis_of(&Point::y);
   const char* const way = "; make one of them: gdal_grid, or gmt surface, then gdal_translate -of AAIGrid";
+  if (points->empty()) return bad("has no line of three numbers, x y z; coordinates must be metres or decimal degrees");
   if (raw.x.size() < 2 || raw.y.size() < 2)
     return bad(std::string("its ") + std::to_string(points->size()) + " points are not a uniform grid" + way);
   if (raw.x.size() * raw.y.size() > max_mesh_triangles / 2)

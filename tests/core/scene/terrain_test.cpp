@@ -504,7 +504,10 @@ TEST(XyzGrid, WrongFilesAreRefused) {
     const auto grid = read_xyz_heights(files.write("bad.xyz", text), {});
     return grid ? std::string("accepted") : grid.error().text;
   };
-  EXPECT_THAT(refusal(""), HasSubstr("its 0 points are not a uniform grid"));
+  EXPECT_THAT(refusal(""), HasSubstr("has no line of three numbers"));
+  EXPECT_THAT(refusal("lat,lon,depth\n60d1N,5d1E,x\n60d2N,5d2E,y\n"),
+              HasSubstr("no line of three numbers, x y z; coordinates must"));
+  EXPECT_THAT(refusal("north: 6650100\n"), HasSubstr("line 1: three numbers are needed, x y z; other grids: gdal_translate"));
   EXPECT_THAT(refusal("1 2\n"), HasSubstr("line 1: three numbers are needed"));
   EXPECT_THAT(refusal("1 2 3\nx y z\n"), HasSubstr("line 2: three numbers"));
   EXPECT_THAT(refusal("1 2 3\n1e9 2 3\n"), HasSubstr("line 2: the point is farther"));
