@@ -1,6 +1,7 @@
 """What .ci/run leaves out, how setup.sh chooses a compiler, and how run_programs.py and test_times.py name what failed."""
 import os
 import pathlib
+import select
 import subprocess
 import sys
 import tempfile
@@ -81,6 +82,23 @@ class Configure(unittest.TestCase):
         self.stub("cmake", "echo no compiler; exit 1")
         done = self.setup("configure asan")
         self.assertEqual((done.returncode, done.stderr), (1, "no compiler\nconfiguring preset asan failed: see above\n"))
+
+
+    def test_work_aside_yields_to_all_else_and_tells_how_it_ended(self):
+        os.mkfifo(self.folder / "nice")
+        done = self.setup('begin_aside log sh -c "nice >nice; echo ended; exit 3"; cat nice; end_aside')
+        self.assertEqual((done.returncode, done.stdout, (self.folder / "log").read_text()), (3, "19\n", "ended\n"))
+
+    def test_work_aside_ends_with_the_shell(self):
+        held = self.folder / "held"
+        os.mkfifo(held)
+        reader = os.open(held, os.O_RDONLY | os.O_NONBLOCK)
+        self.addCleanup(os.close, reader)
+        done = self.setup('begin_aside log sh -c "exec 3>held; sleep 600"; exec 4<held')  # goes on when it has begun
+        self.assertEqual(done.returncode, 0, done.stderr)
+        ended = select.poll()
+        ended.register(reader, 0)  # when nobody holds the other end any more
+        self.assertEqual(ended.poll(60_000), [(reader, select.POLLHUP)])
 
 
 class Programs(unittest.TestCase):

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Builds tests with sanitizers and runs them. usage: tests/tools/sanitized_tests.sh [asan|asan-all|tsan] [targets...]
+# Builds tests with sanitizers and runs them. usage: tests/tools/sanitized_tests.sh [--build] [asan|asan-all|tsan] [targets...]
+#   --build   only builds them
 #   asan      address and undefined behaviour: what reads foreign bytes or files in the daemon and below it, the ray tracer, the core
 #             of the BlueView libraries, and the fuzz targets over their seeds and made-up inputs; the default, and what .ci/run does.
 #             Not engines, their choice and their turns, which read nothing foreign
@@ -13,10 +14,12 @@ cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
 . tests/tools/setup.sh
 
+only_build=
+if [ "${1:-}" = --build ]; then only_build=1; shift; fi
 kind=asan
 case "${1:-}" in
   asan | asan-all | tsan) kind=$1; shift ;;
-  -h | --help) sed -n '2,10s/^# //p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,11s/^# //p' "$0"; exit 0 ;;
 esac
 preset=${kind%-all}
 
@@ -48,6 +51,7 @@ if [ ${#targets[@]} -eq 0 ]; then
 fi
 [ ${#targets[@]} -gt 0 ] || { echo "no test program is of kind $kind" >&2; exit 1; }
 timed "sanitizers: build" build "$preset" "${targets[@]}" "${more[@]}" || exit
+[ -z "$only_build" ] || exit 0
 
 figures=${SONARD_RELIABILITY:-}
 unset SONARD_RELIABILITY

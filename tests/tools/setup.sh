@@ -34,6 +34,26 @@ timed() {
   return $status
 }
 
+# begin_aside LOG COMMAND...: begins it, to run when nothing else wants a processor; it is ended with this shell.
+begin_aside() {
+  local log=$1
+  shift
+  set -m  # a process group of its own
+  nice -n 19 "$@" >"$log" 2>&1 </dev/null &
+  aside=$!
+  set +m
+  trap 'kill -- "-$aside" 2>/dev/null' EXIT
+}
+
+# end_aside: waits for what begin_aside began, from now on as urgent as all else where that is allowed; its status.
+end_aside() {
+  renice -n 0 -g "$aside" >/dev/null 2>&1
+  wait "$aside"
+  local status=$?
+  trap - EXIT
+  return $status
+}
+
 # need_packages NAME...: installs what is missing, with apt, and says so. What the archives do not have is named, the rest installed.
 need_packages() {
   if ! command -v dpkg-query >/dev/null; then
