@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -58,7 +59,8 @@ inline std::shared_ptr<const Ping> computed(PingRequest request) {
 /// A sonar and a driver that connects again when it loses the connection or gets no ping.
 class Link {
  public:
-  explicit Link(const Make& make)
+  /// With a rate its pings come at that rate, in Hz, where drivers or `sonarctl set sonar` can set one; else at the usual one.
+  explicit Link(const Make& make, std::optional<double> rate_hz = {})
       : make_(make),
         world_(pose_rules(config_), vehicles_of(config_), {}, start),
         sonar({config_, world_}, sonar_of(make), 0, start) {
@@ -69,8 +71,13 @@ class Link {
         perform(sonar.open_stream(last_id_, port, now_));
       }
     for (const auto& [at, port] : protocol::test::conversations_of(make)) lines_.push_back({at, port});
-    if (!make.host(wanted()))
-      if (auto changed = sonar.change(wanted().settings, "the test", now_)) perform(*std::move(changed));
+    wanted_.settings.range_m = 3;
+    protocol::Wanted at_rate = wanted_;
+    at_rate.settings.rate_hz = rate_hz;
+    if (make.host(at_rate))
+      wanted_ = at_rate;
+    else if (!changes(at_rate.settings))
+      changes(wanted_.settings);
     connect();
   }
 
@@ -118,10 +125,10 @@ class Link {
   std::size_t pings = 0;
 
  private:
-  static protocol::Wanted wanted() {
-    protocol::Wanted wanted;
-    wanted.settings.range_m = 3;
-    return wanted;
+  bool changes(const protocol::SettingsOverride& settings) {
+    auto changed = sonar.change(settings, "the test", now_);
+    if (changed) perform(*std::move(changed));
+    return changed.has_value();
   }
 
   void step_once() {
@@ -157,7 +164,7 @@ class Link {
 
   void connect() {
     close();
-    auto host = make_.host(wanted());
+    auto host = make_.host(wanted_);
     host_ = host ? *std::move(host) : *make_.host({});  // drivers of some set nothing
     lost_ = false;
     last_sign_ = now_;
@@ -251,6 +258,7 @@ class Link {
     if (message.shape != nullptr && message.shape->end != Outbox::Shape::End::none) lose(id);
   }
 
+  protocol::Wanted wanted_;
   std::unique_ptr<protocol::Host> host_;
   std::vector<ConnectionId> streams_, finished_;
   std::vector<Line> lines_;
