@@ -6,7 +6,6 @@ import json
 import math
 import pathlib
 import re
-import socket
 import struct
 import threading
 import time

@@ -359,3 +359,16 @@ def ulog(truth=False, steps=50, has_place=True):
 
 ROS2_TOPICS = [("/odom", "nav_msgs/msg/Odometry", [(100 + i, odometry(i)) for i in range(5)]),
                ("/image", "sensor_msgs/msg/Image", [(100, b"not read")])]
+
+
+def telemetry_without_place(kinds, submarine=True, steps=20):
+    """A tlog of messages of these kinds; positions have the depth only."""
+    log = bytearray()
+    for step in range(steps):
+        t, _, _, down, *angles = moment(step)
+        ms = round(1000 * t) + 25000
+        values = {"HEARTBEAT": (0, 12 if submarine else 2, 3, 0, 0, 3), "ATTITUDE": (ms, *angles, 0, 0, 0),
+                  "GLOBAL_POSITION_INT": (ms, 0, 0, 0, round(-1000 * down), 0, 0, 0, 0), "VFR_HUD": (0, 0, -down, 0, 0, 0)}
+        for kind in kinds:
+            log += round(1e6 * (1_700_000_000 + t)).to_bytes(8, "big") + mavlink_frame(kind, values[kind])
+    return bytes(log)

@@ -1,0 +1,367 @@
+"""Conversion of synthetic logs of vehicles, DataFlash, MAVLink and PX4: poses are compared with their source."""
+import math
+import struct
+import unittest
+from unittest import mock
+
+import made_logs as made
+from converted import WithFolder
+
+from sonard_client.convert import ConvertError, Geodetic
+from sonard_client.convert.mavlink import crc
+
+HERE = Geodetic(*made.ORIGIN)
+
+
+class Dataflash(WithFolder):
+    def test_attitude_and_position_are_paired(self):
+        track = self.convert(made.dataflash_log(), origin=HERE)
+        self.assertEqual((track.frame, track.source, self.warned), ("NED_FRD", "ATT+POS", []))
+        self.assert_track(track, range(49))  # no position follows the last attitude
+
+    def test_simulators_truth_is_preferred_and_any_source_selectable(self):
+        log = made.dataflash_log(("ATT", "POS", "XKF1", "SIM"))
+        self.assertEqual(self.convert(log).source, "SIM")
+        self.assert_track(self.convert(log, source="SIM", origin=HERE), range(50))
+        core = self.convert(log, source="XKF1")
+        self.assert_track(core, range(50))
+        self.assertIn("origin: 47.60000000,-122.33000000,10.000", core.comments)
+        self.assertAlmostEqual(self.convert(log, source="XKF1:1").rows[0].position_m[2], 102)
+        with self.assertRaisesRegex(ConvertError, r"no poses of 'AHR2'; sources: SIM \(50 poses\), XKF1 "):
+            self.convert(log, source="AHR2")
+
+    def test_another_origin_shifts_local_positions(self):
+        other = Geodetic(*made.degrees_at(-30, 20, 0))
+        row = self.convert(made.dataflash_log(("XKF1",)), origin=other).rows[0]
+        for got, wanted in zip(row.position_m, (30, -20, 2)):
+            self.assertAlmostEqual(got, wanted, delta=0.01)
+
+    def test_default_origin_is_the_first_fix(self):
+        track = self.convert(made.dataflash_log())
+        self.assertEqual(track.comments, ["origin: 47.60000000,-122.33000000,8.000 (the first fix)"])
+        self.assert_track(track, range(49), origin_down=2)
+
+    def test_truncated_log(self):
+        log = made.dataflash_log(("SIM",))
+        track = self.convert(log[:-20])
+        self.assertEqual(len(track.rows), 49)
+        self.assertRegex(self.warned[0], rf"ends within a message, at byte {len(log) - 45}")
+
+    def test_garbage_is_skipped(self):
+        log, begin = made.dataflash_log(("SIM",)), len(made.dataflash_log(("SIM",), 10))
+        track = self.convert(log[:begin] + b"\xa3\x95\xee" + bytes(500) + log[begin:])
+        self.assertEqual(len(track.rows), 50)
+        self.assertRegex(self.warned[0], f"503 bytes outside messages were skipped, the first at byte {begin}")
+
+    def test_inconsistent_description_is_omitted(self):
+        log = made.dataflash_log(("SIM",)).replace(made.dataflash_format("SIM"), made.dataflash_format("SIM", 48))
+        with self.assertRaisesRegex(ConvertError, "no poses"):
+            self.convert(log)
+        self.assertIn("SIM is inconsistent", self.warned[0])
+
+    def test_old_logs_in_milliseconds(self):
+        old = {"SIM": (13, "IccCfLL", "TimeMS,Roll,Pitch,Yaw,Alt,Lat,Lng", "IhhHfii")}
+        with mock.patch.dict(made.DATAFLASH, old):
+            log = made.dataflash_format("SIM") + b"".join(
+                made.dataflash_message("SIM", 500 * i, 0, 0, 9000, -3.0, 476000000, -1223300000) for i in range(3))
+        track = self.convert(log, origin=Geodetic(47.6, -122.33, 0))
+        self.assertEqual([row.t_s for row in track.rows], [0, 0.5, 1])
+        self.assertAlmostEqual(track.rows[0].position_m[2], 3, places=5)
+        self.assertAlmostEqual(track.rows[0].orientation[3], math.sqrt(0.5), places=6)
+
+
+class Telemetry(WithFolder):
+    def test_attitudes_and_positions_are_paired_by_the_vehicles_clock(self):
+        for version in (1, 2):
+            for attitude in ("ATTITUDE", "ATTITUDE_QUATERNION"):
+                with self.subTest(attitude, version=version):
+                    track = self.convert(made.telemetry_log((attitude, "LOCAL_POSITION_NED"), version=version))
+                    self.assertEqual((track.source, self.warned), (f"{attitude}+LOCAL_POSITION_NED", []))
+                    self.assert_track(track, range(49), t0=25, metres=1e-5, radians=1e-5)
+                    self.assertEqual(track.comments[0], "origin: 47.60000000,-122.33000000,10.000")
+
+    def test_time_continues_after_a_restart(self):
+        again = made.telemetry_log(began_s=1_700_000_060, boot_s=3)
+        rows = self.convert(made.telemetry_log() + again).rows
+        self.assertEqual(len(rows), 99)  # one is interpolated between the two parts
+        self.assertAlmostEqual(rows[-1].t_s - rows[0].t_s, 64.8, delta=0.02)
+        self.assertIn("restarted (1 x)", self.warned[0])
+
+    def test_order_of_preference(self):
+        all_of_it = ("ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "SIM_STATE", "ODOMETRY")
+        log = made.telemetry_log(all_of_it)
+        self.assertEqual(self.convert(log).source, "ODOMETRY")
+        self.assert_track(self.convert(log), range(50), t0=25, metres=1e-5, radians=1e-5)
+        truth = self.convert(log, source="SIM_STATE", origin=HERE)
+        self.assert_track(truth, range(50), t0=1_700_000_000, radians=1e-5)  # without a timestamp: time of receipt
+        self.assert_track(self.convert(log, source="ATTITUDE+GLOBAL_POSITION_INT", origin=HERE), range(49), t0=25)
+
+    def test_one_of_several_systems_is_used_and_reported(self):
+        other = bytearray()
+        for step in range(10):
+            t, north, east, down, *angles = made.moment(step)
+            stamp = round(1e6 * (1_700_000_100 + t)).to_bytes(8, "big")
+            other += stamp + made.mavlink_frame("ATTITUDE", (step, *angles, 0, 0, 0), system=2)
+            other += stamp + made.mavlink_frame("LOCAL_POSITION_NED", (step, north, east, down, 0, 0, 0), system=2)
+        both = made.telemetry_log() + bytes(other)
+        self.assertEqual(len(self.convert(both).rows), 49)
+        self.assertIn("using 1, which has most", self.warned[0])
+        self.assertEqual(len(self.convert(both, system=2).rows), 10)
+        with self.assertRaisesRegex(ConvertError, "system 9 is not in the log; systems: 1, 2, 255"):
+            self.convert(both, system=9)
+
+    @staticmethod
+    def sent_by(component, first, steps, away_m):
+        """[(time of receipt, record)] of ODOMETRY and ATTITUDE with LOCAL_POSITION_NED; positions are away_m too deep."""
+        out = []
+        for step in range(first, first + steps):
+            t, north, east, down, *angles = made.moment(step)
+            place = north, east, down + away_m
+            stamp_us = round(1e6 * (1_700_000_000 + t)) + component  # after those of component 1
+            for name, values in (("ODOMETRY", (stamp_us, *place, *made.quaternion(*angles), *[0] * 6, 1, 8, 0, 0, 0)),
+                                 ("ATTITUDE", (round(1e3 * t), *angles, 0, 0, 0)),
+                                 ("LOCAL_POSITION_NED", (round(1e3 * t), *place, 0, 0, 0))):
+                out.append((stamp_us, stamp_us.to_bytes(8, "big") + made.mavlink_frame(name, values, component=component)))
+        return out
+
+    def test_one_of_several_components_is_used_and_reported(self):
+        both = sorted(self.sent_by(1, 0, 20, 0) + self.sent_by(197, 0, 20, 50), key=lambda record: record[0])
+        for source in ("ODOMETRY", "ATTITUDE+LOCAL_POSITION_NED"):
+            with self.subTest(source):
+                track = self.convert(b"".join(record for _, record in both), source=source)
+                self.assert_track(track, range(20), t0=1_700_000_000 if source == "ODOMETRY" else 0, metres=1e-5, radians=1e-5)
+                self.assertEqual(len(self.warned), 1)
+                for name in ("ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY"):
+                    self.assertIn(f"{name}: component 1 (omitted: 20 messages of 197)", self.warned[0])
+
+    def test_selected_component(self):
+        both = b"".join(record for _, record in
+                        sorted(self.sent_by(1, 0, 20, 0) + self.sent_by(197, 0, 20, 50), key=lambda record: record[0]))
+        for source in ("ODOMETRY", "ATTITUDE+LOCAL_POSITION_NED"):
+            for component, away_m in ((1, 0), (197, 50)):
+                track = self.convert(both, source=source, component=component)
+                self.assertEqual((len(track.rows), self.warned), (20, []))
+                for step, row in enumerate(track.rows):
+                    self.assertAlmostEqual(row.position_m[2], made.moment(step)[3] + away_m, places=4)
+        with self.assertRaisesRegex(ConvertError, "component 7 sends no poses; components: 1, 197"):
+            self.convert(both, component=7)
+
+    def test_another_component_is_used_after_silence(self):
+        for gap_steps, used, omitted in ((40, "1", "10 messages of 197"), (52, "1, later 197", "none")):
+            with self.subTest(gap_steps):
+                records = self.sent_by(1, 0, 10, 0) + self.sent_by(197, 9 + gap_steps, 10, 50)
+                track = self.convert(b"".join(record for _, record in records))
+                self.assertEqual(len(track.rows), 10 if omitted != "none" else 20)
+                self.assertIn(f"ODOMETRY: component {used} (omitted: {omitted})", self.warned[0])
+
+    def test_components_with_different_messages_are_combined(self):
+        mixed = [record for _, record in self.sent_by(1, 0, 10, 0)]
+        mixed[2::3] = [record for _, record in self.sent_by(197, 0, 10, 0)][2::3]  # positions
+        track = self.convert(b"".join(mixed), source="ATTITUDE+LOCAL_POSITION_NED")
+        self.assertEqual((len(track.rows), self.warned), (10, []))
+
+    def test_check_value_of_the_crc(self):
+        self.assertEqual(crc(b"12345678", ord("9")), 0x6F91)  # check value of CRC-16/MCRF4XX
+
+    def test_motion_capture_and_signed_frames(self):
+        t, north, east, down, *angles = made.moment(0)
+        for name, values in (("ATT_POS_MOCAP", (0, *made.quaternion(*angles), north, east, down, *[0] * 21)),
+                             ("VISION_POSITION_ESTIMATE", (0, north, east, down, *angles, *[0] * 21, 5))):
+            with self.subTest(name):
+                frame = made.mavlink_frame(name, values, signed=True)
+                track = self.convert(round(1e6 * 77).to_bytes(8, "big") + frame, kind="tlog")
+                self.assert_track(track, range(1), t0=77, metres=1e-6, radians=1e-6)
+
+    def test_broken_frames_do_not_affect_others(self):
+        log = bytearray(made.telemetry_log(("ODOMETRY",)))
+        middle = log.index(b"\xfd", len(log) // 2) + 30
+        log[middle] ^= 0x10
+        track = self.convert(bytes(log))
+        self.assertEqual(len(track.rows), 49)
+        self.assertRegex(self.warned[0], "bytes outside intact frames were skipped, the first at byte [0-9]+")
+        track = self.convert(bytes(log[:-5]))
+        self.assertEqual(len(track.rows), 48)
+        self.assertIn("ends within a frame", self.warned[0])
+
+    def test_odometry_of_a_body_in_frd_or_flu(self):
+        for frames in ((1, 1), (1, 8), (1, 12), (20, 20), (20, 8), (20, 12), (1, 13), (20, 13)):
+            with self.subTest(frames):
+                turned = (0, 1, 0, 0) if frames[1] == 13 else (1, 0, 0, 0)
+                track = self.convert(made.telemetry_log(("ODOMETRY",), frames=frames, turned=turned))
+                self.assert_track(track, range(50), t0=25, metres=1e-5, radians=1e-5)
+                self.assertEqual(["x is used as north" in text for text in self.warned], [True] * (frames[0] == 20))
+
+    def test_a_level_body_in_flu_is_level(self):
+        values = 1000, 1, 2, 3, 0, 1, 0, 0, *[0] * 6, 1, 13, 0, 0, 0  # to NED: half a turn about the forward axis
+        row, = self.convert(bytes(8) + made.mavlink_frame("ODOMETRY", values)).rows
+        self.assertEqual([abs(part) for part in row.orientation], [1, 0, 0, 0])
+
+    def test_odometry_in_unsupported_frames_is_omitted(self):
+        for frames in ((21, 8), (1, 20), (20, 1), (1, 0), (12, 12)):
+            with self.subTest(frames):
+                frame_ids = "frame_id %d and child_frame_id %d" % frames
+                self.convert(made.telemetry_log(("ODOMETRY",), 3) + made.telemetry_log(("ODOMETRY",), 2, frames=frames))
+                self.assertIn(f"ODOMETRY with {frame_ids} (2 messages) was omitted", self.warned[0])
+                with self.assertRaises(ConvertError):
+                    self.convert(made.telemetry_log(("ODOMETRY",), 2, frames=frames))
+                self.assertIn(frame_ids, self.warned[0])
+
+
+class WithoutHorizontalPosition(WithFolder):
+    """Logs of a BlueROV2 without DVL: depth and attitude make a track at one place."""
+
+    def assert_held(self, track, steps, at=(0, 0), t0=0.0):
+        self.assertEqual(len(track.rows), len(steps))
+        for row, step in zip(track.rows, steps):
+            t, _, _, down, *angles = made.moment(step)
+            self.assertAlmostEqual(row.t_s, t0 + t, delta=0.0051)
+            self.assertEqual(row.position_m[:2], at)
+            self.assertAlmostEqual(row.position_m[2], down, delta=0.006)
+            cosine = abs(sum(a * b for a, b in zip(row.orientation, made.quaternion(*angles))))
+            self.assertLess(2 * math.acos(min(1.0, cosine)), 2e-4)
+        self.assertEqual(len(self.warned), 1, self.warned)
+        self.assertIn(f"no horizontal position (no DVL, UGPS or the like): north and east are held at {at[0]:g}, {at[1]:g}",
+                      self.warned[0])
+        self.assertIn("--dead-reckon M/S moves the vehicle ahead", self.warned[0])
+
+    def test_telemetry(self):
+        for kinds in (("HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT", "VFR_HUD"), ("ATTITUDE", "GLOBAL_POSITION_INT"),
+                      ("HEARTBEAT", "ATTITUDE", "VFR_HUD")):
+            with self.subTest(kinds):
+                track = self.convert(made.telemetry_without_place(kinds))
+                self.assertEqual(track.source, "ATTITUDE+depth")
+                self.assert_held(track, range(20), t0=25)
+                self.assert_held(self.convert(made.telemetry_without_place(kinds), at=(5, -2.5)), range(20), (5, -2.5), t0=25)
+        with self.assertRaisesRegex(ConvertError, "lacks positions and depths"):
+            self.convert(made.telemetry_without_place(("HEARTBEAT", "ATTITUDE", "VFR_HUD"), submarine=False))  # above the sea
+        with self.assertRaisesRegex(ConvertError, "lacks attitudes"):
+            self.convert(made.telemetry_without_place(("GLOBAL_POSITION_INT",)))
+
+    def test_a_pressure_sensor_in_the_water(self):
+        def log(message, hpa_of):
+            out = bytearray()
+            for step in range(20):
+                t, _, _, down, *angles = made.moment(step)
+                ms, stamp = round(1000 * t) + 25000, round(1e6 * (1_700_000_000 + t)).to_bytes(8, "big")
+                out += stamp + made.mavlink_frame("ATTITUDE", (ms, *angles, 0, 0, 0))
+                out += stamp + made.mavlink_frame(message, (ms, hpa_of(down), 0, 2100, 0))
+                out += stamp + made.mavlink_frame("SCALED_PRESSURE", (ms, 1008, 0, 3500, 0))  # in the hull
+            return bytes(out)
+        hpa_per_m = 100.518  # 1025 kg/m3 x 9.80665 m/s2
+        track = self.convert(log("SCALED_PRESSURE2", lambda down: 1013.25 + hpa_per_m * down))
+        self.assertIn("it is that of SCALED_PRESSURE2 in sea water", self.warned.pop(0))
+        self.assert_held(track, range(20), t0=25)
+        with self.assertRaisesRegex(ConvertError, "lacks positions and depths"):
+            self.convert(log("SCALED_PRESSURE2", lambda down: 1012.0))  # never in the water
+
+    def test_depths_before_the_vehicles_clock_is_known(self):
+        """VFR_HUD has no time; that of receipt would be decades after the vehicle's start."""
+        first = (1_699_999_999_000_000).to_bytes(8, "big") + made.mavlink_frame("VFR_HUD", (0, 0, -1, 0, 0, 0))
+        self.assert_held(self.convert(first + made.telemetry_without_place(("HEARTBEAT", "ATTITUDE", "VFR_HUD"))), range(20), t0=25)
+
+    def test_a_position_is_preferred(self):
+        both = made.telemetry_log() + made.telemetry_without_place(("GLOBAL_POSITION_INT", "VFR_HUD"))
+        self.assertEqual(self.convert(both).source, "ATTITUDE+LOCAL_POSITION_NED")
+        with self.assertRaisesRegex(ValueError, "--at is for logs without horizontal position"):
+            self.convert(both, at=(1, 2))
+
+    @staticmethod
+    def dataflash(name, values):
+        log = made.dataflash_format(name) + made.dataflash_format("ATT")
+        for step in range(20):
+            t, _, _, down, roll, pitch, yaw = made.moment(step)
+            angles = [round(100 * math.degrees(angle)) for angle in (roll, pitch, yaw)]
+            log += made.dataflash_message("ATT", round(1e6 * t), 0, angles[0], 0, angles[1], 0, angles[2], 0, 0, 3)
+            log += b"".join(made.dataflash_message(name, round(1e6 * t), *v) for v in values(down, angles))
+        return log
+
+    def test_dataflash(self):
+        layouts = {"CTUN": (40, "Qff", "TimeUS,ThI,Alt", "Qff"), "BARO": (41, "QBf", "TimeUS,I,Alt", "QBf")}
+        cases = {"CTUN": lambda down, _: [(0, -down)],
+                 "BARO": lambda down, _: [(0, 99), (1, -down)],
+                 "POS": lambda down, _: [(0, 0, 17, -down, 17)]}
+        for name, values in cases.items():
+            with self.subTest(name), mock.patch.dict(made.DATAFLASH, layouts):
+                track = self.convert(self.dataflash(name, values))
+                self.assertEqual(track.source, "ATT+depth")
+                self.assert_held(track, range(20))
+
+    def test_px4(self):
+        track = self.convert(made.ulog(has_place=False))
+        self.assertEqual(track.source, "vehicle_attitude+depth")
+        self.assert_held(track, range(1, 50))  # the first depth is not valid
+        self.assert_held(self.convert(made.ulog(has_place=False), at=(3, 4)), range(1, 50), (3, 4))
+
+    def test_a_filter_whose_position_does_not_change_is_reported(self):
+        log = self.dataflash("XKF1", lambda down, angles: [(0, *angles, 0, 0, 0, 0, 0.5, 0.25, down, 0, 0, 0, 0)])
+        track = self.convert(log)
+        self.assertEqual(track.source, "XKF1")
+        self.assert_held(track, range(20), (0.5, 0.25))
+        self.assert_held(self.convert(log, at=(3, 4)), range(20), (3, 4))
+
+    def test_the_origin_counts_for_a_vehicle_that_stands_still(self):
+        log = self.dataflash("XKF1", lambda down, angles: [(0, *angles, 0, 0, 0, 0, 0.5, 0.25, down, 0, 0, 0, 0)])
+        with self.assertRaisesRegex(ConvertError, "metres from an unknown origin"):
+            self.convert(log, origin=HERE)
+        place = round(1e7 * HERE.latitude_deg), round(1e7 * HERE.longitude_deg), round(100 * HERE.altitude_m)
+        log += made.dataflash_format("ORGN") + made.dataflash_message("ORGN", 0, 0, *place)
+        track = self.convert(log, origin=Geodetic(*made.degrees_at(-30, 20, 0)))
+        for got, wanted in zip(track.rows[0].position_m, (30.5, -19.75, made.moment(0)[3])):
+            self.assertAlmostEqual(got, wanted, delta=0.01)
+        self.assertEqual(len(self.warned), 1)
+        self.assertIn("north and east do not change: the vehicle stands still, or", self.warned[0])
+        self.assert_held(self.convert(log, at=(3, 4)), range(20), (3, 4))
+
+
+class Px4(WithFolder):
+    def test_estimates(self):
+        track = self.convert(made.ulog())
+        self.assertEqual((track.source, track.frame, self.warned), ("vehicle_attitude+vehicle_local_position", "NED_FRD", []))
+        self.assert_track(track, range(1, 50), metres=1e-5, radians=1e-5)  # the first position is not valid
+        self.assertIn("origin: 47.60000000,-122.33000000,10.000", track.comments)
+
+    def test_truth_of_the_simulator_is_preferred(self):
+        track = self.convert(made.ulog(truth=True))
+        self.assertEqual(track.source, "vehicle_attitude_groundtruth+vehicle_local_position_groundtruth")
+        self.assertAlmostEqual(track.rows[0].position_m[2], 102)
+
+    def of_formats(self, *formats, content=b"\x01" * 32):
+        log = b"ULog\x01\x12\x35\x01" + bytes(8) + b"".join(made.ulog_message("F", text.encode("latin-1")) for text in formats)
+        for number, text in enumerate(formats):
+            log += made.ulog_message("A", bytes([0]) + struct.pack("<H", number) + text.partition(":")[0].encode())
+            log += made.ulog_message("D", struct.pack("<H", number) + content)
+        return log
+
+    def test_formats_of_other_types_are_omitted(self):
+        stamp = "uint64_t timestamp;"
+        attitude, local, place = "vehicle_attitude", "vehicle_local_position", "vehicle_global_position"
+        for name, fields, said in (
+                (attitude, "uint64_t[2] timestamp;float[4] q;", r"timestamp is uint64_t\[2\], not uint64_t"),
+                (attitude, stamp + "char[4] q;", r"q is char\[4\], not float or double\[4\]"),
+                (attitude, stamp + "float[3] q;", r"q is float\[3\], not"),
+                (attitude, stamp + "float[\xb2] q;", "'float.*' is not a field of a known type"),
+                (attitude, stamp + "float[0] q;", "is not a field of a known type"),
+                (attitude, "float[4] q;", "it has no timestamp"),
+                (place, stamp + "char lat;char lon;char alt;", "lat is char, not float or double"),
+                (local, stamp + "float x;float[3] y;float z;", r"y is float\[3\], not"),
+                (local, stamp + "float x;float y;float z;float z;", "z occurs twice"),
+                (local, stamp + "float x;float y;float z;float[65535] a;", "longer than a message"),
+                (local, stamp + "double ref_lat;char[4] xy_global;", r"xy_global is char\[4\]")):
+            with self.subTest(fields), self.assertRaisesRegex(ConvertError, "log: no poses"):
+                self.convert(self.of_formats(f"{name}:{fields}"))
+            self.assertRegex(self.warned[0], f"^at byte 16: {name} is omitted: its format cannot be read: .*{said}")
+
+    def test_messages_shorter_than_their_format_are_omitted(self):
+        with self.assertRaises(ConvertError):
+            self.convert(self.of_formats("vehicle_local_position:uint64_t timestamp;uint8_t[60000] a;float x;float y;float z;"))
+        self.assertEqual(self.warned[0],
+                         "messages of vehicle_local_position omitted because they are shorter than their format: 1")
+
+    def test_truncated(self):
+        log = made.ulog()
+        self.assertEqual(len(self.convert(log[:-10]).rows), 48)
+        self.assertRegex(self.warned[0], "ends within a message, at byte [0-9]+")
+
+
+if __name__ == "__main__":
+    unittest.main()
