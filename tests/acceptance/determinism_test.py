@@ -14,7 +14,7 @@ from depth_hold_test import Autopilot, Control
 from oculus_reader import Client, fire_message
 from running_sonard import ROOT, SONARD, Daemon, Sonard, eventually
 
-PINGS = 200
+PINGS = 60
 STEPS, STEP_S = 20, 0.1
 PATIENCE_S = 120
 

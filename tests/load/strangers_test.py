@@ -225,7 +225,7 @@ class Strangers(unittest.TestCase):
         self.assertGreaterEqual(len(driver.arrivals), 5, daemon.log())
         rows = []
         for name, stranger, work in kinds:
-            alone = self.measure(driver)
+            alone = self.measure(driver) if MEASURES else None  # the suite looks at counts only
             stop, done = threading.Event(), []
             thread = threading.Thread(target=lambda s=stranger, e=stop, d=done: d.append(s(daemon.address, e)), daemon=True)
             begin = time.monotonic()
