@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import unittest
+import urllib.request
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
@@ -119,6 +120,15 @@ class Preview(unittest.TestCase):
             viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/ping" and viewer.decode(*value[::2]).get("preview"))
             viewer.socket.close()
             eventually(lambda: "preview ends" in daemon.log().rpartition("preview begins")[2])
+
+    def test_the_first_ping_is_computed_while_the_page_loads(self):
+        with demo("oculus") as daemon:
+            request = urllib.request.Request(f"http://{HTTP}:8088/", headers={"Accept": "text/html", "Accept-Encoding": "gzip"})
+            with urllib.request.urlopen(request, timeout=60) as page:
+                self.assertEqual(page.status, 200)
+            eventually(lambda: "preview begins" in daemon.log())
+            eventually(lambda: "preview ends" in daemon.log())
+            self.assertNotIn("viewer connected", daemon.log())
 
     def test_a_host_that_has_left_is_no_trouble(self):
         with demo("ping360"):

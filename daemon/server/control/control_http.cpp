@@ -17,7 +17,10 @@ using control::StatusCode;
 asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, HttpConnection& from) {
   RoutedRequest routed = route_request(request, {services_.token, from.reached().ip, config_.hosts});
   if (!routed.pose_refusal.empty()) targets_.poses.refuse(routed.pose_refusal, from.sender());
-  if (auto* answer = std::get_if<HttpAnswer>(&routed.action)) co_return std::move(*answer);
+  if (auto* answer = std::get_if<HttpAnswer>(&routed.action)) {
+    if (view_ != nullptr && answer->type.starts_with("text/html")) view_->expect_viewer();
+    co_return std::move(*answer);
+  }
   if (const auto* wanted = std::get_if<control::Subscribe>(&routed.action)) co_return stream_of(*wanted);
   if (const auto* asked = std::get_if<HealthAction>(&routed.action)) co_return health(asked->with_text);
   if (const auto* asked = std::get_if<SocketAction>(&routed.action)) co_return open_socket(request, *asked, from);

@@ -303,7 +303,7 @@ void ViewFeed::tick() {
   });
   for (const std::string& who : gone) of_.log.info("viewer gone", {{"from", who}});
   drive_previews();
-  if (connections_.empty()) {
+  if (connections_.empty() && Steady::now() >= expected_until_) {
     no_preview_.clear();
     of_.fleet.tap_pings({});
     for (SonarView& sonar : sonars_) sonar.forget();  // the next viewer gets geometry and swath anew

@@ -54,6 +54,8 @@ class ViewFeed final : public ViewerHost {
 
   /// Adds a viewer and greets it.
   void add(const std::shared_ptr<ViewConnection>& viewer);
+  /// Call it when a browser loads the page. In the demo the first ping is computed while the page starts.
+  void expect_viewer();
   bool is_full() const;
   std::vector<ViewerFigures> viewers() const;
   ViewSecrets& secrets() { return secrets_; }
@@ -168,8 +170,8 @@ class ViewFeed final : public ViewerHost {
   std::vector<foxglove::Parameter> pushed_;
   asio::steady_timer timer_;
   bool armed_ = false, stopping_ = false, changed_ = false;
-  Time last_sent_time_{Time::min()};  // the daemon's time, last sent to viewers
-  Steady::time_point status_at_{}, ping_at_{};
+  Time last_sent_time_{Time::min()};                               // the daemon's time, last sent to viewers
+  Steady::time_point status_at_{}, ping_at_{}, expected_until_{};  // the last: a viewer is expected until then
   std::string session_;
   std::uint64_t sessions_ = 0;
   LogLimiter failures_;

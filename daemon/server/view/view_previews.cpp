@@ -5,6 +5,7 @@ namespace sonar {
 namespace {
 
 constexpr std::chrono::seconds rest_after_failure{30};  // pause of previews that start by themselves
+constexpr std::chrono::seconds page_starts_within{5};   // from the request of the page to its subscriptions, on slow computers
 
 }  // namespace
 
@@ -34,7 +35,15 @@ void ViewFeed::end_preview(Device& device, const std::string& why) {
   of_.log.info("preview ends", {{"sonar", device.config().name}, {"why", why}});
 }
 
-/// In the demo: while a viewer looks at its pings and no driver is connected.
+void ViewFeed::expect_viewer() {
+  if (!of_.config.previews || stopping_) return;
+  sync_sonars();
+  expected_until_ = Steady::now() + page_starts_within;
+  drive_previews();
+  arm();
+}
+
+/// In the demo: while a viewer looks at its pings, or is expected, and no driver is connected.
 bool ViewFeed::previews_by_itself(const Device& device) {
   const std::string& name = device.config().name;
   if (!of_.config.previews || of_.clock.stepped() || no_preview_.contains(name)) return false;
@@ -42,7 +51,9 @@ bool ViewFeed::previews_by_itself(const Device& device) {
       failed != preview_failed_at_.end() && Steady::now() < failed->second + rest_after_failure)
     return false;
   const SonarView* const sonar = find(name);
-  return sonar != nullptr && (wanted(sonar->image) || wanted(sonar->fan) || wanted(sonar->cloud)) &&
+  if (sonar == nullptr) return false;
+  const bool is_expected = Steady::now() < expected_until_;
+  return (is_expected || wanted(sonar->image) || wanted(sonar->fan) || wanted(sonar->cloud)) &&
          !device.sonar().connections().has_audience();
 }
 
