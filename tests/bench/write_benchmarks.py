@@ -3,9 +3,11 @@
 
 usage: write_benchmarks.py BENCH.json [SET.json...] DOCS_FOLDER TABLES_FOLDER
        write_benchmarks.py --instruction-sets SET.json... TABLES_FOLDER
+       write_benchmarks.py --curves BENCH.json DOCS_FOLDER
   BENCH.json  the whole run
   SET.json    rates with one instruction set, the best first: the chapter "Instruction sets"
   --instruction-sets  all files are SET.json: replaces that chapter of the tables and keeps everything else
+  --curves  replaces the chapter on how times grow and its picture, and keeps everything else
 Standard library only. tests/tools/benchmarks.sh makes the JSON and calls this; the pages are not edited by hand.
 """
 
@@ -30,6 +32,10 @@ GOALS = {
 # Thread ms of the prototype's stages for P1 (2 processors with AVX-512), from which the goal was derived.
 FLOOR = {"trace": 2.9 + 0.44, "cull": 0.09, "scatter": 1.9, "synthesize": 1.4, "noise": 0.17, "couple": 0.42, "receive": 0.2}
 NAME = "benchmarks"  # of both pages
+PEER = "## Beside a peer"  # a chapter that is written by hand
+# Why a ping costs what it costs, by the quantity that grows.
+KNEES = {
+}
 PAPER = [  # Choi 2025, Table 3: 512 beams, 10 m, RTX 2080 Ti and i9-9900K
     ("paper, 300 rays a beam, GPU", 0.3),
     ("paper, raster, 11 rays, GPU", 2.0),
@@ -207,30 +213,104 @@ def bars(entries):
     return "\n".join(out + ["</svg>", ""])
 
 
+def cost(point):
+    """Milliseconds a ping: the least processor time where the report has it."""
+    return point.get("least_processor_ms", point["median_ms"])
+
+
+def slope(points):
+    """Exponent of the cost over x: least squares in logarithms; and the squares that remain."""
+    xs, ys = [math.log(p["x"]) for p in points], [math.log(cost(p)) for p in points]
+    x, y = sum(xs) / len(xs), sum(ys) / len(ys)
+    exponent = sum((a - x) * (b - y) for a, b in zip(xs, ys)) / sum((a - x) ** 2 for a in xs)
+    return exponent, sum((b - y - exponent * (a - x)) ** 2 for a, b in zip(xs, ys))
+
+
+def exponents(points):
+    """(before, index of the knee, after): the two straight lines through a common point that fit best; (all, None, all) where
+    they differ by less than 0.2 or are shorter than two points."""
+    splits = [(slope(points[:i + 1]), i, slope(points[i:])) for i in range(1, len(points) - 1)]
+    if splits:
+        before, knee, after = min(splits, key=lambda split: split[0][1] + split[2][1])
+        if abs(after[0] - before[0]) >= 0.2:
+            return before[0], knee, after[0]
+    every = slope(points)[0]
+    return every, None, every
+
+
+def in_words(exponents_found, points):
+    before, knee, after = exponents_found
+    return f"{before:.2f}" if knee is None else f"{before:.2f}, from {points[knee]['x']:,} on {after:.2f}"
+
+
+def growth(report):
+    """The chapter on curves: the picture, exponents, and the stages that make the growth before and after a knee."""
+    first = report["results"][0]
+    rows = []
+    for c in report["curves"]:
+        points = c["points"]
+        found = exponents(points)
+        marks = [0] + ([found[1]] if found[1] is not None else []) + [len(points) - 1]
+        grown = []
+        for a, b in zip(marks, marks[1:]):
+            before, after = points[a].get("thread_ms", {}), points[b].get("thread_ms", {})
+            more = {stage: after.get(stage, 0) - before.get(stage, 0) for stage in {**before, **after}}
+            whole = sum(abs(ms) for ms in more.values())
+            words = [f"{stage} {before.get(stage, 0):.1f} to {after.get(stage, 0):.1f}" for stage, ms in more.items()
+                     if abs(ms) >= 0.2 * whole and abs(ms) >= 0.3]
+            grown.append(", ".join(words) or "none")
+        rows.append([f"{c['name']}: {c['case']}", f"{points[0]['x']:,} to {points[-1]['x']:,}",
+                     f"{1e3 / cost(points[0]):.0f} to {1e3 / cost(points[-1]):.0f}", in_words(found, points), "; then ".join(grown),
+                     KNEES.get(c["name"], "")])
+    return ["## How times grow", "",
+            f"Pings/s of one thread, by its processor time, of the ping that other programs disturbed least "
+            f"(`sonard_bench --scene local-search --case P1 --curves`; {rates_title(report)}). The exponent is the slope of the processor "
+            f"time over the quantity in logarithms; the dashed line is the knee, where two slopes fit better than one. Stages are in "
+            f"processor ms a ping, up to the knee and beyond it.", "",
+            "![curves](benchmarks-curves.svg)", ""] + table(
+                ["what grows", "from, to", "pings/s", "exponent", "stages that change", "why"], rows)
+
+
+def with_chapter(text, chapter):
+    """The page `text` with the lines `chapter` in place of the chapter of the same title, or at its end."""
+    body = "\n".join(chapter).rstrip("\n") + "\n"
+    pattern = re.compile(rf"^{re.escape(chapter[0])}\n.*?(?=^## |\Z)", flags=re.M | re.S)
+    if pattern.search(text):
+        return pattern.sub(lambda _: body + "\n", text, count=1).rstrip("\n") + "\n"
+    return text.rstrip("\n") + "\n\n" + body
+
+
 def lines_of(curves):
-    """A small double-logarithmic picture for each curve, three a row."""
-    wide, high, columns = 290, 230, 3
+    """Pings/s over each quantity, both axes logarithmic, three pictures a row."""
+    wide, high, columns = 330, 250, 3
     rows = (len(curves) + columns - 1) // columns
     out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide * columns}" height="{high * rows}">',
            f'<rect width="{wide * columns}" height="{high * rows}" fill="white"/>']
     for i, curve in enumerate(curves):
-        left, top, w, h = i % columns * wide + 50, i // columns * high + 30, wide - 75, high - 80
-        points = [(p["x"], p["median_ms"]) for p in curve["points"]]
-        xs, ys = [math.log10(p[0]) for p in points], [math.log10(p[1]) for p in points]
+        left, top, w, h = i % columns * wide + 50, i // columns * high + 42, wide - 75, high - 92
+        points = curve["points"]
+        xs, ys = [math.log10(p["x"]) for p in points], [math.log10(1e3 / cost(p)) for p in points]
         y0, y1 = math.floor(min(ys)), max(math.ceil(max(ys)), math.floor(min(ys)) + 1)
         x0, x1 = min(xs), max(max(xs), min(xs) + 0.1)
         place = lambda x, y: (left + w * (x - x0) / (x1 - x0), top + h * (1 - (y - y0) / (y1 - y0)))
+        found = exponents(points) if len(points) > 1 else None
         out += [f'<rect x="{left}" y="{top}" width="{w}" height="{h}" fill="none" stroke="#999"/>',
-                text(left, top - 10, f"{curve['name']} ({curve['case']})", 11)]
+                text(left, top - 24, f"{curve['name']} ({curve['case']})", 11)]
+        if found:
+            out.append(text(left, top - 9, f"exponent of the cost: {in_words(found, points)}", 10))
+            if found[1] is not None:
+                at = place(xs[found[1]], y0)[0]
+                out.append(f'<line x1="{at:.1f}" y1="{top}" x2="{at:.1f}" y2="{top + h}" stroke="#c44" stroke-dasharray="4 3"/>')
         for power in range(y0, y1 + 1):
             out.append(text(left - 6, place(x0, power)[1] + 4, f"{10.0 ** power:g}", 10, "end"))
         path = " ".join(f"{a:.1f},{b:.1f}" for a, b in (place(x, y) for x, y in zip(xs, ys)))
         out.append(f'<polyline points="{path}" fill="none" stroke="#2a6f97" stroke-width="2"/>')
-        for (value, ms), x, y in zip(points, xs, ys):
+        for point, x, y in zip(points, xs, ys):
             a, b = place(x, y)
-            out += [f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3" fill="#2a6f97"/>', text(a, top + h + 14, f"{value:g}", 9, "middle"),
-                    text(a, b - 6, f"{ms:.3g}", 9, "middle")]
-        out.append(text(left + w / 2, top + h + 30, "milliseconds a ping", 10, "middle"))
+            name = f"{point['x']:g}" if point["x"] < 1e4 else f"{point['x']:.1g}".replace("e+0", "e")
+            out += [f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3" fill="#2a6f97"/>', text(a, top + h + 14, name, 9, "middle"),
+                    text(a, b - 6, f"{10 ** y:.3g}", 9, "middle")]
+        out.append(text(left + w / 2, top + h + 30, "pings/s of one thread", 10, "middle"))
     return "\n".join(out + ["</svg>", ""])
 
 
@@ -314,7 +394,7 @@ def page(report, scene="local-search", other_rates=()):
               "(`build/release/tests/own_network/in_own_network build/release/tests/bench/sonard_bench --scene local-search --case P0`; "
               "the tables have a row for every product).", ""] + service(report)
     if report.get("curves"):
-        lines += ["## How times grow", "", "![curves](benchmarks-curves.svg)", ""]
+        lines += growth(report)
     return "\n".join(lines)
 
 
@@ -343,7 +423,7 @@ def tables(report, scene="local-search"):
     if report.get("curves"):
         lines += ["## How times grow", ""]
         for c in report["curves"]:
-            lines += [f"- {c['name']} ({c['case']}): " + ", ".join(f"{p['x']:g}: {p['median_ms']:.2f} ms" for p in c["points"])]
+            lines += [f"- {c['name']} ({c['case']}): " + ", ".join(f"{p['x']:,}: {cost(p):.2f} ms" for p in c["points"])]
         lines.append("")
     return "\n".join(lines)
 
@@ -365,7 +445,9 @@ def write(report, folder, tables_folder, sets=()):
             r = found[max(found)]
             entries.append((f"{case}: {r['description']}", r["pings_per_second"], True))
     overview = file_of(folder, NAME)
-    overview.write_text(page(report, scene, other_machines(old(overview), instruction_set(report["results"][0]))), encoding="utf-8")
+    text = page(report, scene, other_machines(old(overview), instruction_set(report["results"][0])))
+    peer = re.search(rf"^{PEER}\n.*?(?=^## |\Z)", old(overview), flags=re.M | re.S)  # of a run of its own
+    overview.write_text(with_chapter(text, peer.group().split("\n")) if peer else text, encoding="utf-8")
     text = tables(report, scene)
     if sets:
         text = with_sets(text, instruction_sets(sets, scene), old(file_of(tables_folder, NAME)))
@@ -375,16 +457,25 @@ def write(report, folder, tables_folder, sets=()):
         (folder / "benchmarks-curves.svg").write_text(lines_of(report["curves"]), encoding="utf-8")
 
 
+def write_curves(report, folder):
+    file = file_of(folder, NAME)
+    file.write_text(with_chapter(old(file), growth(report)), encoding="utf-8")
+    (folder / "benchmarks-curves.svg").write_text(lines_of(report["curves"]), encoding="utf-8")
+
+
 def main():
     words = sys.argv[1:]
+    curves_only = words[:1] == ["--curves"]
     sets_only = words[:1] == ["--instruction-sets"]
-    if sets_only:
+    if sets_only or curves_only:
         words = words[1:]
     folders = [Path(name) for name in words if not name.endswith(".json")]
     reports = [json.loads(Path(name).read_text(encoding="utf-8")) for name in words if name.endswith(".json")]
-    if not reports or len(folders) != (1 if sets_only else 2):
+    if not reports or len(folders) != (1 if sets_only or curves_only else 2):
         sys.exit(__doc__.strip())
-    if sets_only:
+    if curves_only:
+        write_curves(reports[0], folders[0])
+    elif sets_only:
         file = file_of(folders[0], NAME)
         file.write_text(with_sets(old(file), instruction_sets(reports), old(file)), encoding="utf-8")
     else:

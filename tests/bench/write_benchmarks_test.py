@@ -82,6 +82,35 @@ class Page(unittest.TestCase):
         for words in ("31.000 %", "| 500 |", "400: 5.00 ms"):
             self.assertIn(words, tables)
 
+    def test_a_knee_is_found_where_the_slope_changes(self):
+        of = lambda costs: [{"x": 2 ** i, "median_ms": ms, "thread_ms": {"trace": 1.0, "scatter": ms}} for i, ms in enumerate(costs)]
+        before, knee, after = write_benchmarks.exponents(of([4, 4, 4, 8, 16, 32]))
+        self.assertEqual([round(before, 6), knee, round(after, 6)], [0, 2, 1])
+        steady = write_benchmarks.exponents(of([1, 2.1, 3.9, 8, 16]))
+        self.assertIsNone(steady[1])
+        self.assertAlmostEqual(steady[0], 1, places=1)
+        chapter = "\n".join(write_benchmarks.growth(
+            {"processor": "test", "results": [result("P1", 1, 80)],
+             "curves": [{"name": "rows", "case": "P3a", "points": of([4, 4, 4, 8, 16, 32])}]}))
+        self.assertIn("| rows: P3a | 1 to 32 | 250 to 31 | 0.00, from 4 on 1.00 | none; then scatter 4.0 to 32.0 |", chapter)
+
+    def test_curves_alone_replace_their_chapter(self):
+        report = {"processor": "test", "results": [result("P1", 1, 80)],
+                  "curves": [{"name": "rows", "case": "P3a", "points": [{"x": 200, "median_ms": 3.0}, {"x": 400, "median_ms": 5.0}]}]}
+        with TemporaryDirectory() as name:
+            file = Path(name) / "benchmarks.md"
+            file.write_text(f"# Benchmarks\n\n## How times grow\n\nold\n\n{write_benchmarks.PEER}\n\nby hand\n", encoding="utf-8")
+            write_benchmarks.write_curves(report, Path(name))
+            page = file.read_text(encoding="utf-8")
+            self.assertIn("| rows: P3a | 200 to 400 | 333 to 200 | 0.74 |", page)
+            self.assertTrue(page.endswith(f"\n\n{write_benchmarks.PEER}\n\nby hand\n"))
+            self.assertNotIn("\nold\n", page)
+            (Path(name) / "tables").mkdir()
+            write_benchmarks.write(report, Path(name), Path(name) / "tables")
+            whole = file.read_text(encoding="utf-8")
+        self.assertIn("by hand", whole, "a whole run keeps the chapter that is written by hand")
+        self.assertEqual(whole.count("## How times grow"), 1)
+
     def test_threads_and_sonars_have_a_table_each(self):
         report = {"processor": "test", "results": [result("P1", 2, 80)],
                   "threads": [{"case": "P1", "description": "P1 described", "threads": n, "pings_per_second": 50.0 * n} for n in (1, 2)],
