@@ -121,19 +121,31 @@ std::string without_escapes(std::string_view text) {
 }
 
 /// Searches the folders, then beside and above the referencing file: models lie next to each other, packages contain their files.
+/// Last, a file of a model in the model that refers to it, whose folder may be named otherwise. Never the referencing file: a
+/// model may be named like the one on Fuel that it includes.
 fs::path look_around(const fs::path& wanted, const fs::path& from_file, const std::vector<fs::path>& folders, int version = -1) {
-  for (const fs::path& folder : folders)
-    if (const fs::path found = file_at(folder / wanted, version); !found.empty()) return found;
   std::error_code error;
-  fs::path above = fs::absolute(from_file, error).parent_path();
+  const fs::path from = fs::absolute(from_file, error).lexically_normal(), here = from.parent_path();
+  const auto another = [&](const fs::path& place) {
+    const fs::path found = file_at(place, version);
+    return !found.empty() && fs::absolute(found, error).lexically_normal() == from ? fs::path() : found;
+  };
+  for (const fs::path& folder : folders)
+    if (const fs::path found = another(folder / wanted); !found.empty()) return found;
   const std::string first = wanted.empty() ? std::string() : wanted.begin()->string();
+  fs::path above = here;
   for (int up = 0; up < 8 && !above.empty(); ++up, above = above.parent_path()) {
     for (const fs::path& place : {above / wanted, above / "models" / wanted})
-      if (const fs::path found = file_at(place, version); !found.empty()) return found;
-    if (!first.empty() && (above.filename() == first || (up < 4 && !model_in(above).empty()) || is_package(above, first)))
-      if (const fs::path found = file_at(above / wanted.lexically_relative(first), version); !found.empty()) return found;
+      if (const fs::path found = another(place); !found.empty()) return found;
+    if (!first.empty() && (above.filename() == first || is_package(above, first)))
+      if (const fs::path found = another(above / wanted.lexically_relative(first)); !found.empty()) return found;
     if (above == above.parent_path()) break;
   }
+  if (wanted == fs::path(first)) return {};  // a model as a whole, which is not the one that refers to it
+  above = here;
+  for (int up = 0; up < 4 && above != above.parent_path(); ++up, above = above.parent_path())
+    if (!model_in(above).empty())
+      if (const fs::path found = another(above / wanted.lexically_relative(first)); !found.empty()) return found;
   return {};
 }
 

@@ -230,18 +230,12 @@ std::string nearest_frame(const SdfModel& model, const std::string& name) {
   return text::suggestion(name, views, "there are");
 }
 
-/// The frame of that name here or in a model that was merged into this one.
-SdfFrame* find_frame(SdfModel& model, std::string_view name, SdfModel*& owner) {
-  owner = &model;
-  if (const auto found = model.frames.find(name); found != model.frames.end()) return &found->second;
-  for (const auto& nested : model.nested) {
-    if (!nested->merged) continue;
-    if (const auto found = nested->frames.find(name); found != nested->frames.end()) {
-      owner = nested.get();
-      return &found->second;
-    }
-  }
-  return nullptr;
+/// The model that has a frame of that name: this one, or one that was merged into it, which may have it from a further one.
+SdfModel* holder_of(SdfModel& model, const std::string& name) {
+  if (model.frames.contains(name)) return &model;
+  const auto found = std::find_if(model.nested.begin(), model.nested.end(),
+                                  [&](const auto& nested) { return nested->merged && holder_of(*nested, name) != nullptr; });
+  return found == model.nested.end() ? nullptr : found->get();
 }
 
 }  // namespace
@@ -262,22 +256,24 @@ Pose model_in_parent(SdfModel& nested, const Place& asked_by, Findings& findings
 
 Pose frame_in_model(SdfModel& model, const std::string& name, const Place& asked_by, Findings& findings, int depth) {
   if (name.empty() || name == "__model__" || (model.is_world && name == "world") || findings.failed()) return {};
-  SdfModel* owner = nullptr;
   std::size_t colons = std::string::npos;
-  SdfFrame* frame = find_frame(model, name, owner);  // old files have links called crane::hook
-  if (frame == nullptr) {
+  SdfModel* holder = holder_of(model, name);  // old files have links called crane::hook
+  if (holder == nullptr) {
     colons = name.find("::");
-    frame = find_frame(model, name.substr(0, colons), owner);
+    holder = holder_of(model, name.substr(0, colons));
   }
+  if (holder != nullptr && holder != &model)
+    return compose(model_in_parent(*holder, asked_by, findings, depth + 1),
+                   frame_in_model(*holder, name, asked_by, findings, depth + 1));
+  SdfFrame* frame = holder == nullptr ? nullptr : &model.frames.find(name.substr(0, colons))->second;
   if (frame == nullptr || (colons != std::string::npos && frame->nested == nullptr)) {
     findings.fail(asked_by, std::string("no frame \"") + plain(name, 200) + "\" in " +
                                 (model.is_world ? "the world" : std::string("model \"") + plain(model.name) + "\"") +
                                 nearest_frame(model, plain(name)));
     return {};
   }
-  Pose pose = frame->nested ? model_in_parent(*frame->nested, asked_by, findings, depth + 1)
-                            : frame_by_its_pose(*owner, *frame, asked_by, findings, depth + 1);
-  if (owner != &model) pose = compose(model_in_parent(*owner, asked_by, findings, depth + 1), pose);
+  const Pose pose = frame->nested ? model_in_parent(*frame->nested, asked_by, findings, depth + 1)
+                                  : frame_by_its_pose(model, *frame, asked_by, findings, depth + 1);
   if (colons == std::string::npos) return pose;
   return compose(pose, frame_in_model(*frame->nested, name.substr(colons + 2), asked_by, findings, depth + 1));
 }

@@ -81,6 +81,33 @@ TEST_F(ImportScene, ModelsAreFoundBesideTheFileInGivenFoldersAndInTheEnvironment
   EXPECT_THAT(text(), HasSubstr("# near (near/model.sdf:1)"));
 }
 
+TEST_F(ImportScene, ModelsIncludeTheirNeighbours) {
+  const auto holding = [](const char* name, const std::string& content) {
+    return std::string("<sdf version='1.9'><model name='") + name + "'>" + content + "</model></sdf>";
+  };
+  const auto mesh = [](const std::string& uri) {
+    return "<link name='l'><visual name='v'><geometry><mesh><uri>" + uri + "</uri></mesh></geometry></visual></link>";
+  };
+  write("models/tile/model.sdf", holding("tile", mesh("model://tile/meshes/a.stl")));
+  write("models/tile/meshes/a.stl", triangle);
+  write("models/field/meshes/a.stl", "not this one");
+  const std::string field =
+      holding("field", "<include><uri>model://tile</uri><name>near</name></include>" + mesh("model://tile/meshes/a.stl"));
+  const auto done = run(field, "models/field/model.sdf");
+  ASSERT_TRUE(done) << done.error().text;
+  EXPECT_EQ(done->shapes, 2u);
+  EXPECT_EQ(scene()->objects.size(), 2u);
+  // A file of the model itself, whose folder is named otherwise.
+  write("models/clone/meshes/own.stl", triangle);
+  const auto renamed = run(holding("crate", mesh("model://crate/meshes/own.stl")), "models/clone/model.sdf");
+  EXPECT_TRUE(renamed) << renamed.error().text;
+  // A model that is named like the one on Fuel that it includes.
+  const auto same = run(holding("block", "<include><uri>https://fuel.gazebosim.org/1.0/me/models/block</uri></include>"),
+                        "models/block/model.sdf");
+  ASSERT_FALSE(same);
+  EXPECT_THAT(same.error().text, HasSubstr("gz fuel download --url 'https://fuel.gazebosim.org/1.0/me/models/block'"));
+}
+
 struct Environment {
   Environment(const char* variable, const std::string& value) : variable_(variable) {
     if (const char* old = std::getenv(variable)) before_ = old;

@@ -107,6 +107,21 @@ TEST(ReadSdf, IncludesTakeTheirNamePoseAndStaticFromTheIncluder) {
   EXPECT_FALSE(world->models[1].is_static);
 }
 
+TEST(ReadSdf, FramesOfModelsThatAreMergedInMergedModelsAreKnown) {
+  Reading r;
+  r.files["model://base"] =
+      std::string("<sdf version='1.9'><model name='base'>") + link("base_link", "<pose>0 0 1 0 0 0</pose>") + "</model></sdf>";
+  r.files["model://rov"] =
+      "<sdf version='1.9'><model name='rov'><include merge='true'><uri>model://base</uri><pose>0 2 0 0 0 0</pose></include>"
+      "</model></sdf>";
+  const auto world =
+      r.read(sdf(model("m", std::string("<include merge='true'><uri>model://rov</uri><pose>4 0 0 0 0 0</pose></include>") +
+                                link("sonar", "<pose relative_to='base_link'>8 0 0 0 0 0</pose>") +
+                                "<joint name='j' type='fixed'><parent>base_link</parent><child>sonar</child></joint>")));
+  expect_near(where(world, 0), {12, 2, 1});
+  expect_near(where(world, 1), {4, 2, 1});
+}
+
 TEST(ReadSdf, TwoModelsOfOneNameStandWhereEachIsPut) {
   Reading r;
   const auto world = r.read(sdf(model("m", std::string("<pose>1 0 0 0 0 0</pose>") + link("l")) +
