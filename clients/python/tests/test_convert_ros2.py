@@ -217,6 +217,15 @@ class RecordingsOfRos2(WithFolder):
         with self.assertRaisesRegex(ConvertError, "no poses found"):
             self.convert(cut)
 
+    def test_a_log_of_gazebo_is_named(self):
+        path = self.folder / "state.tlog"
+        with contextlib.closing(sqlite3.connect(path)) as base, base:
+            base.execute("CREATE TABLE message_types(id, name)")
+            base.execute("CREATE TABLE topics(id, name, message_type_id)")
+            base.execute("CREATE TABLE messages(id, time_recv, topic_id, message)")
+        with self.assertRaisesRegex(ConvertError, "state.tlog: a log of Gazebo, which is not read; play it .*gazebo_bridge"):
+            convert(path)
+
     def test_another_database(self):
         path = self.folder / "log"
         with contextlib.closing(sqlite3.connect(path)) as base, base:

@@ -57,6 +57,9 @@ class _Base:
     def _check(self) -> None:
         """Views, virtual tables and generated columns are programs, not data."""
         self.base.execute("PRAGMA trusted_schema=OFF")
+        if self.base.execute("SELECT 1 FROM sqlite_master WHERE name = 'message_types'").fetchone():
+            raise ConvertError("a log of Gazebo, which is not read; play it (gz sim --playback FOLDER) and take the "
+                               "poses from clients/gazebo_bridge")
         for table, needed in COLUMNS.items():
             kinds = self.base.execute("SELECT type, rootpage FROM sqlite_master WHERE name = ? COLLATE NOCASE",
                                       (table,)).fetchall()
@@ -104,6 +107,8 @@ def _rows(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> Iterator[Reco
     with contextlib.closing(_Base(path, unmerged)) as base:
         try:
             yield from base.rows(warn, seen)
+        except ConvertError as error:
+            raise ConvertError(f"{path}: {error}") from None
         except sqlite3.Error as error:
             if unmerged and not base.exceeded:
                 raise ConvertError(f"{path}: its writer did not end as it should: {unmerged.name} belongs to it, and the two "
