@@ -46,7 +46,7 @@ class DvlVendor final : public protocol::PushingVendor {
   }
   std::vector<protocol::Bytes> datagrams(const protocol::Port& port, const Ping& ping,
                                          const protocol::DeviceState& device) const override {
-    if (port.number != serial_port) return {*frame(ping, device)};
+    if (port.number != serial_port) return {};  // frame() is what it sends
     const Measurement measured = measure(ping);
     const SerialOutput output = settings_from(device.settings.get()).serial_output;
     Bytes lines = velocity_sentences(measured, since_last(ping, device), sent_at(measured), output);

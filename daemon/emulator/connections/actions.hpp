@@ -107,6 +107,8 @@ inline void report(const std::string& sonar, Report::Topic topic, LogLevel level
   actions.emplace_back(Report{topic, {level, std::move(phrase), std::move(fields)}});
 }
 
+/// The bytes of a ping as a recording holds them, for each port of the vendor by its number; 0: for every port.
+using PartsByPort = std::vector<std::pair<std::uint16_t, protocol::Bytes>>;
 /// Outcome of a PingRequest.
 struct PingOutcome {
   std::shared_ptr<const Ping> ping = nullptr;  // null on failure
@@ -114,6 +116,7 @@ struct PingOutcome {
   bool refused = false;             // only this ping failed: the request is invalid, or memory is short
   ErrorKind kind = ErrorKind::bug;  // kind of a failure of the engine
   double seconds = 0;               // wall time of its computation, without pings of other sonars computed in between
+  std::shared_ptr<const PartsByPort> recorded = nullptr;  // in place of what the vendor makes of the ping; empty: nothing is sent
 };
 
 }  // namespace sonar

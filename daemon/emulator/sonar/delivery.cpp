@@ -30,9 +30,15 @@ std::shared_ptr<const Outbox::Shape> pauses_between(const std::vector<protocol::
 
 // ---- a ping as bytes
 
-FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping)
-    : vendor_(vendor), state_(state), ping_(ping) {
-  bytes_ = vendor.frame(ping, state);
+FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping,
+                       const PartsByPort* recorded)
+    : vendor_(vendor), state_(state), ping_(ping), recorded_(recorded) {
+  if (recorded_ == nullptr) {
+    bytes_ = vendor.frame(ping, state);
+    is_first_ports_ = bytes_ != nullptr;
+  } else if (recorded_->size() == 1 && vendor.pings_by() != protocol::PingsBy::datagrams) {
+    bytes_ = std::make_shared<const Bytes>(recorded_->front().second);
+  }
   if (bytes_ != nullptr || !vendor.has_several_streams()) return;
   // The parts of the ports make up the whole, so that the ping is encoded once.
   auto whole = std::make_shared<Bytes>();
@@ -45,13 +51,22 @@ FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceSta
 FramedPing::AtPort& FramedPing::at(const protocol::Port& port) {
   for (AtPort& made : ports_)
     if (made.port == &port) return made;
-  auto parts = std::make_shared<const std::vector<Bytes>>(vendor_.datagrams(port, ping_, state_));
+  auto parts = std::make_shared<const std::vector<Bytes>>(made_for(port));
   auto pauses = port.kind == protocol::Port::Kind::tcp_stream ? pauses_between(*parts, port.gap) : nullptr;
   return ports_.emplace_back(AtPort{&port, std::move(parts), std::move(pauses)});
 }
 
+std::vector<FramedPing::Bytes> FramedPing::made_for(const protocol::Port& port) const {
+  if (recorded_ == nullptr) return vendor_.datagrams(port, ping_, state_);
+  std::vector<Bytes> made;
+  for (const auto& [number, bytes] : *recorded_)
+    if (number == 0 || number == port.number) made.push_back(bytes);
+  return made;
+}
+
 std::shared_ptr<const FramedPing::Bytes> FramedPing::bytes_at(const protocol::Port& port) {
-  if (!vendor_.has_several_streams()) return bytes_;
+  if (!vendor_.has_several_streams() || (is_first_ports_ && &port == vendor_.port(protocol::Port::Kind::tcp_stream)))
+    return bytes_;
   const Datagrams& own = parts(port);
   return own->empty() ? nullptr : std::shared_ptr<const Bytes>(own, &own->front());
 }
@@ -68,7 +83,7 @@ PingQueued Delivery::queue(const PingOutcome& outcome, Time now, Requests& reque
   // Faults decide whether they act on this ping before it is altered, framed or offered. The calls below use these decisions.
   faults_.begin_ping(static_cast<std::uint32_t>(outcome.ping->request.number), now);
   const auto reported = faults_.altered(outcome.ping, sonar_.state, now);
-  FramedPing framed(sonar_.vendor, sonar_.state, *reported);
+  FramedPing framed(sonar_.vendor, sonar_.state, *reported, outcome.recorded.get());
   PingQueued queued{outcome.ping, framed.bytes(), {}, outcome.seconds};
   if (!faults_.withholds(static_cast<std::uint32_t>(outcome.ping->request.number), now))
     queued.distance = sonar_.vendor.distance_in(*reported);

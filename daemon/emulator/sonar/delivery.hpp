@@ -19,8 +19,9 @@ class FramedPing {
   using Bytes = protocol::Bytes;
   using Datagrams = std::shared_ptr<const std::vector<Bytes>>;
 
-  /// `ping` as the device reports it. All outlive the object.
-  FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping);
+  /// `ping` as the device reports it. `recorded`: PingOutcome::recorded. All outlive the object.
+  FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping,
+             const PartsByPort* recorded = nullptr);
 
   /// The bytes of the ping over TCP; null if the vendor sends only datagrams.
   const std::shared_ptr<const Bytes>& bytes() const { return bytes_; }
@@ -35,7 +36,9 @@ class FramedPing {
   const protocol::Vendor& vendor_;
   const protocol::DeviceState& state_;
   const Ping& ping_;
+  const PartsByPort* recorded_;
   std::shared_ptr<const Bytes> bytes_;
+  bool is_first_ports_ = false;  // of several streams: bytes_ are those of the vendor's first TCP port
   struct AtPort {
     const protocol::Port* port;
     Datagrams parts;
@@ -43,6 +46,7 @@ class FramedPing {
   };
   std::vector<AtPort> ports_;
   AtPort& at(const protocol::Port& port);
+  std::vector<Bytes> made_for(const protocol::Port& port) const;
 };
 
 class Delivery {
