@@ -35,14 +35,29 @@ std::optional<recording::Sender> sender_of(const recording::RecordedMessage& mes
   return sender;
 }
 
+std::optional<recording::PingPart> ping_part(wire::BytesView message) {
+  const auto header = header_of(message);
+  const bool is_ping = header && header->type == FrameType::ping_data && message.size() == header_size + header->payload_length;
+  return is_ping ? std::optional(recording::PingPart{}) : std::nullopt;
+}
+
 constexpr recording::Framing framing{{magic[0], magic[1]}, header_size, length_of};
 
 }  // namespace
 
 recording::Codec codec() {
-  return {.framing = &framing, .sender = sender_of, .message = [](wire::BytesView payload) {
-            return make_frame(FrameType::ping_data, 0, payload);  // id 0: no request caused it
-          }};
+  return {.framing = &framing,
+          .sender = sender_of,
+          .message =
+              [](wire::BytesView payload) {
+                return make_frame(FrameType::ping_data, 0, payload);  // id 0: no request caused it
+              },
+          .ping_part = ping_part,
+          .answer =
+              [](wire::BytesView message, const VendorSettings*) {
+                const auto payload = message.subspan(header_size);  // the dialogue makes the header
+                return wire::Bytes(payload.begin(), payload.end());
+              }};
 }
 
 }  // namespace sonar::blueview

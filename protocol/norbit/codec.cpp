@@ -18,8 +18,14 @@ std::optional<recording::Sender> sender_of(const recording::RecordedMessage& mes
   return recording::Sender{*mode == 0 ? models().back() : models().front()};
 }
 
+std::optional<recording::PingPart> ping_part(BytesView packet) {
+  if (read_bathymetry(packet)) return recording::PingPart{.port = bathymetry_port};
+  if (read_column(packet)) return recording::PingPart{.port = column_port};
+  return std::nullopt;
+}
+
 }  // namespace
 
-recording::Codec codec() { return {.framing = &framing, .sender = sender_of}; }
+recording::Codec codec() { return {.framing = &framing, .sender = sender_of, .ping_part = ping_part}; }
 
 }  // namespace sonar::norbit

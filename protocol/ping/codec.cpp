@@ -8,6 +8,7 @@
 #include "protocol/ping/omniscan.hpp"
 #include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping360.hpp"
+#include "protocol/ping/ping360_settings.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/ping/s500.hpp"
 #include "protocol/ping/surveyor.hpp"
@@ -123,9 +124,25 @@ constexpr std::array<recording::FileKind, 1> kinds{{{
 }  // namespace
 
 recording::Codec ping360::codec() {
-  return {.sender = [](const RecordedMessage& message) {
-    return holds(message, {Id::device_data, Id::auto_device_data}) ? one_of(vendor()) : std::nullopt;
-  }};
+  return {.sender =
+              [](const RecordedMessage& message) {
+                return holds(message, {Id::device_data, Id::auto_device_data}) ? one_of(vendor()) : std::nullopt;
+              },
+          .ping_part = [](BytesView message) -> std::optional<recording::PingPart> {
+            const auto line = line_in(message);
+            if (!line) return std::nullopt;
+            // The sonar that a driver meets has the usual mount; so has the angle of the line, as that driver reads it.
+            static const auto options = protocol::check_options(vendor(), {});
+            return recording::PingPart{.head_rad = head_rad(line->ping.angle, *options)};
+          },
+          // A request decides between the two messages of a line; the settings are those of the recording.
+          .answer =
+              [](BytesView message, const VendorSettings* request) {
+                Settings s = settings_from(request);
+                const auto line = line_in(message);
+                s.ping = line->ping;
+                return encode(s, line->samples);
+              }};
 }
 recording::Codec surveyor::codec() {
   return {.framing = &framing, .files = kinds, .sender = [](const RecordedMessage& message) {

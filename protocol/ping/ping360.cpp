@@ -95,17 +95,7 @@ class Ping360Vendor final : public protocol::Vendor {
     return make_dialogue(device, port, now);
   }
   std::vector<protocol::Bytes> datagrams(const protocol::Port&, const Ping& ping, const protocol::DeviceState&) const override {
-    const Settings s = settings_from(ping.request.vendor_settings.get());
-    const Transducer& t = s.ping;
-    const auto count = static_cast<std::uint16_t>(ping.samples.size());
-    protocol::Bytes payload;
-    if (s.scans)
-      wire::append(payload, AutoDeviceData{t.mode, t.gain, t.angle, t.transmit_us, t.period, t.khz, s.start, s.stop, s.steps,
-                                           s.delay_ms, t.samples, count});
-    else
-      wire::append(payload, DeviceData{t.mode, t.gain, t.angle, t.transmit_us, t.period, t.khz, t.samples, count});
-    payload.insert(payload.end(), ping.samples.begin(), ping.samples.end());
-    return {framed(s.scans ? Id::auto_device_data : Id::device_data, s.id, payload)};
+    return {encode(settings_from(ping.request.vendor_settings.get()), ping.samples)};
   }
   std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
                                        protocol::BytesView message) const override {

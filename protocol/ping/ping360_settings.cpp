@@ -18,6 +18,7 @@ constexpr double sample_unit_s = 25e-9;
 constexpr int shortest_period = 80, longest_period = 40000;    // DEF: sample periods, in sample_unit_s
 constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn takes 2.4 s
 constexpr double db_per_gain = 6;                              // unknown: assumed
+constexpr std::size_t longest_line = 65535;                    // bytes of a payload
 constexpr double fastest_hz = 1000;                            // no limit: hosts request each line, or the head limits the scan
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
@@ -164,6 +165,42 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   }
   if (const std::string why = one_beam_complaint(wanted, "a Ping360", 8); !why.empty()) return refused(why);
   return change_to(s, device);
+}
+
+Bytes encode(const Settings& s, BytesView samples) {
+  const Transducer& t = s.ping;
+  const auto count = static_cast<std::uint16_t>(samples.size());
+  Bytes payload;
+  if (s.scans)
+    wire::append(payload, AutoDeviceData{t.mode, t.gain, t.angle, t.transmit_us, t.period, t.khz, s.start, s.stop, s.steps,
+                                         s.delay_ms, t.samples, count});
+  else
+    wire::append(payload, DeviceData{t.mode, t.gain, t.angle, t.transmit_us, t.period, t.khz, t.samples, count});
+  payload.insert(payload.end(), samples.begin(), samples.end());
+  return framed(s.scans ? Id::auto_device_data : Id::device_data, s.id, payload);
+}
+
+namespace {
+
+template <class Data>
+std::optional<Line> line_of(const Frame& frame) {
+  Data d;
+  wire::Reader reader(frame.payload);
+  fields(reader, d);
+  const BytesView rest = BytesView(frame.payload).subspan(std::min(wire::wire_size<Data>(), frame.payload.size()));
+  if (!reader.ok() || d.count == 0 || rest.size() != d.count || d.angle >= grads) return std::nullopt;
+  return Line{{d.mode, d.gain, d.angle, d.transmit_us, d.period, d.khz, d.samples, 1, 0}, Bytes(rest.begin(), rest.end())};
+}
+
+}  // namespace
+
+std::optional<Line> line_in(BytesView message) {
+  Framer framer(longest_line, true);
+  framer.append(message);
+  const auto frame = framer.next();
+  if (!frame || !frame->sum_is_right) return std::nullopt;
+  if (frame->header.id == Id::auto_device_data) return line_of<AutoDeviceData>(*frame);
+  return frame->header.id == Id::device_data ? line_of<DeviceData>(*frame) : std::nullopt;
 }
 
 double head_rad(std::uint16_t angle, const protocol::OptionValues& options) {

@@ -44,6 +44,15 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
+/// The message of a ping under these settings: auto_device_data in a scan, else device_data.
+Bytes encode(const Settings& settings, BytesView samples);
+/// The ping in such a message. nullopt: the message is another one, is not whole, or its sum is wrong.
+struct Line {
+  Transducer ping;
+  Bytes samples;
+};
+std::optional<Line> line_in(BytesView message);
+
 /// Angle by which the sonar is turned to port, so that it looks to the angle of its head [rad]. Angles of the head grow to
 /// starboard.
 double head_rad(std::uint16_t angle, const protocol::OptionValues& options);

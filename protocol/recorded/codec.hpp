@@ -15,6 +15,10 @@
 #include "protocol/recorded/message_splitter.hpp"
 #include "protocol/recorded/recorded_message.hpp"
 
+namespace sonar {
+struct VendorSettings;
+}
+
 namespace sonar::recording {
 
 inline bool begins_with(BytesView front, std::initializer_list<unsigned> bytes) {
@@ -47,6 +51,12 @@ struct Samples {
   std::shared_ptr<const Bytes> codes;
 };
 
+/// A message that holds a ping, or the part of a ping that one port sends.
+struct PingPart {
+  std::uint16_t port = 0;               // the sonar's port, if each of several sends parts of its own; else 0
+  std::optional<double> head_rad = {};  // of a mechanical scan, as protocol::RequestPing::head_rad
+};
+
 struct Codec {
   const Framing* framing = nullptr;  // framing of its TCP stream; null: nothing tells messages apart
   std::span<const FileKind> files = {};
@@ -56,6 +66,12 @@ struct Codec {
   std::optional<Samples> (*samples)(BytesView message) = nullptr;
   /// A message as a client gets it of what Vendor::frame() makes of a ping. Null: the same bytes.
   Bytes (*message)(BytesView framed) = nullptr;
+  /// Set if requests of hosts decide which pings they get, or if pings come by several ports: then a replay is a whole device,
+  /// whose pings these are. nullopt: the message holds no ping.
+  std::optional<PingPart> (*ping_part)(BytesView message) = nullptr;
+  /// A message of ping_part() as what Vendor::frame() or Vendor::datagrams() makes of a ping that was requested with `request`.
+  /// Null: the same bytes.
+  Bytes (*answer)(BytesView message, const VendorSettings* request) = nullptr;
 };
 
 }  // namespace sonar::recording

@@ -7,6 +7,7 @@
 #include "core/text/decimal.hpp"
 #include "daemon/commands/replay/replay_page.hpp"
 #include "daemon/commands/replay/replay_server.hpp"
+#include "daemon/commands/replay/requested_replay.hpp"
 
 namespace sonar {
 
@@ -16,7 +17,7 @@ void add_replay_options(CLI::App& app, ReplayCommand& replay) {
       "  sonard replay run.pcap                            at 127.0.0.2, at the pace it was recorded with\n"
       "  sonard replay capture.pcapng --speed 4 --loop\n"
       "  sonard replay run.mcap --stepped                  as fast as the driver reads\n"
-      "Ends when a driver has received the whole recording, or, with --loop, by Ctrl-C.");
+      "Ends when a driver has received the whole recording; with --loop, and if it is a mechanical scan, by Ctrl-C.");
   app.add_option("file", replay.file, "recording: pcapng, " + recording::file_endings())->required();
   app.add_option("--ip", replay.ip, "address to serve it at, one of this computer's")->capture_default_str();
   app.add_option("--port", replay.port, "TCP port (default: the sonar's)")->check(text::whole_number(1, 65535));
@@ -98,9 +99,13 @@ Result<void> run_replay(const ReplayCommand& command) {
   if (!opened) return tl::make_unexpected(opened.error());
   auto device = find_replay_device(*opened->reader, command.file, command.part_number);
   if (!device) return tl::make_unexpected(device.error());
+  if (device->by_requests() && (command.stepped || command.port != 0))
+    return failure(ErrorKind::usage, std::string(command.stepped ? "--stepped: the requests of a driver set the pace of "
+                                                                 : "--port: only --ip sets where drivers find ") +
+                                         std::string(device->make->title));
   if (device->by_datagrams() && command.stepped)
     return failure(ErrorKind::usage, "--stepped: datagrams have a pace; --speed changes it");
-  if (command.port == 0) options->at.port = device->tcp_port();
+  if (command.port == 0 && !device->by_requests()) options->at.port = device->tcp_port();
   LogOptions log_options;
   log_options.json = command.json;
   Log log(log_options);
@@ -110,26 +115,34 @@ Result<void> run_replay(const ReplayCommand& command) {
   ReplayPage page(io, limits, admission, log, {command.file, command.sonar, command.rate_hz});
   // The page keeps the event loop running, so it is stopped with the replay.
   options->on_end = [&page] { page.stop(); };
+  const auto serve = [&](auto& server, const std::string& place) -> Result<void> {
+    if (!opened->reader->note().empty()) log.info(opened->reader->note());
+    const auto where = open_page(page, command, log);
+    if (!where) return tl::make_unexpected(where.error());
+    if (!device->is_only_seen.empty() && where->empty()) return failure(ErrorKind::bad_data, device->is_only_seen);
+    if (!device->is_only_seen.empty())
+      log.announce(device->is_only_seen + "; Ctrl-C stops\n");
+    else
+      log.announce(std::string("replaying ") + command.file + " (" + std::string(opened->format) + ") as " + device->name() +
+                   " on " + place + "; Ctrl-C stops\n");
+    log.announce(*where);
+    server.start();
+    io.run();
+    if (!device->is_only_seen.empty()) return server.outcome();
+    const ReplayServer::Figures done = server.figures();
+    log.announce("served " + std::to_string(done.messages) + " messages, " + std::to_string(done.bytes) + " bytes, to " +
+                 std::to_string(done.clients) + (done.clients == 1 ? " client\n" : " clients\n"));
+    return server.outcome();
+  };
+  // The sonar's ports are opened first. If one is in use, the command ends; without the page it continues.
+  if (device->by_requests()) {
+    RequestedReplay server(io, *opened->reader, *device, *options, log);
+    if (auto listening = server.open(command.file); !listening) return listening;
+    return serve(server, server.at());
+  }
   ReplayServer server(io, *opened->reader, *device, *options, log);
-  // The sonar's port is opened first. If it is in use, the command ends; without the page it continues.
   if (auto listening = server.open(); !listening) return listening;
-  if (!opened->reader->note().empty()) log.info(opened->reader->note());
-  const auto where = open_page(page, command, log);
-  if (!where) return tl::make_unexpected(where.error());
-  if (!device->is_only_seen.empty() && where->empty()) return failure(ErrorKind::bad_data, device->is_only_seen);
-  if (!device->is_only_seen.empty())
-    log.announce(device->is_only_seen + "; Ctrl-C stops\n");
-  else
-    log.announce(std::string("replaying ") + command.file + " (" + std::string(opened->format) + ") as " + device->name() +
-                 " on tcp " + text_of(server.at()) + "; Ctrl-C stops\n");
-  log.announce(*where);
-  server.start();
-  io.run();
-  const ReplayServer::Figures& done = server.figures();
-  if (!device->is_only_seen.empty()) return server.outcome();
-  log.announce("served " + std::to_string(done.messages) + " messages, " + std::to_string(done.bytes) + " bytes, to " +
-               std::to_string(done.clients) + (done.clients == 1 ? " client\n" : " clients\n"));
-  return server.outcome();
+  return serve(server, "tcp " + text_of(server.at()));
 }
 
 }  // namespace sonar

@@ -12,12 +12,14 @@ constexpr std::uint64_t most_looked_at_bytes = 64u << 20;  // a status comes eve
 
 /// Why pings of that make cannot be served to a driver; empty: they can.
 std::string why_only_seen(const protocol::Make& make) {
+  if (make.codec.ping_part != nullptr) return "";
   if (make.each_ping_requested || make.scans) return "depend on the requests of its host";
   return make.has_several_streams() ? "come by several connections" : "";
 }
 
 /// A sonar that answers its hosts.
 void take(ReplayDevice& device, const recording::SentBy& by) {
+  device.make = by.make;
   device.vendor = by.make->device;
   device.state = std::make_shared<protocol::DeviceState>();
   device.state->model = by.sender.model;
@@ -92,6 +94,8 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   }
   const auto damage = reader.damage();
   reader.rewind();
+  if (device.by_requests())
+    if (const auto named = recording::find_sender(reader)) device.state->model = named->sender.model;
   if (device.vendor != nullptr) return device;
   if (unserved != nullptr) {
     device.is_only_seen = file + " holds pings of " + std::string(unserved->title) + ", which " + why_only_seen(*unserved) +

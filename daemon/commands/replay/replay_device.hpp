@@ -4,15 +4,17 @@
 #include <memory>
 
 #include "daemon/config/config.hpp"
+#include "protocol/host.hpp"
 #include "protocol/oculus/messages.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace sonar {
 
-/// An Oculus, which sends by itself, or a sonar that hosts ask for pings: an ARIS, a Sonar 3D-15, a sonar of the ping protocol.
+/// An Oculus, which sends by itself, or a sonar that answers its hosts.
 struct ReplayDevice {
   oculus::StatusMessage status;
   bool recorded_status = false;              // if false, it is made up from the device id
+  const protocol::Make* make = nullptr;      // null: an Oculus
   const protocol::Vendor* vendor = nullptr;  // the vendor of a device that answers requests, else null; and its state
   std::shared_ptr<protocol::DeviceState> state;
   std::uint32_t serial = 0;  // serial number of an ARIS
@@ -21,6 +23,8 @@ struct ReplayDevice {
   /// Null: it listens by TCP for connections that last.
   const protocol::Port* http() const { return vendor != nullptr ? vendor->port(protocol::Port::Kind::http) : nullptr; }
   bool by_datagrams() const { return vendor != nullptr && vendor->pings_by() == protocol::PingsBy::datagrams; }
+  /// Its hosts decide which pings they get: RequestedReplay serves it, else ReplayServer.
+  bool by_requests() const { return make != nullptr && make->codec.ping_part != nullptr; }
   std::string name() const;
   std::uint16_t tcp_port() const;
   /// 0: it sends no status.

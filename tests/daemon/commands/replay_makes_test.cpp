@@ -224,20 +224,6 @@ TEST(ReplayOfPingLogs, AFileOfNoKnownSonarIsRefused) {
   EXPECT_THAT(device.error().text, ::testing::HasSubstr("f holds no message of a sonar: f: bytes 1"));
 }
 
-TEST(Replay, SaysThatAPing360CannotBeReplayed) {
-  Bytes file;
-  const auto writer = recording::write_ping_log(recording::sink_into(file));
-  const Bytes line = ping::framed_message(ping::Id::auto_device_data, 0, ping::AutoDeviceData{});
-  ASSERT_TRUE(writer->write({{}, Origin::device, Carrier::stream, line}));
-  auto opened = recording::open_recording(recording::source_from("f", file));
-  ASSERT_TRUE(opened);
-  const auto device = find_replay_device(*opened->reader, "f", 1042);
-  ASSERT_TRUE(device);
-  EXPECT_THAT(
-      device->is_only_seen,
-      ::testing::HasSubstr("f holds pings of a Ping360, which depend on the requests of its host: they cannot be replayed"));
-}
-
 // ---- .sonar files
 
 Bytes sonar_file(std::uint32_t shots, milliseconds period) {

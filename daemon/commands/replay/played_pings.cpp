@@ -1,0 +1,82 @@
+#include "daemon/commands/replay/played_pings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace sonar {
+namespace {
+
+constexpr double same_direction_rad = 1e-4;  // steps of heads are 10 times wider
+
+double between(double a_rad, double b_rad) { return std::abs(std::remainder(a_rad - b_rad, 2 * std::numbers::pi)); }
+
+}  // namespace
+
+Result<void> PlayedPings::open(const std::string& file) {
+  rewind();
+  if (!ahead_) return failure(ErrorKind::bad_data, file + " holds no ping");
+  if (!ahead_->part.head_rad) return {};
+  for (std::size_t bytes = 0; ahead_; ahead_ = read()) {
+    bytes += ahead_->bytes.size();
+    if (bytes > most_scan_bytes)
+      return failure(ErrorKind::bad_data, file + " holds more than " + std::to_string(most_scan_bytes >> 20) +
+                                              " MB of scan lines: replay a shorter recording");
+    const double head_rad = ahead_->part.head_rad.value_or(0);
+    lines_.push_back({head_rad, {ahead_->at, {{ahead_->part.port, std::move(ahead_->bytes)}}}});
+  }
+  return {};
+}
+
+void PlayedPings::rewind() {
+  reader_.rewind();
+  waiting_.clear();
+  ahead_ = read();
+}
+
+/// The next message, or packet of a message, that holds a ping or a part of one.
+std::optional<PlayedPings::Part> PlayedPings::read() {
+  while (waiting_.empty()) {
+    auto message = reader_.next();
+    if (!message) return std::nullopt;
+    if (message->from != recording::Origin::device) continue;
+    const auto keep = [&](recording::Bytes bytes) {
+      if (auto part = codec_.ping_part(bytes)) waiting_.push_back({message->at, *part, std::move(bytes)});
+    };
+    if (codec_.framing == nullptr || message->by == recording::Carrier::datagram) {
+      keep(std::move(message->bytes));
+      continue;
+    }
+    recording::MessageSplitter splitter(message->from, *codec_.framing);
+    splitter.append(message->at, message->bytes);
+    splitter.finish();
+    while (auto whole = splitter.next()) keep(std::move(whole->bytes));
+    std::reverse(waiting_.begin(), waiting_.end());
+  }
+  Part part = std::move(waiting_.back());
+  waiting_.pop_back();
+  return part;
+}
+
+std::optional<PlayedPing> PlayedPings::next() {
+  if (!ahead_) return std::nullopt;
+  PlayedPing ping{ahead_->at, {}};
+  const auto is_new_port = [&ping](std::uint16_t port) {
+    return std::none_of(ping.parts.begin(), ping.parts.end(), [port](const auto& part) { return part.first == port; });
+  };
+  for (; ahead_ && is_new_port(ahead_->part.port); ahead_ = read())
+    ping.parts.emplace_back(ahead_->part.port, std::move(ahead_->bytes));
+  return ping;
+}
+
+const PlayedPing& PlayedPings::nearest(double head_rad) {
+  double least = 4;
+  for (const Line& line : lines_) least = std::min(least, between(line.head_rad, head_rad));
+  const auto is_nearest = [&](const Line& line) { return between(line.head_rad, head_rad) <= least + same_direction_rad; };
+  auto found = std::find_if(lines_.begin() + static_cast<std::ptrdiff_t>(after_), lines_.end(), is_nearest);
+  if (found == lines_.end()) found = std::find_if(lines_.begin(), lines_.end(), is_nearest);
+  after_ = static_cast<std::size_t>(found - lines_.begin()) + 1;
+  return found->ping;
+}
+
+}  // namespace sonar

@@ -1,0 +1,60 @@
+// The pings of a recording for a sonar whose hosts request them: one after another, or, of a mechanical scan, by direction.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/result.hpp"
+#include "protocol/recorded/codec.hpp"
+
+namespace sonar {
+
+struct PlayedPing {
+  Time at{};
+  std::vector<std::pair<std::uint16_t, recording::Bytes>> parts;  // as in PartsByPort: port, or 0, and message
+};
+
+class PlayedPings {
+ public:
+  static constexpr std::size_t most_scan_bytes = 512u << 20;  // a scan is held in memory
+
+  /// `codec` has ping_part. Both outlive the object.
+  PlayedPings(recording::RecordingReader& reader, const recording::Codec& codec) : reader_(reader), codec_(codec) {}
+  /// Looks at the first ping, and reads all of a scan. bad_data: there is none, or a scan is too long; `file` is for the error.
+  Result<void> open(const std::string& file);
+  /// Whether it is a mechanical scan: then nearest() applies, else next().
+  bool is_scan() const { return !lines_.empty(); }
+
+  /// The next ping; nullopt at the end. Packets of different ports that follow each other are one ping.
+  std::optional<PlayedPing> next();
+  /// True if next() has returned the last ping.
+  bool at_end() const { return !ahead_; }
+  void rewind();
+  /// The line whose direction is nearest to `head_rad`; of several, the first after the line that was returned last, and after
+  /// the last the first of all.
+  const PlayedPing& nearest(double head_rad);
+
+ private:
+  struct Part {
+    Time at{};
+    recording::PingPart part;
+    recording::Bytes bytes;
+  };
+  struct Line {
+    double head_rad = 0;
+    PlayedPing ping;
+  };
+  std::optional<Part> read();
+
+  recording::RecordingReader& reader_;
+  const recording::Codec& codec_;
+  std::vector<Part> waiting_;  // parts of a message that was split, the next one last
+  std::optional<Part> ahead_;  // the first part of the next ping
+  std::vector<Line> lines_;
+  std::size_t after_ = 0;  // place of the line after the last one that was returned
+};
+
+}  // namespace sonar

@@ -1,0 +1,150 @@
+#include "daemon/commands/replay/requested_replay.hpp"
+
+#include <csignal>
+#include <cstdlib>
+#include <utility>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar {
+namespace {
+
+/// A sonar at the origin of an empty world, which looks ahead: the yaw of a ping's sonar is that of its head.
+Config config_of(const ReplayDevice& device, const ReplayOptions& options) {
+  Config config;
+  config.vehicles.emplace_back().name = "recording";
+  SonarConfig& sonar = config.sonars.emplace_back();
+  sonar.name = device.vendor->name();
+  sonar.profile = {device.vendor, device.state->model};
+  sonar.bind_ip = sonar.advertise_ip = options.at.ip;
+  sonar.device_id = static_cast<std::uint16_t>(device.serial == 0 ? 1 : device.serial);
+  sonar.max_clients = device.vendor->default_max_clients();
+  sonar.max_observers = 0;
+  sonar.options = device.state->options;
+  derive_addresses(sonar);
+  return config;
+}
+
+std::optional<std::chrono::nanoseconds> interval_of(const recording::RecordingReader& reader, const ReplayOptions& options) {
+  return reader.knows_times() ? std::nullopt : std::optional(nanoseconds_from(1 / options.rate_hz));
+}
+
+}  // namespace
+
+RequestedReplay::RequestedReplay(asio::io_context& io, recording::RecordingReader& reader, const ReplayDevice& device,
+                                 ReplayOptions options, Log& log)
+    : io_(io),
+      reader_(reader),
+      codec_(device.make->codec),
+      pings_(reader, codec_),
+      options_(std::move(options)),
+      log_(log),
+      config_(config_of(device, options_)),
+      world_({}, {{config_.vehicles.front().name, {}}}, {}, clock_.now()),
+      admission_(config_.limits, log),
+      network_{io, clock_, admission_, log},
+      pace_(options_.speed, interval_of(reader, options_)),
+      due_(io),
+      signals_(io) {}
+
+Result<void> RequestedReplay::open(const std::string& file) {
+  if (Result<void> opened = pings_.open(file); !opened) return opened;
+  if (const auto damage = reader_.damage()) log_.warning(damage->text);
+  device_ = std::make_unique<Device>(network_, Sonar::Surroundings{config_, world_}, config_.sonars.front(), 0, *this);
+  return device_->open();
+}
+
+void RequestedReplay::start() {
+  device_->start();
+  if (!options_.handle_signals) return;
+  error_code ec;
+  signals_.add(SIGINT, ec);
+  signals_.add(SIGTERM, ec);
+  signals_.async_wait([this](const error_code& failed, int) {
+    if (failed || over_) return;
+    stop();
+    if (over_) return;
+    signals_.async_wait([](const error_code& e, int) {
+      if (!e) std::_Exit(EXIT_FAILURE);  // asked twice
+    });
+  });
+}
+
+void RequestedReplay::stop(const std::string& why) {
+  if (std::exchange(stopping_, true)) return;
+  due_.cancel();  // a ping that waits for its time is done at once: the device ends when none is under way
+  device_->stop(why);
+  end_when_gone();
+}
+
+void RequestedReplay::end_when_gone() {
+  if (!stopping_ || over_ || !device_->gone()) return;
+  over_ = true;
+  error_code ec;
+  signals_.cancel(ec);
+  if (options_.on_end) options_.on_end();
+}
+
+/// All pings were sent when the last one was, and every client has taken what it was sent.
+void RequestedReplay::on_change() {
+  if (device_ == nullptr) return;
+  if (was_last_ && !stopping_ && device_->sonar().settled())
+    asio::post(io_, [this] {
+      if (was_last_) stop("recording served to its end");  // else another client has come
+    });
+  end_when_gone();
+}
+
+/// The first client gets the recording from its front.
+void RequestedReplay::on_client(const Device& of, const std::string&, bool connected, const std::string&) {
+  if (!connected) return;
+  ++clients_;
+  if (of.sonar().connections().clients() > 1 || pings_.is_scan()) return;
+  pings_.rewind();
+  pace_.begin_again();
+  was_last_ = false;
+}
+
+PlayedPing RequestedReplay::next_ping(const PingRequest& request) {
+  if (pings_.is_scan()) return pings_.nearest(rpy_from_quat(request.sonar_in_world.orientation).yaw_rad);
+  if (pings_.at_end() && options_.loop) {
+    pings_.rewind();
+    pace_.begin_again();
+  }
+  auto ping = pings_.next();
+  was_last_ = pings_.at_end() && !options_.loop;
+  return ping ? *std::move(ping) : PlayedPing{};
+}
+
+void RequestedReplay::compute(const Device&, PingRequest request, Simulator::Done done) {
+  PlayedPing ping = next_ping(request);
+  auto recorded = std::make_shared<PartsByPort>(std::move(ping.parts));
+  if (codec_.answer != nullptr)
+    for (auto& part : *recorded) part.second = codec_.answer(part.second, request.vendor_settings.get());
+  Simulator::Outcome outcome;
+  outcome.recorded = std::move(recorded);
+  auto made = std::make_shared<Ping>();
+  made->request = std::move(request);
+  outcome.ping = std::move(made);
+  const auto now = ReplayPace::Steady::now();
+  due_.expires_at(pings_.is_scan() || outcome.recorded->empty() ? now : pace_.due(ping.at, now));
+  due_.async_wait(
+      [outcome = std::move(outcome), done = std::move(done)](const error_code&) mutable { done(std::move(outcome)); });
+}
+
+ReplayServer::Figures RequestedReplay::figures() const {
+  const DeviceFigures of = device_->figures();
+  ReplayServer::Figures figures;
+  figures.clients = clients_;
+  figures.refused = of.refused_clients;
+  figures.messages = of.served;
+  figures.bytes = of.bytes_written;
+  return figures;
+}
+
+std::string RequestedReplay::at() const {
+  const protocol::DriverAddress first = device_->addresses().front();
+  return std::string(first.protocol) + " " + text_of(first.at);
+}
+
+}  // namespace sonar

@@ -1,0 +1,66 @@
+// Serves a recording of a sonar whose hosts decide which pings they get: the device with all its ports and conversations, whose
+// pings are those of the recording. A request of a mechanical scan gets the line nearest to the direction in which its head
+// looks; other requests get one ping after another, not faster than they were recorded.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "daemon/commands/replay/played_pings.hpp"
+#include "daemon/commands/replay/replay_device.hpp"
+#include "daemon/commands/replay/replay_pace.hpp"
+#include "daemon/commands/replay/replay_server.hpp"
+#include "daemon/server/sonars/device.hpp"
+
+namespace sonar {
+
+class RequestedReplay final : public DeviceParent {
+ public:
+  /// `device` has a make whose codec has ping_part. `options`: the port is that of the make. All outlive io.run().
+  RequestedReplay(asio::io_context& io, recording::RecordingReader& reader, const ReplayDevice& device, ReplayOptions options,
+                  Log& log);
+
+  /// Opens all ports. unavailable; bad_data: the recording holds no ping. `file` is for errors.
+  Result<void> open(const std::string& file);
+  /// Serves in io.run(), which returns when all pings were sent (neither with `loop` nor of a scan) or after stop().
+  void start();
+  void stop(const std::string& why = "the replay stops");
+
+  /// `messages` counts pings.
+  ReplayServer::Figures figures() const;
+  const Result<void>& outcome() const { return outcome_; }
+  /// "tcp 127.0.0.2:4001"
+  std::string at() const;
+
+  void compute(const Device& of, PingRequest request, Simulator::Done done) override;
+  void on_ping_queued(const Device&, const PingQueued&) override {}
+  void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) override;
+  void on_stop(const Device&, const std::string&) override {}
+  void on_change() override;
+  void on_engine_failure(const Error& why) override { outcome_ = tl::make_unexpected(why); }
+
+ private:
+  PlayedPing next_ping(const PingRequest& request);
+  void end_when_gone();
+
+  asio::io_context& io_;
+  recording::RecordingReader& reader_;
+  const recording::Codec& codec_;
+  PlayedPings pings_;
+  ReplayOptions options_;
+  Log& log_;
+  Config config_;
+  Clock clock_{false};
+  World world_;
+  Admission admission_;
+  DeviceNetwork network_;
+  ReplayPace pace_;
+  asio::steady_timer due_;
+  asio::signal_set signals_;
+  Result<void> outcome_;
+  std::uint64_t clients_ = 0;
+  bool was_last_ = false, stopping_ = false, over_ = false;
+  std::unique_ptr<Device> device_;
+};
+
+}  // namespace sonar

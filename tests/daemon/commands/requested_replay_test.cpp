@@ -1,0 +1,306 @@
+// Replay of sonars whose drivers decide which pings they get: which line of a scan a request gets, which port sends what, and the
+// recorded pings at the sockets of a driver.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <array>
+#include <future>
+
+#include "daemon/commands/replay/requested_replay.hpp"
+#include "protocol/ping/messages.hpp"
+#include "protocol/ping/ping_log.hpp"
+#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recording/recording.hpp"
+#include "tests/protocol/micron/micron_testing.hpp"
+#include "tests/protocol/norbit/norbit_testing.hpp"
+
+namespace sonar::requested_replay_test {
+namespace {
+
+using recording::Bytes;
+using recording::Carrier;
+using recording::Origin;
+using recording::RecordedMessage;
+using std::chrono::milliseconds;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+constexpr milliseconds patience{20000};
+
+// ---- which ping
+
+class Messages final : public recording::RecordingReader {
+ public:
+  explicit Messages(std::vector<RecordedMessage> all) : all_(std::move(all)) {}
+  std::optional<RecordedMessage> next() override { return at_ < all_.size() ? std::optional(all_[at_++]) : std::nullopt; }
+  std::optional<Error> damage() const override { return {}; }
+  void rewind() override { at_ = 0; }
+
+ private:
+  std::vector<RecordedMessage> all_;
+  std::size_t at_ = 0;
+};
+
+/// Messages of two bytes: the first is a port, or 0 and the second a direction in degrees; 99: no ping.
+Messages recorded(const std::vector<std::pair<int, int>>& messages) {
+  std::vector<RecordedMessage> all;
+  for (const auto& [port, number] : messages)
+    all.push_back({Time(std::chrono::seconds(all.size())),
+                   Origin::device,
+                   Carrier::datagram,
+                   {static_cast<std::byte>(port), static_cast<std::byte>(number)}});
+  return Messages(std::move(all));
+}
+std::optional<recording::PingPart> part_of(recording::BytesView message) {
+  const auto port = std::to_integer<std::uint16_t>(message[0]);
+  if (port == 99) return std::nullopt;
+  if (port != 0) return recording::PingPart{.port = port};
+  return recording::PingPart{.head_rad = std::to_integer<int>(message[1]) * pi / 180};
+}
+const recording::Codec codec{.ping_part = part_of};
+
+int second_of(const PlayedPing& ping) { return static_cast<int>(seconds(ping.at.time_since_epoch())); }
+
+TEST(PlayedPings, OfAScanTheNearestLineIsTheNextInTime) {
+  Messages reader = recorded({{0, 10}, {99, 0}, {0, 20}, {0, 30}, {0, 20}, {0, 10}});
+  PlayedPings pings(reader, codec);
+  ASSERT_TRUE(pings.open("f"));
+  ASSERT_TRUE(pings.is_scan());
+  const auto at = [&](double deg) { return second_of(pings.nearest(deg * pi / 180)); };
+  EXPECT_EQ(at(20), 2);
+  EXPECT_EQ(at(20), 4) << "the next pass of the head";
+  EXPECT_EQ(at(20), 2) << "and around again";
+  EXPECT_EQ(at(31), 3);
+  EXPECT_EQ(at(11), 5);
+  EXPECT_EQ(at(-350), 0) << "the same direction, a turn away";
+  EXPECT_EQ(at(200), 3) << "nothing was recorded there: the nearest";
+}
+
+TEST(PlayedPings, PartsOfPortsMakeUpAPing) {
+  Messages reader = recorded({{7, 1}, {8, 1}, {99, 0}, {7, 2}, {7, 3}, {8, 3}});
+  PlayedPings pings(reader, codec);
+  ASSERT_TRUE(pings.open("f"));
+  EXPECT_FALSE(pings.is_scan());
+  for (int round = 0; round < 2; ++round) {
+    std::vector<std::size_t> parts;
+    while (const auto ping = pings.next()) {
+      parts.push_back(ping->parts.size());
+      EXPECT_EQ(pings.at_end(), parts.size() == 3);
+    }
+    EXPECT_THAT(parts, ElementsAre(2, 1, 2));
+    pings.rewind();
+  }
+}
+
+TEST(PlayedPings, NeedAPing) {
+  Messages reader = recorded({{99, 0}});
+  PlayedPings pings(reader, codec);
+  const auto opened = pings.open("f");
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().text, "f holds no ping");
+}
+
+// ---- a driver at its sockets
+
+using MakeWriter = std::unique_ptr<recording::RecordingWriter> (*)(std::unique_ptr<recording::Sink>);
+constexpr MakeWriter raw_dump = [](std::unique_ptr<recording::Sink> sink) { return recording::write_raw_dump(std::move(sink)); };
+constexpr MakeWriter ping_log = [](std::unique_ptr<recording::Sink> sink) { return recording::write_ping_log(std::move(sink)); };
+Bytes file_of(MakeWriter make, const std::vector<Bytes>& messages) {
+  Bytes file;
+  const auto writer = make(recording::sink_into(file));
+  for (const Bytes& message : messages) EXPECT_TRUE(writer->write({{}, Origin::device, Carrier::stream, message}));
+  EXPECT_TRUE(writer->close());
+  return file;
+}
+
+/// A replay in a thread of its own.
+class Replay {
+ public:
+  explicit Replay(Bytes file, double rate_hz = 1000)
+      : log_([] {
+          LogOptions quiet;
+          quiet.sink = [](LogLevel, const std::string&) {};
+          return quiet;
+        }()) {
+    auto opened = recording::open_recording(recording::source_from("recording", std::move(file)));
+    if (!opened) throw std::runtime_error(opened.error().text);
+    recording_ = std::move(*opened);
+    auto device = find_replay_device(*recording_.reader, "recording", 1042);
+    if (!device || !device->by_requests()) throw std::runtime_error("not by requests");
+    ReplayOptions options;
+    options.at = {{127, 0, 0, 2}, 0};
+    options.rate_hz = rate_hz;
+    server_ = std::make_unique<RequestedReplay>(io_, *recording_.reader, *device, options, log_);
+    if (const auto listening = server_->open("recording"); !listening) throw std::runtime_error(listening.error().text);
+    server_->start();
+    done_ = std::async(std::launch::async, [this] { io_.run(); });
+  }
+  ~Replay() {
+    asio::post(io_, [this] { server_->stop(); });
+    done_.wait();
+  }
+  bool ends() { return done_.wait_for(patience) == std::future_status::ready; }
+  /// After the end.
+  ReplayServer::Figures figures() const { return server_->figures(); }
+
+ private:
+  Log log_;
+  asio::io_context io_;
+  recording::Recording recording_;
+  std::unique_ptr<RequestedReplay> server_;
+  std::future<void> done_;
+};
+
+class Tcp {
+ public:
+  explicit Tcp(std::uint16_t port) : socket_(io_) { socket_.connect({asio::ip::address_v4({127, 0, 0, 2}), port}); }
+  void send(const Bytes& bytes) { asio::write(socket_, asio::buffer(bytes)); }
+  void send(std::string_view text) { asio::write(socket_, asio::buffer(text)); }
+  /// The next bytes; empty at the end of the stream.
+  Bytes read() {
+    Bytes bytes(1 << 16);
+    pollfd waited{socket_.native_handle(), POLLIN, 0};
+    if (::poll(&waited, 1, static_cast<int>(patience.count())) <= 0) {
+      ADD_FAILURE() << "not a byte for " << patience.count() << " ms";
+      return {};
+    }
+    error_code ec;
+    bytes.resize(socket_.read_some(asio::buffer(bytes), ec));
+    if (ec) socket_.close(ec);
+    return bytes;
+  }
+  Bytes read_to_end() {
+    Bytes all;
+    for (Bytes piece = read(); !piece.empty(); piece = read()) all.insert(all.end(), piece.begin(), piece.end());
+    return all;
+  }
+
+ private:
+  asio::io_context io_;
+  tcp::socket socket_;
+};
+
+Bytes micron_line(int bearing, char bin) {
+  const auto state = micron::tests::device();
+  micron::Settings s;
+  s.command = micron::tests::sector();
+  s.bearing = static_cast<std::uint16_t>(bearing);
+  Ping ping;
+  ping.request.settings = micron::ping_settings(s, state);
+  ping.request.vendor_settings = std::make_shared<micron::HeldSettings>(s);
+  ping.samples.assign(static_cast<std::size_t>(ping.request.settings.range_bin_count), static_cast<std::byte>(bin));
+  return *micron::vendor().frame(ping, state);
+}
+
+/// A driver asks for lines to port of ahead; the head turns on by a grad after each.
+TEST(ReplayOfMicron, ASendDataGetsTheRecordedLineOfItsDirection) {
+  std::vector<Bytes> lines;
+  for (int bearing = 2400; bearing <= 4000; bearing += 16) lines.push_back(micron_line(bearing, static_cast<char>(bearing / 16)));
+  Replay replay(file_of(raw_dump, lines));
+  Tcp driver(4001);
+  driver.send(micron::tests::command(micron::tests::sector()));
+  recording::MessageSplitter splitter(Origin::device, micron::framing);
+  std::vector<int> bearings;
+  for (int line = 0; line < 5; ++line) {
+    driver.send(micron::tests::request());
+    for (bool came = false; !came;) {
+      const Bytes piece = driver.read();
+      ASSERT_FALSE(piece.empty());
+      splitter.append({}, piece);
+      while (const auto whole = splitter.next()) {
+        const auto message = micron::read_frame(whole->bytes);
+        ASSERT_TRUE(message);
+        if (message->header.id != micron::Id::head_data) continue;
+        EXPECT_THAT(lines, ::testing::Contains(whole->bytes)) << "byte for byte";
+        bearings.push_back(micron::read_front<micron::HeadData>(message->payload)->bearing);
+        came = true;
+      }
+    }
+  }
+  for (std::size_t i = 1; i < bearings.size(); ++i) EXPECT_EQ(std::abs(bearings[i] - bearings[i - 1]), 16) << i;
+}
+
+/// A host by UDP.
+class Udp {
+ public:
+  Udp() : socket_(io_, udp::endpoint(asio::ip::address_v4::loopback(), 0)) {}
+  void send(const Bytes& bytes) { socket_.send_to(asio::buffer(bytes), {asio::ip::address_v4({127, 0, 0, 2}), 12345}); }
+  std::optional<ping::Frame> read() {
+    pollfd waited{socket_.native_handle(), POLLIN, 0};
+    if (::poll(&waited, 1, static_cast<int>(patience.count())) <= 0) return std::nullopt;
+    Bytes datagram(1 << 16);
+    datagram.resize(socket_.receive(asio::buffer(datagram)));
+    ping::Framer framer(1 << 16, true);
+    framer.append(datagram);
+    return framer.next();
+  }
+
+ private:
+  asio::io_context io_;
+  udp::socket socket_;
+};
+
+Bytes ping360_line(std::uint16_t angle, bool of_a_scan) {
+  const Bytes samples(3, static_cast<std::byte>(angle));
+  Bytes payload = of_a_scan
+                      ? wire::bytes_of(ping::AutoDeviceData{.angle = angle, .period = 80, .khz = 740, .samples = 3, .count = 3})
+                      : wire::bytes_of(ping::DeviceData{.angle = angle, .period = 80, .khz = 740, .samples = 3, .count = 3});
+  payload.insert(payload.end(), samples.begin(), samples.end());
+  return ping::framed(of_a_scan ? ping::Id::auto_device_data : ping::Id::device_data, 2, payload);
+}
+
+/// The recording is of a scan; the request of a single line is answered by the message that answers it.
+TEST(ReplayOfPing360, ARequestGetsTheLineOfItsAngleInTheMessageThatAnswersIt) {
+  Replay replay(file_of(ping_log, {ping360_line(10, true), ping360_line(20, true), ping360_line(30, true)}));
+  Udp host;
+  for (const std::uint16_t angle : std::array<std::uint16_t, 3>{20, 10, 28}) {
+    host.send(ping::framed_message(
+        ping::Id::transducer, 0,
+        ping::Transducer{.angle = angle, .transmit_us = 10, .period = 80, .khz = 740, .samples = 200, .transmit = 1}));
+    const auto frame = host.read();
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->header.id, ping::Id::device_data);
+    EXPECT_TRUE(frame->sum_is_right);
+    ping::DeviceData data;
+    wire::Reader reader(frame->payload);
+    fields(reader, data);
+    EXPECT_EQ(data.angle, angle == 28 ? 30 : angle) << "the nearest, under its own angle";
+    EXPECT_EQ(data.samples, 3) << "settings of the recording";
+    EXPECT_EQ(frame->payload.back(), static_cast<std::byte>(data.angle));
+  }
+}
+
+struct NorbitReplay : ::testing::Test {
+  NorbitReplay() {
+    norbit::Settings settings{.power = true, .stop_m = 12};
+    const protocol::DeviceState state = norbit::tests::device();
+    for (int row = 100; row < 105; ++row) {
+      const Ping ping = norbit::tests::ping_with(settings, state, row, 10);
+      const Bytes one = norbit::encode_bathymetry(ping, state), other = norbit::encode_column(ping, state);
+      bathymetry.insert(bathymetry.end(), one.begin(), one.end());
+      column.insert(column.end(), other.begin(), other.end());
+      Bytes both = one;
+      both.insert(both.end(), other.begin(), other.end());
+      messages.push_back(both);  // as the daemon records them
+    }
+  }
+  Bytes bathymetry, column;
+  std::vector<Bytes> messages;
+};
+
+TEST_F(NorbitReplay, EachPortSendsItsPacketsOnceTheDriverTurnsItOn) {
+  Replay replay(file_of(raw_dump, messages));
+  Tcp points(norbit::bathymetry_port), pictures(norbit::column_port), commands(norbit::command_port);
+  ASSERT_THAT(commands.read(), ::testing::Not(IsEmpty())) << "it greets: the other two are served by then";
+  commands.send(std::string_view("set_power 1\r\n"));
+  auto received = std::async(std::launch::async, [&] { return pictures.read_to_end(); });
+  EXPECT_EQ(points.read_to_end(), bathymetry);
+  EXPECT_EQ(received.get(), column);
+  EXPECT_THAT(commands.read_to_end(), ::testing::Not(IsEmpty())) << "its replies";
+  EXPECT_TRUE(replay.ends()) << "the driver has received everything";
+  EXPECT_EQ(replay.figures().messages, 5u);
+  EXPECT_EQ(replay.figures().clients, 3u);
+}
+
+}  // namespace
+}  // namespace sonar::requested_replay_test
