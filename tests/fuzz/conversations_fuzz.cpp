@@ -2,6 +2,7 @@
 // first byte chooses the make; then commands: a letter, a number, and of bytes as many as the number says.
 #include "tests/example_make/host_link.hpp"
 #include "tests/fuzz/byte_script.hpp"
+#include "tests/fuzz/sonar_accounts.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace sonar;
@@ -25,6 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } else {
       link.run(host_link::step * (number % 10));
     }
+    fuzz::check_accounts(link.sonar);
   }
   return 0;
 }

@@ -6,6 +6,7 @@
 #include "clients/bvtsdk/core/polar_ping.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
 #include "tests/fuzz/byte_script.hpp"
+#include "tests/fuzz/sonar_accounts.hpp"
 #include "tests/protocol/delegating_vendor.hpp"
 
 namespace sonar::fuzz {
@@ -203,18 +204,7 @@ void SonarClients::write(std::size_t place, std::size_t bytes) {
   check();
 }
 
-/// Checks every client: pings offered are written, dropped, waiting, or the one being written.
-void SonarClients::check() const {
-  for (const Connection& c : sonar_.connections().all()) {
-    const Outbox& box = c.outbox;
-    const std::uint64_t gone = box.pings_written() + box.pings_dropped() + box.pings_waiting();
-    require(gone <= box.pings_offered() && box.pings_offered() <= gone + 1);
-    require(box.pings_waiting() <= static_cast<std::size_t>(sonar_.config().outbox.depth));
-  }
-  const DeviceFigures f = sonar_.figures();
-  require(f.pings == f.unwanted + f.refused || f.pings > f.unwanted);
-  require(f.clients_now <= static_cast<std::uint64_t>(sonar_.config().max_clients));
-}
+void SonarClients::check() const { check_accounts(sonar_); }
 
 void SonarClients::finish(std::size_t place) {
   if (!clients_[place] || !clients_[place]->served) return;

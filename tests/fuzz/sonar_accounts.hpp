@@ -1,0 +1,22 @@
+// Conditions that an emulated sonar of any make meets at any time.
+#pragma once
+
+#include "daemon/emulator/sonar/sonar.hpp"
+#include "tests/fuzz/byte_script.hpp"
+
+namespace sonar::fuzz {
+
+/// Checks every connection: pings offered are written, dropped, waiting, or the one being written.
+inline void check_accounts(const Sonar& sonar) {
+  for (const Connection& c : sonar.connections().all()) {
+    const Outbox& box = c.outbox;
+    const std::uint64_t gone = box.pings_written() + box.pings_dropped() + box.pings_waiting();
+    require(gone <= box.pings_offered() && box.pings_offered() <= gone + 1);
+    require(box.pings_waiting() <= static_cast<std::size_t>(sonar.config().outbox.depth));
+  }
+  const DeviceFigures f = sonar.figures();
+  require(f.pings == f.unwanted + f.refused || f.pings > f.unwanted);
+  require(f.clients_now <= static_cast<std::uint64_t>(sonar.config().max_clients));
+}
+
+}  // namespace sonar::fuzz
