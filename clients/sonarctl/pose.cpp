@@ -8,6 +8,7 @@
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/control_client.hpp"
 #include "clients/sonarctl/trajectory.hpp"
+#include "core/text/counted.hpp"
 #include "protocol/control/control.hpp"
 
 namespace sonar::clients {
@@ -147,8 +148,8 @@ Result<void> send_poses(const PoseOptions& options) {
     if (Result<void> done = (*send)(sample_of(options, moment_at(options, time_s), ++sent)); !done) return done;
     if (time_s >= duration_s(options)) break;
   }
-  std::printf("%llu pose%s sent to %s %s as %s\n", static_cast<unsigned long long>(sent), sent == 1 ? "" : "s",
-              stream ? "tcp" : "udp", text_from(*to).c_str(), std::string(control::name_of(options.frame)).c_str());
+  std::printf("%s sent to %s %s as %s\n", text::counted(sent, "pose").c_str(), stream ? "tcp" : "udp", text_from(*to).c_str(),
+              std::string(control::name_of(options.frame)).c_str());
   return {};
 }
 

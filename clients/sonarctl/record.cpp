@@ -10,6 +10,7 @@
 #include "clients/sonarctl/record_files.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/waiting.hpp"
+#include "core/text/counted.hpp"
 #include "core/text/ipv4.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/recording/recording.hpp"
@@ -154,11 +155,8 @@ class Recorder {
 };
 
 void report(const RecordFiles& files, double seconds) {
-  const auto counted = [](std::uint64_t n, const char* what) {
-    return std::to_string(n).append(" ").append(what).append(n == 1 ? "" : "s");
-  };
-  std::printf("recorded %s, %s, %.1f MB, %.1f s: %s\n", counted(files.pings(), "ping").c_str(),
-              counted(files.messages(), "message").c_str(), static_cast<double>(files.bytes()) / 1e6, seconds,
+  std::printf("recorded %s, %s, %.1f MB, %.1f s: %s\n", text::counted(files.pings(), "ping").c_str(),
+              text::counted(files.messages(), "message").c_str(), static_cast<double>(files.bytes()) / 1e6, seconds,
               files.sizes().c_str());
 }
 

@@ -7,6 +7,7 @@
 #include "clients/scene_tools/describe_scene.hpp"
 #include "clients/scene_tools/import_scene.hpp"
 #include "core/text/arguments.hpp"
+#include "core/text/counted.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -38,8 +39,8 @@ Result<void> info(const std::string& file, bool json) {
 Result<void> import_one(const ImportOptions& options) {
   const auto done = import_scene(options);
   if (!done) return tl::unexpected(done.error());
-  std::printf("%s: %zu shape%s of %zu model%s", options.out.c_str(), done->shapes, done->shapes == 1 ? "" : "s", done->models,
-              done->models == 1 ? "" : "s");
+  std::printf("%s: %s of %s", options.out.c_str(), text::counted(done->shapes, "shape").c_str(),
+              text::counted(done->models, "model").c_str());
   if (done->converted_meshes > 0) std::printf(", %zu stretched meshes written beside it", done->converted_meshes);
   std::printf("\n");
   for (const std::string& what : done->left_out) std::printf("left out: %s\n", what.c_str());

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "core/text/counted.hpp"
 #include "daemon/commands/run/prepare_run.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/emulator/world/plausibility.hpp"
@@ -17,8 +18,8 @@ Result<void> run_check(const CheckCommand& command) {
   const Config& config = prepared->found.config;
   const Scene& scene = *prepared->scene;
   if (!prepared->token_warning.empty()) std::fprintf(stderr, "sonard: %s\n", prepared->token_warning.c_str());
-  std::printf("%s: ok, %zu sonar%s; scene %s: ok, %zu triangles\n", command.config.c_str(), config.sonars.size(),
-              config.sonars.size() == 1 ? "" : "s", config.scene.name().c_str(), scene.triangle_count());
+  std::printf("%s: ok, %s; scene %s: ok, %zu triangles\n", command.config.c_str(),
+              text::counted(config.sonars.size(), "sonar").c_str(), config.scene.name().c_str(), scene.triangle_count());
   for (const std::string& note : scene.notes) std::printf("note: %s\n", note.c_str());
   for (const std::string& note : notes_of_options(config)) std::printf("%s\n", note.c_str());
   for (const VehicleConfig& v : config.vehicles)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 
 namespace sonar {
@@ -81,8 +82,7 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
                             std::string(name_of(f.frame)).c_str(), (*way)->size(), seconds((*way)->duration()));
   if (f.unit != "seconds" || f.unit_by_steps) plan.about += ", stamps in " + std::string(f.unit);
   if (f.unit_by_steps) plan.about += " by their steps (a first line of names says otherwise: t_s x y z qx qy qz qw)";
-  if (f.replaced > 0)
-    plan.about += text::format(", %zu pose%s replaced by the next of the same stamp", f.replaced, f.replaced == 1 ? "" : "s");
+  if (f.replaced > 0) plan.about += ", " + text::counted(f.replaced, "pose") + " replaced by the next of the same stamp";
   return plan;
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/host.hpp"
@@ -11,6 +12,7 @@
 namespace sonar::doctor {
 namespace {
 
+using text::counted;
 using text::format;
 
 constexpr double soon_s = 1;               // time in which a correct driver requests pings, and reads what was sent
@@ -26,10 +28,6 @@ std::string utc_text(std::int64_t ns) {
 }
 std::string reason_of(const v1::Visit& gone) { return gone.why() + (gone.without_ping() ? ", before its first ping" : ""); }
 bool is_recent(const v1::Visit& visit) { return !visit.address().empty() && visit.ago_s() < recent_s; }
-
-std::string counted(std::uint64_t count, const std::string& what) {
-  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
-}
 
 std::string addresses_of(const v1::SonarStatus& sonar) {
   std::string all;

@@ -1,12 +1,12 @@
 #include "clients/sonarctl/control/control_commands.hpp"
 
-#include <cinttypes>
 #include <cstdio>
 #include <thread>
 
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/control/status_text.hpp"
 #include "clients/sonarctl/terminal.hpp"
+#include "core/text/counted.hpp"
 #include "protocol/control/answers.hpp"
 
 namespace sonar::clients {
@@ -95,8 +95,7 @@ Result<void> step_time(const StepOptions& options) {
     if (options.json)
       std::puts(control::json_of(stepped).c_str());
     else
-      std::printf("%.9f s  %" PRIu64 " ping%s\n", 1e-9 * static_cast<double>(stepped.now_ns()), stepped.pings(),
-                  stepped.pings() == 1 ? "" : "s");
+      std::printf("%.9f s  %s\n", 1e-9 * static_cast<double>(stepped.now_ns()), text::counted(stepped.pings(), "ping").c_str());
     if (std::fflush(stdout) != 0) break;  // output closed
   }
   return {};

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "clients/sonarctl/control/fault_text.hpp"
+#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/host.hpp"
@@ -10,6 +11,7 @@
 namespace sonar::clients {
 namespace {
 
+using text::counted;
 using text::format;
 
 unsigned long long wide(std::uint64_t value) { return value; }
@@ -34,8 +36,7 @@ std::string rate_text(const v1::SonarStatus& s) {
 
 std::string settings_text(const v1::SonarStatus& s) {
   std::string text = text::frequency_text(s.frequency_hz()) + format("  %.4g m", s.range_m());
-  text += "  " + rate_text(s) +
-          format("  gain %.3g dB  %u beam%s x %u rows", s.gain_db(), s.beams(), s.beams() == 1 ? "" : "s", s.rows());
+  text += "  " + rate_text(s) + format("  gain %.3g dB  %s x %u rows", s.gain_db(), counted(s.beams(), "beam").c_str(), s.rows());
   if (!s.transmits()) text += "  transmitter off";
   return text + (s.pinging() ? "" : "  not pinging");
 }
@@ -81,14 +82,14 @@ std::string trajectory_text(const auto& body) {
 std::string recording_text(const v1::RecordingStatus& r) {
   if (r.sonar().empty()) return r.file() + format("  %.1f MB, of an earlier run", static_cast<double>(r.bytes()) / 1e6);
   return r.file() +
-         format("  of %s: %llu ping%s, %llu message%s, %.1f MB", r.sonar().c_str(), wide(r.pings()), r.pings() == 1 ? "" : "s",
-                wide(r.messages()), r.messages() == 1 ? "" : "s", static_cast<double>(r.bytes()) / 1e6) +
+         format("  of %s: %s, %s, %.1f MB", r.sonar().c_str(), counted(r.pings(), "ping").c_str(),
+                counted(r.messages(), "message").c_str(), static_cast<double>(r.bytes()) / 1e6) +
          (r.running() ? std::string() : "  ended: " + r.why());
 }
 
 std::string event_text(const v1::PingEvent& e) {
-  return format("ping %u  %s  %.4g m  %u beam%s x %u rows  %.1f ms  %u client%s", e.number(), e.sonar().c_str(), e.range_m(),
-                e.beams(), e.beams() == 1 ? "" : "s", e.rows(), e.simulation_ms(), e.clients(), e.clients() == 1 ? "" : "s");
+  return format("ping %u  %s  %.4g m  %s x %u rows  %.1f ms  %s", e.number(), e.sonar().c_str(), e.range_m(),
+                counted(e.beams(), "beam").c_str(), e.rows(), e.simulation_ms(), counted(e.clients(), "client").c_str());
 }
 std::string event_text(const v1::ClientEvent& e) {
   return "client " + e.client() + (e.connected() ? " connected to " : " left ") + e.sonar() +

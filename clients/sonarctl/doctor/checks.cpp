@@ -5,20 +5,19 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 #include "core/text/ipv4.hpp"
 
 namespace sonar::clients::doctor {
 namespace {
 
+using text::counted;
+
 const char* name_of(Level level) { return level == Level::ok ? "ok" : level == Level::warn ? "warn" : "fail"; }
 
 std::ptrdiff_t count_of(const std::vector<Finding>& findings, Level level) {
   return std::count_if(findings.begin(), findings.end(), [level](const Finding& f) { return f.level == level; });
-}
-
-std::string counted(std::ptrdiff_t count, const std::string& what) {
-  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
 /// Finds pairs of sonars that drivers cannot distinguish.

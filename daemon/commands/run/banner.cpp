@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 #include "cuda/cuda_status.hpp"
 #include "daemon/server/http/page_files.hpp"
@@ -44,7 +45,7 @@ std::string sonar_lines(const Device& device) {
   const FrequencyMode& mode = model.modes[static_cast<std::size_t>(s.mode)];
   std::string text = "sonar     " + device.config().name + "  " + model.name + "  " +
                      text::frequency_text(static_cast<double>(mode.centre_hz)) +
-                     format("  %d beam%s  %.4g m", s.beam_count, s.beam_count == 1 ? "" : "s", s.range_m) +
+                     format("  %s  %.4g m", text::counted(s.beam_count, "beam").c_str(), s.range_m) +
                      (s.rate_hz > 0 && !s.triggered ? format("  %g Hz\n", static_cast<double>(s.rate_hz)) : "\n");
   for (const protocol::DriverAddress& address : device.addresses())
     text += "  " + protocol::line_of(address.protocol, text_of(address.at), address.sonar_speaks_first) + "\n";
