@@ -58,6 +58,12 @@ void close_politely(tcp::socket& socket) {
   socket.close(ec);
 }
 
+void close_by_reset(tcp::socket& socket) {
+  error_code ec;
+  socket.set_option(asio::socket_base::linger(true, 0), ec);
+  socket.close(ec);
+}
+
 Admission::Admission(const LimitConfig& limits, Log& log) : limits_(limits), log_(log), reserve_(open_reserve()) {}
 
 Admission::~Admission() {

@@ -14,6 +14,7 @@
 #include <optional>
 
 #include "daemon/config/config.hpp"
+#include "daemon/server/connections/port_guard.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
 
@@ -45,6 +46,9 @@ class Admission {
   /// Accepts the next connection of a listener without slots here, with a descriptor outside the reserve. nullopt: as accept().
   asio::awaitable<std::optional<tcp::socket>> next_visitor(tcp::acceptor& acceptor, Purpose purpose);
 
+  /// Limits of addresses at the ports of all sonars.
+  PortGuard& guard() { return guard_; }
+
   /// The number of clients: connected, waiting and being refused.
   std::uint64_t now() const { return *count_; }
   std::uint64_t refused_for_places() const { return for_places_; }
@@ -61,6 +65,7 @@ class Admission {
 
   const LimitConfig& limits_;
   Log& log_;
+  PortGuard guard_;
   std::shared_ptr<std::uint64_t> count_ =
       std::make_shared<std::uint64_t>(0);  // shared, because places of sessions may outlive this object
   std::uint64_t for_places_ = 0, for_descriptors_ = 0;
@@ -70,5 +75,7 @@ class Admission {
 
 /// Closes with FIN. Reads what the client has sent before, because with unread bytes the kernel would send RST.
 void close_politely(tcp::socket& socket);
+/// Closes with RST, whatever was not sent.
+void close_by_reset(tcp::socket& socket);
 
 }  // namespace sonar

@@ -17,6 +17,7 @@ namespace work {
 inline constexpr std::size_t of_connection = 1024, of_request = 512, of_upgrade = 32768;  // HTTP
 inline constexpr std::size_t of_frame = 64, of_control_frame = 512;                       // WebSocket
 inline constexpr std::size_t of_message = 128;                                            // control stream, with an answer
+inline constexpr std::size_t of_datagram = 256;  // datagram at a port of a sonar, perhaps of another host than the last one
 inline constexpr std::size_t of_reaction = 256;  // answer of a sonar, or request that it carries out
 }  // namespace work
 

@@ -8,6 +8,7 @@ namespace sonar {
 namespace {
 
 constexpr auto tick_period = std::chrono::milliseconds(250);
+constexpr std::size_t work_of_datagram = 64, work_of_byte = 4;
 
 /// Heartbeats and silence are measured in real time, also if the daemon's time is stepped.
 Time wire_time() { return Time(std::chrono::steady_clock::now().time_since_epoch()); }
@@ -116,13 +117,25 @@ bool MavlinkServer::is_allowed(const Link& link, const asio::ip::address& from) 
 
 asio::awaitable<void> MavlinkServer::receive(Link& link) {
   std::vector<std::byte> buffer(65536);
+  asio::steady_timer pause(io_);
   while (!stopping_) {
     error_code ec;
     udp::endpoint from;
     const std::size_t n = co_await link.socket.async_receive_from(asio::buffer(buffer), from, into(ec));
     if (stopping_) co_return;
     if (ec) continue;  // an ICMP answer: the port is not open yet
-    on_datagram(link, mavlink::BytesView(buffer).first(n), from);
+    const auto now = std::chrono::steady_clock::now();
+    const std::size_t work = work_of_datagram + work_of_byte * n;  // a frame, which may be a pose, has 12 bytes or more
+    const bool taken =
+        link.of_address.pause_after(from.address().to_string(), work, config_.limits.input_bytes_per_s, now).count() == 0;
+    if (taken)
+      on_datagram(link, mavlink::BytesView(buffer).first(n), from);
+    else
+      intake_.refuse("more than limits.input_bytes_per_s was sent", {link.name, link.name});
+    const auto wait = link.rate.pause_after(taken, now);
+    if (wait.count() == 0) continue;
+    pause.expires_after(wait);  // some milliseconds
+    co_await pause.async_wait(into(ec));
   }
 }
 

@@ -12,6 +12,7 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/connections/actions.hpp"
+#include "daemon/server/connections/port_guard.hpp"
 #include "daemon/server/poses/link_figures.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/system/asio.hpp"
@@ -49,6 +50,8 @@ class MavlinkServer {
   Endpoint listens_at(std::size_t link) const;
 
  private:
+  static constexpr std::size_t most_datagrams_per_s = 4096;  // autopilots send some hundred
+
   struct Link {
     MavlinkConfig config;
     mavlink::MavlinkPoses poses;
@@ -58,6 +61,8 @@ class MavlinkServer {
     std::string name;                   // "mavlink udpin:127.0.0.1:14551"
     LogLimiter notices = {}, drops = {};
     LinkFigures distances = {};
+    WorkRate of_address = {};
+    DatagramRate rate = DatagramRate(most_datagrams_per_s);
     bool distances_wanted = false;  // result of the last look_at_wants()
   };
 

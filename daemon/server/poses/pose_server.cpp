@@ -134,8 +134,15 @@ void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes
     intake_.refuse(sample.error().text, sender);
 }
 
+/// A datagram costs its bytes and as much again as a line by TCP for each pose that it may hold.
+std::size_t PoseServer::work_of(Encoding encoding, std::span<const std::byte> datagram) {
+  const auto lines = encoding == Encoding::json ? std::count(datagram.begin(), datagram.end(), std::byte{'\n'}) : 0;
+  return datagram.size() + (1 + std::min<std::size_t>(static_cast<std::size_t>(lines), most_lines_of_a_datagram)) * least_work;
+}
+
 asio::awaitable<void> PoseServer::receive(Port& port) {
   std::vector<std::byte> buffer(65536);
+  asio::steady_timer pause(io_);
   while (!stopping_) {
     error_code ec;
     udp::endpoint from;
@@ -146,7 +153,19 @@ asio::awaitable<void> PoseServer::receive(Port& port) {
       intake_.refuse("address is not in poses.allow_from", sender_of(false, "udp", from.address(), from.port()));
       continue;
     }
-    on_datagram(port.encoding, std::span(buffer).first(n), from);
+    const auto datagram = std::span(buffer).first(n);
+    const auto now = std::chrono::steady_clock::now();
+    const auto owed =
+        of_address_.pause_after(from.address().to_string(), work_of(port.encoding, datagram), limits_.input_bytes_per_s, now);
+    const bool taken = owed.count() == 0;
+    if (taken)
+      on_datagram(port.encoding, datagram, from);
+    else
+      intake_.refuse("more than limits.input_bytes_per_s was sent", sender_of(false, "udp", from.address(), from.port()));
+    const auto wait = port.rate.pause_after(taken, now);
+    if (wait.count() == 0) continue;
+    pause.expires_after(wait);  // some milliseconds
+    co_await pause.async_wait(into(ec));
   }
 }
 

@@ -14,6 +14,7 @@
 #include "daemon/server/connections/connection_slots.hpp"
 #include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/connections/listener.hpp"
+#include "daemon/server/connections/port_guard.hpp"
 #include "daemon/server/connections/shared_rate.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/system/asio.hpp"
@@ -38,11 +39,13 @@ class PoseServer {
 
  private:
   enum class Encoding { protobuf, json };
+  static constexpr std::size_t most_datagrams_per_s = 8192;  // of all senders: simulators send up to some thousand
   struct Port {
     Port(Encoding e, udp::socket s, asio::io_context& io, Admission& admission)
         : encoding(e), datagrams(std::move(s)), lines(io, admission, Admission::Purpose::client) {}
     Encoding encoding;
     udp::socket datagrams;
+    DatagramRate rate{most_datagrams_per_s};
     Listener lines;  // for JSON only
   };
   /// One TCP sender. It is closed by stop(), or if its slot is needed and it has, for the longest time of all, sent no pose or
@@ -90,6 +93,7 @@ class PoseServer {
   bool drop_backlog(Connection& connection, bool pauses);
   void admit(tcp::socket socket);
 
+  static std::size_t work_of(Encoding encoding, std::span<const std::byte> datagram);
   void on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from);
   enum class LineKind { pose, other_object, not_json };  // an accepted pose; another JSON object; neither
   LineKind on_line(const control::LineParser::Line& line, const Sender& sender);
@@ -103,6 +107,7 @@ class PoseServer {
   LogLimiter notices_, faults_;
   std::list<Port> ports_;
   ConnectionSlots<Connection> connections_;
+  WorkRate of_address_;  // of datagrams
   SharedRate together_;  // limit for all connections together
   InputRate dropping_;   // limit for bytes of all connections that are read and dropped
   Endpoint protobuf_at_, json_at_;

@@ -94,23 +94,36 @@ void DatagramPort::take_errors() {
 void DatagramPort::stop() {
   stopping_ = true;
   error_code ec;
-  for (Socket& socket : sockets_) socket.socket.close(ec);
+  for (Socket& socket : sockets_) {
+    socket.socket.close(ec);
+    socket.pause.cancel();
+  }
 }
 
-/// Receives one datagram and calls itself again, until the socket is closed.
+/// Answers a datagram. The answer is sent from the sonar's own address, from which a host learns this address. A host that cannot
+/// be reached gets no answer. Returns false if the datagram was dropped.
+bool DatagramPort::take(Socket& at, std::size_t size) {
+  if (!answer_ || !at.from.address().is_v4()) return false;
+  const Endpoint from{at.from.address().to_v4().to_bytes(), at.from.port()};
+  const auto answers = answer_(from, std::span(at.datagram).first(size));
+  if (!answers) return false;
+  error_code ignored;
+  for (const protocol::Bytes& answer : *answers) socket().send_to(asio::buffer(answer), at.from, 0, ignored);
+  return true;
+}
+
+/// Receives one datagram and calls itself again, perhaps after a pause, until the socket is closed.
 void DatagramPort::receive(Socket& at) {
   at.socket.async_receive_from(asio::buffer(at.datagram), at.from, [this, &at](const error_code& ec, std::size_t size) {
     if (stopping_ || ec == asio::error::operation_aborted) return;
     take_errors();
-    if (!ec && answer_ && at.from.address().is_v4()) {
-      const Endpoint from{at.from.address().to_v4().to_bytes(), at.from.port()};
-      // The answer is sent from the sonar's own address, from which a host learns this address. A host that cannot be reached
-      // gets no answer.
-      error_code ignored;
-      for (const protocol::Bytes& answer : answer_(from, std::span(at.datagram).first(size)))
-        socket().send_to(asio::buffer(answer), at.from, 0, ignored);
-    }
-    receive(at);
+    const bool taken = !ec && take(at, size);
+    const auto pause = rate_.pause_after(taken, DatagramRate::Steady::now());
+    if (pause.count() == 0) return receive(at);
+    at.pause.expires_after(pause);
+    at.pause.async_wait([this, &at](const error_code& ended) {
+      if (!ended && !stopping_) receive(at);
+    });
   });
 }
 

@@ -6,18 +6,20 @@
 #include <array>
 #include <functional>
 #include <list>
+#include <optional>
 #include <vector>
 
 #include "core/base/result.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/server/connections/port_guard.hpp"
 #include "daemon/server/system/asio.hpp"
 
 namespace sonar {
 
 class DatagramPort {
  public:
-  /// Returns the datagrams to send back.
-  using Answer = std::function<std::vector<protocol::Bytes>(Endpoint from, protocol::BytesView datagram)>;
+  /// Returns the datagrams to send back; nullopt: the datagram was dropped, because its host sends too many.
+  using Answer = std::function<std::optional<std::vector<protocol::Bytes>>(Endpoint from, protocol::BytesView datagram)>;
 
   explicit DatagramPort(asio::io_context& io) : io_(io) {}
 
@@ -39,18 +41,23 @@ class DatagramPort {
 
  private:
   struct Socket {
-    explicit Socket(asio::io_context& io) : socket(io) {}
+    explicit Socket(asio::io_context& io) : socket(io), pause(io) {}
     udp::socket socket;
+    asio::steady_timer pause;
     udp::endpoint from;
     std::array<std::byte, 1500> datagram{};
   };
+  static constexpr std::size_t most_per_s = 2048;  // hosts request some tens of pings a second
+
   void receive(Socket& at);
+  bool take(Socket& at, std::size_t size);
   void take_errors();
 
   asio::io_context& io_;
   Answer answer_;
   std::function<void(Endpoint host)> closed_;
   std::list<Socket> sockets_;
+  DatagramRate rate_{most_per_s};
   std::uint16_t number_ = 0;  // the requested port number
   bool stopping_ = false;
 };

@@ -63,8 +63,10 @@ Result<void> Device::open(const protocol::Port& port) {
   if (!datagrams) return tl::make_unexpected(datagrams.error());
   if (port.kind == Kind::udp_dialogue) {
     (*datagrams)->answer_with([this, at = *datagrams, &port](Endpoint from, protocol::BytesView datagram) {
-      on_host_datagram(*at, port, from, datagram);
-      return std::vector<protocol::Bytes>{};
+      return on_limited_datagram(from, datagram, [&] {
+        on_host_datagram(*at, port, from, datagram);
+        return std::vector<protocol::Bytes>{};
+      });
     });
     (*datagrams)->on_port_unreachable([this, &port](Endpoint host) { on_host_closed(port, host); });
     return {};
@@ -72,10 +74,12 @@ Result<void> Device::open(const protocol::Port& port) {
   if (port.kind == Kind::udp_answer) {
     (*datagrams)->receive_broadcasts(config());
     (*datagrams)->answer_with([this, &port](Endpoint from, protocol::BytesView datagram) {
-      Sonar::Answers answers = sonar_.on_datagram(port, from, datagram, network_.clock.now());
-      perform(std::move(answers.actions));
-      if (!answers.datagrams.empty()) searched_ = Visit{text_of(from), {}};
-      return std::move(answers.datagrams);
+      return on_limited_datagram(from, datagram, [&] {
+        Sonar::Answers answers = sonar_.on_datagram(port, from, datagram, network_.clock.now());
+        perform(std::move(answers.actions));
+        if (!answers.datagrams.empty()) searched_ = Visit{text_of(from), {}};
+        return std::move(answers.datagrams);
+      });
     });
     return {};
   }
@@ -113,9 +117,16 @@ void Device::start() {
   started_ = true;
   const auto fault = [this](const std::string& what) { on_fault(what); };
   for (TcpPort& tcp : tcp_ports_)
-    tcp.listener.start([this, port = tcp.port](tcp::socket socket) { on_client_socket(std::move(socket), *port); }, fault);
+    tcp.listener.start(
+        [this, port = tcp.port](tcp::socket socket) {
+          if (admits(socket)) on_client_socket(std::move(socket), *port);
+        },
+        fault);
   observer_listener_.start(
-      [this](tcp::socket socket) { on_arrival(std::move(socket), {}, Role::observer, tcp_ports_.front().port); }, fault);
+      [this](tcp::socket socket) {
+        if (admits(socket)) on_arrival(std::move(socket), {}, Role::observer, tcp_ports_.front().port);
+      },
+      fault);
   for (DatagramPort& port : datagram_ports_) port.start();
   for (SonarHttp& http : http_) http.start();
   for (const StreamPointer& stream : streams_) stream->start();
@@ -142,53 +153,6 @@ void Device::stop(const std::string& why) {
 bool Device::gone() const {
   return sessions_.empty() && streams_.empty() && refusing_ == 0 && !sonar_.busy() &&
          std::all_of(http_.begin(), http_.end(), [](const SonarHttp& http) { return http.gone(); });
-}
-
-void Device::on_client_socket(tcp::socket socket, const protocol::Port& port) {
-  if (auto place = network_.admission.enter(socket)) return on_arrival(std::move(socket), std::move(place), Role::client, &port);
-  sonar_.count_refused_client();
-  refused_ = Visit{peer_of(socket).name, "sonard has no descriptor or slot left for it"};
-  close_politely(socket);
-}
-
-void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port) {
-  // A slot whose client has hung up must be free before this one is judged.
-  forget_who_left();
-  const ConnectionId id = ++last_connection_;
-  Peer peer = peer_of(socket);
-  arrived_.emplace(id, Arrived{std::move(socket), std::move(place), role});
-  perform(sonar_.on_connect(id, role, std::move(peer), network_.clock.now(), port));
-}
-
-/// Sends FIN and no byte. Bytes that the client has sent are read first, or else the kernel would answer them with RST.
-asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place) {
-  error_code ec;
-  socket.shutdown(tcp::socket::shutdown_send, ec);
-  bool late = false;
-  asio::steady_timer deadline(network_.io, std::chrono::seconds(1));
-  deadline.async_wait([&socket, &late](const error_code& e) {
-    if (e) return;
-    late = true;  // a read that has just ended cannot be cancelled, and another would never end
-    socket.cancel();
-  });
-  std::array<std::byte, 1024> discarded;
-  for (int reads = 0; !ec && !late && reads < 64; ++reads) co_await socket.async_read_some(asio::buffer(discarded), into(ec));
-  deadline.cancel();
-  // The handler above must be done with `socket` before this frame goes.
-  co_await asio::post(network_.io, asio::use_awaitable);
-  socket.close(ec);  // before its place is free
-  place.reset();
-}
-
-void Device::forget_who_left() {
-  std::vector<ConnectionId> left;
-  for (auto& [id, arrived] : arrived_)
-    if (has_left(arrived.socket)) left.push_back(id);
-  for (const ConnectionId id : left) {
-    arrived_.erase(id);
-    perform(sonar_.on_closed(id, "it waited for a slot", network_.clock.now()));
-  }
-  for (const SessionPointer& session : std::vector(sessions_.begin(), sessions_.end())) session->end_if_closed();
 }
 
 // ---- sessions
@@ -308,10 +272,7 @@ void Device::carry_out(const Refuse& action) {
     refused_ = Visit{peer_of(from.socket).name, action.reset ? "reset by a fault" : "no slot is free"};
   if (action.reset) {
     report_visit(from.role, VisitLog::Kind::refused, "client refused: reset", {});
-    error_code ec;
-    from.socket.set_option(asio::socket_base::linger(true, 0), ec);
-    from.socket.close(ec);  // its destructor would send FIN
-    return;
+    return close_by_reset(from.socket);
   }
   if (from.role == Role::observer) {
     const std::string most = std::to_string(config().max_observers);

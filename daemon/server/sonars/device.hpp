@@ -163,7 +163,10 @@ class Device final : public SessionParent {
   Result<void> open(const protocol::Port& port);
   Result<DatagramPort*> datagram_port(std::uint16_t number);
   Result<void> open_observers();
+  bool admits(const tcp::socket& socket);
   void on_client_socket(tcp::socket socket, const protocol::Port& port);
+  std::optional<std::vector<protocol::Bytes>> on_limited_datagram(const Endpoint& from, protocol::BytesView datagram,
+                                                                  const std::function<std::vector<protocol::Bytes>()>& act);
   void on_host_datagram(DatagramPort& at, const protocol::Port& port, const Endpoint& from, protocol::BytesView datagram);
   StreamPointer host_of(const protocol::Port& port) const;
   void on_host_closed(const protocol::Port& port, const Endpoint& host);
@@ -218,7 +221,8 @@ class Device final : public SessionParent {
 
   bool started_ = false, stopping_ = false;
   std::array<LogLimiter, static_cast<std::size_t>(Report::Topic::topics)> limiters_;
-  LogLimiter faults_, observer_visits_, send_errors_;
+  std::size_t datagram_work_ = 0;  // of the present datagram, beyond its bytes
+  LogLimiter faults_, observer_visits_, send_errors_, storms_;
   VisitLog visits_;
   std::vector<StreamDigest> digests_;
 };

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "daemon/config/receiver_rules.hpp"
+#include "daemon/server/connections/work_rate.hpp"
 #include "daemon/server/sonars/device.hpp"
 
 namespace sonar {
@@ -46,6 +47,23 @@ void Device::look_for_host(ConnectionId stream) {
   dialogue->send_nothing_to({host->peer.ip, discard});
 }
 
+/// Drops datagrams of an address whose requests cost too much. nullopt: dropped.
+std::optional<std::vector<protocol::Bytes>> Device::on_limited_datagram(
+    const Endpoint& from, protocol::BytesView datagram, const std::function<std::vector<protocol::Bytes>()>& act) {
+  PortGuard& guard = network_.admission.guard();
+  const std::string ip = sonar::text_of(from.ip);
+  const auto now = std::chrono::steady_clock::now();
+  if (!guard.takes_datagram(ip, datagram.size(), limits_.input_bytes_per_s, now)) {
+    log_limited(network_.log, storms_, LogLevel::warning, "datagrams dropped: their address sends too many requests",
+                {{"sonar", config().name}, {"address", ip}});
+    return std::nullopt;
+  }
+  datagram_work_ = 0;
+  std::vector<protocol::Bytes> answers = act();
+  guard.count(ip, datagram_work_ + work::of_reaction * answers.size(), limits_.input_bytes_per_s, now);
+  return answers;
+}
+
 /// The host that sent last has the dialogue, because there is no connection whose end would end the dialogue.
 void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, const Endpoint& from, protocol::BytesView datagram) {
   if (stopping_ || !sonar_.vendor().is_request(port, datagram)) return;
@@ -57,7 +75,7 @@ void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, cons
     sonar_.hand_over(dialogue->id(), host);
   if (!dialogue) return;
   dialogue->heard();
-  on_bytes(dialogue->id(), datagram);
+  datagram_work_ = on_bytes(dialogue->id(), datagram);
 }
 
 /// The computer of a host has answered that a port is closed. For the host's port this is the only sign of its end, because there

@@ -1,5 +1,5 @@
 // Limit of the work of an address: counted in virtual time, whatever it sends and however often it connects.
-#include "daemon/server/connections/work_rate.hpp"
+#include "daemon/server/connections/port_guard.hpp"
 
 #include <gtest/gtest.h>
 
@@ -75,6 +75,33 @@ std::vector<std::byte> frame(unsigned first, std::size_t payload) {
   }
   bytes.insert(bytes.end(), 4 + payload, std::byte{0x89});  // a mask and a payload that look like heads of pings
   return bytes;
+}
+
+TEST(PortGuard, ConnectionsOfOneAddressAreLimitedAndThoseOfOthersAreNot) {
+  PortGuard guard;
+  auto now = Steady::time_point(std::chrono::hours(5));
+  std::size_t taken = 0;
+  for (int i = 0; i < 50000; ++i, now += milliseconds(1) / 10) taken += guard.takes_connection("storm", now);
+  EXPECT_GE(taken, PortGuard::connections_per_s);
+  EXPECT_LE(taken, 6 * PortGuard::connections_per_s) << "10,000 a second for 5 s";
+  EXPECT_TRUE(guard.takes_connection("driver", now));
+  EXPECT_TRUE(guard.takes_connection("storm", now + seconds(2))) << "a driver of that address after its storm";
+}
+
+TEST(PortGuard, DatagramsAreLimitedByWorkAndBySocket) {
+  PortGuard guard;
+  DatagramRate rate(2048);
+  const auto begin = Steady::time_point(std::chrono::hours(5));
+  std::size_t read = 0, taken = 0;
+  for (auto now = begin; now < begin + seconds(5); now += milliseconds(1) / 100, ++read) {  // 100,000 a second
+    const bool takes = guard.takes_datagram("flood", 12, per_s, now);
+    if (takes) guard.count("flood", work::of_reaction, per_s, now);
+    taken += takes;
+    now += rate.pause_after(takes, now);
+  }
+  EXPECT_LE(taken, 6 * per_s / (12 + work::of_datagram + work::of_reaction));
+  EXPECT_LE(read, std::size_t{6} * 16384);
+  EXPECT_TRUE(guard.takes_datagram("host", 12, per_s, begin + seconds(5)));
 }
 
 TEST(FrameWork, CountsFramesAtEverySplit) {

@@ -214,6 +214,23 @@ TEST_F(PoseLimits, ABadLineOfADatagramCostsTheOthersNothing) {
   EXPECT_EQ(daemon->status().poses().refused(), 2u);
 }
 
+TEST_F(PoseLimits, AFloodOfDatagramsIsDroppedAndAnotherAddressSteers) {
+  begin("input_bytes_per_s: 16384");
+  const auto began = Steady::now();
+  for (int i = 0; i < 2000; ++i) send_udp(daemon->address(), port, bytes_of(line_at_x(1)));
+  asio::io_context io;
+  udp::socket other(io, {asio::ip::make_address("127.0.0.5"), 0});
+  EXPECT_TRUE(eventually([&] {
+    other.send_to(asio::buffer(line_at_x(7, "boat")), {asio::ip::make_address(daemon->address()), port});
+    return is_at_x(7, 1, milliseconds(200));
+  }));
+  const v1::PoseFigures p = daemon->status().poses();
+  const double most_bytes = 16384 * (1 + std::chrono::duration<double>(Steady::now() - began).count());
+  EXPECT_LT(static_cast<double>(p.accepted() + p.replaced() + p.over_rate() + p.late()) * 100, most_bytes + 1000);
+  EXPECT_GT(p.refused(), 0u);
+  EXPECT_THAT(daemon->log_text(), HasSubstr("more than limits.input_bytes_per_s was sent"));
+}
+
 TEST_F(PoseLimits, ADatagramHasSoManyLines) {
   begin("");
   send_udp(daemon->address(), port, bytes_of(lines(60000)));

@@ -210,6 +210,49 @@ TEST(Transports, DatagramsAreAnsweredAndSetTheDevicesOwnReceivers) {
   EXPECT_TRUE(eventually([&] { return host.next(milliseconds(500)).empty(); }));
 }
 
+DaemonSetup limited(const std::string& limits) {
+  DaemonSetup setup = made_up();
+  setup.more = "limits: {" + limits + "}\n";
+  return setup;
+}
+
+TEST(Transports, AFloodOfDatagramsIsDroppedAndAnotherHostIsAnswered) {
+  Daemon daemon(limited("input_bytes_per_s: 65536"));
+  UdpSocket flood, other("127.0.0.5");
+  const auto began = Steady::now();
+  int answers = 0;
+  for (int i = 0; i < 3000; ++i) {
+    flood.send("range 5", daemon.address(), udp_port);
+    while (!flood.next(milliseconds(0)).empty()) ++answers;
+  }
+  EXPECT_TRUE(eventually([&] {
+    other.send("who", daemon.address(), udp_port);
+    return other.next(milliseconds(200)) == "front 5\n";
+  })) << "other addresses do not wait for it";
+  while (!flood.next(milliseconds(100)).empty()) ++answers;
+  const double most_bytes = 65536 * (1 + std::chrono::duration<double>(Steady::now() - began).count());
+  EXPECT_GT(answers, 50);
+  EXPECT_LT(answers * 256, most_bytes) << "an answer counts as 256 bytes";
+  EXPECT_THAT(daemon.log_text(), HasSubstr("datagrams dropped: their address sends too many requests"));
+}
+
+TEST(Transports, AnAddressThatConnectsTooOftenIsRefusedAndAnotherIsServed) {
+  Daemon daemon(made_up());
+  const auto refused = [&] { return daemon.status().sonars(0).figures().refused_clients(); };
+  EXPECT_TRUE(eventually([&] {
+    for (int i = 0; i < 300; ++i) Client(daemon.address(), command_port);
+    return daemon.log_text().find("its address connects too often") != std::string::npos;
+  }));
+  EXPECT_GT(refused(), 0u);
+  asio::io_context io;
+  tcp::socket other(io, {asio::ip::make_address("127.0.0.5"), 0});
+  other.connect({asio::ip::make_address(daemon.address()), command_port});
+  asio::write(other, asio::buffer(std::string("range 8\n")));
+  std::string answer(3, ' ');
+  asio::read(other, asio::buffer(answer));
+  EXPECT_EQ(answer, "ok\n");
+}
+
 /// Hosts of a Ping360 search with a socket at port 30303 of all addresses, where sonard's own computer has it too.
 TEST(Transports, APortThatIsSearchedIsSharedWithHostsOfThisComputer) {
   auto before = std::make_unique<UdpSocket>("0.0.0.0", udp_port);

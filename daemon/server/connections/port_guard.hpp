@@ -1,0 +1,50 @@
+// Limits of what the hosts of one address may do at the ports of all sonars, beside what a session limits: connect, and send
+// datagrams. What is beyond is dropped, as by a full queue; other addresses are not affected. Pure arithmetic, as WorkRate.
+#pragma once
+
+#include "daemon/server/connections/work_rate.hpp"
+
+namespace sonar {
+
+class PortGuard {
+ public:
+  using Steady = WorkRate::Steady;
+  /// Connections of one address that are served, at once and then each second. Drivers that reconnect need a few.
+  static constexpr std::size_t connections_per_s = 100;
+
+  bool takes_connection(const std::string& address, Steady::time_point now) {
+    return connections_.pause_after(address, 1, connections_per_s, now).count() == 0;
+  }
+  /// `per_s`: limits.input_bytes_per_s.
+  bool takes_datagram(const std::string& address, std::size_t bytes, std::size_t per_s, Steady::time_point now) {
+    return datagrams_.pause_after(address, bytes + work::of_datagram, per_s, now).count() == 0;
+  }
+  /// Counts the work that a datagram caused.
+  void count(const std::string& address, std::size_t amount, std::size_t per_s, Steady::time_point now) {
+    datagrams_.pause_after(address, amount, per_s, now);
+  }
+
+ private:
+  WorkRate connections_, datagrams_;
+};
+
+/// Limits how many datagrams a second are read from one socket, of all senders; more wait in the kernel, or are lost there.
+class DatagramRate {
+ public:
+  using Steady = InputRate::Steady;
+  /// `most_per_s`: datagrams that are taken, each second. One that is dropped costs `of_dropped`.
+  explicit DatagramRate(std::size_t most_per_s) : of_taken_(all / most_per_s) {}
+  /// Returns the pause before the next read; 0 = none.
+  Steady::duration pause_after(bool taken, Steady::time_point now) {
+    const auto pause = rate_.pause_after(taken ? of_taken_ : of_dropped, now);
+    return pause.count() == 0 ? pause : std::max<Steady::duration>(pause, least_pause);
+  }
+
+ private:
+  static constexpr std::size_t all = 16384, of_dropped = 1;
+  static constexpr std::chrono::milliseconds least_pause{5};  // so that a flood does not set a timer for each datagram
+  std::size_t of_taken_;
+  InputRate rate_{all};
+};
+
+}  // namespace sonar

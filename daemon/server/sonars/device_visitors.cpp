@@ -1,0 +1,68 @@
+// The connections that come to the TCP ports of a Device, until the sonar decides about them.
+#include <array>
+
+#include "daemon/server/sonars/device.hpp"
+#include "daemon/server/system/listen.hpp"
+
+namespace sonar {
+
+/// A host that connects too often is turned away before that costs time. Its sockets are closed when they go out of scope.
+bool Device::admits(const tcp::socket& socket) {
+  error_code ec;
+  const std::string ip = socket.remote_endpoint(ec).address().to_string();
+  if (network_.admission.guard().takes_connection(ip, std::chrono::steady_clock::now())) return true;
+  sonar_.count_refused_client();
+  refused_ = Visit{ip, "it connects too often"};
+  log_limited(network_.log, storms_, LogLevel::warning, "client refused: its address connects too often",
+              {{"sonar", config().name}, {"address", ip}, {"limit_per_s", PortGuard::connections_per_s}});
+  return false;
+}
+
+void Device::on_client_socket(tcp::socket socket, const protocol::Port& port) {
+  if (auto place = network_.admission.enter(socket)) return on_arrival(std::move(socket), std::move(place), Role::client, &port);
+  sonar_.count_refused_client();
+  refused_ = Visit{peer_of(socket).name, "sonard has no descriptor or slot left for it"};
+  close_politely(socket);
+}
+
+void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port) {
+  // A slot whose client has hung up must be free before this one is judged.
+  forget_who_left();
+  const ConnectionId id = ++last_connection_;
+  Peer peer = peer_of(socket);
+  arrived_.emplace(id, Arrived{std::move(socket), std::move(place), role});
+  perform(sonar_.on_connect(id, role, std::move(peer), network_.clock.now(), port));
+}
+
+/// Sends FIN and no byte. Bytes that the client has sent are read first, or else the kernel would answer them with RST.
+asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place) {
+  error_code ec;
+  socket.shutdown(tcp::socket::shutdown_send, ec);
+  bool late = false;
+  asio::steady_timer deadline(network_.io, std::chrono::seconds(1));
+  deadline.async_wait([&socket, &late](const error_code& e) {
+    if (e) return;
+    late = true;  // a read that has just ended cannot be cancelled, and another would never end
+    socket.cancel();
+  });
+  std::array<std::byte, 1024> discarded;
+  for (int reads = 0; !ec && !late && reads < 64; ++reads) co_await socket.async_read_some(asio::buffer(discarded), into(ec));
+  deadline.cancel();
+  // The handler above must be done with `socket` before this frame goes.
+  co_await asio::post(network_.io, asio::use_awaitable);
+  socket.close(ec);  // before its place is free
+  place.reset();
+}
+
+void Device::forget_who_left() {
+  std::vector<ConnectionId> left;
+  for (auto& [id, arrived] : arrived_)
+    if (has_left(arrived.socket)) left.push_back(id);
+  for (const ConnectionId id : left) {
+    arrived_.erase(id);
+    perform(sonar_.on_closed(id, "it waited for a slot", network_.clock.now()));
+  }
+  for (const SessionPointer& session : std::vector(sessions_.begin(), sessions_.end())) session->end_if_closed();
+}
+
+}  // namespace sonar
