@@ -117,10 +117,7 @@ void ReplayServer::stop() {
   client_->wake.cancel();
   deadline_.expires_after(goodbye_limit);
   deadline_.async_wait([this](const error_code& e) {
-    if (e || !client_) return;
-    error_code ignored;
-    client_->socket.set_option(asio::socket_base::linger(true, 0), ignored);
-    client_->socket.close(ignored);
+    if (!e && client_) close_by_reset(client_->socket);
   });
 }
 
@@ -212,7 +209,7 @@ asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, R
   bool any = false;
   const auto carrier = device_.by_datagrams() ? recording::Carrier::datagram : recording::Carrier::stream;
   error_code ec;
-  while (auto message = reader_.next()) {
+  while (auto message = co_await reader_.next()) {
     if (message->from != recording::Origin::device || message->by != carrier) continue;
     co_await send_replies(client);
     while (device_.vendor != nullptr && !client->wants_frames && !ends(*client)) {
@@ -235,8 +232,7 @@ asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, R
       if (!http_ && !number_datagram(*client, message->bytes)) continue;
       co_await send_datagram(client, message->bytes);
     } else {
-      co_await asio::async_write(client->socket, asio::buffer(message->bytes), into(ec));
-      if (ec) co_return stopping_ ? Played::stopped : Played::left;
+      if (!co_await write(client, message->bytes)) co_return stopping_ ? Played::stopped : Played::left;
     }
     figures_.messages += begins;
     figures_.bytes += message->bytes.size();
@@ -267,11 +263,33 @@ asio::awaitable<void> ReplayServer::send_datagram(ClientPointer client, const pr
 
 /// Sends the replies of the stream, which one coroutine writes.
 asio::awaitable<void> ReplayServer::send_replies(ClientPointer client) {
-  error_code ec;
-  while (!client->replies.empty() && !ec) {
+  while (!client->replies.empty()) {
     const protocol::Bytes replies = std::exchange(client->replies, {});
-    co_await asio::async_write(client->socket, asio::buffer(replies), into(ec));
+    if (!co_await write(client, replies)) co_return;
   }
+}
+
+/// False: the client has left, or was reset. The bytes must live until it is done.
+asio::awaitable<bool> ReplayServer::write(ClientPointer client, protocol::BytesView bytes) {
+  error_code ec;
+  while (!bytes.empty() && !ec) {
+    watch_stall(client);
+    bytes = bytes.subspan(co_await client->socket.async_write_some(asio::buffer(bytes.data(), bytes.size()), into(ec)));
+    client->stall.cancel();
+  }
+  co_return !ec;
+}
+
+/// A client that reads nothing would keep the only place. It is reset, as by a sonar of sonard.
+void ReplayServer::watch_stall(const ClientPointer& client) {
+  client->stall.expires_after(options_.stall);
+  client->stall.async_wait([this, client](const error_code& ec) {
+    if (ec || over_ || !client->socket.is_open()) return;
+    ++figures_.stalled;
+    log_.warning("client reset: it took no byte for " + std::to_string(options_.stall.count()) + " ms",
+                 {{"client", client->name}});
+    close_by_reset(client->socket);
+  });
 }
 
 /// Requests of a host decide where frames go, and from when on. A host that reads none of the answers is disconnected, as a sonar

@@ -1,12 +1,14 @@
 // Serves a recording as the recorded sonar would: over TCP, to one client at a time, its messages byte for byte; and status
 // datagrams. A sonar that sends pings on request answers its host, and sends them once the host wants them: an ARIS as datagrams
 // to the receivers that its controller sets; a Sonar 3D-15 in the same way, to the receivers set over HTTP, as for one client
-// that does not leave. This is all of `sonard replay` except its command line; it has one thread, no scene and no engine.
+// that does not leave. This is all of `sonard replay` except its command line; it has one thread beside that of ReadAhead, no
+// scene and no engine.
 #pragma once
 
 #include <functional>
 #include <memory>
 
+#include "daemon/commands/replay/read_ahead.hpp"
 #include "daemon/commands/replay/replay_device.hpp"
 #include "daemon/commands/replay/replay_pace.hpp"
 #include "daemon/server/connections/input_rate.hpp"
@@ -23,6 +25,7 @@ struct ReplayOptions {
   bool stepped = false;             // without a pace: sends a message when the client has read the previous one
   bool loop = false;                // repeats the recording
   double rate_hz = 10;              // messages a second of recordings without times
+  std::chrono::milliseconds stall = LimitConfig{}.stall;  // a client that reads no byte for so long is reset
   bool handle_signals = false;
   std::function<void()> on_end = {};  // called when the server has no more work on io
 };
@@ -31,10 +34,11 @@ class ReplayServer {
  public:
   struct Figures {
     std::uint64_t clients = 0, refused = 0, messages = 0, bytes = 0, times_through = 0, client_bytes = 0;
-    std::uint64_t greedy = 0;  // clients that were closed because they read no answers
+    std::uint64_t greedy = 0;   // clients that were closed because they read no answers
+    std::uint64_t stalled = 0;  // clients that were reset because they read nothing
   };
 
-  /// `reader` must be at its start. All arguments must outlive io.run().
+  /// `reader` must be at its start; it is used in another thread until io.run() has returned. All arguments must outlive it.
   ReplayServer(asio::io_context& io, recording::RecordingReader& reader, ReplayDevice device, ReplayOptions options, Log& log);
 
   /// Listens. Error: unavailable.
@@ -53,9 +57,10 @@ class ReplayServer {
   using Steady = std::chrono::steady_clock;
   struct Client {
     Client(tcp::socket s, const LimitConfig& limits)
-        : socket(std::move(s)), wake(socket.get_executor()), input(limits.input_bytes_per_s) {}
+        : socket(std::move(s)), wake(socket.get_executor()), stall(socket.get_executor()), input(limits.input_bytes_per_s) {}
     tcp::socket socket;
     asio::steady_timer wake;  // ended early when the client goes
+    asio::steady_timer stall;
     Ipv4 ip{};
     std::string name;
     bool gone = false;
@@ -76,6 +81,8 @@ class ReplayServer {
   asio::awaitable<Played> play(ClientPointer client, ReplayPace& pace);
   bool ends(const Client& client) const { return stopping_ || client.gone; }
   bool number_datagram(const Client& client, protocol::Bytes& datagram) const;
+  asio::awaitable<bool> write(ClientPointer client, protocol::BytesView bytes);
+  void watch_stall(const ClientPointer& client);
   asio::awaitable<void> send_replies(ClientPointer client);
   asio::awaitable<void> send_datagram(ClientPointer client, const protocol::Bytes& datagram);
   asio::awaitable<void> listen_to(ClientPointer client);
@@ -91,7 +98,7 @@ class ReplayServer {
   void end();
 
   asio::io_context& io_;
-  recording::RecordingReader& reader_;
+  ReadAhead reader_;
   ReplayDevice device_;
   ReplayOptions options_;
   Log& log_;

@@ -7,6 +7,7 @@
 #include <future>
 
 #include "daemon/commands/replay/replay_server.hpp"
+#include "protocol/oculus/decode.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/waterlinked/messages.hpp"
@@ -19,18 +20,22 @@ using recording::Bytes;
 using std::chrono::milliseconds;
 constexpr milliseconds patience{20000};
 
+std::unique_ptr<recording::RecordingReader> reader_of(Bytes file) {
+  auto opened = recording::open_recording(recording::source_from("recording", std::move(file)));
+  if (!opened) throw std::runtime_error(opened.error().text);
+  return std::move(opened->reader);
+}
+
 /// A replay server in a thread of its own; it counts the lines of its log.
 struct Replay {
-  explicit Replay(Bytes file) : log(counted()) {
-    auto opened = recording::open_recording(recording::source_from("recording", std::move(file)));
-    if (!opened) throw std::runtime_error(opened.error().text);
-    recording = std::move(*opened);
-    auto device = find_replay_device(*recording.reader, "recording", 1042);
+  explicit Replay(Bytes file, ReplayOptions options = {}) : Replay(reader_of(std::move(file)), std::move(options)) {}
+  explicit Replay(std::unique_ptr<recording::RecordingReader> from, ReplayOptions options = {})
+      : log(counted()), reader(std::move(from)) {
+    auto device = find_replay_device(*reader, "recording", 1042);
     if (!device) throw std::runtime_error(device.error().text);
-    ReplayOptions options;
     options.at = {{127, 0, 0, 2}, 0};
     options.loop = true;
-    server = std::make_unique<ReplayServer>(io, *recording.reader, *device, options, log);
+    server = std::make_unique<ReplayServer>(io, *reader, *device, options, log);
     if (const auto listening = server->open(); !listening) throw std::runtime_error(listening.error().text);
     server->start();
     done = std::async(std::launch::async, [this] { io.run(); });
@@ -50,7 +55,7 @@ struct Replay {
   std::atomic<int> lines{0};
   Log log;
   asio::io_context io;
-  recording::Recording recording;
+  std::unique_ptr<recording::RecordingReader> reader;
   std::unique_ptr<ReplayServer> server;
   std::future<void> done;
 };
@@ -85,6 +90,69 @@ TEST(ReplayBesideStrangers, AHostThatReadsNoAnswersIsClosedAndFillsNoLog) {
   replay.stop();
   EXPECT_EQ(replay.server->figures().greedy, 1u);
   EXPECT_LT(replay.lines, 100) << "of 200,000 messages that were refused";
+}
+
+/// A recording of Oculus pings of 64 kB without end, on a disk that stands still while the test wants it.
+class SlowDisk final : public recording::RecordingReader {
+ public:
+  explicit SlowDisk(std::shared_future<void> goes_on = {}) : goes_on_(std::move(goes_on)) {}
+  std::optional<recording::RecordedMessage> next() override {
+    if (rewound_ && goes_on_.valid()) goes_on_.wait();  // the search for the sonar comes before
+    recording::RecordedMessage message;
+    oculus::MessageHeader header;
+    header.type = oculus::MessageType::ping_result;
+    header.payload_size = static_cast<std::uint32_t>(64000);
+    message.bytes = wire::bytes_of(header);
+    message.bytes.resize(message.bytes.size() + header.payload_size);
+    message.at = Time(milliseconds(count_++));
+    return message;
+  }
+  std::optional<Error> damage() const override { return std::nullopt; }
+  void rewind() override { rewound_ = true; }
+
+ private:
+  std::shared_future<void> goes_on_;
+  bool rewound_ = false;
+  int count_ = 0;
+};
+
+bool ends(tcp::socket& socket) {
+  pollfd closed{socket.native_handle(), POLLRDHUP, 0};
+  return ::poll(&closed, 1, static_cast<int>(patience.count())) > 0;
+}
+
+TEST(ReplayBesideStrangers, AClientThatReadsNothingLosesItsPlace) {
+  ReplayOptions options;
+  options.stall = milliseconds(200);
+  Replay replay(std::make_unique<SlowDisk>(), options);
+  asio::io_context io;
+  tcp::socket stalled(io);
+  stalled.open(tcp::v4());
+  stalled.set_option(asio::socket_base::receive_buffer_size(2048));
+  stalled.connect(replay.at());
+  EXPECT_TRUE(ends(stalled)) << "it keeps its place without reading";
+  tcp::socket next(io);
+  next.connect(replay.at());
+  std::array<char, 16> header{};
+  EXPECT_EQ(asio::read(next, asio::buffer(header)), header.size());
+  next.close();
+  replay.stop();
+  EXPECT_EQ(replay.server->figures().stalled, 1u);
+}
+
+TEST(ReplayBesideStrangers, ADiskThatStandsStillDelaysNoOtherClient) {
+  std::promise<void> goes_on;
+  Replay replay(std::make_unique<SlowDisk>(goes_on.get_future().share()));
+  asio::io_context io;
+  tcp::socket served(io), refused(io);
+  served.connect(replay.at());
+  refused.connect(replay.at());
+  EXPECT_TRUE(ends(refused)) << "the event loop waits for the disk";
+  goes_on.set_value();
+  std::array<char, 16> header{};
+  EXPECT_EQ(asio::read(served, asio::buffer(header)), header.size());
+  served.close();
+  replay.stop();
 }
 
 Bytes sonar_file() {
