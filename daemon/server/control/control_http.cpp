@@ -51,7 +51,9 @@ HttpOutcome ControlHttp::open_socket(const HttpRequest& request, const SocketAct
   }
   const ViewWelcome& welcome = std::get<ViewWelcome>(opened);
   if (!welcome.recording.empty())
-    return view_->recordings().open(services_, from, request, welcome, {view_->folder_of_recordings() / welcome.recording});
+    return view_->recordings().open(
+        services_, from, request, welcome,
+        {.file = view_->folder_of_recordings() / welcome.recording, .within = view_->folder_of_recordings()});
   return std::shared_ptr<HttpTakeover>(
       std::make_shared<ViewConnection>(services_, from, *view_, request, welcome,
                                        [view = view_](const std::shared_ptr<ViewConnection>& viewer) { view->add(viewer); }));

@@ -82,6 +82,14 @@ bool RecordingFile::is_recording(std::string_view name) {
                                  }));
 }
 
+bool RecordingFile::is_inside(const std::filesystem::path& folder, const std::filesystem::path& file) {
+  std::error_code ec;
+  const std::filesystem::path within = std::filesystem::canonical(folder, ec);
+  if (ec) return false;
+  const std::filesystem::path place = std::filesystem::canonical(file, ec);
+  return !ec && std::mismatch(within.begin(), within.end(), place.begin(), place.end()).first == within.end();
+}
+
 /// Names are restricted to plain file names, because clients of control choose them.
 Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vendor) {
   const auto refuse = [&](const std::string& why) {

@@ -50,6 +50,8 @@ class RecordingFile {
   static bool is_plain_name(std::string_view name);
   /// Returns whether it is a plain file name with the ending of a recording.
   static bool is_recording(std::string_view name);
+  /// Returns whether the file lies in the folder after symbolic links have been followed.
+  static bool is_inside(const std::filesystem::path& folder, const std::filesystem::path& file);
   /// Returns the kind of a plain file name by its ending: .mcap, those of this vendor, and .pcap or .raw if its pings are a
   /// stream. Other names are errors.
   static Result<Kind> kind_of(std::string_view name, std::string_view vendor);

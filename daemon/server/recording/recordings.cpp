@@ -111,6 +111,7 @@ void Recordings::find_earlier() {
     std::error_code one;
     const std::string name = file->path().filename().string();
     if (!RecordingFile::is_recording(name) || !file->is_regular_file(one)) continue;
+    if (file->is_symlink(one) && !RecordingFile::is_inside(config_.recording.folder, file->path())) continue;
     auto recording = std::make_shared<Recording>();
     recording->state = Recording::State::ended;
     recording->name = name;

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "daemon/server/recording/recording_file.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace sonar {
@@ -26,6 +27,10 @@ class WatchedSource final : public recording::Source {
 }  // namespace
 
 Result<recording::RecordedPings> open_pings(const PlayedRecording& wanted, const ViewerLeft& left) {
+  if (!wanted.within.empty() && !RecordingFile::is_inside(wanted.within, wanted.file))
+    return failure(ErrorKind::missing_file,
+                   wanted.file.filename().string() +
+                       ": is a symbolic link out of the folder of recordings, or to nothing; put a copy there");
   auto source = recording::open_source(wanted.file);
   if (!source) return tl::make_unexpected(source.error());
   auto opened = recording::open_recording(std::make_unique<WatchedSource>(*std::move(source), left), wanted.sonar);
