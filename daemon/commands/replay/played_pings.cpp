@@ -30,32 +30,26 @@ Result<void> PlayedPings::open(const std::string& file) {
 
 void PlayedPings::rewind() {
   reader_.rewind();
-  waiting_.clear();
+  splitter_.reset();
+  if (codec_.framing != nullptr) splitter_.emplace(recording::Origin::device, *codec_.framing);
   ahead_ = read();
 }
 
-/// The next message, or packet of a message, that holds a ping or a part of one.
+/// The next message that holds a ping or a part of one. A recorder may write packets joined or in pieces.
 std::optional<PlayedPings::Part> PlayedPings::read() {
-  while (waiting_.empty()) {
-    auto message = reader_.next();
-    if (!message) return std::nullopt;
-    if (message->from != recording::Origin::device) continue;
-    const auto keep = [&](recording::Bytes bytes) {
-      if (auto part = codec_.ping_part(bytes)) waiting_.push_back({message->at, *part, std::move(bytes)});
-    };
-    if (codec_.framing == nullptr || message->by == recording::Carrier::datagram) {
-      keep(std::move(message->bytes));
-      continue;
+  while (true) {
+    auto message = splitter_ ? splitter_->next() : std::nullopt;
+    if (!message) {
+      message = reader_.next();
+      if (!message) return std::nullopt;
+      if (message->from != recording::Origin::device) continue;
+      if (splitter_ && message->by == recording::Carrier::stream) {
+        splitter_->append(message->at, message->bytes);
+        continue;
+      }
     }
-    recording::MessageSplitter splitter(message->from, *codec_.framing);
-    splitter.append(message->at, message->bytes);
-    splitter.finish();
-    while (auto whole = splitter.next()) keep(std::move(whole->bytes));
-    std::reverse(waiting_.begin(), waiting_.end());
+    if (const auto part = codec_.ping_part(message->bytes)) return Part{message->at, *part, std::move(message->bytes)};
   }
-  Part part = std::move(waiting_.back());
-  waiting_.pop_back();
-  return part;
 }
 
 std::optional<PlayedPing> PlayedPings::next() {

@@ -51,8 +51,8 @@ class PlayedPings {
 
   recording::RecordingReader& reader_;
   const recording::Codec& codec_;
-  std::vector<Part> waiting_;  // parts of a message that was split, the next one last
-  std::optional<Part> ahead_;  // the first part of the next ping
+  std::optional<recording::MessageSplitter> splitter_;  // of a make whose stream tells messages apart
+  std::optional<Part> ahead_;                           // the first part of the next ping
   std::vector<Line> lines_;
   std::size_t after_ = 0;  // place of the line after the last one that was returned
 };

@@ -8,6 +8,7 @@
 #include <future>
 
 #include "daemon/commands/replay/requested_replay.hpp"
+#include "protocol/norbit/host.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/recorded/raw_dump.hpp"
@@ -287,6 +288,25 @@ struct NorbitReplay : ::testing::Test {
   Bytes bathymetry, column;
   std::vector<Bytes> messages;
 };
+
+TEST_F(NorbitReplay, PacketsThatWereRecordedInPiecesAreWhole) {
+  Bytes stream;
+  for (const Bytes& both : messages) stream.insert(stream.end(), both.begin(), both.end());
+  std::vector<RecordedMessage> pieces;
+  for (std::size_t at = 0; at < stream.size(); at += 1000) {
+    const auto begin = stream.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto size = static_cast<std::ptrdiff_t>(std::min<std::size_t>(1000, stream.size() - at));
+    pieces.push_back({{}, Origin::device, Carrier::stream, Bytes(begin, begin + size)});
+  }
+  Messages reader(std::move(pieces));
+  const recording::Codec norbit_codec = norbit::codec();
+  PlayedPings pings(reader, norbit_codec);
+  ASSERT_TRUE(pings.open("f"));
+  Bytes all;
+  while (const auto ping = pings.next())
+    for (const auto& part : ping->parts) all.insert(all.end(), part.second.begin(), part.second.end());
+  EXPECT_EQ(all, stream);
+}
 
 TEST_F(NorbitReplay, EachPortSendsItsPacketsOnceTheDriverTurnsItOn) {
   Replay replay(file_of(raw_dump, messages));
