@@ -164,7 +164,7 @@ json find_curves(const ScenePointer& scene, const BenchScene& where, const Bench
     points.push_back(point(beams, scene, c, where, options));
   }
   finish("beams", "P3a");
-  for (const double spacing_m : {0.56, 0.28, 0.14, 0.07, 0.035, 0.0177, 0.01265}) {  // 10^4 to 2 x 10^7 triangles
+  for (const double spacing_m : {0.56, 0.28, 0.14, 0.07, 0.035, 0.0177, 0.0128}) {  // 10^4 to 2 x 10^7 triangles
     const ScenePointer bed = bed_of(*scene, spacing_m, 40, where.bed_z_m);
     points.push_back(point(static_cast<double>(bed->triangle_count()), bed, *find_case("P1"), where, options));
   }

@@ -35,6 +35,12 @@ NAME = "benchmarks"  # of both pages
 PEER = "## Beside a peer"  # a chapter that is written by hand
 # Why a ping costs what it costs, by the quantity that grows.
 KNEES = {
+    "rays a column": "every ray is traced and is a scatterer; coherent rays cost less each",
+    "rows": "cells have a least size of their own; where rows become finer than that, cells shrink in both directions with them",
+    "beams": "cells do not depend on beams; beyond the columns of the default fan, rays and coupling grow with beams",
+    "triangles, finer": "cells stay as many; rays go deeper in the tree and miss the processor's caches",
+    "triangles, wider": "what is out of range is not visited",
+    "sonars": "sonars share scene and cells; a ping costs what it costs alone",
 }
 PAPER = [  # Choi 2025, Table 3: 512 beams, 10 m, RTX 2080 Ti and i9-9900K
     ("paper, 300 rays a beam, GPU", 0.3),
