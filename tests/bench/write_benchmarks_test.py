@@ -98,7 +98,7 @@ class Page(unittest.TestCase):
         report = {"processor": "test", "results": [result("P1", 1, 80)],
                   "curves": [{"name": "rows", "case": "P3a", "points": [{"x": 200, "median_ms": 3.0}, {"x": 400, "median_ms": 5.0}]}]}
         with TemporaryDirectory() as name:
-            file = Path(name) / "benchmarks.md"
+            file = write_benchmarks.file_of(Path(name), write_benchmarks.NAME)
             file.write_text(f"# Benchmarks\n\n## How times grow\n\nold\n\n{write_benchmarks.PEER}\n\nby hand\n", encoding="utf-8")
             write_benchmarks.write_curves(report, Path(name))
             page = file.read_text(encoding="utf-8")
