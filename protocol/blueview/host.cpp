@@ -254,8 +254,7 @@ class BlueViewHost final : public protocol::Host {
       settings_.emplace_back(Key::stop_range, range_m);
     }
     if (wanted_.gain_percent) settings_.emplace_back(Key::gain, gain_db_from(*wanted_.gain_percent));
-    if (wanted_.rate_hz.value_or(0) > 0)
-      settings_.emplace_back(Key::ping_interval, static_cast<std::int32_t>(std::lround(1000 / *wanted_.rate_hz)));
+    if (wanted_.rate_hz.value_or(0) > 0) settings_.emplace_back(Key::ping_interval, ping_interval_ms(*wanted_.rate_hz));
     return {};
   }
 

@@ -37,11 +37,14 @@ Result<void> set_rate(SonarSettings& all, double rate_hz, const protocol::Device
   if (rate_hz < 0) return refused("a ping rate must be above 0");
   if (rate_hz == 0)
     return refused("BlueView sonars have no standby: they ping when a host asks; to silence one, set transmit: false");
-  const double interval_ms = std::max(1.0, std::round(1000 / rate_hz));
-  return set(all, Key::ping_interval, static_cast<std::int32_t>(std::min(interval_ms, 3600e3)), device);
+  return set(all, Key::ping_interval, ping_interval_ms(rate_hz), device);
 }
 
 }  // namespace
+
+std::int32_t ping_interval_ms(double rate_hz) {
+  return static_cast<std::int32_t>(std::clamp(std::round(1000 / rate_hz), 1.0, 3600e3));
+}
 
 float gain_db_from(double percent) { return static_cast<float>(half_gain_db * (percent / 50 - 1)); }
 

@@ -9,6 +9,9 @@ namespace sonar::blueview {
 float gain_db_from(double percent);
 double gain_percent_from(double gain_db);
 
+/// The shortest is 1 ms, the longest an hour. `rate_hz`: above 0.
+std::int32_t ping_interval_ms(double rate_hz);
+
 /// Selects the head `wanted.mode`, if set, and changes on the active head only the fields that are set. Refuses values that the
 /// product does not support.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);

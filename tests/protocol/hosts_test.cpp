@@ -378,6 +378,17 @@ TEST_P(Hosts, PutTheSonarInStandbyOrSayThatItHasNone) {
   EXPECT_THAT(talk.pings, testing::IsEmpty());
 }
 
+TEST_P(Hosts, AskForSlowPingsWhenTheRateIsLessThanTheWireCanSay) {
+  for (const double rate_hz : {1e-300, 1e-6}) {
+    Wanted slow;
+    slow.settings.rate_hz = rate_hz;
+    if (!GetParam().host(slow)) continue;  // says that its rate cannot be set
+    Talk talk(GetParam(), slow, 0, model_of(GetParam()));
+    talk.run(3);
+    EXPECT_LE(talk.settings.rate_hz, 2) << "slower than that an Oculus cannot be";
+  }
+}
+
 TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
   Wanted nothing;
   nothing.as_it_is = true;
