@@ -46,7 +46,7 @@ void leave(Socket& socket, int way) {
 
 TEST(Load, ConnectCommandDisconnect) {
   const int cycles = quick ? 400 : 10000;
-  LoadDaemon daemon({1, "    clients: {max: 16}\n", ""});
+  LoadDaemon daemon({1, "    clients: {max: 16}\n", "limits: {input_bytes_per_s: 1073741824}\n"});
   const auto cycle = [&](int i) {
     Socket socket(daemon.address(), 52100);
     ASSERT_GE(socket.fd(), 0) << "cycle " << i;
@@ -95,7 +95,7 @@ TEST(Load, ConnectCommandDisconnect) {
 /// Clients connect, request a ping, read it, and disconnect without a message, as drivers do.
 TEST(Load, ReconnectsOfADriver) {
   const int times = quick ? 60 : 1000;
-  LoadDaemon daemon({1, "", ""});  // one place, as the product has
+  LoadDaemon daemon({1, "", "limits: {input_bytes_per_s: 1073741824}\n"});  // one place, as the product has
   int served = 0, attempts = 0;
   std::chrono::duration<double> longest{0};
   std::uint64_t garbled = 0;

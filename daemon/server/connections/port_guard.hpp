@@ -9,11 +9,12 @@ namespace sonar {
 class PortGuard {
  public:
   using Steady = WorkRate::Steady;
-  /// Connections of one address that are served, at once and then each second. Drivers that reconnect need a few.
-  static constexpr std::size_t connections_per_s = 100;
+  /// Connections of one address that are served, at once and then each second: 100 at the default `per_s`, which is
+  /// limits.input_bytes_per_s. Drivers that reconnect need a few.
+  static constexpr std::size_t connections_per_s(std::size_t per_s) { return std::max<std::size_t>(10, per_s / 10240); }
 
-  bool takes_connection(const std::string& address, Steady::time_point now) {
-    return connections_.pause_after(address, 1, connections_per_s, now).count() == 0;
+  bool takes_connection(const std::string& address, std::size_t per_s, Steady::time_point now) {
+    return connections_.pause_after(address, 1, connections_per_s(per_s), now).count() == 0;
   }
   /// `per_s`: limits.input_bytes_per_s.
   bool takes_datagram(const std::string& address, std::size_t bytes, std::size_t per_s, Steady::time_point now) {

@@ -10,11 +10,12 @@ namespace sonar {
 bool Device::admits(const tcp::socket& socket) {
   error_code ec;
   const std::string ip = socket.remote_endpoint(ec).address().to_string();
-  if (network_.admission.guard().takes_connection(ip, std::chrono::steady_clock::now())) return true;
+  if (network_.admission.guard().takes_connection(ip, limits_.input_bytes_per_s, std::chrono::steady_clock::now())) return true;
   sonar_.count_refused_client();
   refused_ = Visit{ip, "it connects too often"};
-  log_limited(network_.log, storms_, LogLevel::warning, "client refused: its address connects too often",
-              {{"sonar", config().name}, {"address", ip}, {"limit_per_s", PortGuard::connections_per_s}});
+  log_limited(
+      network_.log, storms_, LogLevel::warning, "client refused: its address connects too often",
+      {{"sonar", config().name}, {"address", ip}, {"limit_per_s", PortGuard::connections_per_s(limits_.input_bytes_per_s)}});
   return false;
 }
 

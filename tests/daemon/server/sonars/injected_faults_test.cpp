@@ -13,7 +13,10 @@ namespace {
 using ::testing::HasSubstr;
 
 DaemonSetup armed(DaemonSetup setup = {}) {
-  setup.edit_config = [](Config& config) { config.faults.armed = true; };
+  setup.edit_config = [](Config& config) {
+    config.faults.armed = true;
+    config.limits.input_bytes_per_s = std::size_t{1} << 30;  // these tests connect a thousand times
+  };
   return setup;
 }
 control::AddFault fault(const std::string& what, std::map<std::string, std::string> with = {}, double seconds = 0) {
