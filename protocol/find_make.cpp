@@ -22,6 +22,7 @@ bool is_number_of(const Option& option, std::string_view text) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return false;
+  if (option.whole && std::trunc(value) != value) return false;
   return option.highest > 0 ? value >= option.lowest && value <= option.highest : value > 0;
 }
 

@@ -20,13 +20,15 @@ struct Option {
   std::string_view meaning;
   double lowest = 0, highest = 0;  // limits of a number, inclusive; 0, 0 = any number above 0
   std::string_view word = {};      // word that may stand for a number, beside the default
+  bool whole = false;              // the number has no fraction
 };
-/// A text such as "number above 0" or "number from 5 to 170".
+/// A text such as "number above 0", "number from 5 to 170" or "whole number from 0 to 255".
 inline std::string numbers_of(const Option& option) {
-  if (option.highest <= 0) return "number above 0";
+  const std::string kind = option.whole ? "whole number" : "number";
+  if (option.highest <= 0) return kind + " above 0";
   char text[64];
-  std::snprintf(text, sizeof text, "number from %g to %g", option.lowest, option.highest);
-  return text + (option.word.empty() ? "" : ", or " + std::string(option.word));
+  std::snprintf(text, sizeof text, " from %.9g to %.9g", option.lowest, option.highest);
+  return kind + text + (option.word.empty() ? "" : ", or " + std::string(option.word));
 }
 using OptionValues = std::map<std::string, std::string>;
 

@@ -16,8 +16,15 @@ std::span<const protocol::Option> options() {
        "any",
        "where a controller may have frames sent: to any address, or only to its own and to multicast groups"},
       {option_name::silence_s, {}, "10", "a controller that sends no command for so long is disconnected, seconds", 5, 600},
-      {option_name::header_bytes, {}, "744", "of a frame header: older firmware has fewer", 128, 744},
-      {option_name::datagram_bytes, {}, "1400", "longest datagram: above 1472 they are fragmented on Ethernet", 1400, 65000},
+      {option_name::header_bytes, {}, "744", "of a frame header: older firmware has fewer", 128, 744, {}, true},
+      {option_name::datagram_bytes,
+       {},
+       "1400",
+       "longest datagram: above 1472 they are fragmented on Ethernet",
+       1400,
+       65000,
+       {},
+       true},
   }};
   return all;
 }

@@ -19,7 +19,7 @@ protocol::Option silence_option() {
           "never"};
 }
 protocol::Option type_option(std::string_view usual, std::string_view meaning) {
-  return {option_name::device_type, {}, usual, meaning, 0, 255};
+  return {option_name::device_type, {}, usual, meaning, 0, 255, {}, true};
 }
 
 protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now) {

@@ -75,7 +75,7 @@ class Faults(unittest.TestCase):
 
     def test_what_is_wrong_is_said(self):
         self.refuses(65, ("add", "silent-opne"), 'did you mean "silent-open"?')
-        self.refuses(65, ("add", "F01", "--with", "bytes=0"), "bytes must be a number from 1 to 4096")
+        self.refuses(65, ("add", "F01", "--with", "bytes=0"), "bytes must be a whole number from 1 to 4096")
         self.refuses(65, ("add", "L05", "--sonar", "stern"), 'no sonar is called "stern"')
         self.refuses(64, ("add", "F01", "--with", "bytes"), "NAME=VALUE")
         self.refuses(64, ("add", "F01", "--at", "pign=3"), 'did you mean "ping"?')

@@ -87,6 +87,24 @@ TEST(Options, AWordMayStandForANumber) {
   EXPECT_EQ(wrong.error().text, "option host_silence_s must be a number from 5 to 600, or never, not 'always'");
 }
 
+TEST(Options, WholeNumbersHaveNoFraction) {
+  std::set<std::string> whole;
+  for (const protocol::Vendor* vendor : protocol::vendors()) {
+    for (const protocol::Option& option : vendor->options()) {
+      if (!option.whole) continue;
+      const std::string name(option.name);
+      whole.insert(name);
+      const auto with = [&](const std::string& value) { return protocol::check_options(*vendor, {{name, value}}); };
+      EXPECT_TRUE(with(std::to_string(static_cast<int>(option.highest))).has_value()) << name;
+      for (const std::string& bad : {std::to_string(option.lowest + 0.5), std::string("1e-300")}) {
+        ASSERT_FALSE(with(bad).has_value()) << name << ' ' << bad;
+        EXPECT_THAT(with(bad).error().text, HasSubstr(name + " must be a whole number from ")) << bad;
+      }
+    }
+  }
+  EXPECT_THAT(whole, testing::UnorderedElementsAre("device_type", "header_bytes", "datagram_bytes"));
+}
+
 TEST(Options, NumbersMustBeNumbers) {
   EXPECT_TRUE(protocol::check_options(oculus(), {{"dummy_period_ms", "250"}}).has_value());
   for (const char* bad : {"", "fast", "-1", "0", "nan", "inf", "1e999", "250ms"}) {

@@ -143,8 +143,11 @@ class Check {
       return;
     }
     const auto number = number_from(value);
-    if (!number || !(*number >= parameter.lowest && *number <= parameter.highest))
-      wrong(text::format("%s must be a number from %.10g to %.10g, not \"%s\"", name.c_str(), parameter.lowest, parameter.highest,
+    const bool fits = number && *number >= parameter.lowest && *number <= parameter.highest &&
+                      (!parameter.whole || std::trunc(*number) == *number);
+    if (!fits)
+      wrong(text::format("%s must be a %s from %.10g to %.10g, not \"%s\"", name.c_str(),
+                         parameter.whole ? "whole number" : "number", parameter.lowest, parameter.highest,
                          value.substr(0, 64).c_str()));
     fault.numbers[name] = number.value_or(0);
   }

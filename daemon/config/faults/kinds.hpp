@@ -109,6 +109,7 @@ struct FaultParameter {
   std::string_view value;          // default
   double lowest = 0, highest = 0;  // limits of a number, inclusive
   std::string_view words = {};     // "a b c": one of these words instead of a number
+  bool whole = false;              // the number has no fraction
 };
 
 struct FaultKind {

@@ -221,6 +221,10 @@ TEST(Config, UnknownKeysNameTheNearest) {
               AllOf(StartsWith("sonard.yaml:7:52: sonars[0].options.gain_echo: "), HasSubstr("did you mean \"auto\"?")));
   EXPECT_THAT(why(world + vehicles + sonar + "    options: {dummy_period_ms: 0}\n"),
               StartsWith("sonard.yaml:7:32: sonars[0].options.dummy_period_ms: "));
+  for (const char* real : {"1e-300", "2.5"})
+    EXPECT_THAT(why(world + vehicles + sonar + "    options: {device_type: " + real + "}\n"),
+                AllOf(HasSubstr("sonars[0].options.device_type: "), HasSubstr("must be a whole decimal number")))
+        << real;
   EXPECT_THAT(why(world + vehicles + sonar + "    clients: {when_full: close}\n"), HasSubstr("close_new"));
 }
 

@@ -40,7 +40,7 @@ TEST(FaultPlan, ThatCannotHoldIsRefusedInItsPlace) {
   for (const Case& c : {
            Case{"  - {do: silent-opem}\n", {"sonard.yaml:8:", "\"silent-opem\" is no fault", "silent-open"}},
            Case{"  - {do: F01}\n  - {do: F01, name: b, with: {bytes: -3}}\n",
-                {"sonard.yaml:9:", "fault b", "bytes must be a number from", "\"-3\""}},
+                {"sonard.yaml:9:", "fault b", "bytes must be a whole number from", "\"-3\""}},
            Case{"  - {do: F01, with: {byte: 3}}\n", {"sonard.yaml:8:", "no parameter \"byte\"", "bytes"}},
            Case{"  - {do: D16}\n  - {do: D17, sonar: rear}\n", {"sonard.yaml:9:", "both write", "rate", "name different sonars"}},
            Case{"  - {do: L05, name: a}\n  - {do: P02, name: a}\n", {"sonard.yaml:9:", "two faults a"}},

@@ -113,10 +113,13 @@ TEST(FaultRecords, AreRefusedWithWhatIsWrongAndWhatIsPossible) {
     return faults ? std::string("accepted") : faults.error().text;
   };
   EXPECT_THAT(text(record("silent-opne")), HasSubstr("did you mean \"silent-open\"?"));
-  EXPECT_THAT(text(record("F01", {{"bytes", "0"}})), HasSubstr("bytes must be a number from 1 to 4096, not \"0\""));
+  EXPECT_THAT(text(record("F01", {{"bytes", "0"}})), HasSubstr("bytes must be a whole number from 1 to 4096, not \"0\""));
+  for (const char* real : {"1.5", "1e-300"})
+    EXPECT_THAT(text(record("F01", {{"bytes", real}})), HasSubstr("bytes must be a whole number from 1 to 4096")) << real;
+  EXPECT_THAT(text(record("F13", {{"value", "2.5"}})), HasSubstr("value must be a whole number"));
   EXPECT_THAT(text(record("F01", {{"fill", "zeros"}})), HasSubstr("did you mean \"zero\"?"));
   EXPECT_THAT(text(record("F01", {{"byte", "1"}})), HasSubstr("has no parameter \"byte\"; did you mean \"bytes\"?"));
-  EXPECT_THAT(text(record("F05", {{"value", "0xZZ"}})), HasSubstr("value must be a number"));
+  EXPECT_THAT(text(record("F05", {{"value", "0xZZ"}})), HasSubstr("value must be a whole number"));
   EXPECT_THAT(text(record("power-cycle", {{"severity", "4"}})), HasSubstr("severity must be 1, 2 or 3"));
   FaultRecord r = record("L05");
   r.at.ping = 1;
