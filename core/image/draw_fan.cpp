@@ -54,13 +54,13 @@ void draw_rings(Raster& raster, const PolarImage& image, const FanLayout& layout
     const int steps = static_cast<int>(radius * (to - from) * 2) + 2;
     for (int i = 0; i <= steps; ++i) {
       const double azimuth = from + (to - from) * i / steps;
-      blend(raster, static_cast<int>(layout.apex_x - radius * std::sin(azimuth)),
-            static_cast<int>(layout.apex_y - radius * std::cos(azimuth)), ring_colour, 0.12f);
+      blend(raster, static_cast<int>(layout.x_of(azimuth, ring * spacing)),
+            static_cast<int>(layout.y_of(azimuth, ring * spacing)), ring_colour, 0.12f);
     }
     char label[32];
     std::snprintf(label, sizeof label, "%g m", ring * spacing);
-    const int x = static_cast<int>(layout.apex_x - radius * std::sin(from)) + 3 * scale;
-    const int y = static_cast<int>(layout.apex_y - radius * std::cos(from)) - scale;
+    const int x = static_cast<int>(layout.x_of(from, ring * spacing)) + 3 * scale;
+    const int y = static_cast<int>(layout.y_of(from, ring * spacing)) - scale;
     draw_text(raster, std::min(x, layout.width - text_width(label, scale) - 1), y, label, label_colour, scale);
   }
 }
@@ -82,7 +82,7 @@ Result<void> check(const PolarImage& image, const FanStyle& style) {
 
 }  // namespace
 
-FanLayout fan_layout(const PolarImage& image, const FanStyle& style) {
+FanLayout fan_layout(const PolarImage& image, const FanStyle& style, Opens opens) {
   const double half_aperture = std::max(std::abs(image.azimuth_rad.front()), std::abs(image.azimuth_rad.back()));
   const double margin = style.rings ? 28 : 4;
   FanLayout layout;
@@ -91,9 +91,12 @@ FanLayout fan_layout(const PolarImage& image, const FanStyle& style) {
   // A very narrow fan would be very tall.
   layout.metres_per_pixel = std::max(layout.metres_per_pixel, image.range_m() / (4.0 * style.width_px));
   layout.apex_x = style.width_px / 2.0;
-  layout.apex_y = margin + image.range_m() / layout.metres_per_pixel;
-  const double below = std::max(0.0, -std::cos(half_aperture)) * image.range_m() / layout.metres_per_pixel;
-  layout.height = static_cast<int>(std::ceil(layout.apex_y + below + margin));
+  const double ahead = image.range_m() / layout.metres_per_pixel;
+  const double behind = std::max(0.0, -std::cos(half_aperture)) * ahead;
+  const bool is_up = opens == Opens::upwards;
+  layout.up = is_up ? 1 : -1;
+  layout.apex_y = margin + (is_up ? ahead : behind);
+  layout.height = static_cast<int>(std::ceil(margin + ahead + behind + margin));
   return layout;
 }
 
@@ -131,29 +134,30 @@ float FanPainter::mean(const PolarImage& image, const Footprint& of) {
   return static_cast<float>(sum / weights);
 }
 
-bool FanPainter::fits(const PolarImage& image) const {
-  return !footprints_.empty() && image.rows == shape_.rows && image.beams == shape_.beams && image.start_m == shape_.start_m &&
-         image.row_spacing_m == shape_.row_spacing_m && image.azimuth_rad == shape_.azimuth_rad;
+bool FanPainter::fits(const PolarImage& image, Opens opens) const {
+  return (layout_.up > 0) == (opens == Opens::upwards) && !footprints_.empty() && image.rows == shape_.rows &&
+         image.beams == shape_.beams && image.start_m == shape_.start_m && image.row_spacing_m == shape_.row_spacing_m &&
+         image.azimuth_rad == shape_.azimuth_rad;
 }
 
-void FanPainter::lay_out(const PolarImage& image) {
+void FanPainter::lay_out(const PolarImage& image, Opens opens) {
   shape_ = {image.rows, image.beams, image.row_spacing_m, image.azimuth_rad, {}, image.full_scale, image.start_m};
-  layout_ = fan_layout(image, style_);
+  layout_ = fan_layout(image, style_, opens);
   footprints_.clear();
   footprints_.reserve(static_cast<std::size_t>(layout_.width) * static_cast<std::size_t>(layout_.height));
   for (int y = 0; y < layout_.height; ++y) {
     for (int x = 0; x < layout_.width; ++x) {
       const double x_m = (x + 0.5 - layout_.apex_x) * layout_.metres_per_pixel;
-      const double y_m = (layout_.apex_y - y - 0.5) * layout_.metres_per_pixel;
+      const double y_m = layout_.up * (layout_.apex_y - y - 0.5) * layout_.metres_per_pixel;
       footprints_.push_back(footprint(image, x_m, y_m, layout_.metres_per_pixel));
     }
   }
 }
 
-Result<Raster> FanPainter::draw(const PolarImage& image) {
-  if (!fits(image)) {
+Result<Raster> FanPainter::draw(const PolarImage& image, Opens opens) {
+  if (!fits(image, opens)) {
     if (Result<void> sound = check(image, style_); !sound) return tl::unexpected(sound.error());
-    lay_out(image);
+    lay_out(image, opens);
   }
   Raster raster(layout_.width, layout_.height);
   for (std::size_t i = 0; i < footprints_.size(); ++i)

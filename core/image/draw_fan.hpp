@@ -1,7 +1,9 @@
-// Draws the rows and beams of a ping as a fan: the sonar is at the bottom, range increases upwards, port is on the left.
-// It uses the direction of each beam, and averages over the footprint of each pixel, so that no sample is skipped.
+// Draws the rows and beams of a ping as a fan: the sonar is at the bottom, range increases upwards, port is on the left. Of a
+// sonar that looks down the sonar is on top. It uses the direction of each beam, and averages over the footprint of each pixel,
+// so that no sample is skipped.
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -20,23 +22,29 @@ struct FanStyle {
   bool rings = true;  // range rings and their ranges in metres
 };
 
+enum class Opens { upwards, downwards };  // direction in which range increases
+
 /// Relation of metres to pixels in the picture: the sonar is at (apex_x, apex_y), y increases downwards.
 struct FanLayout {
   int width = 0, height = 0;
   double apex_x = 0, apex_y = 0, metres_per_pixel = 1;
+  double up = 1;  // -1: the fan opens downwards
+
+  double x_of(double azimuth, double range_m) const { return apex_x - range_m / metres_per_pixel * std::sin(azimuth); }
+  double y_of(double azimuth, double range_m) const { return apex_y - up * range_m / metres_per_pixel * std::cos(azimuth); }
 };
 /// Layout of the fan of an image that draw_fan accepts.
-FanLayout fan_layout(const PolarImage& image, const FanStyle& style);
+FanLayout fan_layout(const PolarImage& image, const FanStyle& style, Opens opens = Opens::upwards);
 
 /// Error for an image without rows or beams, or with bearings that do not fall from port to starboard within a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 
 /// Draws one ping after another, like draw_fan, but in a third of the time: it keeps the footprint of each pixel until rows,
-/// beams or bearings change. It needs 32 bytes per pixel.
+/// beams, bearings or the direction change. It needs 32 bytes per pixel.
 class FanPainter {
  public:
   explicit FanPainter(FanStyle style) : style_(std::move(style)) {}
-  Result<Raster> draw(const PolarImage& image);
+  Result<Raster> draw(const PolarImage& image, Opens opens = Opens::upwards);
 
  private:
   /// The area of a pixel in units of rows and beams; row or beam i is [i, i + 1).
@@ -44,8 +52,8 @@ class FanPainter {
     double row_low = 0, row_high = -1, beam_low = 0, beam_high = 0;
     bool is_outside() const { return row_high < row_low; }
   };
-  bool fits(const PolarImage& image) const;
-  void lay_out(const PolarImage& image);
+  bool fits(const PolarImage& image, Opens opens) const;
+  void lay_out(const PolarImage& image, Opens opens);
   static Footprint footprint(const PolarImage& image, double x_m, double y_m, double pixel_m);
   static float mean(const PolarImage& image, const Footprint& of);
 

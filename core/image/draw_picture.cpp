@@ -54,18 +54,16 @@ void draw_axis(Raster& raster, double left, double right, double step, const cha
 }
 
 void draw_head(Raster& raster, const SonarPicture& picture, const FanLayout& layout) {
-  const double length = picture.range_m() / layout.metres_per_pixel;
-  for (double r = 0; r < length; r += 0.5)
-    blend(raster, static_cast<int>(layout.apex_x - r * std::sin(picture.head_rad)),
-          static_cast<int>(layout.apex_y - r * std::cos(picture.head_rad)), head_colour, 0.6f);
+  for (double range_m = 0; range_m < picture.range_m(); range_m += 0.5 * layout.metres_per_pixel)
+    blend(raster, static_cast<int>(layout.x_of(picture.head_rad, range_m)),
+          static_cast<int>(layout.y_of(picture.head_rad, range_m)), head_colour, 0.6f);
 }
 
 void draw_points(Raster& raster, const SonarPicture& picture, const FanLayout& layout, Rgb colour) {
   const int radius = std::max(1, raster.width / 240);
   for (const auto& [azimuth, range_m] : picture.points) {
     if (!(range_m >= 0 && range_m <= picture.range_m())) continue;
-    const int x = static_cast<int>(layout.apex_x - range_m / layout.metres_per_pixel * std::sin(azimuth));
-    const int y = static_cast<int>(layout.apex_y - range_m / layout.metres_per_pixel * std::cos(azimuth));
+    const int x = static_cast<int>(layout.x_of(azimuth, range_m)), y = static_cast<int>(layout.y_of(azimuth, range_m));
     for (int dy = -radius; dy <= radius; ++dy)
       for (int dx = -radius; dx <= radius; ++dx)
         if (dx * dx + dy * dy <= radius * radius) blend(raster, x + dx, y + dy, colour, 1);
@@ -88,7 +86,7 @@ Result<void> check_cells(const SonarPicture& picture, const FanStyle& style) {
 }  // namespace
 
 int picture_height(const SonarPicture& picture, const FanStyle& style) {
-  if (picture.is_polar()) return fan_layout(picture.image, style).height;
+  if (picture.is_polar()) return fan_layout(picture.image, style, opens_of(picture)).height;
   const double shape = picture.kind == PictureKind::waterfall
                            ? waterfall_shape
                            : 2 * picture.elevation_rad / (picture.image.azimuth_rad.front() - picture.image.azimuth_rad.back());
@@ -98,9 +96,9 @@ int picture_height(const SonarPicture& picture, const FanStyle& style) {
 Result<Raster> PicturePainter::draw(const SonarPicture& picture) {
   const PolarImage& image = picture.image;
   if (picture.is_polar()) {
-    Result<Raster> raster = fan_.draw(image);
+    Result<Raster> raster = fan_.draw(image, opens_of(picture));
     if (!raster) return raster;
-    const FanLayout layout = fan_layout(image, style_);
+    const FanLayout layout = fan_layout(image, style_, opens_of(picture));
     if (picture.kind == PictureKind::sweep && style_.rings) draw_head(*raster, picture, layout);
     draw_points(*raster, picture, layout, style_.colours.colour(1));
     return raster;

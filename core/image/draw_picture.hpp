@@ -8,6 +8,11 @@
 
 namespace sonar {
 
+/// Multibeams, whose pictures are points, look down.
+inline Opens opens_of(const SonarPicture& picture) {
+  return picture.kind == PictureKind::points ? Opens::downwards : Opens::upwards;
+}
+
 /// Height of the picture in pixels, for the width in `style`. PicturePainter must accept the picture.
 int picture_height(const SonarPicture& picture, const FanStyle& style);
 

@@ -61,10 +61,9 @@ void put_labels(Grid& grid, const PolarImage& image, const FanLayout& layout) {
   const double spacing = ring_spacing_m(image.range_m()), edge = image.azimuth_rad.back();
   int last_line = grid.lines;  // one label a line, from near to far
   for (int ring = 1; ring * spacing <= image.range_m() * 1.0001; ++ring) {
-    const double radius = ring * spacing / layout.metres_per_pixel;
-    const int line = static_cast<int>((layout.apex_y - radius * std::cos(edge)) / (2 * dots));
-    const int column = static_cast<int>((layout.apex_x - radius * std::sin(edge)) / dots) + 2;
-    if (line >= last_line || line < 0) continue;
+    const int line = static_cast<int>(layout.y_of(edge, ring * spacing) / (2 * dots));
+    const int column = static_cast<int>(layout.x_of(edge, ring * spacing) / dots) + 2;
+    if (line == last_line || line < 0 || line >= grid.lines) continue;
     last_line = line;
     char label[32];
     const int length = std::snprintf(label, sizeof label, "%g m", ring * spacing);
@@ -153,7 +152,7 @@ Result<std::vector<std::string>> draw_terminal_picture(const SonarPicture& pictu
   }
   if (!raster) return tl::unexpected(raster.error());
   Grid grid = grid_from(*raster, (drawing.width_px + dots - 1) / dots + (style.labels ? label_columns : 0));
-  if (style.labels && picture.is_polar()) put_labels(grid, image, fan_layout(image, drawing));
+  if (style.labels && picture.is_polar()) put_labels(grid, image, fan_layout(image, drawing, opens_of(picture)));
   std::vector<std::string> lines;
   for (int line = 0; line < std::min(grid.lines, style.lines); ++line) lines.push_back(text_of(grid, line, style.colours));
   return lines;

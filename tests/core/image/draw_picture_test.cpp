@@ -75,15 +75,31 @@ TEST(SonarPicture, AWaterfallBeginsOnTopAndIsEmptyBelow) {
   EXPECT_FALSE(PicturePainter(style()).draw(picture));
 }
 
-TEST(SonarPicture, PointsLieOverTheFan) {
+TEST(SonarPicture, PointsLieOverAFanThatOpensDownwards) {
   SonarPicture picture{.kind = PictureKind::points, .image = cells(100, 2), .points = {{0.3, 5}, {0, 99}}};
   picture.image.azimuth_rad = {0.7, -0.7};
   const Raster raster = *PicturePainter(style()).draw(picture);
-  const FanLayout layout = fan_layout(picture.image, style());
-  const auto x = static_cast<int>(layout.apex_x - 5 / layout.metres_per_pixel * std::sin(0.3));
-  const auto y = static_cast<int>(layout.apex_y - 5 / layout.metres_per_pixel * std::cos(0.3));
+  const FanLayout layout = fan_layout(picture.image, style(), Opens::downwards);
+  const auto x = static_cast<int>(layout.x_of(0.3, 5)), y = static_cast<int>(layout.y_of(0.3, 5));
   EXPECT_EQ(raster.at(x, y).r, 255);
   EXPECT_EQ(raster.at(raster.width - x, y).r, 0);
+  EXPECT_LT(layout.apex_y, y);
+  EXPECT_EQ(raster.height, fan_layout(picture.image, style()).height);
+  EXPECT_LT(x, raster.width / 2) << "port is on the left";
+}
+
+TEST(SonarPicture, AFanThatOpensDownwardsIsTheOtherUpsideDown) {
+  SonarPicture picture{.kind = PictureKind::fan, .image = cells(100, 2)};
+  picture.image.azimuth_rad = {0.7, -0.7};
+  for (std::size_t i = 0; i < picture.image.samples.size(); ++i) picture.image.samples[i] = static_cast<float>(i % 255);
+  PicturePainter painter(style());
+  const Raster up = *painter.draw(picture);
+  picture.kind = PictureKind::points;
+  const Raster down = *painter.draw(picture);
+  ASSERT_EQ(up.height, down.height);
+  const int y = up.height / 3, x = up.width / 2 - 20;
+  EXPECT_NEAR(up.at(x, y).r, down.at(x, fan_layout(picture.image, style()).height - 1 - y).r, 8);
+  EXPECT_NE(up.at(x, y).r, down.at(x, y).r);
 }
 
 }  // namespace

@@ -14,13 +14,15 @@ export function polarOf(image, geometry) {
   };
 }
 
-/// The layout that `sonarctl view --png` has with that width; margin 4 without rings.
+/// The layout that `sonarctl view --png` has with that width; margin 4 without rings. `polar.up` -1: the fan opens downwards.
 export function exactLayout(polar, width, margin) {
   const half = Math.max(Math.abs(polar.azimuth_rad[0]), Math.abs(polar.azimuth_rad.at(-1)));
   const metres_per_pixel = Math.max((2 * polar.range_m * Math.sin(Math.min(half, Math.PI / 2))) / (width - 2 * margin), polar.range_m / (4 * width));
-  const apex_y = margin + polar.range_m / metres_per_pixel;
-  const below = (Math.max(0, -Math.cos(half)) * polar.range_m) / metres_per_pixel;
-  return { width, height: Math.ceil(apex_y + below + margin), apex_x: width / 2, apex_y, metres_per_pixel };
+  const ahead = polar.range_m / metres_per_pixel;
+  const behind = Math.max(0, -Math.cos(half)) * ahead;
+  const up = polar.up ?? 1;
+  const apex_y = margin + (up > 0 ? ahead : behind);
+  return { width, height: Math.ceil(margin + ahead + behind + margin), apex_x: width / 2, apex_y, up, metres_per_pixel };
 }
 
 /// The largest fan that fits between the margins {left, right, top, bottom} of a pane.
@@ -30,7 +32,7 @@ export function fittedLayout(polar, width, height, margins) {
   const tall = height - margins.top - margins.bottom;
   const metres_per_pixel = Math.max((2 * polar.range_m * Math.sin(half)) / Math.max(wide, 40), polar.range_m / Math.max(tall, 40));
   const used = polar.range_m / metres_per_pixel;
-  return { width, height, apex_x: margins.left + wide / 2, apex_y: margins.top + tall / 2 + used / 2, metres_per_pixel };
+  return { width, height, apex_x: margins.left + wide / 2, apex_y: margins.top + tall / 2 + used / 2, up: 1, metres_per_pixel };
 }
 
 /// The place between the margins of a picture that sonard has drawn, and its polar layout if it has one.
@@ -40,8 +42,8 @@ export function drawnLayout(image, polar, width, height, margins) {
   box.left = margins.left + (width - margins.left - margins.right - box.width) / 2;
   box.top = margins.top + (height - margins.top - margins.bottom - box.height) / 2;
   if (!polar) return { width, height, box };
-  const { apex_x, apex_y, metres_per_pixel } = exactLayout(polar, image.width, 4);
-  return { width, height, box, apex_x: box.left + apex_x * scale, apex_y: box.top + apex_y * scale, metres_per_pixel: metres_per_pixel / scale };
+  const { apex_x, apex_y, up, metres_per_pixel } = exactLayout(polar, image.width, 4);
+  return { width, height, box, apex_x: box.left + apex_x * scale, apex_y: box.top + apex_y * scale, up, metres_per_pixel: metres_per_pixel / scale };
 }
 
 /// Distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.
@@ -68,7 +70,7 @@ export function beamAt(azimuth_rad, azimuth) {
 /// The place under a pixel: {range_m, azimuth_rad, row, beam}, or null outside the fan.
 export function under(polar, layout, x, y) {
   const x_m = (x - layout.apex_x) * layout.metres_per_pixel;
-  const y_m = (layout.apex_y - y) * layout.metres_per_pixel;
+  const y_m = layout.up * (layout.apex_y - y) * layout.metres_per_pixel;
   const range_m = Math.hypot(x_m, y_m);
   if (range_m < polar.start_m || range_m >= polar.range_m) return null;
   const azimuth_rad = Math.atan2(-x_m, y_m);

@@ -11,8 +11,13 @@ const label_gap_px = 30;
 const degrees = (radians) => (radians * 180) / Math.PI;
 const place = (layout, range_m, azimuth) => [
   layout.apex_x - (range_m / layout.metres_per_pixel) * Math.sin(azimuth),
-  layout.apex_y - (range_m / layout.metres_per_pixel) * Math.cos(azimuth),
+  layout.apex_y - layout.up * (range_m / layout.metres_per_pixel) * Math.cos(azimuth),
 ];
+/// An arc about the sonar, from one side of the fan to the other.
+const arc = (g, layout, range_m, port, starboard) => {
+  const ends = layout.up > 0 ? [-Math.PI / 2 - port, -Math.PI / 2 - starboard] : [Math.PI / 2 + starboard, Math.PI / 2 + port];
+  g.arc(layout.apex_x, layout.apex_y, range_m / layout.metres_per_pixel, ...ends);
+};
 
 /// Formats an angle with starboard positive, as operators read it: "+15°".
 export function bearingText(azimuth_rad, digits = 0) {
@@ -33,13 +38,13 @@ function drawRings(g, polar, layout, port, starboard) {
     const outermost = (n + 1) * spacing > polar.range_m * 1.0001;
     g.strokeStyle = outermost ? edge : ring;
     g.beginPath();
-    g.arc(layout.apex_x, layout.apex_y, n * px, -Math.PI / 2 - port, -Math.PI / 2 - starboard);
+    arc(g, layout, n * spacing, port, starboard);
     g.stroke();
     if (n % every || outermost) continue;
     const [x, y] = place(layout, n * spacing, starboard);
     const flat = starboard < -1.2;
     g.textAlign = flat ? 'center' : 'left';
-    g.fillText(`${short(n * spacing)} m`, x + (flat ? 0 : 9 * Math.cos(starboard)), y + (flat ? 13 : 4 - 9 * Math.sin(starboard)));
+    g.fillText(`${short(n * spacing)} m`, x + (flat ? 0 : 9 * Math.cos(starboard)), y + (flat ? 13 : 4 - 9 * layout.up * Math.sin(starboard)));
   }
 }
 
@@ -82,7 +87,7 @@ function drawHead(g, polar, layout, head_rad) {
 function drawCursor(g, polar, layout, cursor, port, starboard) {
   g.strokeStyle = 'rgba(79, 184, 255, 0.8)';
   g.beginPath();
-  g.arc(layout.apex_x, layout.apex_y, cursor.range_m / layout.metres_per_pixel, -Math.PI / 2 - port, -Math.PI / 2 - starboard);
+  arc(g, layout, cursor.range_m, port, starboard);
   g.moveTo(layout.apex_x, layout.apex_y);
   g.lineTo(...place(layout, polar.range_m, cursor.azimuth_rad));
   g.stroke();
