@@ -15,7 +15,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
 from browser import Browser  # noqa: E402
 from foxglove_viewer import Viewer  # noqa: E402
-from page_checks import WHY_NOT, PageChecks, shown  # noqa: E402
+from page_checks import LACKING_PX, WHY_NOT, PageChecks, shown  # noqa: E402
 from running_sonard import ROOT, SONARCTL, SONARD, Daemon, eventually, run  # noqa: E402
 
 HTTP, SONAR = "127.0.0.1", "127.0.0.2"
@@ -36,15 +36,6 @@ UNCOVERED = """(() => {
     return over?.closest('#fan-glass');
   }) && !document.querySelector('#notice').offsetWidth;
 })()"""
-# The width that the names of the sonars need, beyond what they have.
-LACKING_PX = """((e) => {
-  const whole = e.cloneNode(true);
-  whole.style.cssText = 'position: absolute; max-width: none; width: max-content';
-  e.after(whole);
-  const lacking = whole.offsetWidth - e.offsetWidth;
-  whole.remove();
-  return lacking;
-})(document.querySelector('#sonar'))"""
 # Controls that can be used now, by how a test names them.
 CONTROLS = """[...document.querySelectorAll('button, select, input, summary, [tabindex="0"]')]
   .filter((e) => e.offsetWidth && !e.disabled && e.tabIndex >= 0).map((e) => e.id || e.name || e.dataset.trouble || e.dataset.tab || e.className + e.textContent)"""

@@ -14,7 +14,7 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
 from browser import Browser  # noqa: E402
-from page_checks import FAINT_WORDS, NAMELESS_CONTROLS, PAGE, SMALL_TARGETS, WHY_NOT, PageChecks, shown  # noqa: E402
+from page_checks import FAINT_WORDS, LACKING_PX, NAMELESS_CONTROLS, PAGE, SMALL_TARGETS, WHY_NOT, PageChecks, shown  # noqa: E402
 from running_sonard import ROOT, Sonard  # noqa: E402
 
 from sonard_client import OculusClient  # noqa: E402  pylint: disable=wrong-import-order
@@ -239,6 +239,8 @@ class Page(PageChecks, unittest.TestCase):
             with self.subTest(width=width):
                 page = self.open(width, height, touch=width < 800)
                 shown(page)
+                page.run("document.querySelector('#sonar').options[0].text = 'forward-looking · Surveyor 240-16'")
+                self.assertLessEqual(page.run(LACKING_PX), 0)
                 self.assert_fits(page, width)
                 page.close()
 

@@ -47,6 +47,16 @@ CUT_WORDS = """[...document.querySelectorAll('button, .chip, h2')].filter((e) =>
 WIDER_THAN = """[...document.querySelectorAll('main *, header *, nav *')].filter((e) => e.offsetWidth && !e.closest('#fan-glass, .unseen')
   && e.getBoundingClientRect().right > WIDTH + 1).map((e) => e.id || e.className || e.tagName)"""
 
+# The width that the names of the sonars need, beyond what they have.
+LACKING_PX = """((e) => {
+  const whole = e.cloneNode(true);
+  whole.style.cssText = 'position: absolute; max-width: none; width: max-content';
+  e.after(whole);
+  const lacking = whole.offsetWidth - e.offsetWidth;
+  whole.remove();
+  return lacking;
+})(document.querySelector('#sonar'))"""
+
 
 def shown(page, patience_s=60):
     """Until the page has drawn a ping."""
