@@ -45,12 +45,15 @@ bool takes(const Device& device, std::optional<double> protocol::SettingsOverrid
 void add_sonar(std::vector<Parameter>& all, const Device& device, bool has_preview) {
   const PingSettings& s = device.sonar().settings();
   const std::string at = "/" + device.config().name + "/";
-  all.push_back({at + "range_m", s.range_m});
+  // A product whose head scans may be previewed with a longer range than that with which it starts.
+  const protocol::Vendor& vendor = *device.config().profile.vendor;
+  const auto step = device.preview().on() ? vendor.scan_step(1, device.sonar().state()) : std::nullopt;
+  all.push_back({at + "range_m", step ? step->settings.range_m : s.range_m});
   const auto rate_hz = static_cast<double>(s.rate_hz);
   using Setting = protocol::SettingsOverride;
   if (takes(device, &Setting::rate_hz, rate_hz > 0 ? rate_hz : 1) || takes(device, &Setting::rate_hz, 0))
     all.push_back({at + "rate_hz", rate_hz});
-  const double gain_percent = device.config().profile.vendor->gain_percent(device.sonar().state());
+  const double gain_percent = vendor.gain_percent(device.sonar().state());
   if (takes(device, &Setting::gain_percent, gain_percent)) all.push_back({at + "gain_percent", gain_percent});
   if (device.config().profile.model->modes.size() > 1) all.push_back({at + "mode", std::int64_t{s.mode}});
   all.push_back({at + "beams", std::int64_t{s.beam_count}});
