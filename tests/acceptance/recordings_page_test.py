@@ -28,12 +28,12 @@ def is_message(topic):
 
 
 def record(maker, pings):
-    """A demo's recording, started and stopped as from the page, while a driver is connected."""
-    with demo(maker), subprocess.Popen([SONARCTL, "listen", f"{SONAR}:{DEMOS[maker][2]}", "--quiet"], stdout=subprocess.DEVNULL,
-                                       stderr=subprocess.DEVNULL) as driver:
+    """A recording of the demo that runs, started and stopped as from the page, while a driver is connected."""
+    with subprocess.Popen([SONARCTL, "listen", f"{SONAR}:{DEMOS[maker][2]}", "--quiet"], stdout=subprocess.DEVNULL,
+                          stderr=subprocess.DEVNULL) as driver:
         name = f"{maker}.mcap"
         assert run(SONARCTL, "recording", "start", name).returncode == 0
-        eventually(lambda: f" {pings} pings" in run(SONARCTL, "status").stdout or more_than(pings), 300)
+        eventually(lambda: more_than(pings), 300)
         assert run(SONARCTL, "recording", "stop").returncode == 0
         driver.terminate()
     return pathlib.Path("sonard-recordings") / name
@@ -70,12 +70,18 @@ class Recordings(PageChecks, unittest.TestCase):
                                                        {"name": OWN + name, "value": value}], id=name)
             return viewer.wait_for(lambda kind, word: kind == "word" and word["op"] == "parameterValues" and word.get("id") == name)
 
+        def seek(position_s, is_there):
+            tell("position_s", position_s)
+            viewer.wait_for(lambda kind, value: is_message("/recording/ping")(kind, value) and is_there(value[1] - first_ns))
+
+        def is_last(ns):
+            return ns > 0.9e9 * trajectory["duration_s"]
+
         tell("paused", True)
-        tell("position_s", trajectory["duration_s"])
-        viewer.wait_for(lambda kind, value: is_message("/recording/ping")(kind, value) and
-                        value[1] - first_ns > 0.9e9 * trajectory["duration_s"])
-        tell("position_s", 0.0)
-        viewer.wait_for(lambda kind, value: is_message("/recording/ping")(kind, value) and value[1] == first_ns)
+        if any(is_last(ns - first_ns) for topic, ns, _ in viewer.messages[-20:] if topic == "/recording/ping"):
+            seek(0.0, lambda ns: ns == 0)  # a short recording may have ended meanwhile: no ping is shown twice in turn
+        seek(trajectory["duration_s"], is_last)
+        seek(0.0, lambda ns: ns == 0)
         tell("speed", 4.0)
         tell("paused", False)
         viewer.wait_for(lambda kind, value: is_message("/recording/ping")(kind, value) and value[1] > first_ns)
@@ -83,9 +89,10 @@ class Recordings(PageChecks, unittest.TestCase):
     def test_every_demo_is_recorded_and_played(self):
         for maker, (kind, pings, port) in DEMOS.items():
             with self.subTest(demo=maker):
-                path = record(maker, max(pings + 10, 5))
-                with demo("oculus"), Viewer(HTTP, path=f"/?recording={path.name}") as viewer:
-                    self.look(viewer, kind)
+                with demo(maker):
+                    path = record(maker, pings + 10)
+                    with Viewer(HTTP, path=f"/?recording={path.name}") as viewer:
+                        self.look(viewer, kind)
                 # On a slow machine doctor and listen may take the whole recording, which ends a replay without --loop.
                 with Replay(path, "--loop") as replay, Viewer(HTTP) as viewer:
                     self.look(viewer, kind)
@@ -124,8 +131,8 @@ class Recordings(PageChecks, unittest.TestCase):
 
     @unittest.skipIf(WHY_NOT, WHY_NOT)
     def test_page(self):
-        path = record("oculus", 20)
         with demo("oculus"), Browser() as browser:
+            path = record("oculus", 20)
             for width, height, theme in ((1600, 1000, "dark"), (390, 844, "light")):
                 with self.subTest(width=width):
                     page = self.opened(browser.open(f"http://{HTTP}:8088/", width, height, touch=width < 800, theme=theme))

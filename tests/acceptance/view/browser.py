@@ -68,7 +68,7 @@ class Page:
     def __init__(self, url, width, height, scale=1, touch=False, script="", theme="dark"):
         host, _, port = url.netloc.partition(":")
         self.socket = WebSocket.connect(socket.create_connection((host, int(port)), timeout=180), url.netloc, url.path)
-        self.calls, self.requests, self.errors = 0, [], []
+        self.calls, self.answers, self.requests, self.errors = 0, {}, [], []
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.call(f"{domain}.enable")
         self.size(width, height, scale, touch)
@@ -94,19 +94,30 @@ class Page:
         self.call("Emulation.setTouchEmulationEnabled", enabled=touch)
 
     def call(self, method, **parameters):
+        return self.answer(self.ask(method, **parameters))
+
+    def ask(self, method, **parameters):
+        """Sends a call; answer() waits for what it returns."""
         self.calls += 1
         self.socket.send(TEXT, json.dumps({"id": self.calls, "method": method, "params": parameters}))
-        while True:
+        return self.calls, method
+
+    def answer(self, asked):
+        number, method = asked
+        while number not in self.answers:
             message = self.socket.receive()
             if message is None:
                 raise ConnectionError("the browser has closed the page")
             word = json.loads(message[1])
-            if word.get("id") == self.calls:
-                if "error" in word:
-                    kind = Navigated if "navigated" in word["error"]["message"] else RuntimeError
-                    raise kind(f"{method}: {word['error']['message']}")
-                return word["result"]
-            self.note(word)
+            if "id" in word:
+                self.answers[word["id"]] = word
+            else:
+                self.note(word)
+        word = self.answers.pop(number)
+        if "error" in word:
+            kind = Navigated if "navigated" in word["error"]["message"] else RuntimeError
+            raise kind(f"{method}: {word['error']['message']}")
+        return word["result"]
 
     def note(self, word):
         """Requests, and what the console holds against the page."""
@@ -147,12 +158,17 @@ class Page:
     def text(self, selector):
         return self.run(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''")
 
-    def press(self, key):
+    def press(self, key, times=1):
+        """So many presses are sent at once: each alone would wait for the browser, which is slow where it draws without a GPU."""
         code = {" ": "Space", "?": "Slash"}.get(key, key)
         text = {"text": key} if len(key) == 1 else {"text": "\r"} if key == "Enter" else {}
         number = {"windowsVirtualKeyCode": KEY_NUMBERS[key]} if key in KEY_NUMBERS else {}  # without it the browser does nothing
-        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, **text, **number)
-        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, code=code, **number)
+        asked = []
+        for _ in range(times):
+            asked.append(self.ask("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, **text, **number))
+            asked.append(self.ask("Input.dispatchKeyEvent", type="keyUp", key=key, code=code, **number))
+        for each in asked:
+            self.answer(each)
 
     def click(self, selector):
         """Waits for the element: a message of the daemon may put it there, or replace it."""

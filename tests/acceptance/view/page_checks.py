@@ -58,6 +58,10 @@ LACKING_PX = """((e) => {
 })(document.querySelector('#sonar'))"""
 
 
+# Resolved when the page has been laid out and drawn as it is now.
+LAID_OUT = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
 def shown(page, patience_s=60):
     """Until the page has drawn a ping."""
     page.wait("/\\d/.test(document.querySelector('#ping-number').textContent)", patience_s)
@@ -140,7 +144,7 @@ class PageChecks:
         for tab in TABS if width < 820 else TABS[:1]:
             if width < 820:
                 page.click(f"#tabs [data-tab={tab}]")
-                time.sleep(0.5)
+                page.run(LAID_OUT)
             self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
             self.assertEqual(page.run(WIDER_THAN.replace("WIDTH", str(width))), [], tab)
             self.assertEqual(page.run(CUT_WORDS), [], tab)
