@@ -1,5 +1,5 @@
 // Limits of what the hosts of one address may do at the ports of all sonars, beside what a session limits: connect, and send
-// datagrams. What is beyond is dropped, as by a full queue; other addresses are not affected. Pure arithmetic, as WorkRate.
+// datagrams. What is beyond waits or is dropped, as by a full queue; other addresses are not affected. Pure arithmetic.
 #pragma once
 
 #include "daemon/server/connections/work_rate.hpp"
@@ -13,8 +13,9 @@ class PortGuard {
   /// limits.input_bytes_per_s. Drivers that reconnect need a few.
   static constexpr std::size_t connections_per_s(std::size_t per_s) { return std::max<std::size_t>(10, per_s / 10240); }
 
-  bool takes_connection(const std::string& address, std::size_t per_s, Steady::time_point now) {
-    return connections_.pause_after(address, 1, connections_per_s(per_s), now).count() == 0;
+  /// How long a connection of the address must wait before it is served, perhaps 0.
+  Steady::duration pause_before_connection(const std::string& address, std::size_t per_s, Steady::time_point now) {
+    return connections_.pause_after(address, 1, connections_per_s(per_s), now);
   }
   /// `per_s`: limits.input_bytes_per_s.
   bool takes_datagram(const std::string& address, std::size_t bytes, std::size_t per_s, Steady::time_point now) {

@@ -119,12 +119,13 @@ void Device::start() {
   for (TcpPort& tcp : tcp_ports_)
     tcp.listener.start(
         [this, port = tcp.port](tcp::socket socket) {
-          if (admits(socket)) on_client_socket(std::move(socket), *port);
+          admit(std::move(socket), [this, port](tcp::socket admitted) { on_client_socket(std::move(admitted), *port); });
         },
         fault);
   observer_listener_.start(
       [this](tcp::socket socket) {
-        if (admits(socket)) on_arrival(std::move(socket), {}, Role::observer, tcp_ports_.front().port);
+        admit(std::move(socket),
+              [this](tcp::socket admitted) { on_arrival(std::move(admitted), {}, Role::observer, tcp_ports_.front().port); });
       },
       fault);
   for (DatagramPort& port : datagram_ports_) port.start();
@@ -151,7 +152,7 @@ void Device::stop(const std::string& why) {
 
 /// True when nothing of the device uses a socket any more, so that it may be destroyed.
 bool Device::gone() const {
-  return sessions_.empty() && streams_.empty() && refusing_ == 0 && !sonar_.busy() &&
+  return sessions_.empty() && streams_.empty() && refusing_ == 0 && waiting_ == 0 && !sonar_.busy() &&
          std::all_of(http_.begin(), http_.end(), [](const SonarHttp& http) { return http.gone(); });
 }
 

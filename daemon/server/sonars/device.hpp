@@ -163,7 +163,9 @@ class Device final : public SessionParent {
   Result<void> open(const protocol::Port& port);
   Result<DatagramPort*> datagram_port(std::uint16_t number);
   Result<void> open_observers();
-  bool admits(const tcp::socket& socket);
+  using OnAdmitted = std::function<void(tcp::socket)>;
+  void admit(tcp::socket socket, OnAdmitted serve);
+  asio::awaitable<void> serve_later(tcp::socket socket, std::chrono::steady_clock::duration pause, OnAdmitted serve);
   void on_client_socket(tcp::socket socket, const protocol::Port& port);
   std::optional<std::vector<protocol::Bytes>> on_limited_datagram(const Endpoint& from, protocol::BytesView datagram,
                                                                   const std::function<std::vector<protocol::Bytes>()>& act);
@@ -215,8 +217,8 @@ class Device final : public SessionParent {
   std::list<SessionPointer> sessions_;
   std::list<StreamPointer> streams_;
   std::list<std::pair<Endpoint, std::chrono::steady_clock::time_point>> closed_;  // receivers, and when they are tried again
-  int refusing_ = 0;
-  std::optional<Visit> refused_, gone_, searched_;  // the last ones
+  int refusing_ = 0, waiting_ = 0;                                                // connections
+  std::optional<Visit> refused_, gone_, searched_;                                // the last ones
   std::string silenced_by_;
 
   bool started_ = false, stopping_ = false;

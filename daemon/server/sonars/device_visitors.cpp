@@ -6,17 +6,41 @@
 
 namespace sonar {
 
-/// A host that connects too often is turned away before that costs time. Its sockets are closed when they go out of scope.
-bool Device::admits(const tcp::socket& socket) {
+/// A host that connects too often waits before it costs time, as one that opens and closes without a pause must not fail. Only
+/// few wait; the others of the address are refused.
+void Device::admit(tcp::socket socket, OnAdmitted serve) {
+  constexpr int most_waiting = 8;
   error_code ec;
   const std::string ip = socket.remote_endpoint(ec).address().to_string();
-  if (network_.admission.guard().takes_connection(ip, limits_.input_bytes_per_s, std::chrono::steady_clock::now())) return true;
-  sonar_.count_refused_client();
-  refused_ = Visit{ip, "it connects too often"};
+  const auto pause =
+      network_.admission.guard().pause_before_connection(ip, limits_.input_bytes_per_s, std::chrono::steady_clock::now());
+  if (pause.count() == 0) return serve(std::move(socket));
   log_limited(
-      network_.log, storms_, LogLevel::warning, "client refused: its address connects too often",
+      network_.log, storms_, LogLevel::warning, "client delayed: its address connects too often",
       {{"sonar", config().name}, {"address", ip}, {"limit_per_s", PortGuard::connections_per_s(limits_.input_bytes_per_s)}});
-  return false;
+  if (waiting_ >= most_waiting || stopping_) {
+    sonar_.count_refused_client();
+    refused_ = Visit{ip, "it connects too often"};
+    return;
+  }
+  ++waiting_;
+  asio::co_spawn(
+      network_.io,
+      [this, s = std::move(socket), pause, then = std::move(serve)]() mutable {
+        return serve_later(std::move(s), pause, std::move(then));
+      },
+      [this](std::exception_ptr fault) {
+        if (fault) on_fault(text_of(fault));
+        --waiting_;
+        parent_.on_change();
+      });
+}
+
+asio::awaitable<void> Device::serve_later(tcp::socket socket, std::chrono::steady_clock::duration pause, OnAdmitted serve) {
+  asio::steady_timer timer(network_.io, pause);
+  error_code ec;
+  co_await timer.async_wait(into(ec));
+  if (!stopping_) serve(std::move(socket));
 }
 
 void Device::on_client_socket(tcp::socket socket, const protocol::Port& port) {

@@ -81,12 +81,16 @@ TEST(PortGuard, ConnectionsOfOneAddressAreLimitedAndThoseOfOthersAreNot) {
   PortGuard guard;
   auto now = Steady::time_point(std::chrono::hours(5));
   std::size_t taken = 0;
-  for (int i = 0; i < 50000; ++i, now += milliseconds(1) / 10) taken += guard.takes_connection("storm", per_s, now);
+  const auto is_taken = [&](const char* address, Steady::time_point at) {
+    return guard.pause_before_connection(address, per_s, at).count() == 0;
+  };
+  for (int i = 0; i < 50000; ++i, now += milliseconds(1) / 10) taken += is_taken("storm", now);
   EXPECT_EQ(PortGuard::connections_per_s(per_s), 102u);
   EXPECT_GE(taken, 102u);
   EXPECT_LE(taken, 6 * 102u) << "10,000 a second for 5 s";
-  EXPECT_TRUE(guard.takes_connection("driver", per_s, now));
-  EXPECT_TRUE(guard.takes_connection("storm", per_s, now + seconds(2))) << "a driver of that address after its storm";
+  EXPECT_TRUE(is_taken("driver", now));
+  EXPECT_LE(guard.pause_before_connection("storm", per_s, now), seconds(1));
+  EXPECT_TRUE(is_taken("storm", now + seconds(2))) << "a driver of that address after its storm";
 }
 
 TEST(PortGuard, DatagramsAreLimitedByWorkAndBySocket) {
