@@ -45,7 +45,7 @@ FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceSta
   for (const protocol::Port& port : vendor.ports())
     if (port.kind == protocol::Port::Kind::tcp_stream)
       for (const Bytes& part : *parts(port)) whole->insert(whole->end(), part.begin(), part.end());
-  bytes_ = std::move(whole);
+  if (recorded_ == nullptr || !whole->empty()) bytes_ = std::move(whole);
 }
 
 FramedPing::AtPort& FramedPing::at(const protocol::Port& port) {
