@@ -267,7 +267,7 @@ class RenderFiles(unittest.TestCase):
             self.assertFalse(result["switches"]["specular"])
             self.assertTrue(result["switches"]["multipath"])
             self.assertTrue(result["switches"]["noise"])
-            self.assertEqual(result["parts_had"], ["leak"])  # of their own
+            self.assertEqual(result["parts_had"], ["texture", "leak"])  # of their own
 
 
 if __name__ == "__main__":
