@@ -272,9 +272,10 @@ void PingStream::take(std::size_t port, std::span<const std::byte> bytes) {
     keep(port, recording::Origin::device, message);
     carry_out(host_->on_bytes(port, message, now()));
   };
-  if (!splitter_ || port != 0) return give(bytes);
-  splitter_->append({}, bytes);
-  while (const auto message = splitter_->next()) give(message->bytes);
+  const auto splitter = splitters_.find(port);
+  if (splitter == splitters_.end()) return give(bytes);
+  splitter->second.append({}, bytes);
+  while (const auto message = splitter->second.next()) give(message->bytes);
 }
 
 void PingStream::keep(std::size_t port, recording::Origin from, std::span<const std::byte> bytes) {

@@ -7,6 +7,7 @@
 #include <deque>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -67,7 +68,11 @@ class PingStream {
  private:
   PingStream(const Make& make, Endpoint device, std::unique_ptr<protocol::Host> host, bool keeps_messages)
       : make_(&make), device_(std::move(device)), host_(std::move(host)), keeps_(keeps_messages) {
-    if (keeps_ && make.codec.framing != nullptr) splitter_.emplace(recording::Origin::device, *make.codec.framing);
+    if (!keeps_ || make.codec.framing == nullptr) return;
+    using Kind = protocol::HostPort::Kind;
+    for (std::size_t port = 0; port < make.ports.size(); ++port)
+      if (port == 0 || (make.ports.front().kind == Kind::tcp && make.ports[port].kind == Kind::tcp))
+        splitters_.try_emplace(port, recording::Origin::device, *make.codec.framing);
   }
   Result<void> start(std::optional<Socket> connected, std::chrono::milliseconds patience);
   Result<Socket> open_port(std::size_t port, std::chrono::milliseconds patience);
@@ -90,9 +95,10 @@ class PingStream {
   bool is_started_ = false;                          // the host must tell the sonar when it leaves
   std::ofstream record_;
   bool keeps_ = false;
-  std::vector<recording::RecordedMessage> kept_;        // messages since the last item
-  std::optional<recording::MessageSplitter> splitter_;  // splits the bytes of the first port, while messages are kept
-  Time last_kept_{};                                    // UNIX time, which never decreases
+  std::vector<recording::RecordedMessage> kept_;  // messages since the last item
+  // While messages are kept: splits the bytes of a port, so that messages of several ports do not come into each other.
+  std::map<std::size_t, recording::MessageSplitter> splitters_;
+  Time last_kept_{};  // UNIX time, which never decreases
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };
 

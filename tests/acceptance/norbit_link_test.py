@@ -8,6 +8,7 @@ import tempfile
 import unittest
 import zlib
 
+import mcap_checker
 import tshark as shark
 from pcap_writer import Capture
 from running_sonard import ROOT, SONARCTL, Sonard, eventually, run
@@ -92,6 +93,20 @@ class Link(unittest.TestCase):
             done = run(SONARCTL, "listen", f"{daemon.address}:{BATHYMETRY}", "--range", 20, "--rate", 5, "--pings", 3)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertIn("points from", done.stdout)
+
+    def test_a_recording_holds_whole_packets_of_all_ports(self):
+        with Sonard(scene="l-targets.yaml", profile="norbit-wbms") as daemon, tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "norbit.mcap"
+            done = run(SONARCTL, "record", f"{daemon.address}:{BATHYMETRY}", "--mcap", path, "--range", 12, "--rate", 10, "--pings", 6)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            messages = [data for topic, _, data in mcap_checker.check(path.read_bytes()).messages if topic.endswith("/device")]
+        kinds = []
+        for data in messages:
+            magic, kind, size, _, _, crc = struct.unpack_from("<6I", data) if len(data) >= 24 else (0,) * 6
+            if magic == 0xDEADBEEF:  # else a reply to a command
+                self.assertEqual((size, zlib.crc32(data[24:])), (len(data), crc))
+                kinds.append(kind)
+        self.assertGreaterEqual((kinds.count(1), kinds.count(2)), (5, 5))
 
     @unittest.skipIf(shark.why_not(), shark.why_not())
     def test_tshark_reads_the_same(self):
