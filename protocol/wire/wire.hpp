@@ -255,8 +255,9 @@ class Locator : public Visitor<Locator<Meaning>> {
   constexpr void means(Meaning meaning) { is_wanted_ = meaning == wanted_; }
   constexpr void find(Field::Type type, std::size_t size) {
     if (!std::exchange(is_wanted_, false)) return;
-    if (found && found->offset + found->size == offset_)
-      found = Field{Field::Type::bytes, found->offset, found->size + size};
+    const Field before = found.value_or(Field{});  // GCC 14 warns falsely of *found here
+    if (found && before.offset + before.size == offset_)
+      found = Field{Field::Type::bytes, before.offset, before.size + size};
     else
       found = Field{type, offset_, size};
   }
