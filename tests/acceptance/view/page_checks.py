@@ -63,8 +63,8 @@ LAID_OUT = "new Promise((done) => requestAnimationFrame(() => requestAnimationFr
 
 
 def shown(page, patience_s=60):
-    """Until the page has drawn a ping."""
-    page.wait("/\\d/.test(document.querySelector('#ping-number').textContent)", patience_s)
+    """Until the page has drawn a ping and lists the sonars: it does not wait for the list to draw."""
+    page.wait("/\\d/.test(document.querySelector('#ping-number').textContent) && document.querySelector('#sonar').options.length", patience_s)
 
 
 class PageChecks:
