@@ -189,7 +189,7 @@ class Viewer:
         return {p["name"]: p.get("value") for p in self._values_for(request)}
 
     def set(self, name, value):
-        """What holds afterwards; None: there is no such parameter."""
+        """Returns the value that holds afterwards; None if there is no such parameter."""
         self.say(op="setParameters", parameters=[{"name": name, "value": value}], id="set " + name)
         values = self._values_for("set " + name)
         return values[0].get("value") if values else None

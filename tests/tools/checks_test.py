@@ -97,7 +97,7 @@ class Configure(unittest.TestCase):
         done = self.setup('begin_aside log sh -c "exec 3>held; sleep 600"; exec 4<held')  # goes on when it has begun
         self.assertEqual(done.returncode, 0, done.stderr)
         ended = select.poll()
-        ended.register(reader, 0)  # when nobody holds the other end any more
+        ended.register(reader, 0)  # POLLHUP: the last writer has closed the pipe
         self.assertEqual(ended.poll(60_000), [(reader, select.POLLHUP)])
 
 

@@ -4,17 +4,17 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "daemon/emulator/connections/actions.hpp"
 #include "protocol/recorded/codec.hpp"
 
 namespace sonar {
 
 struct PlayedPing {
   Time at{};
-  std::vector<std::pair<std::uint16_t, recording::Bytes>> parts;  // as in PartsByPort: port, or 0, and message
+  PartsByPort parts;
 };
 
 class PlayedPings {
@@ -25,7 +25,7 @@ class PlayedPings {
   PlayedPings(recording::RecordingReader& reader, const recording::Codec& codec) : reader_(reader), codec_(codec) {}
   /// Looks at the first ping, and reads all of a scan. bad_data: there is none, or a scan is too long; `file` is for the error.
   Result<void> open(const std::string& file);
-  /// Whether it is a mechanical scan: then nearest() applies, else next().
+  /// True for a mechanical scan, whose lines nearest() finds; next() returns the pings of all others.
   bool is_scan() const { return !lines_.empty(); }
 
   /// The next ping; nullopt at the end. Packets of different ports that follow each other are one ping.

@@ -9,7 +9,7 @@
 
 namespace sonar {
 
-/// One coroutine uses it, on `io`. The reader must outlive it, and is not touched by others once next() was called.
+/// One coroutine uses it. The reader must outlive it, and is not touched by others once next() was called.
 class ReadAhead {
  public:
   explicit ReadAhead(recording::RecordingReader& reader) : reader_(reader) {}

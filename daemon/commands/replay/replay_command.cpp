@@ -4,6 +4,7 @@
 #include <csignal>
 
 #include "core/text/arguments.hpp"
+#include "core/text/counted.hpp"
 #include "core/text/decimal.hpp"
 #include "daemon/commands/replay/replay_page.hpp"
 #include "daemon/commands/replay/replay_server.hpp"
@@ -131,7 +132,7 @@ Result<void> run_replay(const ReplayCommand& command) {
     if (!device->is_only_seen.empty()) return server.outcome();
     const ReplayServer::Figures done = server.figures();
     log.announce("served " + std::to_string(done.messages) + " messages, " + std::to_string(done.bytes) + " bytes, to " +
-                 std::to_string(done.clients) + (done.clients == 1 ? " client\n" : " clients\n"));
+                 text::counted(done.clients, "client") + "\n");
     return server.outcome();
   };
   // The sonar's ports are opened first. If one is in use, the command ends; without the page it continues.
