@@ -19,7 +19,7 @@ class PortGuard {
   }
   /// `per_s`: limits.input_bytes_per_s.
   bool takes_datagram(const std::string& address, std::size_t bytes, std::size_t per_s, Steady::time_point now) {
-    return datagrams_.pause_after(address, bytes + work::of_datagram, per_s, now).count() == 0;
+    return datagrams_.takes(address, bytes + work::of_datagram, per_s, now);
   }
   /// Counts the work that a datagram caused.
   void count(const std::string& address, std::size_t amount, std::size_t per_s, Steady::time_point now) {

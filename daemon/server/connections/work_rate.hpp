@@ -38,6 +38,10 @@ class WorkRate {
     rate.forgive_beyond(longest_pause);
     return std::min(pause, Steady::duration(longest_pause));
   }
+  /// Counts the work as pause_after() does. False: the address has no work left, so that this is to be dropped.
+  bool takes(const std::string& address, std::size_t amount, std::size_t per_s, Steady::time_point now) {
+    return pause_after(address, amount, per_s, now).count() == 0;
+  }
 
  private:
   void forget_one() {

@@ -126,8 +126,7 @@ asio::awaitable<void> MavlinkServer::receive(Link& link) {
     if (ec) continue;  // an ICMP answer: the port is not open yet
     const auto now = std::chrono::steady_clock::now();
     const std::size_t work = work_of_datagram + work_of_byte * n;  // a frame, which may be a pose, has 12 bytes or more
-    const bool taken =
-        link.of_address.pause_after(from.address().to_string(), work, config_.limits.input_bytes_per_s, now).count() == 0;
+    const bool taken = link.of_address.takes(from.address().to_string(), work, config_.limits.input_bytes_per_s, now);
     if (taken)
       on_datagram(link, mavlink::BytesView(buffer).first(n), from);
     else

@@ -155,9 +155,8 @@ asio::awaitable<void> PoseServer::receive(Port& port) {
     }
     const auto datagram = std::span(buffer).first(n);
     const auto now = std::chrono::steady_clock::now();
-    const auto owed =
-        of_address_.pause_after(from.address().to_string(), work_of(port.encoding, datagram), limits_.input_bytes_per_s, now);
-    const bool taken = owed.count() == 0;
+    const bool taken =
+        of_address_.takes(from.address().to_string(), work_of(port.encoding, datagram), limits_.input_bytes_per_s, now);
     if (taken)
       on_datagram(port.encoding, datagram, from);
     else
