@@ -72,7 +72,8 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
   using Candidate = std::pair<const Make*, Endpoint>;
   std::vector<Candidate> streams, others;
   for (const Make& one : protocol::makes()) {
-    if (make != nullptr ? make != &one : make_at(one.ports.front().number) != &one) continue;  // of makes with one port the first
+    // Without a given make, only the first of the makes that share a port is tried.
+    if (make != nullptr ? make != &one : make_at(one.ports.front().number) != &one) continue;
     const Endpoint at{device.host, make != nullptr && device.port != 0 ? device.port : one.ports.front().number};
     (one.ports.front().kind == Kind::tcp ? streams : others).emplace_back(&one, at);
   }

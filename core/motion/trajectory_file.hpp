@@ -37,7 +37,7 @@ struct TrajectoryFile {
   Ns begins_at{0};                    // the earliest stamp, which is time 0 in the trajectories
   Ns duration{0};                     // time from the earliest to the latest stamp
   std::size_t replaced = 0;           // poses that were replaced by a later line with the same stamp
-  std::string_view unit = "seconds";  // of the stamps in the file
+  std::string_view unit = "seconds";  // unit of the stamps in the file
   bool unit_by_steps = false;         // neither the file nor its format names the unit: it is guessed from the steps
 };
 

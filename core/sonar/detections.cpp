@@ -161,7 +161,7 @@ std::vector<std::optional<Found>> loudest_peaks(const Fan& fan, const Levels& le
                                                 double reach_m) {
   const PingSettings& settings = fan.ping.request.settings;
   std::vector<std::optional<Found>> found(static_cast<std::size_t>(fan.directions));
-  std::vector<std::uint32_t> most(static_cast<std::size_t>(level.beams));  // of each beam
+  std::vector<std::uint32_t> most(static_cast<std::size_t>(level.beams));  // the largest code of each beam
   for (int row = 0; row < level.rows; ++row)
     for (int b = 0; b < level.beams; ++b) {
       std::uint32_t& of_beam = most[static_cast<std::size_t>(b)];

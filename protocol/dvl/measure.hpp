@@ -8,8 +8,8 @@ namespace sonar::dvl {
 
 struct Beam {
   bool is_valid = false;
-  double velocity_mps = 0;  // of the device along the beam, positive towards the ground
-  double sigma_mps = 0;     // of its noise
+  double velocity_mps = 0;  // the device's velocity along the beam, positive towards the ground
+  double sigma_mps = 0;     // standard deviation of the velocity's noise
   double distance_m = -1;   // in the device's metres
   double rssi_dbm = 0;
 };

@@ -12,7 +12,7 @@
 namespace sonar::dvl {
 
 inline constexpr std::size_t beam_count = 4;
-inline constexpr double tilt_rad = rad_from_deg(22.5);  // of a beam, off the axis
+inline constexpr double tilt_rad = rad_from_deg(22.5);  // angle between a beam and the axis
 /// A distance along a beam, and the altitude above level ground that it belongs to.
 inline const double altitude_per_distance = std::cos(tilt_rad);
 
@@ -20,7 +20,7 @@ struct Product {
   const char *profile, *name;
   std::uint16_t part_number;
   double centre_hz, beam_deg, source_level_db, highest_m, fastest_mps;
-  double range_unit_m;  // of the pixels of its pings
+  double range_unit_m;  // unit of the ranges in the pixels of its pings
 };
 const Product& product_of(const SonarModel& model);
 std::span<const std::shared_ptr<const SonarModel>> models();

@@ -14,7 +14,7 @@ namespace sonar::dvl {
 /// Dead reckoning, in the axes of the vehicle (x forward, y to starboard, z down) as they were at its start.
 struct Reckoning {
   bool is_started = false;
-  Time at{};                  // of the last ping
+  Time at{};                  // time of the last ping
   Quatd first, last;          // vehicle in the world: at the start, and at the last ping
   Vec3d position_m;           // at the last ping
   Vec3d velocity_mps;         // from then on, in those axes

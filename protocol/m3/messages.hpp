@@ -16,7 +16,7 @@ using wire::Bytes;
 using wire::BytesView;
 
 inline constexpr std::uint16_t tcp_port = 20001;
-inline constexpr std::size_t most_beams = 1024;  // of the table of directions
+inline constexpr std::size_t most_beams = 1024;  // size of the table of directions
 
 enum class DataType : std::uint16_t {
   complex_floats = 0x1002,  // I and Q of each sample, 32 bits each
@@ -66,11 +66,11 @@ constexpr void fields(V& visit, M& m) {
 struct DataFront {
   std::uint32_t version = 14, sonar_id = 0;
   std::array<std::uint32_t, 8> sonar_info{};  // the first: serial number (unknown)
-  std::uint32_t time_s = 0, time_ms = 0;      // UTC, when it fires
+  std::uint32_t time_s = 0, time_ms = 0;      // UTC time at which the ping is fired
   float sound_speed_mps = 0;
-  std::uint32_t samples = 0;        // of each beam
+  std::uint32_t samples = 0;        // samples in each beam
   float near_m = 0, far_m = 0;      // limits of the mode
-  float start_s = 0, length_s = 0;  // of the sampling window; `start_s` counts from the start of the ping
+  float start_s = 0, length_s = 0;  // sampling window; `start_s` counts from the start of the ping
   std::uint16_t beams = 0, processing = 0;
 };
 template <class V, wire::Like<DataFront> M>
@@ -101,7 +101,7 @@ constexpr void fields(V& visit, M& m) {
   visit("angle", m.angle_deg);
 }
 
-/// The rest of the data header: how the ping was made, attitude and place, and zeros up to 8512 bytes.
+/// The rest of the data header: how the ping was made, attitude and position, and zeros up to 8512 bytes.
 struct DataBack {
   float sample_interval_s = 0;
   std::uint16_t image_destination = 0;
@@ -115,10 +115,10 @@ struct DataBack {
   std::array<char, 64> pulse_name{};
   GainLaw gain;
   float heading_deg = 0, magnetic_variation_deg = 0, pitch_deg = 0, roll_deg = 0, depth_m = 0, temperature_c = 0;
-  std::array<float, 3> offset_m{}, rotation_deg{};  // of the head: x to starboard, y ahead, z up
-  std::uint32_t mounting = 0;                       // looks ahead
+  std::array<float, 3> offset_m{}, rotation_deg{};  // mounting of the head: x to starboard, y ahead, z up
+  std::uint32_t mounting = 0;                       // 0: the head looks ahead
   double latitude_deg = 0, longitude_deg = 0;
-  float transmit_s = 0;  // of the pulse's start, from the start of the ping
+  float transmit_s = 0;  // start of the pulse, from the start of the ping
   std::uint8_t head_sensors = 1, head_status = 0, sound_speed_source = 1, time_mode = 1;
   float own_heading_deg = 0, own_pitch_deg = 0, own_roll_deg = 0;
   std::array<RotatorOffset, 3> rotators{};
@@ -201,7 +201,7 @@ constexpr void fields(V& visit, M& m) {
 
 struct DataHeader {
   DataFront front;
-  std::array<float, most_beams> beam_deg{};  // the first `beams` count, rising
+  std::array<float, most_beams> beam_deg{};  // the first `beams` elements are valid, in rising order
   DataBack back;
 };
 template <class V, wire::Like<DataHeader> M>

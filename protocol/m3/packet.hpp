@@ -17,7 +17,7 @@ Bytes encode_packet(const Ping& ping, const protocol::DeviceState& device);
 
 struct Packet {
   DataHeader header;
-  BytesView samples;  // of the beam of the least angle first, each beam from near to far: I, Q
+  BytesView samples;  // I and Q, beam by beam from the smallest angle on, each beam from near to far
 
   double start_m() const;
   double spacing_m() const;

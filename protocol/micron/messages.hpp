@@ -33,7 +33,7 @@ enum class Id : std::uint8_t {
 };
 
 inline constexpr std::uint8_t line_feed = 0x0A, host_node = 255, usual_node = 2;
-inline constexpr std::size_t frame_size = 14;       // of a message without payload
+inline constexpr std::size_t frame_size = 14;       // size of a message without payload
 inline constexpr std::size_t uncounted = 6;         // bytes that `length` leaves out: the first 5 and the last
 inline constexpr std::size_t longest_frame = 4096;  // that of the longest head data is 1545
 
@@ -195,7 +195,7 @@ inline Bytes from_host(Id id, BytesView payload) { return framed(id, host_node, 
 
 struct Message {
   Header header;
-  BytesView payload;  // of the frame that was read
+  BytesView payload;  // payload of the frame that was read
 };
 /// Nothing if the bytes are no whole frame.
 std::optional<Message> read_frame(BytesView frame);

@@ -25,7 +25,7 @@ inline constexpr int most_gain = 210;
 struct Settings {
   HeadCommand command;
   bool has_parameters = false;    // a host has sent the command since the last reboot
-  std::uint16_t bearing = ahead;  // of a ping
+  std::uint16_t bearing = ahead;  // bearing of the present ping
 };
 /// Compares settings without the bearing, which changes with every ping.
 bool same_settings(const Settings& a, const Settings& b);

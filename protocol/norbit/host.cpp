@@ -168,7 +168,7 @@ class NorbitHost final : public protocol::Host {
   std::optional<Bytes> request_;
   static recording::MessageSplitter splitter() { return {recording::Origin::device, framing}; }
   std::array<recording::MessageSplitter, 3> splitters_{splitter(), splitter(), splitter()};
-  std::map<std::uint32_t, Parts> parts_;  // of pings whose other packet has not come
+  std::map<std::uint32_t, Parts> parts_;  // pings of which one packet has not arrived
   std::optional<std::uint32_t> last_;
   Counts counts_;
 };

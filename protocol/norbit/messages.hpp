@@ -24,9 +24,9 @@ inline constexpr std::uint32_t preamble = 0xDEADBEEF, version = 4;
 struct Header {
   std::uint32_t start = preamble;
   Type type{};
-  std::uint32_t size = 0;  // of the packet, this header included
+  std::uint32_t size = 0;  // size of the packet, this header included
   std::uint32_t version = norbit::version, reserved = 0;
-  std::uint32_t crc = 0;  // of all that follows the header
+  std::uint32_t crc = 0;  // checksum of everything after the header
 };
 template <class V, wire::Like<Header> M>
 constexpr void fields(V& visit, M& m) {

@@ -8,7 +8,7 @@
 
 namespace sonar::norbit {
 
-inline constexpr int bottom_beams = 256;                          // of bathymetry
+inline constexpr int bottom_beams = 256;                          // beams of bathymetry
 inline constexpr double swath_deg = 140, beam_width_deg = 0.9;    // DFD; recalled
 inline constexpr double sample_hz = 78125;                        // DFD
 inline constexpr double farthest_m = 600, fastest_hz = 60;        // DFD

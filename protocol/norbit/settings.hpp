@@ -10,7 +10,7 @@
 namespace sonar::norbit {
 
 inline constexpr double most_gain_db = 40;          // DFD
-inline constexpr double gain_slope_db_per_m = 0.4;  // of two-way range; unknown: assumed
+inline constexpr double gain_slope_db_per_m = 0.4;  // per metre of two-way range; unknown: assumed
 
 /// Format of the samples from which both packets are made; gain_db is in them.
 inline constexpr SampleFormat sample_format{
@@ -21,7 +21,7 @@ struct Settings {
   double start_m = 0, stop_m = 10;  // chosen; DFD: 50, or as the product has it
   double rate_hz = -1;              // -1: as fast as the range permits
   double gain_db = 20;
-  int samples = 256, beams = 128;  // of the water column; samples: about
+  int samples = 256, beams = 128;  // size of the water column; the number of samples is approximate
   double sound_mps = -1;           // -1: as measured
   bool operator==(const Settings&) const = default;
 };

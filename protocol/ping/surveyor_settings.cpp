@@ -16,7 +16,7 @@ namespace {
 
 constexpr int beams = 64, directions = 16;         // a point is sought in as many directions as there are receive elements
 constexpr double swath_deg = 80;                   // recalled, as are the width along the track and the number of elements
-constexpr double beam_width_deg = 7;               // of an array of 16 elements half a wavelength apart
+constexpr double beam_width_deg = 7;               // width for an array of 16 elements half a wavelength apart
 constexpr double above_db = 15;                    // unknown: assumed; level of a point above the median of its beam
 constexpr double usual_end_m = 20;                 // assumed for end_mm 0, with which the device follows the bottom
 constexpr double longest_m = 200, least_m = 0.01;  // highest end of the range; least length of the range

@@ -54,7 +54,7 @@ struct Samples {
 /// A message that holds a ping, or the part of a ping that one port sends.
 struct PingPart {
   std::uint16_t port = 0;               // the sonar's port, if each of several sends parts of its own; else 0
-  std::optional<double> head_rad = {};  // of a mechanical scan, as protocol::RequestPing::head_rad
+  std::optional<double> head_rad = {};  // direction of a mechanical scan, as protocol::RequestPing::head_rad
 };
 
 struct Codec {

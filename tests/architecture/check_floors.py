@@ -133,7 +133,7 @@ PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
                       (?:,?\ section\ (?P<section>\d+(?:\.\d+)*)|,?\ (?P<number>\d+(?:\.\d+)*)|,\ "(?P<title>[^"\n]+)")?""", re.X)
 LONGEST_FILE = 400  # lines; tests may be longer
 # A comment is a sentence, or a noun phrase that names the thing: these beginnings are fragments, these words are of persons.
-FRAGMENT = re.compile(r"[ \t]*//+<?[ \t]*(Of|What|Nothing:)(?=[\s,])")
+FRAGMENT = re.compile(r"[ \t]*//+<?[ \t]*([Oo]f|What|Nothing:)(?=[\s,])")
 PERSONS = re.compile(r"\b(to" + r"ld|no" + r"body|some" + r"body|who" + r"ever|ow" + r"ed)\b", re.I)
 
 

@@ -143,6 +143,7 @@ class Planted(unittest.TestCase):
     def test_comments_are_sentences(self):
         for line, words in [("/// Of the last ping.", 'begins with "Of"'), ("  // What a ray met.", 'begins with "What"'),
                             ("int x;\n/// Nothing: no such field.", 'begins with "Nothing:"'),
+                            ("int x;  // of each beam", 'begins with "of"'),
                             ("int x;  // the log is to" + "ld", '"to' + 'ld"')]:
             with self.subTest(line=line):
                 self.expect("core/base/a.cpp", line + "\n", line.count("\n") + 1, words)
@@ -175,7 +176,7 @@ class Innocent(unittest.TestCase):
             "protocol/makes.cpp": '#include "protocol/oculus/oculus.hpp"\n',
             "daemon/server/system/asio.hpp": "#pragma once\n#include <utility>\n#include <boost/asio.hpp>\n",
             "daemon/commands/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
-            "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/host.hpp"  // of an Oculus\n',
+            "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/host.hpp"  // for an Oculus\n',
             "clients/bvtsdk/abi4/include/bvt_sdk.h": '#pragma once\n#include "bvt_sdk_classes.h"\n',
             "clients/bvtsdk/core/link.cpp": "#include <thread>\nstd::thread reader(f);\n",
             "tests/core/a.cpp": '#include <Eigen/Dense>\n#include "daemon/emulator/world/world.hpp"\nstd::thread t; // steady_clock\n',

@@ -58,7 +58,7 @@ class Samples {
 
  private:
   static constexpr auto stages = static_cast<std::size_t>(Stage::stages);
-  struct Sample {  // of one ping, or the mean of a round of them
+  struct Sample {  // one ping, or the mean of a round of them
     double wall_ms = 0, processor_ms = 0;
     std::array<double, stages> stage_ms{};
     PingStatistics last;

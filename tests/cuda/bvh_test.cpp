@@ -143,7 +143,7 @@ TEST(DeviceRays, MeetOneTriangleAndManyInOnePlace) {
   const Vec3d o = flat.origin();
   const RayHit hit = trace_ray(host_view(flat, places), ray_to(Vec3d{0.2, 0.2, 1} - o, Vec3d{0.2, 0.2, -1} - o), 10);
   EXPECT_EQ(hit.object, 0u);
-  EXPECT_EQ(hit.triangle, 0u);  // of many triangles at one range always the first
+  EXPECT_EQ(hit.triangle, 0u);  // with many triangles at one range, always the first
   EXPECT_NEAR(hit.range_m, 1, 1e-6);
 }
 

@@ -16,8 +16,8 @@ void mean_over(const Window& window, int height, int columns, std::vector<std::u
   const auto width = static_cast<std::size_t>(columns);
   const auto margin = static_cast<std::size_t>(window.left + window.right);
   std::vector<std::uint16_t> out(pixels.size());
-  std::vector<std::uint32_t> sums(width + margin, 0);  // of each column: sum over the rows of the window
-  std::vector<float> inside(width, 0);                 // of each column: number of window columns in the image
+  std::vector<std::uint32_t> sums(width + margin, 0);  // for each column, the sum over the rows of the window
+  std::vector<float> inside(width, 0);                 // for each column, the number of window columns in the image
   for (int col = 0; col < columns; ++col)
     inside[static_cast<std::size_t>(col)] =
         static_cast<float>(std::min(col, window.left) + 1 + std::min(columns - 1 - col, window.right));

@@ -40,7 +40,7 @@ class PolarLookup {
  private:
   struct Entry {
     std::uint32_t sample;                    // index of the first of four samples: the near left one
-    std::uint16_t along_range, along_beams;  // weights of the far and the right ones, 0 to 32768
+    std::uint16_t along_range, along_beams;  // weights of the far and of the right samples, 0 to 32768
   };
   struct Span {
     std::uint32_t pixel, count;
@@ -48,7 +48,7 @@ class PolarLookup {
 
   Key key_;
   std::vector<Span> spans_;     // runs of pixels inside the sector
-  std::vector<Entry> entries_;  // of the pixels of all spans, in order
+  std::vector<Entry> entries_;  // entries of the pixels of all spans, in order
 };
 
 }  // namespace sonar::bvt

@@ -24,7 +24,7 @@ struct CellTile {
   Vec3 box_middle_m, box_half_m;                      // the box around its cells, from the centre, object axes
   float position_unit_m = 0;
   float weight_unit = 0;           // xi * sqrt(cell area) [m] per count
-  std::uint64_t weights_hash = 0;  // of the first block: differs between tiles that use the same memory in turn
+  std::uint64_t weights_hash = 0;  // hash of the first block: differs between tiles that use the same memory in turn
   int count = 0;                   // padded to a multiple of CellTile::block
   int stride = 0;                  // int16 values per column
   std::unique_ptr<std::int16_t[]> data;

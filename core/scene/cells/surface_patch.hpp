@@ -16,7 +16,7 @@ namespace sonar {
 
 struct Cube {
   double u, v, w, half;
-  double radius() const { return half * 1.7320508075688772 * 1.0001; }  // of a ball around the cube
+  double radius() const { return half * 1.7320508075688772 * 1.0001; }  // radius of a ball around the cube
 };
 inline Cube cube_of(const TileAddress& a) {
   const double e = lattice::tile_edge_m(a.level);

@@ -13,7 +13,7 @@ constexpr bool north = false, south = true;
 
 struct Zones {
   std::uint16_t first, last;
-  int zone;  // of the first
+  int zone;  // UTM zone of `first`
   bool south;
 };
 

@@ -42,7 +42,7 @@ class ImportFiles final : public Assimp::DefaultIOSystem {
   std::uint64_t free_form_ = 0;
   bool is_obj_ = false, without_objects_ = false;
   std::optional<std::uint64_t> obj_triangles_;
-  std::vector<std::uint64_t> bad_faces_;  // of an OBJ file: faces that name vertices which it does not have
+  std::vector<std::uint64_t> bad_faces_;  // faces of an OBJ file that name vertices which it does not have
 };
 
 }  // namespace sonar

@@ -51,7 +51,7 @@ class PlayedPings {
 
   recording::RecordingReader& reader_;
   const recording::Codec& codec_;
-  std::optional<recording::MessageSplitter> splitter_;  // of a make whose stream tells messages apart
+  std::optional<recording::MessageSplitter> splitter_;  // for a make whose stream delimits messages
   std::optional<Part> ahead_;                           // the first part of the next ping
   std::vector<Line> lines_;
   std::size_t after_ = 0;  // place of the line after the last one that was returned

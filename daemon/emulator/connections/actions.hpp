@@ -84,7 +84,7 @@ struct PingQueued {
   std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream that has receivers
   double simulation_s = 0;
   bool preview = false;                             // for viewers of the live view alone
-  std::optional<protocol::Distance> distance = {};  // of a range finder, unless a fault withholds the ping
+  std::optional<protocol::Distance> distance = {};  // result of a range finder, unless a fault withholds the ping
 };
 /// A line for the log. The lines of one topic share a rate limit.
 struct Report {

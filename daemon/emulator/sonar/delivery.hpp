@@ -38,7 +38,7 @@ class FramedPing {
   const Ping& ping_;
   const PartsByPort* recorded_;
   std::shared_ptr<const Bytes> bytes_;
-  bool is_first_ports_ = false;  // of several streams: bytes_ are those of the vendor's first TCP port
+  bool is_first_ports_ = false;  // with several streams, bytes_ are those of the vendor's first TCP port
   struct AtPort {
     const protocol::Port* port;
     Datagrams parts;

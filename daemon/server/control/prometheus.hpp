@@ -1,5 +1,5 @@
 // Writes the figures in the text format 0.0.4 of Prometheus, with names by its conventions (base units, _total for counters).
-// Pure; Operations::metrics() calls metrics_text, and docs/operations.md lists the metrics.
+// Pure; Operations::metrics() calls metrics_text, and docs/operations.md explains the counters.
 #pragma once
 
 #include <string>
@@ -37,8 +37,8 @@ struct DaemonFigures {
   double uptime_s = 0;
   std::vector<std::pair<std::string, DeviceFigures>> sonars;  // by name
   PoseCounters poses;
-  std::vector<LinkFigures> links;                                                      // of MAVLink
-  std::uint64_t clients_now = 0, refused_for_places = 0, refused_for_descriptors = 0;  // of all sonars together
+  std::vector<LinkFigures> links;                                                      // MAVLink links
+  std::uint64_t clients_now = 0, refused_for_places = 0, refused_for_descriptors = 0;  // sums over all sonars
   std::vector<ViewerFigures> viewers;                                                  // viewers of the live view
   ProcessFigures process;
   std::vector<std::pair<std::string, std::uint64_t>> active_faults;          // by sonar

@@ -20,8 +20,8 @@ constexpr std::size_t work_of_a_turn = 4096;            // bytes processed befor
 constexpr std::size_t least_work = 64;                  // bytes: cost of a read or of a line, beside its own bytes
 constexpr int most_not_json = 8;                        // lines in a row that are too long or not JSON; then the connection ends
 constexpr std::size_t dropped_per_s = 1024u << 20;      // limit of discarded bytes: 32 floods hold 0.1 to 1 GB in the kernel
-constexpr std::chrono::milliseconds between_looks{10};  // for new input
-constexpr std::chrono::milliseconds longest_wait{100};  // of poses in the kernel
+constexpr std::chrono::milliseconds between_looks{10};  // pause before the next look for new input
+constexpr std::chrono::milliseconds longest_wait{100};  // limit for poses that wait in the kernel
 constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
 
 std::size_t waiting_bytes(tcp::socket& socket) {

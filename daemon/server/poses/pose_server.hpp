@@ -39,7 +39,7 @@ class PoseServer {
 
  private:
   enum class Encoding { protobuf, json };
-  static constexpr std::size_t most_datagrams_per_s = 8192;  // of all senders: simulators send up to some thousand
+  static constexpr std::size_t most_datagrams_per_s = 8192;  // sum over all senders; simulators send up to a few thousand
   struct Port {
     Port(Encoding e, udp::socket s, asio::io_context& io, Admission& admission)
         : encoding(e), datagrams(std::move(s)), lines(io, admission, Admission::Purpose::client) {}
@@ -107,7 +107,7 @@ class PoseServer {
   LogLimiter notices_, faults_;
   std::list<Port> ports_;
   ConnectionSlots<Connection> connections_;
-  WorkRate of_address_;  // of datagrams
+  WorkRate of_address_;  // limit for the datagrams of one address
   SharedRate together_;  // limit for all connections together
   InputRate dropping_;   // limit for bytes of all connections that are read and dropped
   Endpoint protobuf_at_, json_at_;

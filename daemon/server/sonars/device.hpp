@@ -223,7 +223,7 @@ class Device final : public SessionParent {
 
   bool started_ = false, stopping_ = false;
   std::array<LogLimiter, static_cast<std::size_t>(Report::Topic::topics)> limiters_;
-  std::size_t datagram_work_ = 0;  // of the present datagram, beyond its bytes
+  std::size_t datagram_work_ = 0;  // work for the present datagram, beyond its bytes
   LogLimiter faults_, observer_visits_, send_errors_, storms_;
   VisitLog visits_;
   std::vector<StreamDigest> digests_;

@@ -14,7 +14,7 @@ namespace {
 
 // Bytes the kernel may hold that are not yet on the wire. More would only make a slow client's picture older.
 constexpr int unsent_limit_bytes = 256 * 1024;
-constexpr std::size_t piece_bytes = 256;  // of what a client sends, passed on at a time
+constexpr std::size_t piece_bytes = 256;  // bytes of a client that are passed on at a time
 constexpr auto idle_watch = std::chrono::seconds(1);
 constexpr auto delivery_watch = std::chrono::milliseconds(1), fin_watch = std::chrono::milliseconds(50);
 

@@ -285,7 +285,7 @@ TEST(EsriGrid, SaysWhatItTakesForDegrees) {
   };
   for (const char* cell : {"0.00416666667", "0.000277777778", "0.00083333", "0.0166666667"})
     EXPECT_EQ(smooth(cell), "degrees") << cell;
-  for (const char* cell : {"0.004", "0.0005", "0.025", "0.0254"}) EXPECT_EQ(smooth(cell), "metres") << cell;  // of a tank
+  for (const char* cell : {"0.004", "0.0005", "0.025", "0.0254"}) EXPECT_EQ(smooth(cell), "metres") << cell;  // cells of a tank
   EXPECT_EQ(is_geographic(degrees_of(near_zero, "30")), "metres");
   EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.05", 12, true)), "metres");  // a tank
   EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.004166667"), {.geographic = false}), "metres");

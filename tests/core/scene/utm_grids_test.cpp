@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 using tests::TemporaryFiles;
 
 const Geodetic origin{rad_from_deg(60), rad_from_deg(15), 0};
-constexpr double northing_m = 6'651'411.19;  // of 60 degrees, in the middle of a zone
+constexpr double northing_m = 6'651'411.19;  // latitude 60 degrees, in the middle of a zone
 
 /// 21 x 21 heights, 100 m apart, about a place.
 std::string grid_about(double easting_m, double at_northing_m) {

@@ -99,7 +99,7 @@ struct Image {
       }
     return products / std::sqrt(of_first * of_second);
   }
-  std::vector<double> strengths_over_local_mean() const {  // of 15 x 15 pixels
+  std::vector<double> strengths_over_local_mean() const {  // the mean of 15 x 15 pixels
     std::vector<double> over(strength.size());
     for (int row = 0; row < rows; ++row)
       for (int column = 0; column < columns; ++column) {

@@ -1,21 +1,21 @@
-// The fan without a graphics processor: a table holds the samples under each pixel, so that a ping takes a few milliseconds. Of a
-// footprint it takes whole samples, where core/image/draw_fan.cpp weights those at the edges.
+// Draws the fan without a graphics processor. A table holds the samples under each pixel, so that a ping takes a few milliseconds.
+// All samples under a pixel have the same weight; core/image/draw_fan.cpp gives less weight to those at its edges.
 import { table_entries } from './layout.js';
 
-const most_beams = 32;  // of one pixel; there are more at the apex only
-const most_pixels = 2e6;  // of screens with more than one pixel in a CSS pixel
+const most_beams = 32;  // beams averaged in one pixel; only pixels at the apex cover more
+const most_pixels = 2e6;  // limit for screens with more than one pixel in a CSS pixel
 
 export class LookupPainter {
   constructor(canvas) {
     this.g = canvas.getContext('2d', { alpha: false });
   }
 
-  /// The pixels a CSS pixel with which a picture of this size is drawn quickly.
+  /// Returns how many pixels to draw in a CSS pixel, so that a picture of this size is drawn quickly.
   ratio({ width, height }, ratio) {
     return width * height * ratio ** 2 < most_pixels ? ratio : 1;
   }
 
-  /// Takes the samples of a new ping.
+  /// Stores the samples of a new ping.
   load(image, samples, table, full_scale) {
     Object.assign(this, { samples, table, full_scale });
   }
@@ -39,7 +39,7 @@ export class LookupPainter {
     this.g.putImageData(this.picture, 0, 0);
   }
 
-  /// Finds the samples of each pixel: `wide` beams of so many rows, from the sample `first` on.
+  /// Finds the samples of each pixel: a block of `wide` beams and this.rows rows, from the sample `first` on.
   arrange(polar, { width, height, apex_x, apex_y, metres_per_pixel: px_m }, outside) {
     const { first: port, last, beams: beamOf } = this.table;
     const { rows, beams, spacing_m, start_m, range_m, azimuth_rad } = polar;

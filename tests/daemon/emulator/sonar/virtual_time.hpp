@@ -111,7 +111,7 @@ class VirtualTime {
   std::map<ConnectionId, Client> clients;
   std::vector<std::string> log;
   std::uint64_t pings = 0;
-  std::vector<std::optional<protocol::Distance>> distances;  // of each ping that was queued
+  std::vector<std::optional<protocol::Distance>> distances;  // one for each ping that was queued
   FaultJournal* journal = nullptr;
   std::map<const Sonar*, bool> listening;
 
