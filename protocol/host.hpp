@@ -131,7 +131,7 @@ struct Search {
   };
   std::uint16_t port = 0;
   Bytes (*question)() = nullptr;
-  std::optional<Answer> (*answer)(BytesView datagram) = nullptr;  // nullopt: it is none
+  std::optional<Answer> (*answer)(BytesView datagram) = nullptr;  // nullopt: it is not an answer
 };
 
 /// A make of sonar: the device's side and the driver's side. A new make is one folder and one row of makes.cpp.
@@ -144,7 +144,7 @@ struct Make {
   /// usage: a setting that such a sonar does not have.
   Result<std::unique_ptr<Host>> (*host)(const Wanted& wanted) = nullptr;
   recording::Codec codec;
-  std::optional<Announcement> (*announced)(BytesView beacon) = nullptr;  // nullopt: it is none; null: hosts need no beacon
+  std::optional<Announcement> (*announced)(BytesView beacon) = nullptr;  // nullopt: not a beacon; null: hosts need no beacon
   const Search* search = nullptr;                                        // null: hosts do not search
 
   std::string_view usual_settings = {};  // settings that a host sends if none are given, as options of sonarctl: "--rate 10"

@@ -98,7 +98,7 @@ class Vendor {
   }
   /// Whether its sonars are range finders: they measure one distance with each ping.
   virtual bool measures_distance() const { return false; }
-  /// The distance in a ping, as the device reports it. nullopt: the sonar is no range finder.
+  /// The distance in a ping, as the device reports it. nullopt: the sonar is not a range finder.
   virtual std::optional<Distance> distance_in(const Ping& ping) const {
     static_cast<void>(ping);
     return std::nullopt;

@@ -16,7 +16,7 @@ inline Opens opens_of(const SonarPicture& picture) {
 /// Height of the picture in pixels, for the width in `style`. PicturePainter must accept the picture.
 int picture_height(const SonarPicture& picture, const FanStyle& style);
 
-/// Draws one picture after another. With rings it also draws the head of a sweep, or axes in pictures that are no fans.
+/// Draws one picture after another. With rings it also draws the head of a sweep, or axes in pictures that are not fans.
 class PicturePainter {
  public:
   explicit PicturePainter(FanStyle style) : style_(style), fan_(std::move(style)) {}

@@ -34,18 +34,18 @@ class Columns {
   static Columns tum();
   /// 8 words: without velocity; 11: with velocity; 17: with velocity and the biases of an IMU, which are ignored.
   static Columns euroc(std::size_t words);
-  /// Twelve numbers, the first three rows of the matrix that takes points of the body to the world; no time.
+  /// Twelve numbers, the first three rows of the matrix that converts points of the body to the world; no time.
   static Columns kitti();
 
   std::size_t count() const { return count_; }
-  /// Unless the header names the unit: whole numbers too large for seconds are taken as milliseconds, microseconds or nanoseconds
+  /// Unless the header names the unit: whole numbers too large for seconds are read as milliseconds, microseconds or nanoseconds
   /// since 1970. `words`: the first line with values.
   void guess_unit(const Words& words);
-  /// False while the unit is only the usual one of the format, 10^power() ns.
+  /// False if the file does not state the unit; it is then that of the format, 10^power() ns.
   bool says_unit() const { return says_unit_ || matrix_; }
   int power() const { return power_; }
   void set_power(int power) { power_ = power; }
-  /// A line before its unit is known: its stamp as it is written, its position, its body. False if they are no numbers.
+  /// Reads a line before its unit is known: the stamp as it is written, the position, the body. False if a word is not a number.
   bool peek(const Words& words, double& stamp, Vec3d& position_m, std::string_view& of) const;
   /// Unit of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
   std::string_view unit() const;

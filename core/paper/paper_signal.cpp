@@ -80,7 +80,7 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
 std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad) {
   const std::size_t n = azimuth_rad.size();
   if (n < 2) return nullptr;
-  // Azimuths must be uniform to 1e-9 rad, or the correction is no convolution.
+  // Azimuths must be uniform to 1e-9 rad, or the correction is not a convolution.
   const double step = (azimuth_rad.back() - azimuth_rad.front()) / static_cast<double>(n - 1);
   std::vector<double> v;
   double energy = 0;

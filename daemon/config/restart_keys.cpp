@@ -17,7 +17,7 @@ class Keeper {
   }
   void control(const ControlConfig& now, ControlConfig& next) {
     const auto& [stream, http, stream_given, http_given, token_file, hosts, view_origins] = now;
-    next.stream_given = stream_given, next.http_given = http_given;  // the same address, written out, is no change
+    next.stream_given = stream_given, next.http_given = http_given;  // the default address, written out, is not a change
     keep("control", now, next);
   }
   void limits(const LimitConfig& now, LimitConfig& next) {

@@ -67,7 +67,7 @@ struct RawField {
 class RawReader {
  public:
   explicit RawReader(BytesView message) : rest_(message) {}
-  /// The next field. nullopt: the end of the message, or, if ok() is false, bytes that are no field.
+  /// The next field. nullopt: the end of the message, or, if ok() is false, bytes that are not a field.
   std::optional<RawField> next();
   bool ok() const { return ok_; }
 

@@ -72,7 +72,7 @@ struct Frame {
   wire::BytesView payload;
 };
 
-/// Splits a stream into frames. After bytes that are no frame next() returns nothing more, and broken() states the reason.
+/// Splits a stream into frames. After bytes that are not a frame, next() returns nothing more, and broken() states the reason.
 class Framer {
  public:
   /// `longest`: longest accepted payload; a host passes longest_payload.

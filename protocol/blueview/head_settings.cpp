@@ -20,7 +20,7 @@ const FrequencyMode& mode_of(const protocol::DeviceState& device, int head) {
 bool strict_range(const protocol::DeviceState& device) { return text_option(device.options, option_name::strict_range) == "on"; }
 
 /// The number in a value. Hosts may send integers and floats for any numeric key, as the interface of the SDK does. NaN and
-/// infinity are no numbers.
+/// infinity are refused.
 std::optional<double> number_in(const Value& value) {
   if (const auto* i = std::get_if<std::int32_t>(&value)) return *i;
   if (const auto* f = std::get_if<float>(&value)) return std::isfinite(*f) ? std::optional<double>(*f) : std::nullopt;

@@ -34,7 +34,7 @@ tl::expected<Request, RefusedRequest> decode_request(BytesView message);
 /// Whether a message of the stream is a pose without an id, which gets no answer. It does not decode the pose, so it takes much
 /// less time than decode_request().
 bool is_unasked_pose(BytesView message);
-/// The bytes of a response. Bytes of its texts that are no UTF-8 become '?'.
+/// The bytes of a response. Bytes of its texts that are not UTF-8 become '?'.
 Bytes encode_response(v1::Response response);
 
 /// The datagram of a pose, for senders. The pose is sent in the frame `sent_in`.

@@ -20,7 +20,7 @@ void keep_protobuf_quiet();
 std::optional<std::string> first_unreal_number(const google::protobuf::Message& message);
 /// Path of the first orientation that is given and has another length than 1.
 std::optional<std::string> first_bad_orientation(const google::protobuf::Message& message);
-/// Texts become what protobuf and JSON allow: bytes that are no UTF-8 turn into '?'.
+/// Texts become what protobuf and JSON allow: bytes that are not UTF-8 become '?'.
 void repair_texts(google::protobuf::Message& message);
 
 // ---- poses (pose_messages.cpp)

@@ -12,7 +12,7 @@ struct Finding {
   std::string check;  // "status", "ping", "rate", "ports", ...: for programs
   std::string text;
   std::string cure;         // empty for Level::ok
-  std::string sonar = {};   // empty = of none
+  std::string sonar = {};   // name of the sonar; empty = none
   std::string client = {};  // address of the client; empty = none
 };
 

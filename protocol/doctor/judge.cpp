@@ -158,7 +158,7 @@ class SonarJudge {
           "point it at " + where_to_connect(sonar_), observer);
   }
 
-  /// Connections that the sonar, or a time-out, has ended; a driver that left by itself is no fault.
+  /// Connections that the sonar, or a time-out, has ended; a driver that disconnected by itself is not reported.
   void check_who_left() {
     const v1::Visit& gone = sonar_.gone();
     if (!is_recent(gone) || gone.by_itself()) return;

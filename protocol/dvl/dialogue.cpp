@@ -63,7 +63,7 @@ class JsonDialogue final : public Session {
     for (const std::byte b : received)
       if (const auto object = splitter_.add(static_cast<char>(b))) on_object(*object, now, reaction);
     if (const std::size_t junk = splitter_.take_junk(); junk > 0)
-      reaction.events.emplace_back(protocol::Notice{std::to_string(junk) + " bytes that are no command"});
+      reaction.events.emplace_back(protocol::Notice{std::to_string(junk) + " bytes that are not a command"});
     return reaction;
   }
 
@@ -74,7 +74,7 @@ class JsonDialogue final : public Session {
     const Json message = Json::parse(object, nullptr, false);
     const auto named = message.is_object() ? message.find("command") : message.end();
     if (named == message.end() || !named->is_string()) {
-      reaction.replies.push_back(response_line("", {.error = "the message is no command"}));
+      reaction.replies.push_back(response_line("", {.error = "the message is not a command"}));
       return;
     }
     const std::string command = named->get<std::string>();

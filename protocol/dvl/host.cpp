@@ -83,7 +83,7 @@ class DvlHost final : public protocol::Host {
                                       : "no velocity";
     if (report.reflected_s > 0) ping.fired_s = report.reflected_s;
     ping.picture = []() -> Result<PolarImage> {
-      return failure(ErrorKind::usage, "the report of a DVL is no picture: sonarctl listen prints its velocities");
+      return failure(ErrorKind::usage, "the report of a DVL is not a picture: sonarctl listen prints its velocities");
     };
     std::vector<float> echoes(points, silent_db);
     for (const auto& beam : report.transducers) {

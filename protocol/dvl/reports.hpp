@@ -40,7 +40,7 @@ struct Response {
   std::string to, error;
   bool success = false;
 };
-/// A line of the device. Both members are absent for lines of other kinds and for text that is no JSON.
+/// A line of the device. Both members are absent for lines of other kinds and for text that is not JSON.
 struct Line {
   std::optional<VelocityReport> velocity;
   std::optional<Response> response;

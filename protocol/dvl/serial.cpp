@@ -47,8 +47,8 @@ std::optional<std::string_view> without_checksum(std::string_view sentence) {
   return fits ? std::optional(body) : std::nullopt;
 }
 
-/// The parameters of set_config, from words in the order of the sentence; an empty word sets nothing. nullopt: they are no
-/// such words.
+/// The parameters of set_config, from words in the order of the sentence; an empty word sets nothing. nullopt: a word
+/// is invalid.
 std::optional<Json> parameters_from(const Words& words) {
   constexpr std::array<const char*, 6> names{"speed_of_sound",   "mounting_rotation_offset",
                                              "acoustic_enabled", "dark_mode_enabled",

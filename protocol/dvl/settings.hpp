@@ -50,7 +50,7 @@ struct HeldSettings final : RangeImageSettings {
 /// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Allows the modes of "auto", "=a" or "a<=b". False: the text is none of these.
+/// Allows the modes of "auto", "=a" or "a<=b". False: the text has another form.
 bool allow_modes(std::string_view text, Settings& settings);
 /// The text that allows the modes up to the one that reaches this altitude.
 std::string range_mode_for(double range_m, const Product& product);

@@ -36,7 +36,7 @@ class MicronDialogue final : public protocol::Dialogue {
       if (const auto message = read_frame(whole->bytes))
         on_message(*message, now, reaction);
       else
-        notice(std::to_string(whole->bytes.size()) + " bytes that are no message", reaction);
+        notice(std::to_string(whole->bytes.size()) + " bytes that are not a message", reaction);
     }
     return reaction;
   }

@@ -197,7 +197,7 @@ struct Message {
   Header header;
   BytesView payload;  // payload of the frame that was read
 };
-/// Nothing if the bytes are no whole frame.
+/// nullopt if the bytes are not a whole frame.
 std::optional<Message> read_frame(BytesView frame);
 /// Reads a message off the front of the payload.
 template <class M>

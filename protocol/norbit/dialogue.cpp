@@ -82,7 +82,7 @@ std::vector<std::string_view> words_of(std::string_view line) {
   return words;
 }
 
-/// Nothing if a word is no finite number.
+/// nullopt if a word is not a finite number.
 std::optional<std::vector<double>> numbers_of(std::span<const std::string_view> words) {
   std::vector<double> numbers;
   for (const std::string_view word : words) {

@@ -1,4 +1,4 @@
-// Where packets have the fields and regions that faults change. A message is one packet, or both of a ping, bathymetry first.
+// Locates the fields and regions of packets that faults change. A message is one packet, or both of a ping, bathymetry first.
 #include "protocol/norbit/packet.hpp"
 
 namespace sonar::norbit {
@@ -6,7 +6,7 @@ namespace {
 
 using Place = std::pair<std::size_t, std::size_t>;  // offset, size
 
-/// Nothing if the bytes begin with no header.
+/// nullopt if the bytes do not begin with a header.
 std::optional<Header> header_of(BytesView bytes) {
   Header header;
   wire::Reader reader(bytes);

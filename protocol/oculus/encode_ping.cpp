@@ -12,7 +12,7 @@ namespace sonar::oculus {
 namespace {
 
 /// Added before the truncation to 0.01 deg, because a float near 65 deg has an error of 4e-4 of that unit: 29.99999 deg must give
-/// 3000. The values of the capture's formula that are no integers are further from an integer than this.
+/// 3000. All other values of the capture's formula are farther from an integer than this.
 constexpr double truncation_guard_cdeg = 1e-3;
 
 /// Converts to the short form of versions 0 and 1, which has no extension and no attitude, and states the start time as a 32-bit

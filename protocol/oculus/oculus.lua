@@ -142,13 +142,13 @@ register("ping.filler", ProtoField.bytes("oculus.ping.filler", "filler"))
 register("ping.image", ProtoField.bytes("oculus.ping.image", "image"))
 register("ping.rowGain", ProtoField.uint32("oculus.ping.rowGain", "row gain"))
 register("payload", ProtoField.bytes("oculus.payload", "payload"))
-register("junk", ProtoField.bytes("oculus.junk", "bytes that are no message"))
+register("junk", ProtoField.bytes("oculus.junk", "bytes that are not a message"))
 oculus.fields = registered
 
 local expert = {
   identity = ProtoExpert.new("oculus.expert.identity", "Identity broken", expert.group.PROTOCOL, expert.severity.ERROR),
   short = ProtoExpert.new("oculus.expert.short", "Message too short", expert.group.MALFORMED, expert.severity.ERROR),
-  junk = ProtoExpert.new("oculus.expert.junk", "Bytes that are no message", expert.group.UNDECODED, expert.severity.WARN),
+  junk = ProtoExpert.new("oculus.expert.junk", "Bytes that are not a message", expert.group.UNDECODED, expert.severity.WARN),
   doubt = ProtoExpert.new("oculus.expert.doubt", "Unusual value", expert.group.PROTOCOL, expert.severity.WARN),
   note = ProtoExpert.new("oculus.expert.note", "Remark", expert.group.COMMENTS_GROUP, expert.severity.NOTE),
 }
@@ -458,7 +458,7 @@ end
 
 local function add_junk(tvb, pinfo, tree, from, to)
   local item = tree:add(oculus, tvb(from, to - from))
-  item:set_text("Oculus, " .. to - from .. " bytes that are no message")
+  item:set_text("Oculus, " .. to - from .. " bytes that are not a message")
   say(item:add(fields.junk, tvb(from, to - from)), expert.junk, false, "skipped " .. to - from .. " bytes to the next header")
   show(pinfo, to - from .. " bytes of junk")
 end

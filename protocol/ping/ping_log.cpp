@@ -55,8 +55,8 @@ class PingLogReader final : public RecordingReader {
  public:
   explicit PingLogReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
 
-  /// The next frame. Frames without a time of their own get that of the frame before. The JSON text at the start is no message
-  /// of the device and is left out.
+  /// The next frame. Frames without a time of their own get that of the frame before. The JSON text at the start is not a
+  /// message of the device and is left out.
   std::optional<RecordedMessage> next() override {
     while (const auto frame = next_frame()) {
       const BytesView bytes = framer_.bytes();
@@ -94,7 +94,7 @@ class PingLogReader final : public RecordingReader {
   }
   void note_what_is_skipped(std::uint64_t to) {
     if (to > whole_to_)
-      damages_.add("bytes " + std::to_string(whole_to_) + " to " + std::to_string(to - 1) + " are no whole frame");
+      damages_.add("bytes " + std::to_string(whole_to_) + " to " + std::to_string(to - 1) + " are not a whole frame");
     whole_to_ = to;
   }
 

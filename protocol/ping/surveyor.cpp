@@ -38,7 +38,7 @@ class SurveyorDialogue final : public StreamingConversation<Settings, settings_f
       }
       case Id::utc_response: {
         UtcResponse told;
-        if (read(frame, told, reaction) && told.utc_ms < 4000000000000)  // later than the year 2096 is no time
+        if (read(frame, told, reaction) && told.utc_ms < 4000000000000)  // times after the year 2096 are invalid
           change(reaction,
                  [&](Settings& s) { s.utc_ahead = Time(std::chrono::milliseconds(told.utc_ms)) - (now + device_.skipped); });
         return true;

@@ -13,7 +13,7 @@ namespace sonar::recording {
 struct Framing {
   std::array<std::uint8_t, 2> magic{};  // the bytes that every message begins with
   std::size_t header_size = 0;
-  /// Total length of the message with this header; nullopt: this is none. `strict`: of a type that is known.
+  /// Total length of the message with this header; nullopt: this is not a header. `strict`: unknown types are refused.
   std::optional<std::size_t> (*length)(wire::BytesView header, Origin from, bool strict) = nullptr;  // null: lines
 
   /// A header of a known type at the front.

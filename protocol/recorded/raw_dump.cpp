@@ -30,8 +30,8 @@ class RawReader final : public RecordingReader {
   bool knows_times() const override { return false; }
 
  private:
-  /// Ends the stream. The first call reports an unfinished message and returns the first of the remaining bytes that are no
-  /// message.
+  /// Ends the stream. The first call reports an unfinished message and returns the first of the remaining bytes outside
+  /// messages.
   std::optional<RecordedMessage> end() {
     if (std::exchange(ended_, true)) return std::nullopt;
     const std::size_t unfinished = splitter_.waiting_bytes();

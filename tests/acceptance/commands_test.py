@@ -185,7 +185,7 @@ class CheckAndRun(unittest.TestCase):
     def test_all_of_the_configuration_itself(self):
         for more, code, *words in [
                 ("faults: {plan: [{do: L05}]}", 78, "faults.plan: faults act only when they are armed"),
-                ("faults: {armed: true, plan: [{do: L99}]}", 78, "is no fault"),
+                ("faults: {armed: true, plan: [{do: L99}]}", 78, "is not a fault"),
                 ("faults: {armed: true, plan: [{do: U02, sonar: stern}]}", 78, 'sonar "stern" is unknown'),
                 ("faults: {armed: true, plan: [{do: L05, at: {every: 1, phase: 5}}]}", 78, "phase must be below every"),
                 ("faults: {armed: true, journal: missing/j.jsonl}", 74, "journal of faults cannot be written", "No such file"),

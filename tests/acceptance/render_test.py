@@ -173,7 +173,7 @@ class Render(unittest.TestCase):
         self.expect(self.render("--poses", poses, "--pose-frame", "ENU_FLU", "--format", "raw", out=self.path / "third"), 0, "1 of 1")
 
     def test_snapshots_do_not_smear(self):
-        """Poses further apart than a vehicle goes: pings as of a sonar at rest there, said once and in render.json."""
+        """Poses too far apart for a vehicle: the sonar is at rest in each ping, with one note, also in render.json."""
         snapshots = self.path / "snapshots.csv"
         snapshots.write_text("# frame: ENU_FLU\nt,x,y,z,yaw\n0,0,0,0,0\n0.5,0.3,0,0,-150\n1,8.3,0,0,0\n", encoding="utf-8")
         options = ["--format", "raw", "--noise", "off"]

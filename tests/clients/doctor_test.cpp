@@ -249,7 +249,7 @@ TEST(Doctor, NamesWhoElseHasThePort) {
   expect(line(facts, "ping"), Level::fail, "no ping came within 4.0 s: nginx (pid 99) has the port, not sonard", "stop it");
   sonar.stream.junk_bytes = 300;
   expect(line(facts, "ping"), Level::fail,
-         "sends 300 bytes that are no messages of an Oculus: nginx (pid 99) listens on 0.0.0.0:52100",
+         "sends 300 bytes that are not messages of an Oculus: nginx (pid 99) listens on 0.0.0.0:52100",
          "another program has the port");
 }
 

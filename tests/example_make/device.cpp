@@ -55,7 +55,7 @@ class ExampleDialogue final : public protocol::Dialogue {
       } else if (is_message) {
         reaction.replies.push_back(message(Kind::refused, {}));
       } else {
-        reaction.events.emplace_back(protocol::Notice{std::to_string(whole->bytes.size()) + " bytes that are no message"});
+        reaction.events.emplace_back(protocol::Notice{std::to_string(whole->bytes.size()) + " bytes that are not a message"});
       }
     }
     return reaction;

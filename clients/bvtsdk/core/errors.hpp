@@ -1,5 +1,5 @@
-// Names and texts of the return codes (BVTError_GetName, BVTError_GetString), also for numbers that are no return code. The names
-// are those of the SDK's constants; the texts are sonard's.
+// Names and texts of the return codes (BVTError_GetName, BVTError_GetString), also for numbers that are not return codes. The
+// names are those of the SDK's constants; the texts are sonard's.
 #pragma once
 
 namespace sonar::bvt {

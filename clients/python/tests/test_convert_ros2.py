@@ -211,7 +211,7 @@ class RecordingsOfRos2(WithFolder):
                 self.assert_track(convert(path, topic="/path"), range(6), t0=100, metres=1e-9, radians=1e-6)
         self.assertEqual(convert(self.folder / "a.db3").source, "/odom")  # a path is rather a plan
         plan = made.mcap([("/plan", "cdr", "nav_msgs/msg/Path", [(100, made.path(range(4), stamped=False))])])
-        with self.assertRaisesRegex(ConvertError, "the poses of /plan have no times of their own, so they are no track in time"):
+        with self.assertRaisesRegex(ConvertError, "the poses of /plan have no time stamps, so they are not a track"):
             self.convert(plan)
         cut = made.mcap([("/path", "cdr", "nav_msgs/msg/Path", [(100, made.path(range(4))[:-9])])])
         with self.assertRaisesRegex(ConvertError, "no poses found"):

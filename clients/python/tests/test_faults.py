@@ -89,7 +89,7 @@ class Faults(unittest.TestCase):
 
     def test_a_refused_fault_is_an_error_and_leaves_nothing(self):
         with self.assertRaisesRegex(ControlError, 'did you mean "silent-open"'), self.control.fault("silent-opne"):
-            self.fail("it is no fault")
+            self.fail("not a fault")
         with self.assertRaisesRegex(ControlError, "no fault"):
             self.control.end_fault("nothing")
         self.assertEqual(self.acting(), [])

@@ -180,7 +180,7 @@ class SonarChecks {
       std::string who;
       for (const PortHolder& holder : sonar_.listeners) who = ": " + text_of(holder) + " listens on " + holder.at;
       return add(Level::fail, "ping",
-                 at_ + " sends " + std::to_string(s.junk_bytes) + " bytes that are no messages of " +
+                 at_ + " sends " + std::to_string(s.junk_bytes) + " bytes that are not messages of " +
                      std::string(sonar_.make->title) + who,
                  "another program has the port; stop it, or give the sonar's own address");
     }

@@ -47,7 +47,7 @@ struct StreamFacts {
   bool refuses = false;                      // `error` is the answer of the sonar to a request
   std::string own;                           // our end of the connection; empty = there was none
   bool asked = false;                        // settings were sent, since no other client was connected
-  std::uint64_t junk_bytes = 0, others = 0;  // others: messages that are no pings
+  std::uint64_t junk_bytes = 0, others = 0;  // others: messages that are not pings
   double first_ping_ms = 0, waited_s = 0;
   unsigned beams = 0, rows = 0, bits = 0;
   std::uint64_t pings = 0, missing = 0, broken = 0;

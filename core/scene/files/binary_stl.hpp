@@ -17,7 +17,7 @@ struct BinaryStl {
   std::uint64_t bytes_behind = 0;  // bytes after the last triangle
 };
 
-/// Nothing if the file is too short for the triangles of its header, which is true for every text: then it is not binary STL.
+/// nullopt: not a binary STL file, because it is too short for the triangles that its header counts. So is every text.
 std::optional<BinaryStl> binary_stl(std::FILE* file);
 /// Passes `count` triangles of the file to `take`, with material 0. False: they could not all be read.
 bool each_triangle_of_binary_stl(std::FILE* file, std::uint64_t count, const TriangleSink& take);

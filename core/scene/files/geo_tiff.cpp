@@ -223,7 +223,7 @@ class GeoTiffReader {
     raw_.scale = metadata.scale, raw_.offset = metadata.offset;
     if (!(std::abs(raw_.scale) > 0 && std::abs(raw_.scale) <= 1000 && std::abs(raw_.offset) <= 1e7))
       return bad(
-          "stores heights with a scale or an offset that is no number or too large; write the heights themselves: "
+          "stores heights with a scale or an offset that is not a number or too large; write the heights themselves: "
           "gdal_translate -unscale -ot Float32 IN OUT.tif");
     const auto texts = values_of<char>(tiff_, key_texts, TIFF_ASCII);
     const GeoKeys keys(values_of<std::uint16_t>(tiff_, key_directory, TIFF_SHORT),

@@ -325,7 +325,7 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   note_depths(raw, options.z_scale, grid.notes);
   const auto holes = static_cast<std::size_t>(std::count_if(raw.z.begin(), raw.z.end(), [](float z) { return std::isnan(z); }));
   if (holes > 0)
-    grid.notes.push_back(text::format("%zu of its %zu heights (%.2g %%) are no data: holes in the ground", holes, raw.z.size(),
+    grid.notes.push_back(text::format("%zu of its %zu heights (%.2g %%) are missing: holes in the ground", holes, raw.z.size(),
                                       100 * static_cast<double>(holes) / static_cast<double>(raw.z.size())));
   grid.x = std::move(raw.x);
   grid.y = std::move(raw.y);

@@ -120,9 +120,10 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
     // A text has no zero bytes; binary files may begin with the word, too.
     const std::string more = read_regular(request.file, 512).value_or("");
     if (small_letters(begin).find("solid") == std::string::npos || more.find('\0') != std::string::npos)
-      return bad_mesh(request,
-                      "is no STL, or cut short: a text begins with the word solid, and a binary file has 84 bytes and 50 for "
-                      "each triangle that its header counts; export it again");
+      return bad_mesh(
+          request,
+          "is not an STL file, or cut short: a text begins with the word solid, and a binary file has 84 bytes and 50 for "
+          "each triangle that its header counts; export it again");
   }
   opened->reset();
   if (auto room = check_import_memory(request, bytes); !room) return tl::make_unexpected(room.error());

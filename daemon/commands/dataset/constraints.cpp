@@ -77,7 +77,7 @@ bool overlap(const Extent& a, const Extent& b) {
 bool are_in_view(const Constraints& c, const PingRequest& request, const Scene& scene) {
   return std::all_of(c.in_view.begin(), c.in_view.end(), [&](const std::string& name) {
     const auto objects = placed(name, request, scene);
-    // A name without visible objects is no failure, because a draw may hide objects.
+    // A name without visible objects is not a failure, because a draw may hide objects.
     return objects.empty() || std::any_of(objects.begin(), objects.end(),
                                           [&](const auto& o) { return is_in_fan(middle_of(*o.first, o.second), request); });
   });

@@ -35,8 +35,8 @@ struct Exported {
   std::size_t scenes = 0;
   std::array<std::uint64_t, 3> pings{};
 };
-/// Writes the folder `folder` or `coco` into a set that is complete. Errors: usage when it is there already, or a name of
-/// Split::by is none; io; bad_data.
+/// Writes the folder `folder` or `coco` into a set that is complete. Errors: usage when it is there already, or Split::by
+/// has an unknown name; io; bad_data.
 Result<Exported> export_dataset(const DatasetJob& job, const std::filesystem::path& set, ExportForm form, const Split& split);
 
 }  // namespace sonar::dataset

@@ -59,7 +59,7 @@ std::array<char, tar_block> tar_header(std::string_view name, std::size_t size) 
   return h;
 }
 
-/// The size in a header, in octal; nothing if these characters are no number.
+/// Returns the size in a header, in octal; nullopt if these characters are not a number.
 std::optional<std::uint64_t> size_in(std::string_view header) {
   std::uint64_t size = 0;
   for (const char c : header.substr(124, 11)) {

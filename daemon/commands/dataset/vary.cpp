@@ -47,7 +47,7 @@ bool is_name(std::string_view name) {
 Variation read_one(const std::string& name, const text::Node& node) {
   Variation v;
   v.name = name;
-  if (!is_name(name)) node.fail("is no name: letters, digits and _, to be used as $" + name);
+  if (!is_name(name)) node.fail("is not a name: use letters, digits and _, so that it can be used as $" + name);
   text::Map keys = node.map();
   int kinds = 0;
   const auto pair = [&](const char* key, Variation::Kind kind) {

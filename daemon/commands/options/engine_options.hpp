@@ -35,7 +35,7 @@ void add_device_option(CLI::App& app, EngineOptionsGiven& given);
 void add_model_options(CLI::App& app, EngineOptionsGiven& given);
 void add_engine_options(CLI::App& app, EngineOptionsGiven& given);
 
-/// Refuses (usage) an option that switches on a part without effect in this mode or fixed fan. In the file that is no error.
+/// Refuses (usage) an option that switches on a part without effect in this mode or fixed fan. In the file this is not an error.
 Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given);
 
 }  // namespace sonar

@@ -53,7 +53,7 @@ class Check {
       std::vector<std::string_view> names;
       for (const FaultKind& k : fault_kinds()) names.push_back(k.name);
       for (const Trouble& t : troubles()) names.push_back(t.name);
-      wrong("\"" + record_.what.substr(0, 64) + "\" is no fault" + text::suggestion(record_.what, names, "faults"));
+      wrong("\"" + record_.what.substr(0, 64) + "\" is not a fault" + text::suggestion(record_.what, names, "faults"));
     }
     if (!error_.empty()) {
       const std::string name = record_.name.empty() ? record_.what : record_.name;

@@ -166,7 +166,7 @@ constexpr FaultKind table[] = {
      "sends its settings again; reports that no ping comes", 6, {}, {}, "flow"},
     {"D24", "spontaneous-standby", 2, S::device, E::change_settings, "The device goes to standby by itself.", "resumes or reports",
      5, {}, {P{.name = "what", .value = "rate", .words = "rate"}, P{"value", "0", 0, 100}}, "settings"},
-    {"D26", "env-values-wild", 1, S::framing, E::set_field, "Temperature or pressure is no sensible number.",
+    {"D26", "env-values-wild", 1, S::framing, E::set_field, "Temperature or pressure is implausible or not a number.",
      "computes nothing with it", 5, F::temperature, {P{.name = "value", .value = "nan", .words = "nan inf -inf huge absolute-zero"},
      P{.name = "field", .value = "temperature", .words = "temperature pressure"}}, "environment"},
     {"D27", "scale-zero", 1, S::framing, E::set_field, "The row spacing or sound speed is 0, negative or no number.",
@@ -270,7 +270,7 @@ constexpr FaultKind table[] = {
      {P{"factor", "0.97", 0.1, 10}}, "image"},
     {"P13", "intermittent", 1, S::payload, E::intermittent, "The image comes and goes.", "marks what is missing", 10, {},
      {whole("on", "5", 1, 1000), whole("off", "5", 1, 1000)}, "image"},
-    {"P15", "attitude-wild", 2, S::framing, E::set_field, "Heading, pitch or roll is no sensible number.", "ignores it", 5,
+    {"P15", "attitude-wild", 2, S::framing, E::set_field, "Heading, pitch or roll is implausible or not a number.", "ignores it", 5,
      F::heading, {P{.name = "value", .value = "nan", .words = "nan inf -inf huge"},
      P{.name = "field", .value = "heading", .words = "heading pitch roll"}}, "attitude"},
 

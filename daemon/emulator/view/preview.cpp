@@ -34,7 +34,7 @@ void Preview::done(bool made) {
 
 void Preview::end() {
   until_.reset();
-  made_ = {};  // the pause before the next preview is no part of its rate
+  made_ = {};  // the pause before the next preview does not count for its rate
 }
 
 }  // namespace sonar

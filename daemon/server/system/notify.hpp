@@ -3,7 +3,7 @@
 //
 // Alive means two things: the I/O loop turns, because the message is sent by a timer of that loop; and the simulation thread is
 // not stuck, because no ping has been under way for longer than the watchdog's period. A daemon without clients computes no
-// ping and is alive. What fails once (a refused ping, a client) is no reason to be restarted.
+// ping and is alive. A single failure (a refused ping, a client) is not a reason for a restart.
 #pragma once
 
 #include <chrono>

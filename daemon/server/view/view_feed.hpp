@@ -144,7 +144,7 @@ class ViewFeed final : public ViewerHost {
   std::string begin_playback(Viewer& viewer, const std::string& vehicle);
   void watch_playback(const Viewer* but = nullptr);
   ViewPayloadPointer in_time_of(const Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) const;
-  /// Returns an empty text, or why not; nullopt if it is no parameter of the view itself.
+  /// Returns an empty text, or why not; nullopt if it is not a parameter of the view itself.
   std::optional<std::string> set_own(Viewer& viewer, const foxglove::Parameter& wanted);
   template <class Visit>
   void each(Visit visit) const {

@@ -22,7 +22,7 @@ struct ParameterSource {
   const Fleet& fleet;
 };
 
-/// Returns the number of a parameter; nullopt if it is no finite number.
+/// Returns the number of a parameter; nullopt if it is not a finite number.
 std::optional<double> number_of(const foxglove::Value& value);
 /// Returns all parameters; those without a value are unset.
 std::vector<foxglove::Parameter> parameters_of(const ParameterSource& of);

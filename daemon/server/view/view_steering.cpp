@@ -75,7 +75,8 @@ std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer& viewer, cons
   return all;
 }
 
-/// Parameters of the live view itself, not of control. nullopt: it is none of these; else empty, or why it was not set.
+/// Sets a parameter of the live view itself, not of control. nullopt: it is not such a parameter; else empty, or why it was not
+/// set.
 std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Parameter& wanted) {
   for (SonarView& sonar : sonars_) {
     if (wanted.name != sonar.points.threshold) continue;

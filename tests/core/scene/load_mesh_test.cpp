@@ -280,7 +280,7 @@ TEST_F(LoadMesh, BinaryStlMayHaveBytesBehindItsTriangles) {
   EXPECT_EQ(good("tail.stl", binary(2, 2, "made by hand")).lost, 0u);
   EXPECT_EQ(good("more.stl", binary(1, 3, "")).lost, 2u) << "which the header does not count";
   for (const std::string& text : {binary(3, 2, ""), binary(0, 0, ""), std::string("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")})
-    EXPECT_THAT(refusal("short.stl", text), HasSubstr("is no STL, or cut short"));
+    EXPECT_THAT(refusal("short.stl", text), HasSubstr("is not an STL file, or cut short"));
 }
 
 TEST_F(LoadMesh, PlyHeadersMayHaveCapitalsAndOtherLineEnds) {
@@ -314,7 +314,8 @@ TEST_F(LoadMesh, TextStlMayHaveCapitalsAndBlankLinesFirst) {
   for (char& c : capitals) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c;
   for (const std::string& text : {capitals, "\n\r\n  " + stl, "\t" + capitals})
     expect_extent(good("t.stl", text), {0, 0, 0}, {2, 1, 3});
-  EXPECT_THAT(refusal("cut.stl", binary_stl().substr(0, 200)), HasSubstr("is no STL, or cut short"));  // begins with "solid", too
+  EXPECT_THAT(refusal("cut.stl", binary_stl().substr(0, 200)),
+              HasSubstr("is not an STL file, or cut short"));  // begins with "solid", too
   EXPECT_THAT(refusal("cut.stl", stl.substr(0, 60)), HasSubstr("is it cut short? Export it again"));
 }
 

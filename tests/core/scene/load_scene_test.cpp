@@ -241,7 +241,7 @@ TEST(LoadScene, HeightmapsInDegreesStandAboutAnOrigin) {
   const auto scene = parsed(object(bed + "geographic: true, origin: {lat: 60, lon: 5}"), files.folder());
   EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 557.9, 0.5);  // 0.01 degrees, a little less in the north
   EXPECT_NEAR(scene->objects[0].in_world.position_m.y, 1114.2, 0.5);
-  EXPECT_THAT(scene->notes, ::testing::ElementsAre("g.asc: 1 of its 9 heights (11 %) are no data: holes in the ground"));
+  EXPECT_THAT(scene->notes, ::testing::ElementsAre("g.asc: 1 of its 9 heights (11 %) are missing: holes in the ground"));
   EXPECT_THAT(refusal(object(bed + "origin: {lat: 60, lon: 5}, centred: true"), files.folder()),
               HasSubstr("origin: give origin or centred, not both"));
   EXPECT_THAT(refusal(object(bed + "origin: {lat: 91, lon: 5}"), files.folder()), HasSubstr("origin.lat"));

@@ -187,7 +187,7 @@ TEST(EsriGrid, KnowsNoDataInEveryForm) {
       }
     std::string notes;
     for (const std::string& note : grid->notes) notes += note + ". ";
-    EXPECT_THAT(notes, HasSubstr(" of its 100 heights (1 %) are no data"));
+    EXPECT_THAT(notes, HasSubstr(" of its 100 heights (1 %) are missing"));
     EXPECT_EQ(grid->notes.size(), with_note ? 2u : 1u) << notes;
     return std::to_string(holes);
   };
@@ -562,7 +562,7 @@ TEST(EsriGrid, LengthsOfItsPrjBecomeMetres) {
   ASSERT_TRUE(grid) << grid.error().text;
   EXPECT_NEAR(grid->x.back(), 1010e3, 1e-6);
   EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("in units of 1000 m, become metres"), HasSubstr("of P, are taken"),
-                                                  HasSubstr("are no data")));
+                                                  HasSubstr("are missing")));
 }
 
 TEST(EsriGrid, VerticalSystemsOfItsPrjAreRead) {

@@ -38,7 +38,7 @@ TEST(FaultPlan, ThatCannotHoldIsRefusedInItsPlace) {
     std::vector<const char*> said;
   };
   for (const Case& c : {
-           Case{"  - {do: silent-opem}\n", {"sonard.yaml:8:", "\"silent-opem\" is no fault", "silent-open"}},
+           Case{"  - {do: silent-opem}\n", {"sonard.yaml:8:", "\"silent-opem\" is not a fault", "silent-open"}},
            Case{"  - {do: F01}\n  - {do: F01, name: b, with: {bytes: -3}}\n",
                 {"sonard.yaml:9:", "fault b", "bytes must be a whole number from", "\"-3\""}},
            Case{"  - {do: F01, with: {byte: 3}}\n", {"sonard.yaml:8:", "no parameter \"byte\"", "bytes"}},

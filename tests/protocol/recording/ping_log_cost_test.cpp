@@ -54,7 +54,7 @@ TEST(PingLogCost, FalseStartsCostWorkInProportionToTheFile) {
     costs.push_back(allocated_bytes - before);
     EXPECT_EQ(messages, 2u);
     EXPECT_EQ(reader->damage()->text, "f: bytes " + std::to_string(behind) + " to " +
-                                          std::to_string(file.size() - last.size() - 1) + " are no whole frame");
+                                          std::to_string(file.size() - last.size() - 1) + " are not a whole frame");
   }
   EXPECT_LT(costs[1], 5 * costs[0]);
   EXPECT_LT(costs[1], 16u * (std::size_t{1} << 19));

@@ -75,7 +75,7 @@ TEST(PingLog, CutOrDamagedSaysWhere) {
   const Bytes whole = log_of(3);
   const std::size_t text = whole.size() - 3 * 64;
   const auto bytes = [](std::size_t from, std::size_t to) {
-    return "f: bytes " + std::to_string(from) + " to " + std::to_string(to) + " are no whole frame";
+    return "f: bytes " + std::to_string(from) + " to " + std::to_string(to) + " are not a whole frame";
   };
   ReadBack read = read_back(Bytes(whole.begin(), whole.end() - 5));
   EXPECT_EQ(read.messages.size(), 5u);

@@ -49,7 +49,7 @@ TEST(MessageSplitter, LinesEndAtTheirLineEnd) {
   }
   MessageSplitter endless(Origin::device, lines);
   endless.append(after_ms(1), bytes_of("{\"" + std::string(70'000, 'a')));
-  EXPECT_TRUE(endless.next()) << "given up, as bytes that are no message";
+  EXPECT_TRUE(endless.next()) << "given up, as bytes that are not a message";
 }
 
 TEST(MessageSplitter, TimeIsThatOfTheLastByte) {

@@ -113,7 +113,7 @@ def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optio
     selected = topics[chosen]
     rows = rising(selected.rows)
     if selected.rank == KINDS.index("Path") and len(rows) == 1 and len(selected.rows) > 1:
-        raise ConvertError(f"{name}: the poses of {chosen} have no times of their own, so they are no track in time")
+        raise ConvertError(f"{name}: the poses of {chosen} have no time stamps, so they are not a track")
     if len(rows) < len(selected.rows):
         warn(f"poses of {chosen} omitted because their time does not increase: {len(selected.rows) - len(rows)}" +
              _clock_reset(selected.rows))

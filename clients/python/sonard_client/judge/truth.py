@@ -31,7 +31,7 @@ class NoPings:
 
 
 class Make(NamedTuple):
-    """What the judge knows of a make of sonar."""
+    """The rules of a make of sonar that the judge needs."""
     profiles: Tuple[str, ...]                    # what the names of its products begin with
     stream: Callable[[], Reader] = NoPings       # reads a TCP connection
     datagrams: Callable[[], Reader] = NoPings    # reads a flow of datagrams
@@ -55,12 +55,12 @@ class WholeMessages:
         self._data = bytearray()
         self._base = 0             # offset of _data[0] in the stream
         self._open: List[int] = []  # where in _data messages begin that are not complete
-        self._looked = 0           # where in _data the search for further ones goes on
+        self._looked = 0           # where in _data the search for further messages continues
         self._unnumbered = 0
         self._is_stream = is_stream
 
     def length(self, begin: int) -> int:
-        """Bytes of the message there; 0 if it is none, -1 if that is not known yet."""
+        """Returns the number of bytes of the message there; 0 if there is no message, -1 if more bytes are needed to decide."""
         raise NotImplementedError
 
     def pings(self, message: bytes, begin: int) -> Iterator[TruePing]:
@@ -68,7 +68,7 @@ class WholeMessages:
         raise NotImplementedError
 
     def is_damaged(self, message: bytes) -> bool:
-        """Whether a message of the right length is none."""
+        """Returns whether a message of the right length is invalid."""
         return False
 
     def feed(self, received: bytes) -> List[TruePing]:

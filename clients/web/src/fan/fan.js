@@ -53,7 +53,7 @@ export class Fan {
     this.redraw();
   }
 
-  /// True if sonard draws the picture, because it is no fan of one ping.
+  /// True if sonard draws the picture, because it is not a fan of one ping.
   get drawn() {
     return Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
   }

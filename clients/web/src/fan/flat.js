@@ -1,4 +1,4 @@
-// Colours pictures that sonard has drawn (/SONAR/fan, mono8; 0 = outside): those of sonars whose picture is no fan of the last ping.
+// Colours pictures that sonard has drawn (/SONAR/fan, mono8; 0 = outside): those of sonars whose picture is not a fan of the last ping.
 
 const outside = new Uint32Array(new Uint8Array([13, 17, 23, 255]).buffer)[0];
 

@@ -22,7 +22,7 @@ class Part(NamedTuple):
 
 
 def part_of(datagram: bytes) -> Optional[Part]:
-    """None: it is no part of a frame."""
+    """Returns None if the datagram is not part of a frame."""
     try:
         message = protobuf.fields(datagram)
         part = Part(protobuf.number(message, 1), protobuf.number(message, 2), protobuf.block(message, 3), protobuf.block(message, 4),

@@ -48,7 +48,7 @@ def number(message: Dict[int, Value], field: int) -> int:
     """A number; 0 where it is missing. Raises ValueError."""
     value = message.get(field, 0)
     if not isinstance(value, int):
-        raise ValueError(f"field {field} is no number")
+        raise ValueError(f"field {field} is not a number")
     return value
 
 
