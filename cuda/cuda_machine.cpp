@@ -123,7 +123,7 @@ class CudaMachine final : public Machine {
   void wait(int lane) override { check(module_.wait(at_, lane)); }
 
  private:
-  /// An error of the device ends its use: DeviceEngine reports it and may go on with the CPU.
+  /// An error of the device ends its use: DeviceEngine reports it and may continue on the CPU.
   void check(int code) const {
     if (code == 0) return;
     const std::string why = name_ + ": " + module_.reason(code);

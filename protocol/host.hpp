@@ -23,7 +23,7 @@
 
 namespace sonar::protocol {
 
-/// The settings that a user wants. Unset values stay as the sonar has them, or are those that a usual driver sends.
+/// The settings that a user requests. Unset values stay as the sonar has them, or are those that a usual driver sends.
 struct Wanted {
   bool as_it_is = false;                         // send no settings; request pings only from makes that need a request for each
   bool stamped = false;                          // prefer messages that state when a ping was fired

@@ -64,7 +64,7 @@ bool FileResolver::resolve(PlacedShape& placed) {
 void FileResolver::report_missing() {
   if (missing_.empty()) return;
   std::string text = missing_.front().what +
-                     ": no such file here; give the folder that holds it with --model-path, or go on without it with "
+                     ": no such file here; give the folder that holds it with --model-path, or continue without it with "
                      "--skip-missing";
   for (std::size_t i = 1; i < missing_.size(); ++i) text += (i == 1 ? "; neither are there: " : ", ") + missing_[i].what;
   std::vector<std::string> commands;  // one a model

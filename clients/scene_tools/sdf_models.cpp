@@ -78,7 +78,7 @@ void SdfTree::report_missing() {
   }
   if (options_.skip_missing) return;
   findings_.fail(missing_.front().at,
-                 "include: models that are not here; fetch them, give the folder that holds them with --model-path, or go on "
+                 "include: models that are not here; fetch them, give the folder that holds them with --model-path, or continue "
                  "without them with --skip-missing:" +
                      list);
 }

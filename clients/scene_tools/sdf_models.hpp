@@ -24,7 +24,7 @@ struct SdfFrame {
 
 struct SdfModel {
   std::string name, path;  // such as crane and ship/crane; both are empty for the world
-  std::string source;      // name of the included model, which may tell more than the name in this file
+  std::string source;      // name of the included model, which may be more descriptive than the name in this file
   Element element;         // <model> or <world>
   SdfModel* parent = nullptr;
   bool is_world = false, is_static = false, merged = false;

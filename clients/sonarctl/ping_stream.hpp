@@ -92,7 +92,7 @@ class PingStream {
   std::deque<Item> items_;                           // items to be handed out
   std::optional<Error> ended_;                       // the conversation is over; empty text: the sonar closed it
   bool interrupted_ = false, has_answered_ = false;  // has_answered_: at the first port
-  bool is_started_ = false;                          // the host must tell the sonar when it leaves
+  bool is_started_ = false;                          // the host must send what on_leave() returns
   std::ofstream record_;
   bool keeps_ = false;
   std::vector<recording::RecordedMessage> kept_;  // messages since the last item

@@ -14,7 +14,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-# What is served -> where it begins. The scene has a script of its own, for it is loaded after the first picture.
+# Served file -> source file where it begins. The scene has a script of its own, for it is loaded after the first picture.
 SOURCES = {"app.js": "src/main.js", "scene.js": "src/scene/scene.js", "graphics.js": "src/graphics.js", "app.css": "style/app.css"}
 TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8",
          ".svg": "image/svg+xml"}
@@ -22,7 +22,7 @@ TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=u
 
 def bundled(esbuild, source, three, generated, *options):
     # three.js is found by its name, so that any release of it can be bundled.
-    # es2021: esbuild 0.14 of Ubuntu 22.04 knows no later one.
+    # es2021: esbuild 0.14 of Ubuntu 22.04 supports no later one.
     command = [esbuild, str(source), "--bundle", "--minify", "--target=es2021", "--legal-comments=inline", *options]
     environment = dict(os.environ, NODE_PATH=os.pathsep.join([str(three), str(generated)]))
     return subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE).stdout

@@ -1,5 +1,5 @@
 // Pictures whose neighbouring beams come from successive pings (docs/acoustics.md, section 6): the requests of these pings, the
-// beams that each of them forms, and the picture that they make. A beam hears columns far beyond its own, so that a ping can
+// beams that each of them forms, and the picture that they make. A beam receives columns far beyond its own, so that a ping can
 // leave out few of them: half, if its beams are eight apart, hardly any, if they are three apart.
 #pragma once
 

@@ -229,7 +229,7 @@ class RangeImager {
     return amplitude * full_scale_factor(mode_.receiver, gain_db) * static_cast<double>(settings_.format.max_code >> 16);
   }
   int block_of(int row) const { return wanted_.block_rows > 0 ? row / wanted_.block_rows : 0; }
-  /// Range of the loudest scatterer that a return has in a range cell: random, and the same for all beams that hear it.
+  /// Range of the loudest scatterer that a return has in a range cell: random, and the same for all beams that receive it.
   double place_in_cell_m(const RangeReturn& r, std::ptrdiff_t k) const {
     const double from = std::max(center_of(k) - cell_m_ / 2, r.range_m - r.half_m),
                  to = std::min(center_of(k) + cell_m_ / 2, r.range_m + r.half_m);

@@ -13,7 +13,7 @@ namespace sonar {
 namespace {
 
 /// Looks first near the program, so that an unpacked or moved installation finds its own files. In a build folder, links lead to
-/// the tree (CMakeLists.txt), whose place the program does not know.
+/// the tree (CMakeLists.txt), whose path is not built into the program.
 std::vector<std::filesystem::path> make_shipped_folders() {
   std::error_code ec;
   std::vector<std::filesystem::path> folders;

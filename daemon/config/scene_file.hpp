@@ -28,7 +28,7 @@ bool has_scene_name(const std::filesystem::path& given);
 /// the shipped scenes, after resolving links.
 bool may_be_quoted(const SceneFile& file, const std::filesystem::path& directory);
 
-/// `world_origin`: that of the configuration, for grids that know their latitudes and longitudes.
+/// `world_origin`: that of the configuration, for grids with latitudes and longitudes.
 /// Inline, so that the configuration alone does not need the scene loader and its libraries.
 inline Result<std::shared_ptr<const Scene>> load_scene(const SceneFile& file, const std::optional<Geodetic>& world_origin = {}) {
   return file.built_in ? load_built_in_scene(file.path.string()) : load_scene(file.path, world_origin);

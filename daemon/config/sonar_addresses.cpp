@@ -131,7 +131,7 @@ Result<void> check_ports_apart(const Config& config) {
 Result<void> move_addresses(Config& config, int offset, bool first_too) {
   const Config unmoved = config;
   for (SonarConfig& sonar : config.sonars) {
-    // The device number is moved as well, because drivers tell sonars apart by it.
+    // The device number is moved as well, because drivers distinguish sonars by it.
     const int id = sonar.device_id + 100 * offset;
     if (id > 65535)
       return cannot_move("device_id " + std::to_string(sonar.device_id) + " would exceed 65535; give a smaller offset");

@@ -24,7 +24,7 @@ enum NavField : std::uint16_t {
 
 enum class Compression : std::uint8_t { none = 0, deflate = 1 };
 
-/// The payload before its samples, with the navigation data that the daemon knows.
+/// The payload before its samples, with the navigation data of the daemon.
 struct PingHead {
   std::int32_t head = 0;
   std::uint32_t number = 0;

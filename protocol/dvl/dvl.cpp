@@ -30,8 +30,8 @@ class DvlVendor final : public protocol::PushingVendor {
     const Measurement measured = measure(ping);
     Settings s = settings_from(device.settings.get());
     s.reckoning = reckoned(s.reckoning, measured, ping.request, s);
-    // The search among range modes goes on only after a ping of the present mode. A ping that was fired before a client changed
-    // the mode does not tell whether the new one fits.
+    // The search among range modes continues only after a ping of the present mode. A ping that was fired before a client changed
+    // the mode does not show whether the new one fits.
     if (settings_from(ping.request.vendor_settings.get()).mode == s.mode)
       s.mode = next_mode(measured, s, product_of(*device.model));
     return change_to(s, device);

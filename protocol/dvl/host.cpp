@@ -47,7 +47,7 @@ class DvlHost final : public protocol::Host {
     if (!request_) return {};
     return {protocol::HostSend{0, *request_}};
   }
-  /// Reports end with CR LF. A line that is too long is dropped, and reading goes on behind the next line end.
+  /// Reports end with CR LF. A line that is too long is dropped, and reading continues after the next line end.
   HostActions on_bytes(std::size_t, BytesView received, Time) override {
     HostActions actions;
     for (const std::byte b : received) {

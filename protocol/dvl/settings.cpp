@@ -17,7 +17,7 @@ bool HeldSettings::equals(const VendorSettings& other) const {
   return of != nullptr && of->settings.configured() == settings.configured();
 }
 
-// The device begins with the highest allowed mode, from which the search goes on.
+// The device begins its search with the highest allowed mode.
 bool allow_modes(std::string_view text, Settings& settings) {
   const auto mode = [](char c) { return c >= '0' && c < '0' + range_mode_count ? std::optional(c - '0') : std::nullopt; };
   std::optional<int> lowest, highest;

@@ -26,7 +26,7 @@ Json json_of(Time at) {
 }
 
 /// A parameter as the protocol has it. JSON has no NaN and no infinity, so such a value is sent as unset. Numbers have
-/// the type "float64", because JSON does not tell 5.0 from 5.
+/// the type "float64", because JSON does not distinguish 5.0 from 5.
 Json json_of(const Parameter& parameter) {
   Json json{{"name", parameter.name}};
   std::visit(

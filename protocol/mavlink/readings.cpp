@@ -32,7 +32,7 @@ Quatd quat_of(const std::array<float, 4>& wxyz) { return {wxyz[0], wxyz[1], wxyz
 RawPose raw_pose(Vec3d ned_m, Quatd frd_in_ned) {
   return {Frame::ned_frd, array_of(ned_m), array_of(frd_in_ned), std::nullopt, std::nullopt};
 }
-/// Senders set velocities that they do not know to NaN.
+/// Senders set unknown velocities to NaN.
 void set_motion(RawPose& pose, Vec3d frd_mps, Vec3d frd_radps) {
   if (is_finite(frd_mps)) pose.velocity_mps = array_of(frd_mps);
   if (is_finite(frd_radps)) pose.angular_velocity_radps = array_of(frd_radps);

@@ -409,7 +409,7 @@ local function natural_length(kind, version)  -- of a client's message that anno
   return kind == 0x55 and 28 or HEADER
 end
 
--- Bytes of the message at `at`: a number; "more" when they cannot be told yet; nil when no message begins here. After junk only a
+-- Bytes of the message at `at`: a number; "more" when more data are needed; nil when no message begins here. After junk only a
 -- known kind is believed: in the middle of an image anything can look like a header.
 local function message_length(tvb, at, to_device, after_junk)
   local left = tvb:len() - at

@@ -87,7 +87,7 @@ class LogReader final : public RecordingReader {
     return false;
   }
 
-  /// Reads the message in an item. nullopt: it is damaged, which is noted; the reader then goes on with the next item.
+  /// Reads the message in an item. nullopt: it is damaged, which is noted; the reader then continues with the next item.
   std::optional<RecordedMessage> read_message(const OculusLogItem& item, std::uint64_t at) {
     const auto refuse = [&](const std::string& why) {
       damages_.add("the message at byte " + std::to_string(at) + " " + why);
@@ -184,7 +184,7 @@ class LogWriter final : public RecordingWriter {
 
 }  // namespace
 
-// Version 2 is an SQLite database, whose first letter is S; the error tells users so.
+// Version 2 is an SQLite database, whose first letter is S; the error for it explains that.
 Result<std::unique_ptr<RecordingReader>> read_oculus_log(std::unique_ptr<Source> source) {
   Scan scan(*source);
   const BytesView front = scan.read(file_header_bytes);

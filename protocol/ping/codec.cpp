@@ -95,7 +95,7 @@ std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool st
 }
 
 /// Whether the message has a frame with one of these numbers and the right sum. The pings of each product have numbers of their
-/// own, so they tell which product sent them.
+/// own, which identify the product.
 bool holds(const RecordedMessage& message, std::initializer_list<Id> pings) {
   Framer framer(longest_payload, true);
   framer.append(message.bytes);
@@ -131,7 +131,7 @@ recording::Codec ping360::codec() {
           .ping_part = [](BytesView message) -> std::optional<recording::PingPart> {
             const auto line = line_in(message);
             if (!line) return std::nullopt;
-            // The sonar that a driver meets has the usual mount; so has the angle of the line, as that driver reads it.
+            // Drivers assume the usual mount; so does the angle of the line, as they read it.
             static const auto options = protocol::check_options(vendor(), {});
             return recording::PingPart{.head_rad = head_rad(line->ping.angle, *options)};
           },

@@ -10,13 +10,7 @@ constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hos
 }  // namespace
 
 protocol::Option silence_option() {
-  return {option_name::silence_s,
-          {},
-          "60",
-          "a host by UDP of which nothing is heard for so long is given up, seconds",
-          5,
-          600,
-          "never"};
+  return {option_name::silence_s, {}, "60", "seconds without a message after which a UDP host counts as gone", 5, 600, "never"};
 }
 protocol::Option type_option(std::string_view usual, std::string_view meaning) {
   return {option_name::device_type, {}, usual, meaning, 0, 255, {}, true};

@@ -22,7 +22,7 @@ protocol::Option type_option(std::string_view usual, std::string_view meaning);
 
 class Conversation : public protocol::Dialogue {
  public:
-  /// `device` outlives it. At a port of kind udp_dialogue a frame does not go on in the next datagram.
+  /// `device` outlives it. At a port of kind udp_dialogue a frame does not continue in the next datagram.
   Conversation(const protocol::DeviceState& device, const protocol::Port& port, DeviceInformation identity, std::uint8_t id)
       : device_(device),
         by_datagrams_(port.kind == protocol::Port::Kind::udp_dialogue),

@@ -104,7 +104,7 @@ std::optional<Frame> Framer::next() {
       frame.payload.assign(payload.begin(), payload.end());
       last_size_ = summed + sum_size;
     }
-    // After a wrong sum the length may be wrong too, so the search goes on at the next byte.
+    // After a wrong sum the length may be wrong too, so the search continues at the next byte.
     begin_ += std::max<std::size_t>(last_size_, 1);
     return frame;
   }

@@ -34,7 +34,7 @@ class Ping1DVendor final : public StreamingVendor {
     const Parameters before = settings_from(ping.request.vendor_settings.get()).parameters;
     if (before.range.start_mm != s.parameters.range.start_mm || before.range.length_mm != s.parameters.range.length_mm ||
         before.gain != s.parameters.gain)
-      return std::nullopt;  // a host has changed range or gain since: the ping does not tell whether the new ones fit
+      return std::nullopt;  // a host has changed range or gain since: the ping does not show whether the new ones fit
     const Parameters next = adjusted(s.parameters, find_echo(ping));
     if (next == s.parameters) return std::nullopt;
     s.parameters = next;

@@ -35,7 +35,7 @@ class Ping360Dialogue final : public Conversation {
     Reaction reaction;
     if (now < next_tick()) return reaction;
     if (awaited_.is_under_way()) {
-      if (awaited_.lose(ping_pending, now)) advance(now);  // the ping is late: the scan goes on without it
+      if (awaited_.lose(ping_pending, now)) advance(now);  // the ping is late: the scan continues without it
       return reaction;
     }
     Settings s = settings();

@@ -1,4 +1,4 @@
-// The common part of the family's hosts: frames, refusals, the settings that a user wants, and the picture of one beam.
+// The common part of the family's hosts: frames, refusals, the settings that a user requests, and the picture of one beam.
 #pragma once
 
 #include <algorithm>

@@ -104,7 +104,7 @@ std::string complaint(const SetPingParams& p) {
   return p.chirp > 1 ? "chirp is 0 or 1" : "";
 }
 
-// An automatic range or gain goes on from the value in force.
+// An automatic range or gain starts from the value in force.
 Parameters requested(const Parameters& before, const SetPingParams& wanted) {
   Parameters p = before;
   p.ping = wanted;
@@ -178,7 +178,7 @@ Settings after(const Ping& ping, const Settings& now) {
   next.earlier = with(now.earlier, echo);
   Parameters& p = next.parameters;
   const Reach made_with = settings_from(ping.request.vendor_settings.get()).parameters.reach;
-  // If a host has changed range or gain since, the ping does not tell whether the new ones fit.
+  // If a host has changed range or gain since, the ping does not show whether the new ones fit.
   if (made_with.length_mm != p.reach.length_mm || made_with.gain != p.reach.gain) return next;
   const Reach chosen = adjusted(made_with, echo, {gains(), most_mm});
   if (p.ping.length_mm == 0)

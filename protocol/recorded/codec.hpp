@@ -37,7 +37,7 @@ struct FileKind {
   bool is_raw_dump = false;  // the same bytes as those of a raw dump, which it reads
 };
 
-/// The device that sent a message, as far as the message tells.
+/// The device that sent a message, as far as the message identifies it.
 struct Sender {
   std::shared_ptr<const SonarModel> model;
   std::uint32_t serial = 0;  // 0: not known
@@ -58,7 +58,7 @@ struct PingPart {
 };
 
 struct Codec {
-  const Framing* framing = nullptr;  // framing of its TCP stream; null: nothing tells messages apart
+  const Framing* framing = nullptr;  // framing of its TCP stream; null: nothing delimits messages
   std::span<const FileKind> files = {};
   /// Finds the sender of a device's message or datagram; nullopt: it is another make's, or does not name its sender.
   std::optional<Sender> (*sender)(const RecordedMessage&) = nullptr;

@@ -71,7 +71,7 @@ std::optional<RecordedMessage> MessageSplitter::next() {
         return cut(*length);
       }
       if (!finished_) return std::nullopt;
-      // The stream ends within this message. The search goes on inside it: it may have been a false begin.
+      // The stream ends within this message. The search continues inside it, because its begin may have been false.
       if (!lost_) ++losses_;
       lost_ = strict_ = true;
       lose(1);

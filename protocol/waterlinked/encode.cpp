@@ -65,7 +65,7 @@ StrengthMessage strength_message(const Ping& ping, const Settings& settings, con
   return m;
 }
 
-/// Samples are taken at whole periods of the device's clock, whatever the time of the shot. A batch goes on where the previous
+/// Samples are taken at whole periods of the device's clock, whatever the time of the shot. A batch continues where the previous
 /// one ended; after a pause, or at first, it begins one period of the mode before the shot.
 ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
   ImuMessage m;

@@ -21,7 +21,8 @@ constexpr double darkest = 0.85;  // the farthest pixel of a range image is dark
 constexpr std::size_t most_pixels = 1 << 20;
 constexpr std::string_view title = "a Sonar 3D-15", api = "/api/v1/integration";
 
-/// The carrier of the shot's mode. The field `frequency` has the rate instead, so the horizontal field of view tells the mode.
+/// The carrier of the shot's mode. The field `frequency` has the rate instead, so the horizontal field of view identifies the
+/// mode.
 double centre_hz_of(const Shot& shot) {
   for (const auto& mode : mode_rows())
     if (std::abs(mode.horizontal_deg - static_cast<double>(shot.horizontal_deg)) < 1) return mode.centre_hz;

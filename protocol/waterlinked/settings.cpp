@@ -9,7 +9,7 @@ namespace sonar::waterlinked {
 namespace {
 
 constexpr std::uint32_t least_strength = 31;  // the least strength whose pixel is not 0
-constexpr float first_gain_db = 33;  // gain of the first pictures, from which the gain assist goes on; 2 cm poles show at 8 m
+constexpr float first_gain_db = 33;           // gain of the first pictures, where the gain assist starts; 2 cm poles show at 8 m
 
 }  // namespace
 

@@ -19,7 +19,7 @@ std::optional<Time> time_of(BytesView content) {
   return std::nullopt;
 }
 
-/// Reads packet by packet; the CRC of each tells whether it is whole.
+/// Reads packet by packet; the CRC of each shows whether it is whole.
 class SonarFileReader final : public RecordingReader {
  public:
   explicit SonarFileReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
@@ -35,7 +35,7 @@ class SonarFileReader final : public RecordingReader {
         scan_.skip(length);
         return message;
       }
-      // A damaged place is reported once; the search goes on byte by byte, because a length in it may be wrong.
+      // A damaged place is reported once; the search continues byte by byte, because a length in it may be wrong.
       if (!std::exchange(searching, true)) damages_.add(why(at, length, packet.size()));
       scan_.skip(1);
     }

@@ -95,7 +95,7 @@ class Dataset(unittest.TestCase):
             time.sleep(0.002)  # until the first pings are written
         process.send_signal(signal.SIGINT)
         words = process.communicate(timeout=300)[1]
-        self.assertRegex(words, r"stopped: \d+ of 24 pings are made and kept.*run the same command again")
+        self.assertRegex(words, r"stopped: \d+ of 24 pings are made and kept.*run the command again")
         self.assertEqual(process.returncode, 130)
         self.assertEqual([p.name for p in out.glob("shard-*.tar*")], [])
         made = int(re.search(r"stopped: (\d+) of", words).group(1))

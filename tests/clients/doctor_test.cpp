@@ -198,10 +198,10 @@ TEST(Doctor, SaysWhatDriversWouldObjectToInTheStatus) {
 TEST(Doctor, FollowsTheAdvertisedAddress) {
   Facts facts = healthy();
   facts.status.received[0].from = "127.0.0.1";
-  expect(line(facts, "status"), Level::ok, "from 127.0.0.1, which tells drivers to connect to 127.0.0.2", "");
+  expect(line(facts, "status"), Level::ok, "from 127.0.0.1, which directs drivers to 127.0.0.2", "");
   facts.status.received[0] = received("127.0.0.2");
   facts.status.received[0].advertised = "10.1.1.1";
-  expect(line(facts, "status"), Level::fail, "connect to 10.1.1.1, where no sonar answers", "advertise_ip");
+  expect(line(facts, "status"), Level::fail, "directs drivers to 10.1.1.1, where no sonar answers", "advertise_ip");
 }
 
 TEST(Doctor, LeavesABusySonarAlone) {

@@ -145,7 +145,7 @@ def read_request(text: str) -> Tuple[str, Dict[str, str]]:
     for part in rest.replace(",", " ").split():
         key, equals, value = part.partition("=")
         if not equals or key not in given:
-            raise ValueError(f"{part}: {code} knows {', '.join(given)}")
+            raise ValueError(f"{part}: {code} has {', '.join(given)}")
         allowed = CHOICES.get((code, key))
         if allowed and value not in allowed:
             raise ValueError(f"{part}: it must be {' or '.join(allowed)}")

@@ -210,7 +210,7 @@ class Connection:
 
 
 class LiveView(threading.Thread):
-    """Receives messages until stop() and connects again after an error. `wants(topic)` says whether to subscribe to a topic.
+    """Receives messages until stop() and connects again after an error. `wants(topic)` decides whether to subscribe to a topic.
     `on_message(topic, ns, payload)` gets each message with the daemon's time. The topic is empty if the message has only the
     time."""
 

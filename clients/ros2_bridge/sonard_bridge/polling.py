@@ -9,7 +9,7 @@ import urllib.request
 from typing import Any, Callable, Dict, Tuple
 
 LIMIT_S = 1.0  # a request that takes longer is abandoned
-WANTS_TOKEN = "sonard wants a token: set the parameter token_file to the file that its control.token_file names"
+WANTS_TOKEN = "sonard requires a token: set the parameter token_file to the file that its control.token_file names"
 
 
 class StatusPoll(threading.Thread):

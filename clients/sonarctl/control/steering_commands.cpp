@@ -164,7 +164,7 @@ void add_set_trajectory(CLI::App& set, const std::shared_ptr<Steering>& steering
   command.add_option("NAME", arguments->wanted.name, "name of the vehicle (default: the only one)");
   command.add_flag("--object", arguments->object, "NAME is a moving object of the scene");
   command.add_flag("--pause", arguments->pause, "stop the body where it is");
-  command.add_flag("--resume", arguments->resume, "it goes on");
+  command.add_flag("--resume", arguments->resume, "continue after --pause");
   add_optional(command, "--seek", arguments->wanted.position_s, "seconds from the start of the trajectory")->check(number(0));
   add_optional(command, "--speed", arguments->wanted.speed, "seconds of the trajectory per second of the clock")
       ->check(number(0.001, 1000));

@@ -73,7 +73,7 @@ class SonarChecks {
     const std::string at = "http at " + sonar_.at.host;
     if (!sonar_.reported && is_replay(facts_.http))
       return add(Level::ok, "ping", at + ": sends a recording to the receiver that a driver names", "");
-    if (!sonar_.reported) return add(Level::warn, "ping", at + ": no daemon tells whether images are sent", "");
+    if (!sonar_.reported) return add(Level::warn, "ping", at + ": no daemon reports whether images are sent", "");
     if (!sonar_.reported->pinging()) {
       const std::string& who = sonar_.reported->asked_by();
       const bool is_waited_for = !who.empty();
@@ -117,7 +117,7 @@ class SonarChecks {
                  "is it a sonar?");
     std::string text = "status broadcast received back on udp " + port + " from " + received->from;
     if (received->advertised == received->from) return add(Level::ok, "status", text, "");
-    text += ", which tells drivers to connect to " + received->advertised;
+    text += ", which directs drivers to " + received->advertised;
     const bool reachable = answers() && sonar_.at.host == received->advertised;
     add(reachable ? Level::ok : Level::fail, "status", text + (reachable ? "" : ", where no sonar answers"),
         reachable ? "" : "set advertise_ip of the sonar to an address that reaches it from here");

@@ -28,7 +28,7 @@ void check_identities(const StatusFacts& status, std::vector<Finding>& findings)
       if (a.device_id != b.device_id || a.advertised == b.advertised) continue;
       findings.push_back({Level::warn, "identity",
                           "the sonars at " + a.advertised + " and " + b.advertised + " have the same device id, " +
-                              std::to_string(a.device_id) + ": drivers cannot tell them apart",
+                              std::to_string(a.device_id) + ": drivers cannot distinguish them",
                           "give each its own device_id in the configuration"});
     }
   }

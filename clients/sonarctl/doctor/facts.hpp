@@ -69,7 +69,7 @@ struct SonarFacts {
   bool out_of_time = false;                         // not examined, for lack of time
   std::vector<std::string> clients;                 // clients that were connected before us
   std::vector<PortHolder> listeners;                // programs on this computer that listen on its port
-  std::shared_ptr<const v1::SonarStatus> reported;  // after the pings; null = the daemon does not know it
+  std::shared_ptr<const v1::SonarStatus> reported;  // after the pings; null = the daemon has no such sonar
   StreamFacts stream;
 };
 

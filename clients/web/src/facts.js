@@ -1,4 +1,4 @@
-// The state of the daemon as the page knows it: messages change it, panels read it. It draws nothing.
+// The page's copy of the daemon's state: messages change it, panels read it. It draws nothing.
 import { Counter, Counters } from './rates.js';
 
 const log_lines = 500;

@@ -164,7 +164,7 @@ class PingSimulation {
   Crosstalk crosstalk_;
   std::span<const Pose> bodies_;
   const PingContext context_;
-  std::vector<ColumnRange> heard_, groups_;  // columns that the beams hear; the same in parts that a worker computes at once
+  std::vector<ColumnRange> heard_, groups_;  // columns that the beams use; the same in parts that a worker computes at once
   int group_columns_ = 0;                    // most columns of a group
   std::vector<PointEcho> points_;
   std::vector<ReceivedPulse> other_sonars_;

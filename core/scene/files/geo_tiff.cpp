@@ -52,7 +52,7 @@ void on_error(const char*, const char* pattern, va_list arguments) {
 
 Tiff open(const std::filesystem::path& file) {
   TIFFSetErrorHandler(on_error);
-  TIFFSetWarningHandler(nullptr);  // libtiff would warn of every tag that it does not know
+  TIFFSetWarningHandler(nullptr);  // libtiff would warn of every unknown tag
   last_error.clear();
 #if TIFFLIB_VERSION >= 20221213
   const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(), TIFFOpenOptionsFree);
@@ -63,7 +63,7 @@ Tiff open(const std::filesystem::path& file) {
 #endif
 }
 
-/// The values of a tag that the library does not know; empty if the tag is missing or has another type.
+/// The values of a tag that is unknown to the library; empty if the tag is missing or has another type.
 template <class T>
 std::vector<T> values_of(TIFF* tiff, std::uint32_t tag, TIFFDataType type) {
   const TIFFField* field = TIFFFindField(tiff, tag, TIFF_ANY);

@@ -48,7 +48,7 @@ tl::unexpected<Error> without_answer(const MeshFile& request, const ChildEnd& en
   if (end.signal == SIGKILL)
     return failure(ErrorKind::unavailable,
                    request.file.filename().string() + ": cannot be read: " + program +
-                       " was killed, most likely for want of memory; use a smaller mesh, or give it more");
+                       " was killed, most likely because memory was short; use a smaller mesh, or give it more");
   if (end.signal == SIGXFSZ)
     return failure(ErrorKind::unavailable,
                    request.file.filename().string() +

@@ -228,7 +228,7 @@ MeshFault glb_fault(std::string_view file) {
              " goes beyond the end of the file; fetch or export it again";
     if (size % 4 != 0)
       return std::string("its ") + name + " chunk has " + bytes(size) +
-             ", and GLB wants a multiple of 4, filled up with blanks or zeros; export it again";
+             ", and GLB requires a multiple of 4, filled up with blanks or zeros; export it again";
     at += chunk_head + static_cast<std::size_t>(size);
   }
   return std::nullopt;

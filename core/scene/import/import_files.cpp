@@ -37,7 +37,7 @@ class ObjText {
     step.begins_vertex = after_v_ && is_blank(c);
     after_v_ = false;
     const bool goes_on =
-        in_face_ && before_ == '\\' && (c == '\n' || c == '\r');  // the face goes on in the next line; both become one line
+        in_face_ && before_ == '\\' && (c == '\n' || c == '\r');  // the face continues in the next line; both become one line
     if (goes_on) {
       step.c = ' ';
       in_word_ = false;
@@ -207,7 +207,7 @@ class ObjStream final : public Assimp::IOStream {
   ObjText text_;
 };
 
-/// The text at the beginning of a file as the importer knows it: in small letters, without blank lines before it.
+/// The text at the beginning of a file as the importer compares it: in small letters, without blank lines before it.
 struct PlainText {
   std::size_t blank_bytes = 0, text_bytes = 0;
 };

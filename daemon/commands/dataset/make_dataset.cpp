@@ -39,7 +39,7 @@ class Folder final : public DatasetFolder {
   Folder(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress)
       : job_(job), o_(options), on_progress_(std::move(on_progress)), pool_(options.threads) {}
 
-  // First finds the shards that are missing, so that progress knows how many pings are to be made.
+  // First finds the shards that are missing, so that the progress counts the pings that are still to be made.
   Result<DatasetProgress> make_all() {
     std::vector<std::uint64_t> missing;
     for (std::uint64_t shard = o_.part; shard < job_.shards(); shard += o_.parts) {

@@ -20,8 +20,8 @@ namespace sonar::dataset {
 std::string shard_name(std::uint64_t shard);
 
 /// A file that gets its final name when it is complete. Until then it is NAME.tmp.HOST.PID in the same folder, a name that no
-/// other process uses. It stays locked until then, so that remove_unfinished() can tell it from a file that a killed run left.
-/// The destructor removes a file that was not committed.
+/// other process uses. It stays locked until then, so that remove_unfinished() can distinguish it from a file that a killed run
+/// left. The destructor removes a file that was not committed.
 class DurableFile {
  public:
   static Result<DurableFile> open(const std::filesystem::path& file);

@@ -174,7 +174,7 @@ Result<int> status(const FarmCommand& c) {
   if (!queue) return tl::make_unexpected(queue.error());
   while (true) {
     const auto text = describe_farm(**queue);
-    // A watch goes on after an error, and shows it, because the server may come back.
+    // A watch continues after an error, and shows it, because the server may come back.
     if (!text && !c.watch) return tl::make_unexpected(text.error());
     // The escape sequence clears the terminal, so each status replaces the one before.
     std::printf("%s%s", c.watch ? "\033[H\033[J" : "", (text ? *text : text.error().text + "\n").c_str());

@@ -40,7 +40,7 @@ class Cartesian {
   const FanLayout& layout() const { return layout_; }
   std::pair<double, double> at(Corner corner) const {
     const auto& azimuth = shape_.azimuth_rad;
-    // Beam k spans [k - 1/2, k + 1/2] of the table; past its ends it goes on as between the last two.
+    // Beam k spans [k - 1/2, k + 1/2] of the table; past its ends the spacing is that of the last two.
     const double beam = corner.x - 0.5;
     const auto left = static_cast<std::size_t>(std::clamp(std::floor(beam), 0.0, static_cast<double>(azimuth.size()) - 2));
     const double angle = azimuth[left] + (beam - static_cast<double>(left)) * (azimuth[left + 1] - azimuth[left]);

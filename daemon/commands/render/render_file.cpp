@@ -232,7 +232,7 @@ Result<RenderInput> parse_render_file(std::string_view text, const std::string& 
   return input;
 }
 
-/// A key tells the kind of file: `world` a configuration, `objects` a scene, `dataset` a job; else it is a render file.
+/// A key decides the kind of file: `world` a configuration, `objects` a scene, `dataset` a job; else it is a render file.
 Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar) {
   const auto text = text_of_file(file);
   if (!text) return tl::make_unexpected(text.error());

@@ -1,5 +1,5 @@
-// Detects files of unrelated poses, as in a data set. Their poses are too far apart for the trajectory of a vehicle, so they do
-// not tell the motion within a ping.
+// Detects files of unrelated poses, as in a data set. Their poses are too far apart for the trajectory of a vehicle, so they
+// do not define the motion within a ping.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 namespace sonar::render {
 
 /// Highest speeds of a carrier of an imaging sonar: a fast boat, and a towfish that rolls. A file of poses with more than one
-/// faster step in `steps_to_one_too_far` is taken as snapshots, not as a trajectory, unless it contains velocities.
+/// faster step in `steps_to_one_too_far` is read as snapshots, not as a trajectory, unless it contains velocities.
 inline constexpr double fastest_vehicle_mps = 15, fastest_vehicle_radps = 5;
 inline constexpr std::size_t steps_to_one_too_far = 10;
 /// Poses that are closer in time count as one step, because the jitter of a fast log is not motion.
@@ -22,7 +22,7 @@ struct Steps {
 };
 Steps steps_of(const motion::Trajectory& trajectory);
 bool are_snapshots(const motion::Trajectory& trajectory);
-/// Returns one sentence about a trajectory that is taken as snapshots.
+/// Returns one sentence about a trajectory that is read as snapshots.
 std::string note_of_snapshots(const motion::Trajectory& trajectory);
 
 }  // namespace sonar::render

@@ -29,7 +29,7 @@ void add_replay_options(CLI::App& app, ReplayCommand& replay) {
                            ->capture_default_str();
   app.add_flag("--stepped", replay.stepped, "no pace: the next message when the driver has taken the last")->excludes(speed);
   app.add_flag("--loop", replay.loop, "from the front again and again");
-  app.add_option("--rate", replay.rate_hz, "messages a second of raw dumps, which know no times")
+  app.add_option("--rate", replay.rate_hz, "messages a second of raw dumps, which have no times")
       ->check(text::number(0.001, 10000))
       ->capture_default_str();
   app.add_option("--sonar", replay.sonar, "which of several in the file: its address in captures, its name in MCAP");

@@ -203,8 +203,8 @@ asio::awaitable<void> ReplayServer::serve(ClientPointer client) {
   if (stopping_ || played == Played::to_the_end) end();
 }
 
-/// Sends the device's messages in order. Before each it sends waiting replies, waits until the host wants pings, and waits for
-/// the time at which the message is due.
+/// Sends the device's messages in order. Before each it sends waiting replies, waits until the host has requested pings, and
+/// waits for the time at which the message is due.
 asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, ReplayPace& pace) {
   bool any = false;
   const auto carrier = device_.by_datagrams() ? recording::Carrier::datagram : recording::Carrier::stream;

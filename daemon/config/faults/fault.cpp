@@ -63,7 +63,7 @@ class Check {
   }
 
  private:
-  // The first error counts; checks go on after it, with values that do no harm.
+  // The first error counts; checks continue after it, with harmless values.
   void wrong(std::string text) {
     if (error_.empty()) error_ = std::move(text);
   }

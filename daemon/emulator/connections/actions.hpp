@@ -43,7 +43,7 @@ struct Refuse {
 struct Listen {
   bool on = true;
 };
-/// Stop or go on reading what this client sends: its window fills.
+/// Stop or resume reading from this client. While it is stopped, the client's TCP window fills.
 struct ReadFrom {
   ConnectionId connection = 0;
   bool on = true;

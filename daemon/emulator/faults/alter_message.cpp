@@ -225,7 +225,7 @@ void write_address(Bytes& bytes, const std::optional<Field>& field, const text::
   for (std::size_t i = 0; i < 4; ++i) bytes[field->offset + i] = static_cast<std::byte>(address[i]);
 }
 
-/// A second device differs in what drivers tell devices apart by: id, hardware address, and network address if wanted.
+/// A second device differs in all by which drivers distinguish devices: id, hardware address, and network address if requested.
 Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
   const auto of = [&](FieldName name) { return vendor.field(Part::beacon, name, bytes); };
   const std::string& address = fault.word("address");

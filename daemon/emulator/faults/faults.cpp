@@ -230,7 +230,7 @@ void Faults::step(Entry& e, Time now) {
 
 // ---- pings
 
-/// Decides once for each ping which faults it meets, and remembers that, so that all clients and all stages agree.
+/// Decides once for each ping which faults act on it, and stores the decision, so that all clients and stages use the same.
 void Faults::begin_ping(std::uint32_t number, Time now) {
   if (entries_.empty()) return;
   on_tick(now);

@@ -22,7 +22,7 @@ class Preview {
   bool on() const { return until_.has_value(); }
   /// The time between two previews of this sonar.
   static std::chrono::nanoseconds period(const Sonar& sonar);
-  /// Returns why the preview must end now, for the log; empty if it may go on.
+  /// Returns why the preview must end now, for the log; empty if it may continue.
   std::string why_over(const Sonar& sonar, Time now) const;
   /// Returns the ping that is due. Call done() when it is computed; until then no other is due.
   std::optional<PingRequest> due(const Sonar& sonar, Time now);

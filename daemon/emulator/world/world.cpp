@@ -159,7 +159,8 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   const Ns offset = own_clock ? offset_for(track, at, now, goes_on) : Ns(0);
   const bool vehicle = sample.of == PoseSample::Of::vehicle;  // poses of objects may be rare
   if (rules_.follows && vehicle && offset != track.offset && track.sender_id == sender.id)
-    out.notice = "stamps of " + track.body.name + " do not go on from where they were: taken as the next moments of our time";
+    out.notice = "stamps of " + track.body.name +
+                 " do not continue from the last one: they are shifted, and sonard's time continues without a jump";
   track.offset = offset;
 
   if (track.source != sender.source) {

@@ -254,7 +254,7 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
   if (!over()) next_request();
 }
 
-/// HTTP/1.1 gets chunks. HTTP/1.0 does not know them (RFC 9112, 6.1): there the end of the connection ends the body.
+/// HTTP/1.1 gets chunks. HTTP/1.0 has none (RFC 9112, 6.1): there the end of the connection ends the body.
 asio::awaitable<void> HttpConnection::write_stream(HttpStream stream, Head head) {
   discards_ = true;  // reading continues, to notice that the client disconnects
   wake_reader_.cancel();

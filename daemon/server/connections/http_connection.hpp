@@ -34,7 +34,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   Endpoint reached() const { return reached_; }
   /// The address of the other end.
   Ipv4 peer() const { return peer_; }
-  /// Claims a slot for a client that has shown the token in a way that only the service knows. Returns false if no slot is free.
+  /// Claims a slot for a client that has shown the token in a way that only the service can check. Returns false if no slot is
+  /// free.
   bool claim_slot() { return !claim_slot_ || std::exchange(claim_slot_, nullptr)(); }
   /// The socket, for a takeover.
   tcp::socket& socket() { return socket_; }

@@ -187,7 +187,7 @@ void write_links(PrometheusText& text, const std::vector<LinkFigures>& links) {
   for (const LinkFigures& link : links) text.sample({{"link", link.endpoint}}, static_cast<double>(link.sent));
   text.family(
       "sonard_distances_dropped_total", Type::counter,
-      "DISTANCE_SENSOR messages that were not sent, because a fault withheld the ping, no vehicle was heard on the link, or "
+      "DISTANCE_SENSOR messages that were not sent, because a fault withheld the ping, no vehicle was detected on the link, or "
       "the socket refused them.");
   for (const LinkFigures& link : links)
     for (const auto& [reason, count] :

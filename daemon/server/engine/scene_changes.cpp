@@ -25,7 +25,7 @@ SceneChanges::SceneChanges(asio::io_context& io, Simulator& simulator, ScenePoin
 
 SceneChanges::~SceneChanges() { thread_.join(); }
 
-/// A build that is under way goes on; finish() then drops its result.
+/// A build that is under way continues; finish() then drops its result.
 void SceneChanges::stop() {
   stopped_ = true;
   waiting_.clear();

@@ -3,8 +3,8 @@
 // everything here is called on the I/O thread, except for Change::make.
 //
 // Pings are made with the old scene until the new one is ready. Then the simulator gets the new engine and the world the new
-// moving bodies before anything else happens, so that a request's bodies are always those of the scene it meets. In stepped
-// time that moment lies before the next step, which waits for it.
+// moving bodies before anything else happens, so that a request's bodies are always those of the scene with which it is computed.
+// In stepped time that moment lies before the next step, which waits for it.
 #pragma once
 
 #include <chrono>

@@ -37,7 +37,7 @@ class ViewSecrets {
 
 /// A handshake that is accepted.
 struct ViewWelcome {
-  std::string protocol;  // the protocol that both sides know
+  std::string protocol;  // the protocol that both sides support
   bool may_steer = false;
   double most_hz = 0;     // limit for the rate of pictures that the viewer set; 0 = none
   std::string playback;   // the requested vehicle whose trajectory it looks at; empty = none

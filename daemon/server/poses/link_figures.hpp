@@ -12,7 +12,7 @@ struct LinkFigures {
   std::string vehicle;
   std::uint64_t sent = 0;
   std::uint64_t withheld = 0;     // by a fault
-  std::uint64_t unaddressed = 0;  // no vehicle was heard on a listening link
+  std::uint64_t unaddressed = 0;  // no vehicle was detected on a listening link
   std::uint64_t refused = 0;      // by the socket: its buffer is full, or there is no way to the other end
 
   std::uint64_t dropped() const { return withheld + unaddressed + refused; }

@@ -157,14 +157,14 @@ bool MavlinkServer::wants_distances(const std::string& vehicle) const {
                      [&](const Link& l) { return l.config.vehicle == vehicle && l.poses.wants_distances(); });
 }
 
-/// Reports a change of what the vehicle of this link wants, because the sonars of that vehicle then begin or cease to ping by
+/// Reports when the vehicle of this link starts or stops requesting distances, because its sonars then start or stop to ping by
 /// themselves.
 void MavlinkServer::look_at_wants(Link& link) {
   const bool wants = link.poses.wants_distances();
   if (std::exchange(link.distances_wanted, wants) != wants && distances_wanted_) distances_wanted_();
 }
 
-/// Sends a distance to every link of the vehicle that wants it, and counts it as sent or dropped there.
+/// Sends a distance to every link of the vehicle that requested it, and counts it as sent or dropped there.
 void MavlinkServer::on_distance(const SonarConfig& sonar, const PingQueued& ping) {
   if (sonar.vehicle >= config_.vehicles.size()) return;
   const std::string& vehicle = config_.vehicles[sonar.vehicle].name;

@@ -144,7 +144,7 @@ void Device::stop(const std::string& why) {
   timer_.cancel();
   for (SonarHttp& http : http_) http.stop();
   visits_.end();
-  if (started_) parent_.on_stop(*this, why);  // a device that was never started may have the name of one that goes on
+  if (started_) parent_.on_stop(*this, why);  // a device that was never started may have the name of a running one
   perform(sonar_.stop(why));
   for (DatagramPort& port : datagram_ports_) port.stop();
   if (!started_) streams_.clear();

@@ -185,7 +185,7 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
 
 // ---- pings and clients, passed on to the simulator, recordings and events
 
-/// The request says what recordings and viewers want beside the samples. The scene's names are remembered for the ping, because
+/// The request contains what recordings and viewers need beside the samples. The scene's names are stored for the ping, because
 /// another scene may be in use when it is done.
 void Fleet::compute(const Device& of, PingRequest request, Simulator::Done done) {
   const std::string& name = of.config().name;

@@ -102,7 +102,7 @@ void Notify::send(const std::string& message, int flags) {
     if (sent < 0) why = std::strerror(errno);
   }
   if (!why.empty() && !std::exchange(complained_, true))
-    log_.warning("cannot tell the service manager at " + target_.socket + " (NOTIFY_SOCKET): " + why);
+    log_.warning("cannot notify the service manager at " + target_.socket + " (NOTIFY_SOCKET): " + why);
 }
 
 }  // namespace sonar

@@ -46,7 +46,7 @@ class Notify {
   std::function<std::chrono::nanoseconds()> ping_under_way_;
   Log& log_;
   asio::steady_timer timer_;
-  int socket_ = -1;  // kept open: a message must not fail for want of a descriptor
+  int socket_ = -1;  // kept open, so that a message never fails for lack of a descriptor
   bool stopping_ = false, keeping_ = false, complained_ = false, stuck_ = false;
 };
 

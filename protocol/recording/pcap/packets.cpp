@@ -88,7 +88,7 @@ std::optional<Packet> PacketReader::next_classic() {
   return Packet{time_of(whole_s * per_s + rest, per_s), interfaces_.front().link_type, bytes};
 }
 
-/// Reads the byte order of a section, which the number at offset 8 tells. A new section has interfaces of its own.
+/// Reads the byte order of a section, which the number at offset 8 shows. A new section has interfaces of its own.
 bool PacketReader::begin_section(std::uint64_t at) {
   scan_.seek(at);
   const BytesView front = scan_.peek(12);

@@ -100,7 +100,7 @@ class PcapWriter final : public RecordingWriter {
 
   Result<void> write(const RecordedMessage& message) override {
     Bytes packets;
-    // If the sink fails, the next message goes on from here, as if this one had not been written.
+    // If the sink fails, the next message continues from here, as if this one had not been written.
     const auto before = std::tuple(device_, client_, identification_, begun_, connected_);
     last_ = message.at;
     begin(packets);
@@ -140,7 +140,7 @@ class PcapWriter final : public RecordingWriter {
     if (!std::exchange(begun_, true)) wire::append(packets, PcapFileHeader{});
   }
 
-  /// The handshake. Wireshark needs it to know the window scale.
+  /// The handshake. Wireshark reads the window scale from it.
   void connect(Bytes& packets) {
     if (std::exchange(connected_, true)) return;
     segment(packets, client_, device_, tcp_flag::syn, {});

@@ -229,10 +229,11 @@ TEST(ReadSdf, MissingModelsAreNamedOnceEachWithTheCommandThatFetchesThem) {
   const std::string rock = "https://fuel.gazebosim.org/1.0/Cole/models/Ocean Rock 03";
   const std::string world = sdf("<include><uri> " + rock + " </uri></include>\n<include><uri>" + rock + "</uri></include>\n" +
                                 "<include><uri>model://gone</uri></include>" + model("m", link("l")));
-  EXPECT_EQ(r.error(world),
-            "w.sdf:3: include: models that are not here; fetch them, give the folder that holds them with --model-path, or go on "
-            "without them with --skip-missing: gz fuel download --url '" +
-                rock + "' (2 includes); model://gone");
+  EXPECT_EQ(
+      r.error(world),
+      "w.sdf:3: include: models that are not here; fetch them, give the folder that holds them with --model-path, or continue "
+      "without them with --skip-missing: gz fuel download --url '" +
+          rock + "' (2 includes); model://gone");
   r.options.skip_missing = true;
   ASSERT_TRUE(r.read(world));
   EXPECT_THAT(r.findings.left_out(), ElementsAre("w.sdf:3: include of " + rock +

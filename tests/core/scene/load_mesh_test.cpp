@@ -523,7 +523,7 @@ TEST_F(LoadMesh, FaultsOfAGlbAreNamed) {
   unpadded.insert(20 + json, " ");
   unpadded[12] = static_cast<char>(unpadded[12] + 1), unpadded[8] = static_cast<char>(unpadded[8] + 1);
   EXPECT_THAT(refusal("u.glb", unpadded), HasSubstr("u.glb: cannot be read: its JSON chunk has " + std::to_string(json + 1) +
-                                                    " bytes, and GLB wants a multiple of 4"));
+                                                    " bytes, and GLB requires a multiple of 4"));
   EXPECT_THAT(refusal("l.glb", "version https://git-lfs.github.com/spec/v1\n"), HasSubstr("l.glb: is a pointer of Git LFS"));
   EXPECT_THAT(refusal("c.glb", whole.substr(0, whole.size() - 30)), HasSubstr("c.glb: cannot be read: is cut short"));
   EXPECT_THAT(refusal("v.glb", with(4, 3)), HasSubstr("v.glb: cannot be read: is GLB of version 3"));

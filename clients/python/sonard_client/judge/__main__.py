@@ -242,7 +242,7 @@ class Judge:
             return ""
         kind = self.kinds.get(case.kind)
         if kind is None:
-            return f"this sonard does not know {case.kind}"
+            return f"this sonard has no fault {case.kind}"
         product = self.options.profile.replace("-", "")  # it begins with the name of its make
         why = next((why for make, why in kind.get("without_effect", {}).items() if product.startswith(make)), "")
         if why:

@@ -284,5 +284,5 @@ def case_page(column: Json, row: Json, folder: pathlib.Path, reasons: Sequence[s
 <p><span class="swatch {row["colour"]}">&nbsp;{_MARKS[row["colour"]]} {_e(row["result"])}&nbsp;</span>
 {_MEANINGS[row["colour"]]}</p>
 <ul>{why}</ul><dl class="facts"><dt>expectation</dt><dd>{_e(row["expectation"])}</dd><dt>parameters</dt><dd>{_e(parameters)}</dd>
-<dt>a good driver</dt><dd>{_e(row.get("good_driver") or "goes on as before")}</dd><dt>begins, lasts</dt><dd>{_e(row["at"])}, {_e(row["duration"])}; the driver has {row["limit"]:g} s after it</dd></dl>
+<dt>a good driver</dt><dd>{_e(row.get("good_driver") or "continues as before")}</dd><dt>begins, lasts</dt><dd>{_e(row["at"])}, {_e(row["duration"])}; the driver has {row["limit"]:g} s after it</dd></dl>
 <h2>Repeat</h2><pre>{_e(row["repeat"])}</pre>{parts}</main>""")

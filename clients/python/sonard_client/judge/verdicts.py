@@ -93,7 +93,7 @@ def sort_published(published: Sequence[Published], true_pings: Sequence[Seen]
         if not matching:
             false.append(shown)
             continue
-        # Equal images without a number cannot be told apart; the first one that is not yet published is assumed.
+        # Equal images without a number cannot be distinguished; the first one that is not yet published is assumed.
         keys = [(seen.ping.number, shown.crc) for seen in matching]
         fresh = next((key for key in keys if before[key] < len(connections[key])), None)
         if fresh is None:

@@ -148,9 +148,9 @@ TEST(Notify, AManagerThatIsNotThereIsMentionedOnceAndHurtsNothing) {
   for (int i = 0; i < 8; ++i) ASSERT_TRUE(client.next_ping());
   EXPECT_EQ(daemon.stop(), 0);
   const std::string text = daemon.log_text();
-  const std::size_t first = text.find("cannot tell the service manager");
+  const std::size_t first = text.find("cannot notify the service manager");
   ASSERT_NE(first, std::string::npos);
-  EXPECT_EQ(text.find("cannot tell the service manager", first + 1), std::string::npos);
+  EXPECT_EQ(text.find("cannot notify the service manager", first + 1), std::string::npos);
 }
 
 TEST(Notify, SocketNamesThatAreNoneAreRefusedInWords) {

@@ -50,7 +50,7 @@ class OculusReader:
         return found
 
     def _ping_at(self, at: int, found: List[TruePing]) -> int:
-        """The bytes to go on by; 0 if more data are needed."""
+        """Returns the number of bytes to advance; 0 if more data are needed."""
         data = self._data
         if len(data) - at < layouts.HEADER_BYTES:
             return 0
