@@ -9,7 +9,7 @@
 
 namespace sonar::cuda {
 
-// The device loads such a struct at once, not value by value.
+// The device loads such a struct by one instruction.
 struct alignas(8) Pair {
   float re, im;
 };
@@ -52,7 +52,7 @@ SONAR_HD inline void add_points(const PingView& p, std::uint32_t j, std::int32_t
   re += static_cast<float>(power ? sum_re * sum_re + sum_im * sum_im : sum_re);
   if (!power) im += static_cast<float>(sum_im);
 }
-/// Adds the pulses of other sonars, likewise.
+/// Adds the pulses of other sonars at sample `n` of beam `j`.
 SONAR_HD inline void add_pulses(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
   const auto beams = static_cast<std::uint32_t>(p.beams);
   const bool power = p.sea.expected_power != 0;

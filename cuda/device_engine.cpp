@@ -84,7 +84,7 @@ class DeviceEngine final : public PingEngine {
            std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
   }
   std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
-    // As many as are prepared at the same time, so that a ping waits only for the others' steps on the device.
+    // The number of pings that are prepared at the same time, so that a ping waits only for the others' steps on the device.
     const std::size_t most = std::min(batch_, static_cast<std::size_t>(pool_.threads()));
     return !failed_ && are_alike(a, b) && why_by_cpu(a).empty() && why_by_cpu(b).empty() ? most : 1;
   }

@@ -10,8 +10,8 @@
 namespace sonar {
 namespace {
 
-/// The fractional position in the beam table; beam k spans [k - 0.5, k + 0.5]. nullopt outside the fan; a full turn has no
-/// outside.
+/// The fractional position in the beam table; beam k spans [k - 0.5, k + 0.5]. nullopt outside the fan; never for a full
+/// turn.
 std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azimuth) {
   const auto next = std::lower_bound(azimuth_rad.begin(), azimuth_rad.end(), azimuth, std::greater<>());
   const auto right = std::clamp<std::ptrdiff_t>(next - azimuth_rad.begin(), 1, std::ssize(azimuth_rad) - 1);
@@ -67,11 +67,12 @@ void draw_rings(Raster& raster, const PolarImage& image, const FanLayout& layout
 
 Result<void> check(const PolarImage& image, const FanStyle& style) {
   if (style.width_px < 64 || style.width_px > 8000)
-    return failure(ErrorKind::usage, "a picture " + std::to_string(style.width_px) + " pixels wide: choose 64 to 8000");
+    return failure(ErrorKind::usage,
+                   "the picture would be " + std::to_string(style.width_px) + " pixels wide: choose 64 to 8000");
   if (image.rows < 1 || image.beams < 2 || !(image.row_spacing_m > 0) || !std::isfinite(image.row_spacing_m) ||
       !(image.start_m >= 0) || !std::isfinite(image.start_m))
-    return failure(ErrorKind::bad_data, "the ping has no picture: " + std::to_string(image.rows) + " rows of " +
-                                            std::to_string(image.beams) + " beams, nothing to draw");
+    return failure(ErrorKind::bad_data, "the ping cannot be drawn: it has " + std::to_string(image.rows) + " rows of " +
+                                            std::to_string(image.beams) + " beams");
   for (std::size_t i = 1; i < image.beams; ++i)
     if (image.azimuth_rad[i] >= image.azimuth_rad[i - 1])
       return failure(ErrorKind::bad_data, "the bearing table does not run from port to starboard at beam " + std::to_string(i));

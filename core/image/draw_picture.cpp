@@ -73,14 +73,15 @@ void draw_points(Raster& raster, const SonarPicture& picture, const FanLayout& l
 Result<void> check_cells(const SonarPicture& picture, const FanStyle& style) {
   const PolarImage& image = picture.image;
   if (style.width_px < 64 || style.width_px > 8000)
-    return failure(ErrorKind::usage, "a picture " + std::to_string(style.width_px) + " pixels wide: choose 64 to 8000");
+    return failure(ErrorKind::usage,
+                   "the picture would be " + std::to_string(style.width_px) + " pixels wide: choose 64 to 8000");
   const bool has_sides = picture.kind == PictureKind::waterfall
                              ? image.row_spacing_m > 0
                              : image.azimuth_rad.size() == image.beams && picture.elevation_rad > 0 &&
                                    picture.elevation_rad < pi && image.azimuth_rad.front() > image.azimuth_rad.back();
   if (image.rows >= 1 && image.beams >= 2 && has_sides && image.samples.size() == image.rows * image.beams) return {};
-  return failure(ErrorKind::bad_data, "the ping has no picture: " + std::to_string(image.rows) + " rows of " +
-                                          std::to_string(image.beams) + " cells, nothing to draw");
+  return failure(ErrorKind::bad_data, "the ping cannot be drawn: it has " + std::to_string(image.rows) + " rows of " +
+                                          std::to_string(image.beams) + " cells");
 }
 
 }  // namespace

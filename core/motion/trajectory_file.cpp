@@ -225,7 +225,7 @@ class Reader {
     if (!p.times.empty() && Ns(row.stamp_ns) < p.times.back())
       return set_error("the time is earlier than the previous one" +
                        (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
-    // As with live poses, a pose replaces an earlier one of the same time. So no interval between poses has length 0.
+    // A pose replaces an earlier one of the same time, as with live poses. So no interval between poses has length 0.
     if (!p.times.empty() && Ns(row.stamp_ns) == p.times.back()) {
       ++replaced_;
       p.times.pop_back(), p.poses.pop_back();

@@ -72,7 +72,7 @@ Vec3d PaperFan::direction(int column, int row) const {
 
 double PaperFan::solid_angle_sr(int column, int row) const {
   const double cell = column_width[static_cast<std::size_t>(column)] * row_step;
-  // As P25's (2) is printed, dtheta dphi, without cos(phi) [sr].
+  // P25's (2) as it is printed: dtheta dphi, without cos(phi) [sr].
   if (!perspective) return cell;
   const double x = direction(column, row).x;  // a pixel of the plane x = 1 has the solid angle dy dz x^3
   return cell * x * x * x;

@@ -120,7 +120,7 @@ void find_reach(const PingContext& context, const Rotation& sonar_from_object, V
     return std::clamp(static_cast<int>(bin_of_tangent(plan.fan.axis, static_cast<float>(t))) + more, 0, plan.fan.bins);
   };
   out.first_bin = bin(tangent.low, -1), out.last_bin = bin(tangent.high, 2);
-  // As see_cells() compares them: 1 / x with the map's tolerance.
+  // Compares like see_cells(): 1 / x with the map's tolerance.
   constexpr double rounding = 1e-5;
   const double tolerance = static_cast<double>(plan.depth_tolerance_m()) / range.low + static_cast<double>(seen.tolerance_share);
   out.nearest = static_cast<float>((1 + tolerance) * (1 + rounding) / forward.low);

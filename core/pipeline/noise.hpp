@@ -21,7 +21,7 @@ class NoiseTable {
   void prepare(Seed seed, const std::vector<float>& filter, std::span<const NoiseTable* const> others = {});
   /// column[2 n], column[2 n + 1] += rms * noise for n in [0, samples). It depends only on (seed, sonar, ping, column, n).
   void add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
-  /// As add(), but replaces the values of the column.
+  /// Like add(), but replaces the values of the column.
   void set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The table that add() reads: noise_table_samples complex values (core/pipeline/arithmetic/noise_place.hpp).
   const std::vector<float>& shaped() const { return *shaped_; }

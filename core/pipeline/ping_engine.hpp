@@ -74,8 +74,8 @@ class PingEngine {
     submitted_.pop_front();
     return run(requests);
   }
-  /// Largest number of requests like these two that one run() computes faster than several runs. 1: it is not faster, or one of
-  /// the two would take much longer than in a run() of its own.
+  /// Largest number of requests like these two that one run() computes faster than several runs. 1: together is not faster, or
+  /// delays one of the two much.
   virtual std::size_t most_together(const PingRequest& a, const PingRequest& b) const {
     return static_cast<void>(a), static_cast<void>(b), 1;
   }

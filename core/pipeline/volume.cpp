@@ -17,7 +17,7 @@ constexpr int most_slices = 256;
 
 }  // namespace
 
-// du dpsi for cones; flat beams are cos(phi) dtheta dphi, u = sin(theta).
+// The width of a column in (17): du for cones; for flat beams dtheta = du / cos(theta), with u = sin(theta).
 double volume_column_width(const PingPlan& plan, int column) {
   const double u = plan.columns.sine(column), across = 1 - u * u;
   if (!(across > 0)) return 0;

@@ -1,5 +1,5 @@
 // The configuration file as one struct tree with defaults, read and validated once at start; docs/configuration.md is its manual.
-// Nothing else in the daemon reads settings from anywhere.
+// No other part of the daemon reads settings.
 #pragma once
 
 #include <array>

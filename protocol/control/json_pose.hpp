@@ -36,7 +36,8 @@ class LineParser {
   };
   void feed(std::span<const std::byte> received);
   std::optional<Line> next();
-  /// A part of the stream was dropped here: the line that has begun is discarded, and the bytes up to the end of the next one.
+  /// Call it when a part of the stream was dropped. The line that has begun is discarded, and so are all bytes up to the next
+  /// line end, because they may be the end of a dropped line.
   void skip_gap();
   /// Whether the line that has begun can become a JSON object: so far only blanks have come, or its first character is a brace. A
   /// request line of HTTP never can.

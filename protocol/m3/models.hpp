@@ -8,13 +8,14 @@
 
 namespace sonar::m3 {
 
-inline constexpr int beam_count = 128;                           // PKT
-inline constexpr double beam_spacing_deg = 0.9375;               // PKT
-inline constexpr double nearest_m = 0.2;                         // PKT
-inline constexpr double farthest_m = 150;                        // recalled from the data sheet
-inline constexpr float usual_rate_hz = 15;                       // PKT
-inline constexpr float highest_rate_hz = 40;                     // recalled from the data sheet
-inline constexpr double slowest_mps = 1400, fastest_mps = 1560;  // sound speeds for which windows have room; fitted to PKT, LOG
+inline constexpr int beam_count = 128;              // PKT
+inline constexpr double beam_spacing_deg = 0.9375;  // PKT
+inline constexpr double nearest_m = 0.2;            // PKT
+inline constexpr double farthest_m = 150;           // recalled from the data sheet
+inline constexpr float usual_rate_hz = 15;          // PKT
+inline constexpr float highest_rate_hz = 40;        // recalled from the data sheet
+inline constexpr double slowest_mps = 1400,
+                        fastest_mps = 1560;  // limits of the sound speed for the size of windows; fitted to PKT, LOG
 
 std::span<const std::shared_ptr<const SonarModel>> models();
 

@@ -21,8 +21,8 @@ inline constexpr int block_rows = 16;
 /// The median of nine ranges, of itself and its neighbours, is the range of 0.69 of the pixels; 3 % have the largest or the
 /// least.
 inline constexpr int median_passes = 1;
-/// Where the ranges around a pixel span less than 4 mm 0.3 % of the pixels have no return, 4 % of 16 to 64 mm, 8 % beyond,
-/// whatever the strength beside them: returns that no pixel around them confirms are dropped. Fitted on rough slopes.
+/// The device drops returns that no pixel around them confirms: if the ranges around a pixel span less than 4 mm, 0.3 % of the
+/// pixels have no return; 16 to 64 mm, 4 %; more, 8 %; at any strength of the neighbours. Fitted on rough slopes.
 inline constexpr int least_confirming = 1;
 inline constexpr double confirming_m = 0.007;
 /// Most ranges are multiples of it.

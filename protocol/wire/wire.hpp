@@ -43,7 +43,7 @@ constexpr T from_bits(std::uint64_t bits) {
   return std::bit_cast<T>(static_cast<UnsignedOf<sizeof(T)>>(bits));
 }
 
-/// Byte `index` (in wire order) of a value of `size` bytes is found `shift_of` bits up.
+/// Returns by how many bits a value of `size` bytes is shifted right to get its byte `index` (in wire order).
 constexpr unsigned shift_of(std::size_t index, std::size_t size, Endian endian) {
   return static_cast<unsigned>(8 * (endian == Endian::little ? index : size - 1 - index));
 }
@@ -112,7 +112,7 @@ class Writer : public Visitor<Writer> {
   Endian endian_;
 };
 
-/// Consumes a span. The first failure is kept, everything after it leaves its fields untouched.
+/// Reads fields from a span. It keeps the first failure; fields read after that stay unchanged.
 class Reader : public Visitor<Reader> {
  public:
   struct Failure {
@@ -235,7 +235,7 @@ class Namer : public Visitor<Namer> {
   std::string prefix_;
 };
 
-/// The place of a field in a message, and its type; little-endian. `bytes`: neither an integer nor a floating-point number.
+/// The position of a field in a message, and its type; little-endian. `bytes`: neither an integer nor a floating-point number.
 struct Field {
   enum class Type { integer, number, bytes } type{};
   std::size_t offset = 0, size = 0;

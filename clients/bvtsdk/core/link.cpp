@@ -77,8 +77,8 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
   if (greeted == bad_packet_version)
     return refuse(greeted,
                   "sonard at " + there + " uses another version of the link; use the library and sonard of the same release");
-  // Programs retry after connection_timed_out and give up after any other code. Therefore a sonar that is just starting or
-  // shutting down has this code.
+  // Programs retry after connection_timed_out and give up after any other code. Therefore this code is
+  // returned for a sonar that is just starting or shutting down.
   if (greeted != success)
     return refuse(connection_timed_out,
                   there +
@@ -183,7 +183,7 @@ void Link::receive() {
 void Link::deliver(const FrameHeader& header, Bytes payload) {
   const std::lock_guard lock(waiting_mutex_);
   const auto found = waiting_.find(header.request_id);
-  if (found == waiting_.end()) return;  // keep-alive, unsolicited, or too late
+  if (found == waiting_.end()) return;  // a keep-alive, an unsolicited frame, or a late answer
   Waiter& waiter = *found->second;
   const auto expected = static_cast<FrameType>(static_cast<std::uint16_t>(waiter.request) | 0x8000);
   waiter.code = header.type == expected ? success : header.type == FrameType::error ? refusal(payload) : bad_packet_type;

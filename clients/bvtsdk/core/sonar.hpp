@@ -50,7 +50,7 @@ class Sonar : public Object {
   int open(const std::string& type, const std::string& parameter, int abi);
   /// Creates a recording of the sonar that `of` describes; this object then writes to it.
   int create_file(const std::string& path, const SonarDescription& of);
-  /// Closes the link or file. Heads that the program still has then return errors, and 3.x handles of heads are invalid.
+  /// Closes the link or file. After that, heads that the program still holds return errors, and 3.x handles of heads are invalid.
   void reset();
   /// Returns no_head if the sonar has no head of that number, and net_not_connected if the sonar is not open.
   int head(int number, std::shared_ptr<Head>& head) const;

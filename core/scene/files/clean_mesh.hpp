@@ -19,7 +19,7 @@ using TriangleSource = std::function<void(const TriangleSink&)>;
 /// Checks that vertices are finite and within 1e7 m, drops triangles without area, merges equal vertices, and moves the middle to
 /// the origin. It calls `source` twice, so that it needs no copy of the corners. Errors do not contain the file name.
 Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t most = max_mesh_triangles);
-/// As above, for a list of corners, three for each triangle.
+/// The same for a list of corners, three for each triangle.
 Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material,
                                std::size_t most = max_mesh_triangles);
 

@@ -32,7 +32,7 @@ std::string visible_of(const Scene& scene) {
   return flags;
 }
 
-/// Pixels per class. Pixels without an instance are either in a shadow or of nothing.
+/// Pixels per class. Pixels without an instance are in a shadow or show no object.
 json pixels_of(const PingLabels& labels, const Scene& scene) {
   std::vector<std::uint64_t> by_instance(labels.visible.size() + 1);
   std::uint64_t shadow = 0;
@@ -74,7 +74,7 @@ Result<DrawnPing> PingMaker::compute(std::uint64_t number, Ping& ping) {
   // An engine is used again while the scene and the visibility of its objects are the same.
   if (!engine_ || key != engine_key_) {
     const SimdLevel simd = simd_.value_or(drawn->job.config.engine.simd);
-    // The engine that start_engine() returns is the one that is kept.
+    // start_engine() returns the engine that `make` returned; it is kept.
     const auto make = [&](std::shared_ptr<const Scene> s) -> std::unique_ptr<PingEngine> {
       std::unique_ptr<ChangingEngine> engine = std::move(engine_);
       if (engine)
@@ -154,7 +154,8 @@ Result<LabelledPing> PingMaker::make(std::uint64_t number) {
     if (!png) return tl::make_unexpected(png.error());
     made.files.emplace_back("fan.png", *std::move(png));
   }
-  made.files.emplace_back("json", bytes_of_text(words.dump() + "\n"));  // last: a reader of the stream has the ping then
+  made.files.emplace_back("json",
+                          bytes_of_text(words.dump() + "\n"));  // last, so that a reader of the stream has the whole ping then
   return made;
 }
 

@@ -1,4 +1,4 @@
-// Where the farm's queue is, as the command line names it.
+// The options of the command line for the address of the farm's queue.
 #pragma once
 
 #include <filesystem>

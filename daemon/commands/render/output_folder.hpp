@@ -21,7 +21,7 @@ struct OutputOptions {
   bool overwrite = false;              // pings of other inputs in the folder are removed
   std::uint64_t first = 1;             // number of the first ping; those before it are left out
   std::optional<std::uint64_t> pings;  // pings of each job; empty: one, or one for every pose of the file
-  std::optional<double> rate_hz;       // nothing: as the settings say, or at every pose
+  std::optional<double> rate_hz;       // nullopt: the rate of the settings, or one ping at every pose
 };
 
 class OutputFolder {

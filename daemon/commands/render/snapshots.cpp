@@ -46,8 +46,8 @@ bool are_snapshots(const motion::Trajectory& trajectory) {
 std::string note_of_snapshots(const motion::Trajectory& trajectory) {
   const Steps steps = steps_of(trajectory);
   return text::format(
-      "the poses are taken as unconnected snapshots: %zu of %zu steps from one to the next are faster than a vehicle goes "
-      "(%g m/s, %g rad/s; the fastest: %.3g m/s, %.3g rad/s). The sonar rests within each ping; --motion on moves it",
+      "the poses are read as unconnected snapshots: %zu of %zu steps from one to the next are faster than a vehicle "
+      "(%g m/s, %g rad/s; the fastest: %.3g m/s, %.3g rad/s). The sonar does not move during a ping; --motion on moves it",
       steps.too_far, steps.all, fastest_vehicle_mps, fastest_vehicle_radps, steps.fastest_mps, steps.fastest_radps);
 }
 

@@ -18,7 +18,7 @@ class ReadAhead {
   asio::awaitable<std::optional<recording::RecordedMessage>> next();
   /// The next message is the first one again.
   void rewind();
-  /// As of RecordingReader, after next() has returned nullopt.
+  /// The reader's damage(); valid after next() has returned nullopt.
   std::optional<Error> damage() const { return reader_.damage(); }
   bool knows_times() const { return reader_.knows_times(); }
 

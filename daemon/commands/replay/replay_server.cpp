@@ -104,10 +104,10 @@ asio::awaitable<void> ReplayServer::watch_signals() {
   stop();
   if (over_) co_return;  // no client was connected
   co_await signals_.async_wait(into(ec));
-  if (!ec && !over_) std::_Exit(EXIT_FAILURE);  // asked twice
+  if (!ec && !over_) std::_Exit(EXIT_FAILURE);  // a second signal
 }
 
-/// Ends after the present message. A client that does not take it within the limit is reset.
+/// Ends after the present message. A client that does not receive it within the limit is reset.
 void ReplayServer::stop() {
   if (stopping_ || over_) return;
   stopping_ = true;
@@ -167,7 +167,7 @@ asio::awaitable<void> ReplayServer::accept() {
       device_.state->settings.reset();
       client->dialogue = device_.vendor->converse(*device_.vendor->port(protocol::Port::Kind::tcp_stream), *device_.state, {});
       client->wants_frames = !device_.by_datagrams() && device_.vendor->pings_before_first_request(*device_.state);
-      status_timer_.cancel();  // says so at once
+      status_timer_.cancel();  // sends the next status at once
     }
     ++figures_.clients;
     log_.info("client connected", {{"client", client->name}});
@@ -242,7 +242,8 @@ asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, R
   co_return any ? Played::to_the_end : Played::left;
 }
 
-/// Frames are counted from 1 in each connection, whatever is left out or begins again. False: it is of no frame.
+/// Frames are counted from 1 in each connection, also if some are left out or the recording restarts. False: the datagram belongs
+/// to no frame.
 bool ReplayServer::number_datagram(const Client& client, protocol::Bytes& datagram) const {
   const auto number = [&](auto) { return client.frames - 1; };
   return client.frames > 0 &&
@@ -339,7 +340,7 @@ void ReplayServer::apply(Client& client, const protocol::Event& event) {
   }
 }
 
-/// As the device does it: a dialogue with a keep-alive ends the connection of a silent client.
+/// Ends the connection of a silent client, as the device does, if its dialogue has a keep-alive.
 void ReplayServer::end_if_silent() {
   if (!client_ || !client_->dialogue) return;
   const auto limit = client_->dialogue->longest_silence();

@@ -65,7 +65,7 @@ void RequestedReplay::start() {
     stop();
     if (over_) return;
     signals_.async_wait([](const error_code& e, int) {
-      if (!e) std::_Exit(EXIT_FAILURE);  // asked twice
+      if (!e) std::_Exit(EXIT_FAILURE);  // a second signal
     });
   });
 }

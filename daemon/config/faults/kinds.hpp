@@ -14,7 +14,7 @@
 
 namespace sonar {
 
-/// Where a fault acts; several active ones act in this order.
+/// The stage at which a fault acts; several active ones act in this order.
 enum class FaultStage { payload, device, time, framing, stream, link, clients, status, datagrams };
 inline constexpr std::array<std::string_view, 9> fault_stage_names = {"payload", "device",  "time",   "framing",  "stream",
                                                                       "link",    "clients", "status", "datagrams"};

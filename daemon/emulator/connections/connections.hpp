@@ -86,7 +86,7 @@ class Connections {
   Connection* longest_waiting();
   /// The stream of that number, counted from 0 among the vendor's ports.
   Connection* stream(std::size_t number);
-  /// Where the datagrams of a stream go: the device's own list and those of the clients, each address once.
+  /// The receivers of a stream's datagrams: the device's own list and those of the clients, each address once.
   std::vector<protocol::Endpoint> receivers(const Connection& stream) const;
   /// True if a client is served or a stream has receivers.
   bool has_audience() const;

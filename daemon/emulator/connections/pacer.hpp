@@ -1,5 +1,5 @@
 // Computes when the next ping of one sonar is due: on a grid from its start (never a sum of sleeps), or one ping per trigger.
-// Pure arithmetic on times passed in; the Sonar asks it and its caller sets the timer.
+// Pure arithmetic on times that the caller passes; the caller of the Sonar sets the timer.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ std::chrono::nanoseconds ping_period(const PingSettings& settings);
 struct SkippedTicks {
   std::uint64_t late = 0;     // the next tick was due already
   std::uint64_t busy = 0;     // the ping before it was still being computed
-  std::uint64_t trigger = 0;  // another trigger waited, or pings ended before its turn
+  std::uint64_t trigger = 0;  // another trigger was waiting, or pings stopped before this one was used
   std::uint64_t total() const { return late + busy + trigger; }
 };
 
@@ -58,7 +58,7 @@ class Pacer {
   Time start_{};                                    // start of the grid
   std::int64_t index_ = 0;                          // index of the next tick on the grid
   Time trigger_at_{};
-  Time last_tick_{}, home_at_{};  // time of the last ping, and when its sound is back
+  Time last_tick_{}, home_at_{};  // time of the last ping; time when its sound has returned
   std::uint64_t ticks_ = 0;
   SkippedTicks skipped_;
 };

@@ -20,8 +20,7 @@ void drop_unreceived(Connections& connections) {
 
 // ---- slots
 
-// Order: the configuration decides, a fault may override it, a client that is taken over begins to leave, and then the new
-// connection is entered, so that it is the newest.
+// The new connection is entered after a client that is taken over has begun to leave, so that it is the newest.
 Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protocol::Port* port, Faults::Admission by_fault,
                             Actions& actions) {
   using Verdict = Connections::Verdict;

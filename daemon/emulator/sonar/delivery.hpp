@@ -29,7 +29,7 @@ class FramedPing {
   std::shared_ptr<const Bytes> bytes_at(const protocol::Port& port);
   /// The parts of the ping at that port: datagrams, or what a port of kind tcp_stream with a gap sends between pauses.
   const Datagrams& parts(const protocol::Port& port);
-  /// The pauses between the parts of bytes(). Null: it is written without pauses.
+  /// The pauses between the parts of bytes(). Null: bytes() are written without pauses.
   std::shared_ptr<const Outbox::Shape> pauses(const protocol::Port& port);
 
  private:
@@ -51,7 +51,7 @@ class FramedPing {
 
 class Delivery {
  public:
-  /// All outlive it.
+  /// The arguments outlive the object.
   Delivery(SonarData& sonar, Audience& audience, Faults& faults) : sonar_(sonar), audience_(audience), faults_(faults) {}
 
   /// The requests by which clients answer a ping.

@@ -50,7 +50,7 @@ foxglove::CloudPoint point_of(double range_m, double azimuth_rad, double elevati
           static_cast<float>(range_m * std::sin(elevation_rad)), static_cast<std::uint8_t>(std::lround(255 * part))};
 }
 
-/// Every pixel of a range image is a place in space.
+/// Converts every pixel of a range image to a point in space.
 std::vector<foxglove::CloudPoint> points_of(const Ping& ping, const RangeImageSettings& settings, double threshold) {
   const RangeImageGrid grid(ping.request);
   const auto full = static_cast<float>(ping.request.settings.format.max_code >> 16);
@@ -143,7 +143,7 @@ ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPic
   if (!fan) return nullptr;
   auto samples = std::make_shared<wire::Bytes>();
   samples->reserve(fan->pixels.size());
-  for (const Rgb& p : fan->pixels)  // outside of the fan pixels have a colour that the map does not have
+  for (const Rgb& p : fan->pixels)  // pixels outside the fan have a colour that is not in the map
     samples->push_back(static_cast<std::byte>(p.r == p.g && p.g == p.b ? p.r : 0));
   return picture(at, sonar,
                  {static_cast<std::uint32_t>(fan->width), static_cast<std::uint32_t>(fan->height), "mono8", 1, samples});
@@ -157,7 +157,7 @@ ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, dou
     return view_payload(ping.request.fired_at,
                         foxglove::cloud(ping.request.fired_at, sonar, points_of(ping, *range_image, threshold)));
   const PolarImage image = polar_image_of(ping);
-  std::vector<std::pair<float, std::size_t>> bright;  // sample, where
+  std::vector<std::pair<float, std::size_t>> bright;  // sample, index
   const auto least = static_cast<float>(threshold) * image.full_scale;
   for (std::size_t i = 0; i < image.samples.size(); ++i)
     if (image.samples[i] > least) bright.emplace_back(image.samples[i], i);

@@ -1,4 +1,4 @@
-// The messages of a ping for viewers, each made from the ping alone and once for all viewers. Functions that say "takes long"
+// The messages of a ping for viewers, each made from the ping alone and once for all viewers. Functions marked "Takes long"
 // are called on a thread of their own. Pure.
 #pragma once
 
@@ -24,7 +24,7 @@ ViewPayloadPointer truth_payload(const Ping& ping);
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);
 /// The style of fan_payload(): gray, without rings.
 FanStyle view_fan_style();
-/// As `painter` of view_fan_style() draws it, 0 outside. Takes long. Null: it cannot be drawn.
+/// The picture that `painter` draws in view_fan_style(), 0 outside. Takes long. Null: it cannot be drawn.
 ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPicture& picture, PicturePainter& painter);
 /// The axes of fan_payload(), as sonar.v1.Picture.
 ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture);

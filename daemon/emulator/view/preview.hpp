@@ -1,6 +1,6 @@
 // Pings for viewers while no driver is connected: at most 5 a second, or 25 with one beam. They have numbers and noise of their
-// own, so that the pings of the first driver do not depend on them. Pure: the caller computes the pings that are due, and asks
-// whether the preview must end.
+// own, so that the pings of the first driver do not depend on them. Pure: the caller computes the pings that are due, and calls
+// why_over() regularly.
 #pragma once
 
 #include <chrono>

@@ -103,7 +103,7 @@ std::optional<Doubt> doubt_of_attitude(const std::string& body, Quatd q) {
   return Doubt{body + format(" is upside down, %.0f deg from upright", deg_from_rad(from_upright_rad)), turned_cure};
 }
 
-/// As if the file had w at the other end of the four numbers, and in the frame that they were written in.
+/// Returns whether a body is upright if w is at the other end of the four numbers, in the frame in which they were written.
 bool is_upright_in_another_order(Quatd q) {
   const auto reordered = [](Quatd r) { return std::array{upright({r.x, r.y, r.z, r.w}), upright({r.z, r.w, r.x, r.y})}; };
   const auto as_enu = reordered(q), as_ned = reordered(enu_flu_from_ned_frd(q));

@@ -14,7 +14,7 @@ namespace sonar {
 
 struct HttpRequest {
   std::string method, target, host, origin, authorization, content_type, body;
-  // As they came; several headers of a name are joined by ", ".
+  // Values of headers as they were received; several headers of a name are joined by ", ".
   std::string upgrade, connection, accept, accept_encoding, if_none_match;
   std::string socket_key, socket_version, socket_protocols;  // Sec-WebSocket-...
   bool bytes_behind = false;                                 // more had been received when it was whole

@@ -1,5 +1,5 @@
-// Limits how fast one client is read: a bucket of bytes that fills at the allowed rate. Pure arithmetic; the Session asks after
-// each read how long to wait before the next, so that a client that sends too much waits in its own kernel.
+// Limits how fast one client is read: a bucket of bytes that fills at the allowed rate. Pure arithmetic. After each read the
+// Session gets the pause before the next one, so that the bytes of a client that sends too much wait in its own kernel.
 #pragma once
 
 #include <algorithm>

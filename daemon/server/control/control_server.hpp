@@ -21,7 +21,7 @@ class ControlServer {
   void start();
   void stop();
 
-  /// Where they listen, with the ports the system chose for 0. Port 0 = not listening.
+  /// The addresses of the listeners, with the ports that the system chose for 0. Port 0 = not listening.
   Endpoint stream() const { return stream_.at(); }
   Endpoint http() const { return http_.at(); }
 

@@ -117,7 +117,7 @@ OperationResult FaultOperations::add(const control::FaultRecord& record, bool ma
       takers.push_back(&device);
     else if (record.sonar.empty() && why_not->code == FaultRefusal::Code::no_effect)
       // A request for all sonars leaves out those on which the fault has no effect. Any other refusal ends the request.
-      why = std::move(why_not->text);  // it may have an effect on other sonars
+      why = std::move(why_not->text);
     else
       return refused(std::move(why_not->text));
   }
@@ -156,7 +156,7 @@ mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureT
   using enum mavlink::MavResult;
   if (unit != mavlink::distance_sensor) return unsupported;
   if (!config_.faults.armed || instance > fleet_.devices().size()) return denied;
-  if (!config_.control.token_file.empty()) {  // HTTP would require it, and MAVLink has no field for one
+  if (!config_.control.token_file.empty()) {  // HTTP requires the token, and MAVLink has no field for it
     log_.warning("failure refused: a command of MAVLink cannot show the token of control.token_file",
                  {{"client", name_by_mavlink}});
     return denied;

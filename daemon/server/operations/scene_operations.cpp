@@ -68,7 +68,7 @@ void SceneOperations::load(const control::LoadScene& asked, const Sender& sender
 OperationResult SceneOperations::without_details(const Error& error, const SceneFile& file, const Sender& sender) {
   log_.warning("scene not loaded: " + error.text, {{"client", sender.id}});
   OperationResult result = result_of(error);
-  if (error.kind == ErrorKind::unavailable || error.kind == ErrorKind::bug) return result;  // says nothing of the file
+  if (error.kind == ErrorKind::unavailable || error.kind == ErrorKind::bug) return result;  // the error does not quote the file
   result.text = file.name() + " could not be loaded: the scene file has errors, see sonard's log (docs/control.md)";
   return result;
 }

@@ -32,8 +32,8 @@ struct Recordings::Recording {
   bool labels = false;
   v1::RecordingStatus status;
   std::size_t waiting_bytes = 0;
-  bool failed = false;    // and the log says so
-  std::string ends_with;  // the sonar stopped while it was opened: why
+  bool failed = false;    // it failed, and the failure was logged
+  std::string ends_with;  // reason, if the sonar stopped while the file was opened
   std::vector<Done> at_end;
   std::shared_ptr<Work> work = std::make_shared<Work>();
 };
@@ -44,9 +44,9 @@ Recordings::Recordings(WriterThread& writer, const Config& config, Log& log, std
 
 Recordings::~Recordings() = default;
 
-/// Runs `job` on the thread of the recording. `after` runs here, with the result and the size of the file.
+// Runs `job` on the thread of the recording. `after` runs here, with the result and the size of the file.
 // States of a recording: opening (the file is made), running, ending (no more pings; what waits is written, the file is closed),
-// ended (only its status is kept). All changes of state happen on the I/O thread; the writer thread sees only Work.
+// ended (only its status is kept). All changes of state happen on the I/O thread; the writer thread uses only Work.
 template <class Job, class After>
 void Recordings::on_thread(const std::shared_ptr<Work>& work, Job job, After after) {
   const auto figures = std::make_shared<RecordingFile::Figures>();
@@ -67,7 +67,7 @@ std::size_t Recordings::running() const {
                                                 [](const Pointer& r) { return r->state != Recording::State::ended; }));
 }
 
-// ---- asked for by control
+// ---- requests of the control interface
 
 void Recordings::start(const control::StartRecording& asked, RecordedSonar sonar, const std::string& who, Done done) {
   const auto begun = begin(asked, sonar);
@@ -293,7 +293,7 @@ void Recordings::end(const Pointer& recording, const std::string& why) {
       [this, recording](const Outcome& outcome) { ended(recording, outcome); });
 }
 
-/// The file is closed. Those who asked for the end get the result now.
+/// The file is closed. Requests to end the recording are answered now.
 void Recordings::ended(const Pointer& recording, const Outcome& outcome) {
   if (!outcome.result) fail(recording, outcome.result.error().text);
   recording->state = Recording::State::ended;

@@ -14,7 +14,7 @@ constexpr std::size_t most_closed = 64;
 
 }  // namespace
 
-/// Receivers that clients asked for. Left out are group addresses that neither the product nor the configuration names, and
+/// Receivers that clients requested. Left out are group addresses that neither the product nor the configuration names, and
 /// receivers whose port is closed.
 std::vector<Endpoint> Device::receivers(ConnectionId stream) {
   const Connection* const connection = sonar_.connections().find(stream);

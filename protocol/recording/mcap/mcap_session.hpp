@@ -1,4 +1,4 @@
-// A session as an MCAP file: the vendor's bytes message by message, each ping also as a picture, poses and ground truth where
+// Writes a session as an MCAP file: the vendor's bytes message by message, a picture of each ping, and poses and ground truth if
 // they are known. The vendor's bytes can be replayed; the rest is for viewers.
 #pragma once
 
@@ -12,23 +12,23 @@
 
 namespace sonar::recording {
 
-/// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose and /tf in the live view's
-/// protobuf (protocol/foxglove/foxglove_messages.hpp), as /NAME/labels, share and caster; /NAME/truth, /NAME/instances and
-/// /faults in JSON.
+/// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose, /tf, /NAME/labels,
+/// /NAME/share and /NAME/caster in the live view's protobuf (protocol/foxglove/foxglove_messages.hpp); /NAME/truth,
+/// /NAME/instances and /faults in JSON.
 class McapSession final : public RecordingWriter {
  public:
   /// `make`: the make whose messages are written. Messages that hold samples (Codec::samples) are also written as images.
   McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make = protocol::makes().front());
 
   Result<void> write(const RecordedMessage& message) override;
-  /// Pose of the sonar at time `of`, also as the frame NAME of /tf. `at` as in RecordedMessage: must not decrease.
+  /// Writes the pose of the sonar at time `of`, also as the frame NAME of /tf. `at` must not decrease (see RecordedMessage).
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
-  /// Image of a ping whose messages hold no samples.
+  /// Writes the image of a ping whose messages hold no samples.
   Result<void> write_image(Time at, const std::shared_ptr<const Ping>& ping);
   Result<void> write_image(Time at, const Samples& samples);
-  /// Moving bodies also as the frames object/NAME of /tf.
+  /// Writes the ground truth; moving bodies also as the frames object/NAME of /tf.
   Result<void> write_truth(Time at, const mcap::PingTruth& truth);
-  /// Labels of the samples as pictures, and the instances that they name.
+  /// Writes the labels of the samples as pictures, and the instances that they name.
   Result<void> write_labels(Time at, const mcap::PingTruth& truth, const PingLabels& labels);
   /// `json`: a FaultEntry of control.proto.
   Result<void> write_fault(Time at, const std::string& json) { return write_json(faults_, at, json); }
@@ -46,7 +46,7 @@ class McapSession final : public RecordingWriter {
   std::uint16_t device_, client_, status_, image_, pose_, tf_, truth_, labels_, share_, caster_, instances_, faults_;
 };
 
-/// The vendor's bytes of one sonar: the named one, or the first. bad_data: not an MCAP file.
+/// Reads the vendor's bytes of the sonar of that name, or of the first one. bad_data: not an MCAP file.
 Result<std::unique_ptr<RecordingReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar = {});
 
 }  // namespace sonar::recording

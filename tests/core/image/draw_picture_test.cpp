@@ -59,7 +59,7 @@ TEST(SonarPicture, ARangeImageHasItsHighestRowOnTopAndPortLeft) {
   EXPECT_EQ(raster.at(20, 20).r, 0);
   EXPECT_EQ(raster.at(60, 60).r, 0);
   picture.elevation_rad = 0;
-  EXPECT_THAT(PicturePainter(style()).draw(picture).error().text, testing::HasSubstr("nothing to draw"));
+  EXPECT_THAT(PicturePainter(style()).draw(picture).error().text, testing::HasSubstr("cannot be drawn"));
 }
 
 TEST(SonarPicture, AWaterfallBeginsOnTopAndIsEmptyBelow) {

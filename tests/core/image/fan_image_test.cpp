@@ -143,7 +143,7 @@ TEST(Fan, APainterDrawsPingsOfChangingShapesAsOneByOne) {
 
 TEST(Fan, RefusesWhatCannotBeDrawn) {
   PolarImage none;
-  EXPECT_THAT(draw_fan(none, plain_gray()).error().text, testing::HasSubstr("no picture"));
+  EXPECT_THAT(draw_fan(none, plain_gray()).error().text, testing::HasSubstr("cannot be drawn"));
   PolarImage twisted = black_fan(10, 16, 60);
   std::swap(twisted.azimuth_rad[3], twisted.azimuth_rad[4]);
   EXPECT_THAT(draw_fan(twisted, plain_gray()).error().text, testing::HasSubstr("bearing table"));
