@@ -1,5 +1,5 @@
 // Part of every test program: testing::TempDir() is a folder of the process, because ctest runs each case as a process of its
-// own, several at a time, and a file of one must not be that of another. It goes when the process ends.
+// own, several at a time, and their files must not collide. The folder is removed when the process ends.
 #include <unistd.h>
 
 #include <cstdlib>

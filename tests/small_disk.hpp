@@ -1,4 +1,4 @@
-// A disk that ends early, for tests of whatever writes files: the files of this process may not grow any further.
+// Imitates a small disk, for tests of code that writes files: the files of this process may not grow any further.
 // Used by the tests of recordings, those of protocol/recording and those inside the daemon.
 #pragma once
 

@@ -15,7 +15,7 @@ inline constexpr double farthest_m = 150;           // recalled from the data sh
 inline constexpr float usual_rate_hz = 15;          // PKT
 inline constexpr float highest_rate_hz = 40;        // recalled from the data sheet
 inline constexpr double slowest_mps = 1400,
-                        fastest_mps = 1560;  // limits of the sound speed for the size of windows; fitted to PKT, LOG
+                        fastest_mps = 1560;  // sound speeds that a window covers; fitted to PKT, LOG
 
 std::span<const std::shared_ptr<const SonarModel>> models();
 

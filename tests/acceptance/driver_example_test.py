@@ -1,4 +1,4 @@
-"""The example of docs/writing-a-driver-test.md as it is, with its own little driver."""
+"""Runs the example of docs/writing-a-driver-test.md unchanged, with its small driver."""
 import os
 import re
 import subprocess
@@ -12,7 +12,7 @@ EXAMPLE = ROOT / "docs/driver-test"
 
 
 def run_example(test, **more):
-    """The example's tests, or one of them, as a newcomer runs them."""
+    """Runs the example's tests, or one of them, as its page describes."""
     environment = {**os.environ, "SONARD": str(SONARD.resolve()), "ADDRESS": "127.0.0.9", **more}
     if "DRIVER" not in more:
         environment.pop("DRIVER", None)
@@ -28,7 +28,7 @@ class DriverExample(unittest.TestCase):
         self.assertEqual(run.returncode, 1, run.stdout)
         self.assertIn("the driver ended with code 3 after 0 of 20 pings", run.stdout)
         self.assertIn("starting\nno such device\n", run.stdout)
-        self.assertLess(time.monotonic() - begin, 20)  # 30 s is how long a driver may take for its pings
+        self.assertLess(time.monotonic() - begin, 20)  # well before the 30 s that a driver may take for its pings
 
     def test_the_page_is_true(self):
         run = run_example("test_driver.py")

@@ -1,5 +1,5 @@
-// Requirements of parts of the model to a scene and a sonar, and typical figures for benchmarks of scenes and
-// sonars that lack it: so that the cost of every part can be measured over every scene.
+// The data that each part of the model needs from a scene and a sonar, and typical values for scenes and sonars without them, so
+// that the cost of every part can be measured over every scene.
 #pragma once
 
 #include <memory>

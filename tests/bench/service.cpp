@@ -1,5 +1,5 @@
-// Latency and the cost of clients of a whole daemon: the one that `sonard run` is, in a thread of this process, and clients that
-// talk the Oculus protocol to it over loopback.
+// Measures the latency and the cost of clients of a whole daemon, which runs in a thread of this process as `sonard run` would;
+// the clients use the Oculus protocol over loopback.
 #include <algorithm>
 #include <array>
 #include <atomic>

@@ -1,4 +1,4 @@
-// A whole daemon in a thread of this process, the one that `sonard run` is, for cases with clients on loopback.
+// A whole daemon in a thread of this process, as `sonard run` would run it, for cases with clients on loopback.
 #pragma once
 
 #include <pthread.h>

@@ -1,5 +1,5 @@
-// The sum of a column's echoes, four ways: by complex exponentials term by term, by turning phases on step by step in vectors, by
-// a non-uniform transform, and as pulses in time, which is what the pipeline does.
+// Sums the echoes of a column in four ways: by complex exponentials term by term, by rotating phases step by step in vectors, by
+// a non-uniform transform, and as pulses in time, as the pipeline does.
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -41,7 +41,7 @@ std::vector<Column> draw_columns() {
 
 using Sums = std::vector<std::complex<double>>;
 
-/// As eq. (1) of the paper reads.
+/// Eq. (1) of the paper as it is printed.
 Sums exponentials(const Column& c, int count) {
   Sums sums(static_cast<std::size_t>(count));
   for (int m = 0; m < count; ++m)

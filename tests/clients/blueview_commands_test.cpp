@@ -1,5 +1,5 @@
-// listen, view and stats against a BlueView head of a few lines, written from docs/protocols/blueview-link.md: found by itself,
-// asked for every ping, and drawn where its samples are.
+// listen, view and stats against a BlueView head of a few lines, written from docs/protocols/blueview-link.md: they
+// find it, request every ping, and draw it where its samples are.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

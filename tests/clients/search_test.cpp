@@ -1,5 +1,4 @@
-// Sonars that PingStream searches without a port, or does not find: programs of a few lines have the ports of makes, others
-// nothing.
+// Sonars that PingStream searches without a given port, found or not: small test programs listen at the ports of some makes.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Memory of a batch: what comes back of it was written, also where no piece lies.
+// Memory of a batch: every byte that is copied back was written, also between the pieces.
 #include "cuda/arena.hpp"
 
 #include <gtest/gtest.h>

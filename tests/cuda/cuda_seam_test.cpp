@@ -1,4 +1,4 @@
-// The seam answers on every machine: without the module, with one that is none, without a device, and with one.
+// The interface to the CUDA module works on every machine: without the module, with an invalid one, without and with a device.
 #include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ TEST(CudaSeam, NamesTheDeviceOrSaysThatThereIsNone) {
 #endif
 }
 
-// The library alone: it needs no device to say who it is.
+// The library alone: it states its version without a device.
 TEST(CudaSeam, FindsCufftOrSaysWhichFileIsMissing) {
 #ifdef SONARD_CUDA_MODULE
   void* library = dlopen(built_module.c_str(), RTLD_NOW | RTLD_LOCAL);

@@ -1,5 +1,5 @@
-// The device engine against the CPU engine as shipped, which sees by Embree. Both round a ray's way differently in the last bit,
-// so that at the rim of a shadow a cell may be seen by one and not by the other; how many that are is measured here and bounded.
+// The device engine against the shipped CPU engine, which uses Embree. Both round rays differently in the last bit, so that at
+// the edge of a shadow a cell may be visible for only one of them; the test measures and bounds the number of such cells.
 #include <gtest/gtest.h>
 
 #include "tests/core/pipeline/basin.hpp"

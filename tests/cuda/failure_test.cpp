@@ -1,4 +1,4 @@
-// A device that fails, at every call that it can fail at: no ping is lost, or the engine says that it is at its end.
+// A device that fails, at every call that it can fail at: no ping is lost, or the engine reports that it cannot continue.
 #include "tests/cuda/failing_machine.hpp"
 
 #include <gmock/gmock.h>

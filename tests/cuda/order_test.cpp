@@ -1,5 +1,5 @@
-// A device's threads run in any order and at once, its queues when they like, its memory lies anywhere: the bytes are the same,
-// and no step reads what none has written.
+// The order of a device's threads and queues and the addresses of its memory are arbitrary: the bytes do not depend on them, and
+// no step reads memory that was not written.
 #include <gtest/gtest.h>
 
 #include <iterator>

@@ -1,4 +1,4 @@
-// A device that does not answer is given up, one that is slow is not.
+// A device that does not answer counts as failed, a slow one does not.
 #include "cuda/patience.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// The device engine against the CPU engine where both are given the same rays (flat_ray_scene.cpp): what is left is arithmetic,
-// and it is the same arithmetic. Every part of the model, alone and together, in batches and one by one.
+// The device engine against the CPU engine where both are given the same rays (flat_ray_scene.cpp): the rest is arithmetic,
+// which must be the same. Every part of the model, alone and together, in batches and one by one.
 #include <gtest/gtest.h>
 
 #include <chrono>

@@ -1,5 +1,5 @@
-// Devices that do what a real one may do and plain host loops do not: all work as late as the order of lanes allows; a step's
-// indices by threads at once; memory in pieces that do not touch.
+// Devices with behaviour of real ones that host loops lack: all work as late as the order of lanes allows; a step's indices
+// computed by threads at the same time; memory in pieces that are not adjacent.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// The makes and their products, for makes_text.py: a line for each make, "a BlueView sonar: blueview-p900-90 ...".
+// Prints the makes and their products for makes_text.py, a line for each make: "a BlueView sonar: blueview-p900-90 ...".
 #include <cstdio>
 #include <string>
 

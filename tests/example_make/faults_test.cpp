@@ -1,5 +1,5 @@
 // The host and the emulated sonar of every make against each other in virtual time, through every kind of fault that takes effect
-// on such a sonar: the host takes whatever comes, and pings come again when the fault is over.
+// on such a sonar: the host accepts any bytes, and pings return when the fault is over.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

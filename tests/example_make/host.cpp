@@ -1,4 +1,4 @@
-// The driver's end, and what recordings know.
+// The driver's end, and the functions for recordings.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// Messages of the Example, a sonar that tests alone have: by TCP, little-endian, a header and a payload.
+// Messages of the Example, a sonar for tests only: over TCP, little-endian, a header and a payload.
 #pragma once
 
 #include <optional>

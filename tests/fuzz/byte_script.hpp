@@ -1,4 +1,5 @@
-// Reads a fuzzer's bytes as a script: small numbers and pieces, zero after the end. And `require`, by which targets object.
+// Reads a fuzzer's bytes as a script: small numbers and pieces, zero after the end. Also has `require`, by which targets report
+// failures.
 #pragma once
 
 #include <algorithm>

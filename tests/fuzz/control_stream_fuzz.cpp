@@ -1,4 +1,4 @@
-// The control stream: lengths, requests, and what they ask. First byte = length of the pieces, the rest is the stream.
+// The control stream: lengths, requests, and their contents. First byte = length of the pieces, the rest is the stream.
 // Checks that the messages do not depend on the pieces, that accepted ones are usable, and that every request gets an answer.
 #include <algorithm>
 #include <cmath>

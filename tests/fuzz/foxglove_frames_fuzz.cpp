@@ -1,4 +1,4 @@
-// Binary messages that viewers send: what is taken is encoded to the same bytes again.
+// Binary messages that viewers send: an accepted message is encoded to the same bytes again.
 #include <algorithm>
 
 #include "protocol/foxglove/foxglove_frames.hpp"

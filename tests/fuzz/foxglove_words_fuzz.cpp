@@ -1,4 +1,4 @@
-// JSON that viewers send: what is taken is within its limits, what is refused gets one sentence; both may go back as a status.
+// JSON that viewers send: accepted values are within their limits, a refusal is one sentence; both may be sent back as a status.
 #include <nlohmann/json.hpp>
 #include <string_view>
 

@@ -1,6 +1,6 @@
 // Datagrams of MAVLink, one after the other over one link. The first byte chooses the settings; then each two bytes of length are
 // followed by a datagram. Frames of known messages get a right checksum where the input made them otherwise sound, or hardly any
-// mutation would get behind it. What comes out is usable, whatever came in.
+// mutation would get behind it. All results are usable, for any input.
 #include <cmath>
 
 #include "protocol/mavlink/mavlink_poses.hpp"

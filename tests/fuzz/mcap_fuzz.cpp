@@ -1,4 +1,4 @@
-// MCAP files of anybody: every message, and the sonar's among them, which replay paces by their times.
+// MCAP files of any origin: every message, and the sonar's among them, which replay paces by their times.
 #include "daemon/commands/replay/replay_pace.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"

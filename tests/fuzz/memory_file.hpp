@@ -1,4 +1,4 @@
-// A file that lives in memory under a name, for readers that take nothing but names.
+// A file in memory with a name, for readers that accept only names.
 #pragma once
 
 #include <sys/mman.h>

@@ -1,4 +1,4 @@
-// Inputs made up for fuzz targets where libFuzzer is not: seeds, changed a little, and bytes from nowhere. A pure function of the
+// Makes inputs for fuzz targets without libFuzzer: slightly changed seeds, and random bytes. A pure function of the
 // number, so that a failure can be run again.
 #pragma once
 
@@ -10,7 +10,7 @@ namespace sonar::fuzz {
 
 using Input = std::vector<std::uint8_t>;
 
-/// Every tenth input, and all when there are no seeds, is from nowhere.
+/// Every tenth input is random; all are if there are no seeds.
 Input made_up(std::uint32_t number, const std::vector<Input>& seeds, const std::vector<Input>& words);
 
 /// The words of a libFuzzer dictionary: lines of name="value" with \xAB, \\ and \" inside. Empty when it cannot be read.

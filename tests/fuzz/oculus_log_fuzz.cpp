@@ -1,4 +1,4 @@
-// .oculus log files and raw dumps of anybody. A compressed item may hold a message of the largest kind.
+// .oculus log files and raw dumps of any origin. A compressed item may hold a message of the largest kind.
 #include "protocol/oculus/host.hpp"
 #include "protocol/oculus/messages.hpp"
 #include "protocol/oculus/oculus_log.hpp"

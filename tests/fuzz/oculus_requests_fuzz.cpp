@@ -1,5 +1,5 @@
 // Bytes of a client, through a whole Dialogue: first byte = length of the pieces, the rest is the stream.
-// Stops when a setting leaves the model's limits, or when bytes turn into more of ours than they paid for.
+// Stops when a setting leaves the model's limits, or when the replies are much longer than the requests.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-// Capture files of anybody: pcap and pcapng, down to the messages of a sonar.
+// Capture files of any origin: pcap and pcapng, down to the messages of a sonar.
 #include "protocol/recording/pcap/pcap.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 

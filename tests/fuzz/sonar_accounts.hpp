@@ -1,4 +1,4 @@
-// Conditions that an emulated sonar of any make meets at any time.
+// Conditions that hold for every emulated sonar at any time.
 #pragma once
 
 #include "daemon/emulator/sonar/sonar.hpp"

@@ -15,7 +15,7 @@ from right_driver import HEADER, MAGIC, PING_ID, Driver, Stream, fire_message, s
 
 
 class IgnoresFin(Driver):
-    """Takes the end of the stream for "nothing yet"."""
+    """Treats the end of the stream as "no data yet"."""
 
     def serve(self, sonar):
         while True:
@@ -27,7 +27,7 @@ class IgnoresFin(Driver):
 
 
 class TrustsLengths(Driver):
-    """Waits for as many bytes as the header says, and publishes what the sizes of the image say."""
+    """Waits for the number of bytes in the header, and publishes an image of the sizes in the message."""
 
     def serve(self, sonar):
         sonar.settimeout(right_driver.SILENT_S)
@@ -88,7 +88,7 @@ class LeaksDescriptor(Driver):
 
 
 class GluesPings(Driver):
-    """Keeps the head of a ping when the connection ends, and takes the bytes of the next connection for its rest."""
+    """Keeps the head of a ping when the connection ends, and appends the bytes of the next connection to it."""
 
     def connect(self):
         sonar = socket.create_connection((self.address, self.port), timeout=right_driver.CONNECT_S)
@@ -127,7 +127,7 @@ class ExitsWhenRefused(Driver):
 
 
 class FloodsLog(Driver):
-    """A line of log for each byte that does not fit."""
+    """Prints a log line for each byte that does not fit."""
 
     def log(self, text):
         count = int(text.rpartition(" ")[2]) if text.startswith("skipped bytes") else 1
@@ -142,7 +142,7 @@ class PublishesDuplicates(Driver):
 
 
 class AllocatesByLength(Driver):
-    """Makes room for what a header announces before it looks at it."""
+    """Allocates the size in a header before it checks the header."""
 
     def received(self, sonar, data):
         at = data.find(MAGIC)

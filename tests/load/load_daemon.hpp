@@ -1,5 +1,5 @@
 // A whole daemon in a thread of this process, with pings made beforehand and as many sonars as asked for, each on an address of
-// its own. Its header knows nothing of Asio, so that the tests compile quickly.
+// its own. Its header does not include Asio, so that the tests compile quickly.
 #pragma once
 
 #include <memory>

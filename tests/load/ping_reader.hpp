@@ -1,4 +1,4 @@
-// Drivers without a driver: many sockets read by one thread, every ping compared with what was made for it.
+// Reads many sockets in one thread, as drivers would, and compares every ping with the one that was made.
 #pragma once
 
 #include <chrono>

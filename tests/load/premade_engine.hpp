@@ -1,5 +1,5 @@
-// Pings made beforehand, 256 beams x 512 rows of 8 bit: an engine that costs next to nothing, so that a load test loads what
-// stands behind it. Ping n shows picture n modulo their count, so that its reader can check that it is whole.
+// Pings made beforehand, 256 beams x 512 rows of 8 bit: an engine that needs almost no time, so that a load test measures the
+// parts after it. Ping n shows picture n modulo their count, so that its reader can check that it is whole.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// Many streams at once, and streams beside neighbours that behave badly: nothing is lost unseen, nothing is garbled.
+// Many streams at once, and streams beside neighbours that behave badly: every loss is counted, and nothing is garbled.
 #include <arpa/inet.h>
 #include <sys/socket.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-// Clients that come and go, by the thousand and in rude ways: everything is as before when they have gone.
+// Thousands of clients that connect and end in many ways, also by a reset: afterwards everything is as before.
 #include <algorithm>
 #include <memory>
 #include <vector>
@@ -12,7 +12,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Until one ping has been read whole, over as many connections as it takes: a place may not be free yet.
+/// Connects until one whole ping has been read, because a slot may not be free yet.
 bool is_served(const std::string& address) {
   return eventually([&] {
     PingReader reader(Socket(address, 52100));

@@ -1,4 +1,4 @@
-// The book-keeping of oracles: what is out of tolerance fails, what is recorded can be read back, old figures do not survive.
+// The records of oracles: a figure out of tolerance fails, records can be read back, old records are removed.
 #include "tests/oracles/record.hpp"
 
 #include <gtest/gtest-spi.h>

@@ -1,5 +1,5 @@
-// The host of each make against the device of the same make, in memory and virtual time: settings take, pings arrive, however the
-// bytes are split; bytes that are cut off, or junk, end in no ping and no crash.
+// The host of each make against the device of the same make, in memory and virtual time: settings have effect and pings arrive
+// for any split of the bytes; cut or foreign bytes cause neither a ping nor a crash.
 #include "protocol/host.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
 // Keeps what a reliability test measured beside its bound: one JSON file a figure, in the folder that SONARD_RELIABILITY names.
-// reliability_table.py makes the table of reliability from them; the items it knows are listed there.
+// reliability_table.py makes the table of reliability from them; it contains the list of items.
 #pragma once
 
 #include <string>

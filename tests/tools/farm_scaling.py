@@ -2,7 +2,7 @@
 """Simulates the farm of docs/datasets.md with 1 to 10,000 workers at one queue.
 
 usage: farm_scaling.py [--svg FILE]     prints the table of efficiencies, draws it
-       farm_scaling.py --measure        asks a nats-server on loopback what its costs are (COSTS below)
+       farm_scaling.py --measure        measures the costs of a nats-server on loopback (COSTS below)
 
 Efficiency: time that workers computed, over workers times the time until the last shard is acknowledged. The server does one thing
 at a time, in order of arrival; a worker waits for its answers. Each worker has 50 shards on average. The file system is left out.
@@ -18,17 +18,17 @@ import subprocess
 import tempfile
 import time
 
-# Of nats-server 2.9.10 on an AMD EPYC, by --measure: processor time of the server [s].
+# Processor time of nats-server 2.9.10 on an AMD EPYC [s], measured by --measure.
 COSTS = {"take": 125e-6, "look": 125e-6, "beat": 80e-6, "acknowledge": 90e-6}
-NETWORK_S = 0.0005  # there and back, beside the server's time
-SPREAD = 0.3          # deviation of a shard's time over its mean: mines.yaml on a machine busy with other work
+NETWORK_S = 0.0005  # both ways, without the server's time
+SPREAD = 0.3          # standard deviation of a shard's time over its mean: mines.yaml on a busy machine
 BETWEEN_BEATS_S = 5.0
 SHARDS_EACH = 50
 
 
 def efficiency(workers, shard_s, rng):
     shards, server_free, computed, end = workers * SHARDS_EACH, 0.0, 0.0, 0.0
-    # Events by time: what the worker asks the server, in the order of its life with one shard.
+    # Events by time: the requests of workers, for each shard in this order.
     events = [(rng.random() * 0.01, worker, "take", 0.0) for worker in range(workers)]
     heapq.heapify(events)
     following = {"take": "look", "look": "compute", "acknowledge": "take"}
@@ -43,7 +43,7 @@ def efficiency(workers, shard_s, rng):
         answered = server_free + NETWORK_S
         if what == "acknowledge":
             end = max(end, answered)
-        if what == "beat":  # computing goes on meanwhile
+        if what == "beat":  # computing continues meanwhile
             answered = at
         step = following.get(what, "compute")
         if step == "compute":
@@ -62,7 +62,7 @@ def efficiency(workers, shard_s, rng):
 
 
 class Client:
-    """As much of the NATS protocol as a worker's life needs."""
+    """The part of the NATS protocol that a worker needs."""
 
     def __init__(self, port):
         self.socket = socket.create_connection(("127.0.0.1", port))

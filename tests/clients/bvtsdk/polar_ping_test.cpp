@@ -1,4 +1,4 @@
-// The payload of PING_DATA, in and out.
+// Reading and writing of the payload of PING_DATA.
 #include <gtest/gtest.h>
 
 #include <cmath>

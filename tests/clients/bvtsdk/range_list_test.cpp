@@ -1,4 +1,4 @@
-// Range profile and range data: one range a bearing.
+// Range profile and range data: one range for each bearing.
 #include "clients/bvtsdk/core/range_list.hpp"
 
 #include <gtest/gtest.h>

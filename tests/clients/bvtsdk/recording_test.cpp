@@ -1,4 +1,4 @@
-// Recordings: what was put comes back, also from files that were never closed, were cut, or are none of ours.
+// Recordings: written pings are read back, also from files that were not closed or were cut; other files are refused.
 #include "clients/bvtsdk/core/recording.hpp"
 
 #include <gmock/gmock.h>
@@ -216,7 +216,7 @@ TEST_F(Recording, HoldsPackedSamples) {
   RecordingWriter writer;
   ASSERT_EQ(writer.create(path, hello), success);
   ASSERT_EQ(writer.put_ping(0, quiet, hello), success);
-  EXPECT_LT(writer.size_bytes(), quiet.samples.size());  // half of what they are
+  EXPECT_LT(writer.size_bytes(), quiet.samples.size());  // less than half of the samples' size
   RecordingReader reader;
   ASSERT_EQ(reader.open(path), success);
   PolarPing ping;

@@ -1,4 +1,4 @@
-// Programs that may fail: their end is known, and they get three files and nothing else of this process.
+// Programs that may fail: their exit is reported, and they inherit three files and nothing else from this process.
 #include "core/base/child_process.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Only regular files are opened: what else has the name is said, and never waited for.
+// Only regular files are opened: the error names any other kind, and opening never waits for it.
 #include "core/base/regular_file.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
-// Universal Transverse Mercator against what defines it: true to angles everywhere, and 0.9996 times the length of the meridian
-// in the middle of a zone.
+// Universal Transverse Mercator against its definition: angles are preserved everywhere, and the meridian in the middle of a zone
+// has 0.9996 times its length.
 #include "core/base/utm.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The fan: what is to port must be left, what is far must be up, and nothing may be lost between samples and pixels.
+// The fan: port must be left, far must be up, and no sample may be missing in the pixels.
 #include "core/image/draw_fan.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// The fan as text: what is seen where, in letters and in colours, and that it fits.
+// The fan as text: the positions of echoes, in letters and in colours, and the size.
 #include "core/image/terminal_fan.hpp"
 
 #include <gmock/gmock.h>

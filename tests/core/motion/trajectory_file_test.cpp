@@ -1,4 +1,4 @@
-// Files of trajectories: all formats mean the same, errors name their line, an hour of poses is read in no time.
+// Files of trajectories: all formats mean the same, errors name their line, an hour of poses is read quickly.
 #include "core/motion/trajectory_file.hpp"
 
 #include <gmock/gmock.h>

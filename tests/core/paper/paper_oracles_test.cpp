@@ -1,5 +1,5 @@
-// The comparison modes through the whole engine: the oracles' halves that are about them (9, 46), levels, determinism, and that
-// canonical pings pass through untouched.
+// The comparison modes through the whole engine: oracles 9 and 46 for them, levels, determinism, and that
+// canonical pings do not change.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// The rod of Choi 2025's tank, by itself: what each of the three readings of "turned by 15 degrees" sends back in the beam that
-// looks at it, against an integration of eq. (5) and (6) made outside this program, in 2.5 mm bins (docs/validation.md).
+// The rod of Choi 2025's tank alone: the echo in the beam towards it for each of the three interpretations of "turned by 15
+// degrees", against an integration of eq. (5) and (6) made outside this program, in 2.5 mm bins (docs/validation.md).
 #include <gtest/gtest.h>
 
 #include <cmath>

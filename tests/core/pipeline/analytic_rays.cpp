@@ -1,6 +1,6 @@
 // RayScene over the true planes, boxes, spheres and cylinders of a scene, in place of Embree: a program that is linked with this
-// file has no ray tracer of third parties in it, so that the thread sanitizer sees all that runs. What has no such shape is not
-// there for rays. Slow and plain on purpose.
+// file contains no ray tracer of third parties, so that the thread sanitizer sees all code. Objects of other shapes are invisible
+// to rays. It is slow and simple on purpose.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,5 +1,5 @@
-// A basin with something of everything the model knows, and two sonars that ask all there is to ask of it, one thing changed at
-// a time: for tests that hold whole pings equal.
+// A basin that uses every part of the model, and requests of two sonars, each with one change, which together use every setting.
+// For tests that compare whole pings.
 #pragma once
 
 #include <functional>
@@ -15,7 +15,7 @@
 
 namespace sonar::test {
 
-// A basin with something of everything: texture, a bed by another law, smooth walls, smooth primitives and meshes, bubbles.
+// The basin has texture, a bed with another scattering law, smooth walls, smooth primitives and meshes, and bubbles.
 inline constexpr const char* basin_yaml = R"(
 materials:
   patchy: {law: gsab, texture: {shape: 2, correlation_m: 0.3}, grain: {shape: 1, correlation_m: 0.01}, trend_db_per_decade: 10}
@@ -73,7 +73,7 @@ inline PingRequest request_of(std::shared_ptr<const SonarModel> model, std::uint
   return r;
 }
 
-// Sweeps in the time domain, tones by way of the spectrum; the second is at home where `worn` mirrors.
+// high() uses a sweep in the time domain, low() a tone in the frequency domain, at which `worn` reflects like a mirror.
 inline PingRequest high() { return request_of(model_of(oculus_high(), Waveform::Shape::lfm, false), 0); }
 inline PingRequest low() {
   PingRequest r = request_of(model_of(p900(), Waveform::Shape::cw, true), 1);
@@ -83,7 +83,7 @@ inline PingRequest low() {
   return r;
 }
 
-/// Requests of two sonars one after the other: all at once, then one thing changed at a time, and back.
+/// Requests of both sonars in turn: first with everything on, then each with one change, at last again with everything on.
 inline std::vector<std::pair<std::string, PingRequest>> turns() {
   std::vector<std::pair<std::string, PingRequest>> all;
   const auto both = [&all](const std::string& what, const std::function<void(PingRequest&)>& change) {

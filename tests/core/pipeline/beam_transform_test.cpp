@@ -1,4 +1,4 @@
-// Beams by way of a transform across the columns are the sums over columns that they stand for, with every instruction set.
+// Beams computed by a transform across the columns are equal to sums over columns, with every instruction set.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// Truths beyond the table of oracles: thin things never vanish, relief and shadows as brute force finds them, a world far from
-// its origin, and speckle far out.
+// Checks that are not in the table of oracles: thin objects never vanish, relief and shadows agree with brute force, a world far
+// from its origin, and speckle at long range.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Oracles on what a bed looks like sample by sample, in expected power: no holes for any shipped sonar, relief as brute force
-// sees it, and the speckle's statistics far out, where few cells share a sample.
+// Oracles on the picture of a bed sample by sample, in expected power: no holes for any shipped sonar, relief that agrees with
+// brute force, and the speckle's statistics at long range, where few cells share a sample.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// A receive array element by element: every echo delayed to every element, shaded, focused and summed in double. The slow truth
-// behind eq. (9), which knows of an array only its far-field pattern (docs/acoustics.md, section 6).
+// A receive array element by element: every echo delayed to every element, shaded, focused and summed in double. The slow
+// reference for eq. (9), which uses only the far-field pattern of an array (docs/acoustics.md, section 6).
 #pragma once
 
 #include <functional>

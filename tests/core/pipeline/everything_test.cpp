@@ -1,5 +1,5 @@
-// Every part of the model at once: two sonars take turns in one engine, and each ping is the same bytes whichever thread computes
-// it and whatever came before. And a part that is switched off is as if its data were not there.
+// Every part of the model at once: two sonars take turns in one engine, and the bytes of each ping depend neither on the thread
+// that computes it nor on earlier pings. A part that is switched off has the same effect as missing data.
 #include <gtest/gtest.h>
 
 #include <algorithm>

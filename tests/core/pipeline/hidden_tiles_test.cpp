@@ -1,5 +1,5 @@
-// Tiles of a ping, one by one: none of the cells of those that are left out unseen may echo, and labels get the same energy
-// beside the echoes as from a ping in expected power.
+// Tiles of a ping, one by one: no cell of a tile that is left out as hidden may echo, and labels get the same energy from the
+// echoes as from a ping in expected power.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The transmitter's leak, other sonars' pulses and crosstalk, through the whole engine: level by definition, place, and silence
-// when switched off or not given.
+// The transmitter's leak, other sonars' pulses and crosstalk, through the whole engine: level by definition, position, and no
+// effect when switched off or not given.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Pings let in between the parts of another one: both are the bytes they are alone, whatever bodies, settings and tiles they
-// need; and what a warm ping asks of the heap.
+// Pings computed between the parts of another one: both have the same bytes as alone, for any bodies, settings and tiles; and the
+// allocations of a warm ping.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

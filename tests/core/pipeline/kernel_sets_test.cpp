@@ -1,5 +1,4 @@
-// The hot loops, whatever the processor: the same picture from all, and of what is simple enough the picture that its definition
-// gives.
+// The hot loops with every instruction set: all give the same picture, and simple loops also the picture of their definition.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Labels of samples against what geometry says: which arc a sphere makes, what an occluded object leaves, where shadows lie.
+// Labels of samples against geometry: the arc of a sphere, the rest of an occluded object, the positions of shadows.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// The slow truth: eq. (8) and (9) of the acoustic model summed directly in double, and closed forms of the levels to expect.
+// The slow reference: eq. (8) and (9) of the acoustic model summed directly in double, and closed forms of the levels to expect.
 // Shares the formulae of core/pipeline/arithmetic with the engine, but none of its tables, grids or float arithmetic.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Tables of settings: kept while they fit, by bytes; those in use always.
+// Tables of settings are kept up to a number of bytes; those in use are always kept.
 #include "core/pipeline/settings_cache.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The elevation pattern's side lobes: points, beds and walls far off the main lobe, as loud as the closed forms say.
+// The elevation pattern's side lobes: the levels of points, beds and walls far off the main lobe agree with closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>

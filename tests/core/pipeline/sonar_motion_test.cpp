@@ -1,4 +1,5 @@
-// A sonar that moves while its ping is under way: bearings of the moment an echo comes home, ranges of the moment it bounced.
+// A sonar that moves while its ping is under way: bearings at the moment an echo is received, ranges at the moment it is
+// scattered.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// One sonar over one scene, ready to ping: the test's hand on the engine, and the measurements taken on what comes back.
+// One sonar over one scene, through which tests call the engine, and measurements of the result.
 #pragma once
 
 #include <memory>

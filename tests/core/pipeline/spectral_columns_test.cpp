@@ -1,4 +1,4 @@
-// Column synthesis by way of the spectrum, and in time, against the direct sum of eq. (8) in double, for pulses of every shape.
+// Column synthesis in the frequency and the time domain, against the direct sum of eq. (8) in double, for pulses of every shape.
 #include "core/pipeline/spectral_columns.hpp"
 
 #include <gtest/gtest.h>

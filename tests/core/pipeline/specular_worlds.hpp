@@ -1,5 +1,5 @@
-// Worlds of one mirror and what their echoes should be: the Kirchhoff integral summed patch by patch, which knows neither
-// Fresnel integrals nor principal radii. For the tests of specular echoes.
+// Worlds of one mirror and their expected echoes: the Kirchhoff integral summed patch by patch, without Fresnel integrals and
+// principal radii. For the tests of specular echoes.
 #pragma once
 
 #include <complex>

@@ -1,4 +1,4 @@
-// Reverberation of the water itself: level, statistics, and what stands in its way (docs/acoustics.md, section 3).
+// Reverberation of the water: level, statistics, and objects that block it (docs/acoustics.md, section 3).
 #include "core/pipeline/volume.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The fast ray caster against the plain one: soups, moving bodies, far places, and scenes with nothing in them.
+// The fast ray caster against the simple one: triangle soups, moving bodies, distant positions, and empty scenes.
 #include <gtest/gtest.h>
 
 #include <array>

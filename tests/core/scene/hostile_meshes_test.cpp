@@ -1,4 +1,4 @@
-// Mesh files that would end or starve the program that reads them: each is refused with a sentence, and the program goes on.
+// Mesh files that would crash the program that reads them or exhaust its memory: each is refused, and the program continues.
 #include "tests/core/scene/hostile_meshes.hpp"
 
 #include <gmock/gmock.h>

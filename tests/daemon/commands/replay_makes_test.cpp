@@ -1,4 +1,4 @@
-// Replay on loopback of files of other makes than Oculus: their hosts ask for pings first, and are answered.
+// Replay on loopback of files of other makes than Oculus: their hosts request pings first, and get answers.
 #include <gmock/gmock.h>
 
 #include "protocol/aris/aris_file.hpp"

@@ -1,4 +1,4 @@
-// Replay on loopback: a driver gets the recording's bytes, all of them and nothing else, at the pace asked for.
+// Replay on loopback: a driver gets exactly the recording's bytes, at the requested pace.
 #include <gmock/gmock.h>
 
 #include <thread>

@@ -1,4 +1,4 @@
-// Mistakes of the first hour in a configuration: what is meant is named, not only that something is wrong.
+// Common mistakes in a configuration: the error names the probable intention, not only the fault.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-// A plan of faults that cannot hold is refused with file, line and what to do.
+// An invalid plan of faults is refused with file, line and the remedy.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// Requests of control to a running daemon: status, settings, water, poses, events. Pings are made by a fake engine that remembers
-// what it was asked.
+// Requests of control to a running daemon: status, settings, water, poses, events. A fake engine makes the pings and
+// stores its requests.
 #include <gmock/gmock.h>
 
 #include "protocol/control/answers.hpp"

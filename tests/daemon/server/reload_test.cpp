@@ -1,5 +1,5 @@
-// SIGHUP: the configuration is read again. Sonars that it does not touch go on with their clients, the others follow the file,
-// and a file that is wrong changes nothing. The signal goes to this process, as a user would send it.
+// SIGHUP: the configuration is read again. Unchanged sonars keep their clients, the others follow the file, and a
+// file with errors changes nothing. The signal goes to this process, as a user would send it.
 #include <gmock/gmock.h>
 #include <unistd.h>
 

@@ -1,5 +1,5 @@
-// The scene changes while sonars ping: no ping is lost, each meets the scene its request was made for, and what fails changes
-// nothing.
+// The scene changes while sonars ping: no ping is lost, each is computed with the scene of its request, and a failed change has
+// no effect.
 #include <gmock/gmock.h>
 
 #include <atomic>
@@ -120,7 +120,7 @@ TEST(SceneChange, UnderLoadNoPingIsLostAndEachMeetsItsOwnBodies) {
   EXPECT_EQ(daemon.figures().refused, 0u);
 }
 
-/// Each engine costs pings some time: one client that changes the scene without end must not take the others' rate.
+/// Each engine costs pings some time: one client that changes the scene all the time must not reduce the rate of others.
 TEST(SceneChange, WhileADriverIsServedEnginesAreMadeSoOften) {
   Daemon daemon;
   Client client(daemon.address());

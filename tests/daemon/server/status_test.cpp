@@ -1,4 +1,4 @@
-// The beacon: when it starts, where it comes from, and what it says about the connected client.
+// The beacon: when it starts, its source address, and its data about the connected client.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <netinet/in.h>

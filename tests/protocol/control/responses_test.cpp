@@ -1,4 +1,4 @@
-// Answers and events in both directions; a client is no more trusting than the daemon.
+// Answers and events in both directions; a client checks messages as strictly as the daemon.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// A DVL against the published protocol: its lines and commands, its frames and signs, and the laws of velocity and dead
+// A DVL against the published protocol: its lines and commands, coordinate frames and signs, and the laws of velocity and dead
 // reckoning.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

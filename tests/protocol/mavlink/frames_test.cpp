@@ -1,4 +1,4 @@
-// Frames of both versions are found among others and among junk; nothing damaged passes, nothing said about lengths is trusted.
+// Frames of both versions are found among others and among junk; damaged frames are refused, and no length is trusted.
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
 namespace sonar::mavlink {

@@ -1,5 +1,5 @@
-// Frames written by another hand (tests/acceptance/mavlink_frames.py), from the message definitions: every field is read as it
-// was meant, and our own writer makes the same bytes.
+// Frames of an independent writer (tests/acceptance/mavlink_frames.py), made from the message definitions: every field is read
+// correctly, and our own writer makes the same bytes.
 #include <cstdio>
 #include <fstream>
 #include <map>

@@ -1,4 +1,4 @@
-// Axes: whatever frames a message is in, the same vehicle comes out the same.
+// Axes: messages about one pose in different frames give the same pose.
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
 namespace sonar::mavlink {

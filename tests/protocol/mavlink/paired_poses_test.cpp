@@ -1,4 +1,4 @@
-// Places meet the attitude of their own moment: interpolated, carried on a little, waited for, or given up.
+// A position is paired with the attitude of the same moment, which is interpolated, briefly extrapolated, waited for, or missing.
 #include "protocol/mavlink/paired_poses.hpp"
 
 #include "tests/protocol/mavlink/mavlink_testing.hpp"

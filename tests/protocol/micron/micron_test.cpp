@@ -1,5 +1,5 @@
-// A driver's conversation with an emulated Micron, without a socket: frames, signs of life, scans, what is ignored, and what its
-// host makes of foreign bytes.
+// A driver's conversation with an emulated Micron, without a socket: frames, signs of life, scans, ignored messages, and the
+// handling of foreign bytes by its host.
 #include <gmock/gmock.h>
 
 #include "core/base/geometry.hpp"

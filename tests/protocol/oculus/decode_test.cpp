@@ -1,4 +1,4 @@
-// The driver-side decoder: each broken ping has its own sentence, hostile ones never read or allocate beyond themselves.
+// The driver-side decoder: each broken ping gives an error of its own, and none makes it read or allocate beyond the message.
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
 namespace sonar::oculus::tests {

@@ -1,4 +1,4 @@
-// One client's conversation: what public clients really send, in any pieces, with junk between, and what they get back.
+// One client's conversation: the messages of public clients in any pieces, with junk between, and the replies.
 #include "core/base/random.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 

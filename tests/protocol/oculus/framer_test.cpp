@@ -1,4 +1,4 @@
-// The stream cutter: every split, every truncation, junk of all kinds, sizes that lie.
+// The splitting of the stream: every split, every truncation, junk of all kinds, wrong sizes.
 #include "protocol/oculus/framer.hpp"
 
 #include "core/base/random.hpp"

@@ -1,5 +1,5 @@
 // Any Oculus message as a JSON object by the vendor's names, from the one description of its fields. Used by the golden pairs and
-// by dump_oculus, the program through which other languages look at what our decoder says.
+// by dump_oculus, the program by which tests in other languages compare our decoder.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// The laws from fire message to PingSettings: rows, rates, gain, gamma, limits, sound speed, sample formats.
+// The rules that convert a fire message to PingSettings: rows, rates, gain, gamma, limits, sound speed, sample formats.
 #include "protocol/oculus/settings.hpp"
 
 #include <limits>

@@ -1,5 +1,5 @@
-// Rules of every format: written messages are read again, whatever part of the file is there, and a full disk spoils
-// nothing.
+// Rules of every format: written messages are read again, also from a part of the file, and a full disk does not damage what was
+// written.
 #include "tests/protocol/recording/recording_testing.hpp"
 #include "tests/small_disk.hpp"
 

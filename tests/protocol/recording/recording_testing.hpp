@@ -1,4 +1,4 @@
-// Common parts of the tests of recordings: a small conversation with everything in it, and files that go away.
+// Common parts of the tests of recordings: a small conversation with every kind of message, and temporary files.
 #pragma once
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// .sonar files: packets back to back, their times, and what is said of damage.
+// .sonar files: packets one after the other, their times, and the reports of damage.
 #include <cstdlib>
 
 #include "protocol/recording/recording.hpp"

@@ -1,4 +1,4 @@
-// Formulas of render files: what they come to, and what is said about those that cannot be read.
+// Formulas of render files: their values, and the errors for those that cannot be read.
 #include "daemon/commands/render/formula.hpp"
 
 #include <gmock/gmock.h>

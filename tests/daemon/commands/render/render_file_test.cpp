@@ -1,4 +1,4 @@
-// Render files: what their keys reach, and what they refuse.
+// Render files: the effects of their keys, and their errors.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,5 +1,5 @@
-// Side lobes are on for products, and off for a sonar without a profile. What a product at its own settings then hears of a bed
-// and of an obstacle outside of the main lobe.
+// Side lobes are on for products, and off for a sonar without a profile. The echoes of a bed and of an
+// obstacle outside of the main lobe, for a product at its own settings.
 #include <gtest/gtest.h>
 
 #include <cmath>

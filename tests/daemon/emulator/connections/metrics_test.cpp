@@ -1,4 +1,4 @@
-// Histograms and the Prometheus text: bounds, quantiles, escaping, and that every line is one that a scraper takes.
+// Histograms and the Prometheus text: bounds, quantiles, escaping, and that a scraper accepts every line.
 #include "daemon/emulator/connections/metrics.hpp"
 
 #include "daemon/server/system/process_figures.hpp"

@@ -1,4 +1,4 @@
-// Only a sonar that computing keeps from its rate is reported, once, with the possible rate.
+// A sonar is reported once, with the possible rate, if computing takes too long for its rate, and never otherwise.
 #include "daemon/emulator/sonar/rate_watch.hpp"
 
 #include <gmock/gmock.h>
@@ -9,7 +9,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// A sonar whose pings take so long, each after the one before; what was said, if anything.
+/// Runs a sonar whose pings take that long, one after the other; returns the report, if any.
 struct Sonar {
   double rate_hz, ping_s, waits_s;  // for others' pings
   RateWatch watch{};

@@ -1,4 +1,4 @@
-// A viewer in virtual time: what it may ask, what it is sent in which order, and what it loses when it is slow.
+// A viewer in virtual time: its allowed requests, the order of its messages, and those that a slow one loses.
 #include "daemon/emulator/view/viewer.hpp"
 
 #include <gmock/gmock.h>

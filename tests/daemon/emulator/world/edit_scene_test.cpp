@@ -1,4 +1,4 @@
-// Scenes made from scenes: what is not changed keeps its place, and what cannot be is refused with what the scene has.
+// Scenes made from scenes: unchanged objects keep their places, and a refusal lists what the scene has.
 #include "daemon/emulator/world/edit_scene.hpp"
 
 #include <gmock/gmock.h>

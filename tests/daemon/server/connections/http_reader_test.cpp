@@ -1,4 +1,4 @@
-// Requests out of bytes: every split gives the same, limits hold, what is no HTTP is refused with its status.
+// Reading of HTTP requests: every split of the bytes gives the same, limits hold, and other bytes are refused with a status.
 #include "daemon/server/connections/http_reader.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,5 @@
-// Several sonars on one engine: a quick one is let in between, a greedy one waits, and silence saves up no turns.
+// Several sonars on one engine: a quick ping interrupts a long one, a sonar that has used more time waits, and a pause gives no
+// credit.
 #include "daemon/server/engine/fair_turns.hpp"
 
 #include <gtest/gtest.h>

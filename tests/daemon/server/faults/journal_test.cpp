@@ -1,4 +1,5 @@
-// The journal of faults in its file: lines are whole, nothing waits for a reader or a disk, and what is lost is counted and said.
+// The journal of faults in its file: lines are whole, nothing waits for a reader or a disk, and lost lines are counted and
+// reported.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-// Poses by MAVLink over real sockets: what arrives moves the sonar, what is no MAVLink is counted, and the autopilot hears of us.
+// Poses by MAVLink over real sockets: messages move the sonar, other bytes are counted, and the autopilot gets our messages.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <sys/socket.h>

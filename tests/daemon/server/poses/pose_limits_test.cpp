@@ -1,4 +1,4 @@
-// Limits of senders of poses by TCP: bytes a second, turns, slots, and the connection when they speak another protocol.
+// Limits of senders of poses by TCP: bytes a second, turns, slots, and the end of a connection with another protocol.
 #include <gmock/gmock.h>
 
 #include <list>

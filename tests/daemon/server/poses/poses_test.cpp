@@ -1,4 +1,4 @@
-// Poses by every road change what the engine is asked; nonsense changes nothing and is counted.
+// Poses by every protocol change the requests to the engine; invalid ones change nothing and are counted.
 #include <gmock/gmock.h>
 
 #include <atomic>

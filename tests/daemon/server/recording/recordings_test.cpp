@@ -1,5 +1,4 @@
-// Recordings inside the daemon: which names they take, what goes into files, and that neither a full nor a slow disk is anything
-// to the clients.
+// Recordings inside the daemon: their names, the content of files, and that neither a full nor a slow disk affects clients.
 #include <gmock/gmock.h>
 
 #include <csignal>

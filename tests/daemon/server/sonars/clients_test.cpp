@@ -1,4 +1,4 @@
-// Several clients, slow ones, dead ones, and the end of the daemon: none disturbs another, nothing is cut.
+// Several clients, slow ones, dead ones, and the end of the daemon: none disturbs another, and no ping is cut.
 #include <gmock/gmock.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// A host by datagrams that is silent: when the daemon looks for it, and when it is given up.
+// A host by datagrams that is silent: when the daemon looks for it, and when it counts as gone.
 #include "daemon/server/sonars/datagram_stream.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// An exception in one conversation, a mistake of ours: it is said, and costs that conversation only.
+// An exception in one conversation, a fault of sonard: it is logged, and ends that conversation only.
 #include <gmock/gmock.h>
 
 #include "daemon/server/poses/pose_server.hpp"

@@ -1,4 +1,4 @@
-// Every kind of port, served end to end by a sonar that no vendor makes: TCP streams, a beacon, datagrams that are answered,
+// Every kind of port, served end to end by a made-up make of sonar: TCP streams, a beacon, datagrams that are answered,
 // pings as datagrams to receivers and to a multicast group, HTTP resources, and conversations across them.
 #include <gmock/gmock.h>
 

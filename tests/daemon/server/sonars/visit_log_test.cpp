@@ -1,4 +1,4 @@
-// A client that reconnects for ever: its comings and goings stay in the log, in few lines, and none goes unsaid.
+// A client that reconnects for ever: a few lines of the log count all of its connections.
 #include "daemon/server/sonars/visit_log.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Loops of listeners go on after a fault, until they end by themselves or are not to survive.
+// Loops of listeners continue after a fault, unless they have ended by themselves or must not survive it.
 #include <gmock/gmock.h>
 
 #include <stdexcept>

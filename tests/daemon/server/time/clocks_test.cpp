@@ -1,5 +1,5 @@
-// Time that others let pass: by control requests (lockstep) and by the stamps of poses (follow). Answers come when the pings are
-// out.
+// Time that programs advance: by control requests (lockstep) and by the stamps of poses (follow). Answers come when the pings
+// have been sent.
 #include <gmock/gmock.h>
 
 #include "protocol/control/answers.hpp"
@@ -24,7 +24,8 @@ DaemonSetup with_clock(const std::string& mode, const std::string& more = "") {
   return setup;
 }
 
-/// A daemon with one client that asked for 40 Hz, once the sonar has heard of it. It reads all the time: time waits for readers.
+/// A daemon with one client that asked for 40 Hz, once the sonar has served it. It reads all the time, because time waits for
+/// readers.
 struct Pinging {
   explicit Pinging(DaemonSetup setup) : daemon(std::move(setup)), client(daemon.address()) {
     client.fire(fire_at(PingRate::hz40));

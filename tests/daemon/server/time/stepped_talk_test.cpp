@@ -1,5 +1,5 @@
-// Conversations where time is not real: what they do by themselves happens when it is due, between the pings, and whether a host
-// is still there is judged by the wall's clock.
+// Conversations in simulated time: timed messages are sent when they are due, between the pings, and silent hosts are detected in
+// wall time.
 #include <gmock/gmock.h>
 
 #include <thread>
