@@ -1,4 +1,4 @@
-"""A host on the BlueView link, written from docs/protocols/blueview-link.md alone: the tests' second opinion on the daemon."""
+"""A host on the BlueView link, written from docs/protocols/blueview-link.md alone: independent of the daemon's code."""
 import array
 import socket
 import struct

@@ -1,4 +1,4 @@
-"""The BlueView link as a stranger would use it: discovery, greeting, settings, pings with the L targets where they are."""
+"""The BlueView link as an independent program uses it: discovery, greeting, settings, pings with the L targets in place."""
 import struct
 import threading
 import time

@@ -1,5 +1,5 @@
-"""Time that others let pass. lockstep: a program sends a pose, asks for a step, and has every ping due in it; follow: a simulator
-stamps its poses and waits for each answer. Both give the same bytes again, whatever the wall clock does meanwhile."""
+"""Time that programs advance. lockstep: a program sends a pose, requests a step, and has every ping due in it; follow: a simulator
+stamps its poses and waits for each answer. Both give the same bytes in every run, independent of the wall clock."""
 import re
 import sys
 import threading
@@ -38,7 +38,7 @@ class Clocks(unittest.TestCase):
         return pings, digests[0]
 
     def when_pinging(self, daemon):
-        """The sonar has heard what its client asked."""
+        """Waits until the sonar has received its client's request."""
         control, deadline = Control(daemon.address), time.monotonic() + 60
         while not control.status()["sonars"][0]["pinging"]:
             self.assertLess(time.monotonic(), deadline)

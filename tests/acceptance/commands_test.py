@@ -1,4 +1,4 @@
-"""What the programs say when asked wrongly: one sentence with what, where and what to do, and the exit code of its class."""
+"""Errors of the command lines: one sentence with what, where and what to do, and the exit code of its class."""
 import os
 import pathlib
 import tempfile

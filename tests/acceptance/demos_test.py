@@ -1,5 +1,5 @@
-"""Each demo at once: it previews by itself while a viewer looks, hands over to a driver and takes over again, and shows echoes; the page has
-its picture, of the product's own kind, with nothing over it, and all its controls can be reached and used by keys.
+"""All demos at the same time: each previews while a viewer looks, stops for a driver and resumes after it, and shows echoes; the page
+has its picture, of the product's own kind, with nothing over it, and all its controls can be reached and used by keys.
 
 The page's part is skipped without browser or page. SONARD_SHOTS names a folder for pictures.
 """

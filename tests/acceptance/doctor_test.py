@@ -1,4 +1,4 @@
-"""sonarctl doctor beside a daemon that is well, none at all, one that is busy, and ports that others have."""
+"""sonarctl doctor with a healthy daemon, without a daemon, with a busy one, and with ports that other programs use."""
 import json
 import os
 import pathlib

@@ -1,5 +1,5 @@
-"""The programs with one make of sonar more (tests/example_make): what is its folder and a row is demonstrated, listened to, seen,
-recorded, replayed, examined and faulted like every other."""
+"""The programs with one more make of sonar (tests/example_make): demo, listen, view, record, replay, doctor and faults work for it as
+for every other."""
 import json
 import pathlib
 import socket

@@ -1,4 +1,4 @@
-"""sonarctl fault beside a running daemon: what is added acts on a connection, is listed, written down, recorded, and ends."""
+"""sonarctl fault beside a running daemon: a fault acts on a connection, is listed, written to the journal, recorded, and ends."""
 import json
 import pathlib
 import signal

@@ -1,6 +1,6 @@
-"""How sonard ends, comes back and bears what its surroundings do to it: signals, kill -9, full disks, closed outputs, being frozen.
-What is measured is kept for the table of reliability where SONARD_RELIABILITY names a folder. Times are asserted with room for a busy
-machine; the record says whether the promise itself was kept."""
+"""The end and the restart of sonard, and its behaviour after signals, kill -9, full disks, closed outputs, and while it is frozen.
+Figures are recorded for the table of reliability in the folder that SONARD_RELIABILITY names. Times are asserted with room for a busy
+machine; the record states whether the promised time was met."""
 import contextlib
 import fcntl
 import os

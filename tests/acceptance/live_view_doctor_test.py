@@ -1,4 +1,4 @@
-"""What the live view's doctor says of drivers that get no pings."""
+"""The findings of the live view's doctor on drivers that get no pings."""
 import contextlib
 import socket
 import time

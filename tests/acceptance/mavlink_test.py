@@ -22,7 +22,7 @@ from sonard_client import Control, OculusClient  # noqa: E402
 
 SIDE_M, LEG_S, TURN_S, DEPTH_M = 1.0, 1.2, 2.5, 3.0
 START_S = 1.0  # at rest before it goes
-SALINITY = 30.0  # as the water's, so that the device believes the water's sound speed
+SALINITY = 30.0  # as the water's, so that the device assumes the water's sound speed
 RANGE_M, FIELD_DEG = 8.0, 50  # targets farther to the side are left out
 RING_M, TARGETS = 4.5, 10  # round the square's middle
 OLDEST_POSE_S, UNDER_WAY_S = 0.05, 0.02  # of a pose at a ping: its age, and the time it has had to arrive

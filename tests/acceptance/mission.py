@@ -1,5 +1,5 @@
-"""A vehicle that dives through the tank on a trajectory, in stepped time: what the tests of reproducibility and of whole missions
-run. The way is a file of the run's folder; everything a client received is kept."""
+"""A vehicle that dives through the tank on a trajectory, in stepped time: used by the tests of reproducibility and of whole missions.
+The trajectory is a file in the run's folder; all bytes that a client received are kept."""
 import hashlib
 import math
 import pathlib

@@ -1,5 +1,4 @@
-"""What `cpack -G DEB` and `cmake --install` make of the build: the right files in the right places, and a sonard that runs from
-wherever it was unpacked."""
+"""The results of `cpack -G DEB` and `cmake --install`: the right files in the right places, and a sonard that runs from any folder."""
 import gzip
 import os
 import pathlib

@@ -107,7 +107,7 @@ class Capture(unittest.TestCase):
 
 
 class TheReaderOfTheLogEnds(unittest.TestCase):
-    """sonard 2>&1 | head: the log goes nowhere, the service goes on."""
+    """sonard 2>&1 | head: the log is lost, the service continues."""
 
     def test_clients_are_served_all_the_same(self):
         configured = Sonard("tank-rod.yaml", pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}")

@@ -1,4 +1,4 @@
-"""Recorded by sonarctl, replayed by sonard: the same bytes, whatever kind of file lies between; files judged by other readers."""
+"""Recorded by sonarctl, replayed by sonard: the same bytes through every kind of file; files checked by other readers."""
 import base64
 import json
 import os

@@ -1,4 +1,4 @@
-"""sonard render as a user runs it: arrays that another language reads, runs that go on where they stopped, plain refusals."""
+"""sonard render as a user runs it: arrays that another language reads, runs that continue where they stopped, plain refusals."""
 import ast
 import contextlib
 import fcntl

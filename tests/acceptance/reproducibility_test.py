@@ -1,5 +1,5 @@
-"""The bytes of a stepped run depend on the configuration and on what its clients ask for, and on nothing else: not on threads,
-onlookers or recordings, nor on what became of a run before. Restarted further on in the trajectory it shows the same pictures."""
+"""The bytes of a stepped run depend only on the configuration and on the requests of clients: not on threads, observers,
+recordings, or earlier runs. A run that starts later in the trajectory shows the same pictures."""
 import hashlib
 import signal
 import subprocess

@@ -1,4 +1,4 @@
-"""sonarctl scene as a user runs it: a Gazebo world becomes a scene, and its box is heard where its poses put it."""
+"""sonarctl scene as a user runs it: a Gazebo world becomes a scene, and its box echoes at the position of its poses."""
 import json
 import math
 import pathlib

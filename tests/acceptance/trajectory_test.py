@@ -1,5 +1,5 @@
-"""A vehicle follows a trajectory file: in stepped time every ping shows where it is, again and again the same bytes; a running
-daemon pauses, seeks and speeds it up on request, and reading the configuration again does not disturb it."""
+"""A vehicle follows a trajectory file: in stepped time every ping shows its position, with the same bytes in every run; a running
+daemon pauses, seeks and speeds it up on request, and a reload does not disturb it."""
 import json
 import math
 import pathlib

@@ -1,4 +1,4 @@
-"""Runs tshark with the Oculus dissector and reads what it says. Used by dissector_test."""
+"""Runs tshark with the Oculus dissector and reads its output. Used by dissector_test."""
 import os
 import shutil
 import subprocess

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds the floors of docs/architecture.md: who may include whom, and what must not appear where.
+"""Checks the floors of docs/architecture.md: which folders may include which, and what files must not contain.
 
 usage: check_floors.py ROOT      prints one line a violation, exits 1 when there is any
 """
@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 
-# What a make of sonar may include beside its own folder.
+# Files that a make of sonar may include beside its own folder.
 DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/awaited_ping.hpp", "protocol/dialogue.hpp",
           "protocol/held_settings.hpp", "protocol/host.hpp", "protocol/limits.hpp",
           "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/recorded/", "protocol/serial_line.hpp",

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Programs and libraries as they are shipped: are the compiler's and the linker's guards in them?
+"""Checks that shipped programs and libraries have the guards of the compiler and the linker.
 
 usage: check_hardening.py FILE...    prints what is missing, a line each; exit 1 when anything is
 """

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Programs made without each guard: check_hardening must say so, and must not where all are there."""
+"""Programs made without each guard: check_hardening must report each, and nothing in a program with all guards."""
 import subprocess
 import sys
 import tempfile

@@ -21,7 +21,7 @@ CODE = re.compile(r"(?<!`)(`+)(?!`)(.+?)(?<!`)\1(?!`)", re.S)
 LINK = re.compile(r"\]\(\s*<?(?P<inline>[^\s)>]+)>?(?:\s+\"[^\"]*\")?\s*\)|^ {0,3}\[[^\]^]+\]:\s+<?(?P<reference>[^\s>]+)"
                   r"|<img\b[^>]*?\bsrc=\"(?P<picture>[^\"]+)\"", re.M)
 WEB = re.compile(r"[a-z][a-z0-9+.-]*:", re.I)
-# What a page names in backticks, alone or at the beginning of a command: a path; `*` and `{a,b}` stand for several files.
+# A path that a page names in backticks, alone or at the beginning of a command; `*` and `{a,b}` stand for several files.
 NAMED = re.compile(r"(?:\./)?(?P<path>[\w.+-]+/[\w./+*{},-]*?)/?(?::\d+(?:-\d+)?)?(?:\s.*)?", re.S)
 
 TABLE = re.compile(r"(?:^\|.*\n?)+", re.M)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Programs and libraries that run on older systems than the one they were built on: which versions of system libraries do they need?
+"""Checks which versions of system libraries programs and libraries need, so that they run on older systems than the build's.
 
 usage: check_symbol_versions.py GLIBC=2.35 [GLIBCXX=3.4.30 ...] FILE...    prints what is newer, a line each; exit 1 when anything is
 """

@@ -1,4 +1,4 @@
-"""What configuring says where something is missing or too old: core/requirements.cmake in a project that has nothing else."""
+"""The messages of CMake if something is missing or too old: core/requirements.cmake in a project that has nothing else."""
 import pathlib
 import subprocess
 import tempfile

@@ -59,7 +59,7 @@ TEST(CudaSeam, NamesTheDeviceOrSaysThatThereIsNone) {
 #endif
 }
 
-// The library alone: it states its version without a device.
+// The library alone: it names its cuFFT, or the missing file, without a device.
 TEST(CudaSeam, FindsCufftOrSaysWhichFileIsMissing) {
 #ifdef SONARD_CUDA_MODULE
   void* library = dlopen(built_module.c_str(), RTLD_NOW | RTLD_LOCAL);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the makes and products into the manual pages and the package's description, from what print_makes says of the code.
+"""Writes the makes and products into the manual pages and the package's description, from the output of print_makes.
 
 usage: makes_text.py PRINT_MAKES [--check]     --check: writes nothing, exits 1 when a file is not what it should be
 """

@@ -1,5 +1,5 @@
-"""What newer parts of the shipped program cost a driver: viewers of the live view, faults on purpose at a sonar beside it, and
-hosts of the UDP families, whose pings are all accounted for. --quick takes 3 s a case instead of 60."""
+"""The effect on a driver of viewers of the live view, of faults at another sonar, and of hosts of the UDP families, whose pings are
+all accounted for. --quick takes 3 s a case instead of 60."""
 import contextlib
 import json
 import pathlib

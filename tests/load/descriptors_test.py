@@ -1,5 +1,5 @@
-"""Every file descriptor used up by visitors: a stream that runs goes on, newcomers get a FIN, the log says so once, and all is as
-before when they have gone. The shipped program, its limit lowered from outside; --quick does the same for a shorter time."""
+"""Clients use up all file descriptors: a running stream continues, new clients get a FIN, the log reports it once, and all is as
+before when they have gone. Uses the shipped program with a lowered limit; --quick does the same for a shorter time."""
 import pathlib
 import resource
 import select

@@ -1,5 +1,5 @@
-"""40 Hz of 512 beams, really simulated by the shipped program: however many this machine can do, every tick is a ping or counted
-as skipped, and every ping is sent or counted as dropped. --quick takes 5 s instead of 60."""
+"""40 Hz of 512 beams, simulated by the shipped program: at any speed of the machine, every tick is a ping or counted as skipped,
+and every ping is sent or counted as dropped. --quick takes 5 s instead of 60."""
 import pathlib
 import re
 import signal

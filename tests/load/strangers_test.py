@@ -1,6 +1,6 @@
-"""What one stranger's connection may cost: work is counted, so that requests, frames and handshakes beyond the limit wait
-(docs/control.md, "Access"), 32 that send a byte now and then keep no one from /healthz, and poses of senders that have closed
-steer nothing. The shipped program.
+"""The load that one untrusted client can cause: work is counted, so that requests, frames and handshakes beyond the limit wait
+(docs/control.md, "Access"), 32 clients that send a byte now and then do not block /healthz, and poses of closed connections have
+no effect. Uses the shipped program.
 
 In the suite (--quick) the counts alone are asserted, with the time that passed. --measure SECONDS prints beside them the rate of a
 driver that asks for 40 Hz, in turns without and with each stranger.

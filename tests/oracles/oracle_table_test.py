@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The summary table: the worst of many stands for all, what fails or is missing is a fault, what was not built is said."""
+"""The summary table: the worst of many figures stands for all, a failed or missing oracle is a fault, one that was not built is named."""
 
 import json
 import os

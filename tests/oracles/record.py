@@ -1,4 +1,4 @@
-"""Records what an oracle measured from Python; tests/oracles/record.hpp says the same for C++ and explains the fields.
+"""Records what an oracle measured from Python; tests/oracles/record.hpp does the same for C++ and explains the fields.
 
 A test that uses it is given the folder and its place in the run by
 set_tests_properties(NAME PROPERTIES ENVIRONMENT SONARD_ORACLES=${oracle_records} FIXTURES_REQUIRED oracles).

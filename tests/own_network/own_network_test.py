@@ -1,4 +1,4 @@
-"""in_own_network: what its programs bind does not meet; without namespaces its programs run one after the other."""
+"""in_own_network: addresses of its programs do not collide; without namespaces its programs run one after the other."""
 import os
 import pathlib
 import select

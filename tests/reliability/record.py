@@ -1,4 +1,4 @@
-"""Keeps what a reliability test measured beside its bound; record.hpp beside it says the same for C++ and explains the fields.
+"""Keeps what a reliability test measured beside its bound; record.hpp beside it does the same for C++ and explains the fields.
 
 From a shell: record.py ITEM FIGURE BOUND yes|no COMMAND
 """

@@ -1,4 +1,4 @@
-"""What .ci/run leaves out, how setup.sh chooses a compiler, and how run_programs.py and test_times.py name what failed."""
+"""The steps that .ci/run leaves out, the compiler that setup.sh chooses, and failures as run_programs.py and test_times.py name them."""
 import os
 import pathlib
 import select

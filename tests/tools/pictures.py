@@ -22,11 +22,11 @@ from page_checks import shown  # noqa: E402
 from running_sonard import SONARCTL, SONARD, Daemon, run  # noqa: E402
 
 HTTP = "http://127.0.0.1:8088/"
-# Of a make: its demo, where the vehicle stands (east, north, up; roll, pitch, yaw in degrees), what else sonarctl view is asked for.
+# For each make: its demo, the vehicle's pose (east, north, up; roll, pitch, yaw in degrees), further options of sonarctl view.
 VIEWS = {"aris": ("aris", "2.6,2.9,-3.2", "0,0,214.5", ()),
          "ping360": ("ping360", "0,0.6,-4.4", "0,0,0", ("--range", "8")),
          "sonar-3d15": ("3d15", "-7,0,-3", "0,0,0", ())}
-# What the page shows on an idle computer: the rate that the driver asked for, and no warning above the picture.
+# The page on an idle computer shows the rate that the driver requested, and no warning above the picture.
 IDLE = "parseFloat(document.querySelector('#rate').textContent) > 9.5 && !document.querySelector('#badges').children.length"
 IDLE_WITHIN_S = 60
 WIDTH = 360

@@ -1,4 +1,4 @@
-"""What `sonard render --report coverage` says of every sonar there is, as a table."""
+"""The results of `sonard render --report coverage` for every sonar, as a table."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""What the comparison modes do otherwise than the canonical model, in figures: law of scattering, side lobes, rays, beams."""
+"""Differences between the comparison modes and the canonical model, in figures: law of scattering, side lobes, rays, beams."""
 
 import numpy as np
 

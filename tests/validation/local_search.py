@@ -1,4 +1,4 @@
-"""Local search of Choi 2025: what fraction of the bottom's bins come out right, and what it looks like."""
+"""Local search of Choi 2025: the fraction of the bottom's bins that are right, and the picture."""
 
 import numpy as np
 

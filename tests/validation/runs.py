@@ -1,4 +1,4 @@
-"""Runs the program for the validation page: pings by `sonard render`, times by `sonard_bench`. Nothing here knows acoustics."""
+"""Runs the program for the validation page: pings by `sonard render`, times by `sonard_bench`. It contains no acoustics."""
 
 import json
 import pathlib
@@ -16,7 +16,7 @@ def text_of(scene):
 
 
 class Ping:
-    """One rendered ping: pressure [rows, beams] in uPa and all the sidecar says."""
+    """One rendered ping: pressure [rows, beams] in uPa and all of the sidecar."""
 
     def __init__(self, stem):
         self.about = json.loads(stem.with_suffix(".json").read_text(encoding="utf-8"))
@@ -76,7 +76,7 @@ class Sonard:
         return list(self.pings_of(scene, "--expected-power", "--noise", "off", *arguments, text=text))
 
     def coverage(self, scene, *arguments):
-        """What --report coverage says of the (first) ping: a dict."""
+        """The result of --report coverage for the first ping: a dict."""
         lines = self.call("render", SCENES / f"{scene}.yaml", "--report", "coverage", *arguments).splitlines()
         words = lines[1].split()
         return {"bins": int(words[-5]), "within_1_db": float(words[-4]), "worst_db": float(words[-2]), "mean_db": float(words[-1])}

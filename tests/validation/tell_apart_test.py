@@ -1,4 +1,4 @@
-"""The classifier of captured and simulated pings, on made pictures: what differs is told, what does not is not."""
+"""The classifier of captured and simulated pings, on made pictures: it separates different ones, and does not separate equal ones."""
 import os
 import random
 import unittest

@@ -288,7 +288,7 @@ class TimeLeft(unittest.TestCase):
 
 
 class Clock:
-    """Stands in for time: it goes on only while something sleeps, and longer where the computer stalls."""
+    """Replaces the clock: time advances only during a sleep, and more if the computer is to stall."""
 
     def __init__(self, stalls=()):
         self.now, self.stalls, self.sleeps = 1000.0, dict(stalls), 0

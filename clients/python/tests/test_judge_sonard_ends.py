@@ -1,4 +1,4 @@
-"""A sonard that ends during a case is no verdict on the driver: the case is NOT RUN, and says why."""
+"""If sonard ends during a case, there is no verdict on the driver: the case is NOT RUN, with the reason."""
 import os
 import pathlib
 import signal
@@ -20,7 +20,7 @@ NEVER = {"ran": True, "data": "CLEAN", "recovery": "NEVER"}
 
 class SonardEnds(unittest.TestCase):
     def result_of(self, happens):
-        """happens(sonard): what goes on during the case."""
+        """happens(sonard): called during the case."""
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             program = folder / "sonard"

@@ -1,4 +1,4 @@
-"""The judge judges rightly: a driver that is right passes, and each planted fault is found by its case and by no other MUST.
+"""The judge's verdicts are right: a driver that is right passes, and each planted fault is found by its case and by no other MUST.
 
 SONARD_JUDGE_CASES=some runs the proof, which takes minutes; =all takes the right driver through every case."""
 import contextlib
@@ -63,7 +63,7 @@ FEW = ("--case", "N00.1", "--case", "L02.1", "--case", "F01.1")
 
 
 class Few(Judging):
-    """What every change must pass: the judge runs, and tells a right driver from one that never returns."""
+    """Run at every change: the judge runs, and distinguishes a right driver from one that never returns."""
 
     def test_a_right_driver_passes_what_it_must(self):
         index = self.judged("right_driver.py {ip}", *FEW)

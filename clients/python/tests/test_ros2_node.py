@@ -168,7 +168,7 @@ class Fails:
 
 
 class Helpers(WithNode):
-    """Threads that go on after errors."""
+    """Threads that continue after errors."""
 
     def connections(self, *streams):
         """Stands in for the live view's connections, one after the other; the last one stays open. Returns those made."""
@@ -325,7 +325,7 @@ class Parameters(unittest.TestCase):
         values = checked(self.given(odometry="/odom", vehicle=1, tf_rate_hz=50, truth_rate_hz="1e1", http="10.0.0.1"))
         self.assertEqual((values["vehicle"], values["tf_rate_hz"], values["truth_rate_hz"]), ("1", 50.0, 10.0))
         self.assertEqual((values["sonard"], values["http"]), (("127.0.0.1", 14771), ("10.0.0.1", 8088)))
-        self.assertTrue(checked(self.given(tf_static=True)))  # no source is needed for what sonard knows
+        self.assertTrue(checked(self.given(tf_static=True)))  # no source is needed for frames of sonard
 
     def test_wrong_ones_are_named(self):
         for name, parameters in (("odometry", {}), ("pose", {"odometry": "/a", "pose": "/b"}), ("tf_child", {"tf_parent": "map"}),

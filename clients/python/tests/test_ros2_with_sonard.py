@@ -72,7 +72,7 @@ class ATargetToPort(WithSonard):
         found = []
         for beam, bearing in enumerate(ping.bearings_rad):  # as on the wire: negative to port
             echo = max(ping.row(row)[beam] for row in range(ping.rows) if 3.5 < ping.ranges_m[row] < 4.5)
-            # As oculus_sonar_driver computes a beam's direction, and RViz its place in the sonar's frame.
+            # The direction of a beam as oculus_sonar_driver computes it, and its place in the sonar's frame as RViz computes it.
             x, y, z = c.rotate(c.wxyz(c.IMAGE_IN_FLU_XYZW), (0.0, -math.sin(bearing), math.cos(bearing)))
             found.append((echo, math.degrees(math.atan2(y, x)), z))
         brightest = max(echo for echo, deg, _ in found if deg > 15)

@@ -1,4 +1,4 @@
-"""A small harbour as GLB files: about what scenes/demo.yaml holds, for the pictures of the page's tests."""
+"""A small harbour as GLB files: similar to scenes/demo.yaml, for the pictures of the page's tests."""
 import json
 import math
 import struct

@@ -1,4 +1,4 @@
-"""What the browser tests of the page hold against it, before a scripted daemon (page_test.py) and a real one (page_live_test.py)."""
+"""The checks of the browser tests of the page, with a scripted daemon (page_test.py) and a real one (page_live_test.py)."""
 import base64
 import contextlib
 import os

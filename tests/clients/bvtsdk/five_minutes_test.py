@@ -1,4 +1,4 @@
-"""docs/bvtsdk.md, "BlueView in five minutes": what the banner says, the first look, and the program as it is printed there."""
+"""docs/bvtsdk.md, "BlueView in five minutes": the banner's text, the first look, and the program as it is printed there."""
 import pathlib
 import re
 import signal

@@ -1,4 +1,4 @@
-"""The prefixes as a driver's build meets them: headers in every language, the two-line detector that tells 3.x from 4.x, every
+"""The prefixes as a driver's build uses them: headers in every language, the two-line detector that distinguishes 3.x and 4.x, every
 function in the library and nothing else, no foreign libraries, the CMake package and pkg-config."""
 import os
 import pathlib

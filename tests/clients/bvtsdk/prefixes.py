@@ -1,4 +1,4 @@
-"""Where the build put the libraries' prefixes and the programs that use them; the acceptance tests' daemon."""
+"""Paths of the libraries' prefixes and of the programs that use them in the build; the acceptance tests' daemon."""
 import pathlib
 import sys
 
