@@ -8,7 +8,7 @@ namespace sonar {
 
 enum class ClockMode {
   realtime,  // UNIX time that never jumps
-  stepped,   // by itself: the next tick comes when every client has taken the last ping
+  stepped,   // by itself: the next tick comes when every client has received the last ping
   lockstep,  // the same, but only as far as control requests (Step) let it
   follow,    // the same, but only as far as the stamps of the vehicles' poses let it
 };

@@ -29,7 +29,7 @@ function stands(facts) {
   if (facts.realtime || now_s() - facts.movedAt < stands_after_s) return null;
   const at = `Time stands still at ${fixed((facts.now_ns ?? 0) / 1e9, 3)} s`;
   const driverIsSlow = facts.findings?.some((f) => f.check === 'clock' && f.level === 2);  // a step would wait too
-  const text = noted(facts, 'clock') ?? (clock === 'lockstep' ? `${at}: it moves when a step is requested, here or by sonarctl step.` : `${at}: it moves when every driver has taken the last ping.`);
+  const text = noted(facts, 'clock') ?? (clock === 'lockstep' ? `${at}: it moves when a step is requested, here or by sonarctl step.` : `${at}: it moves when every driver has received the last ping.`);
   const button = clock === 'lockstep' && !driverIsSlow ? { label: 'Step 0.1 s', service: '/sonard/step', request: { dt_s: 0.1 } } : undefined;
   return { kind: `${clock}-waits`, picture: 'dim', text, button };
 }

@@ -50,7 +50,7 @@ void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("--profile", run.profile, "run the demo with this product (docs/configuration.md)");
   app.add_option(
          "--clock", run.clock,
-         "realtime, or stepped (when clients have taken the last ping), lockstep (sonarctl step), follow (stamps of poses)")
+         "realtime, or stepped (when clients have received the last ping), lockstep (sonarctl step), follow (stamps of poses)")
       ->check(one_of({clock_modes.begin(), clock_modes.end()}))
       ->envname("SONARD_CLOCK");
   add_engine_options(app, run.engine);
@@ -64,7 +64,7 @@ void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("--clients", run.clients, "clients that each sonar serves at a time, instead of its clients.max")
       ->check(whole_number(1, 16));
   app.add_flag("--faults", run.faults, "arm faults on purpose: without it every request for one is refused (docs/faults.md)");
-  app.add_option("--fault-journal", run.fault_journal, "file that what faults did is appended to, as JSON lines");
+  app.add_option("--fault-journal", run.fault_journal, "file to which the journal of faults is appended, as JSON lines");
   app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings")->check(whole_number());
   app.add_flag("--digest", run.digest, "print the SHA-256 of every client's byte stream at the end");
   app.add_option("--log-format", run.log_format, "text or json (default text)")
@@ -122,7 +122,8 @@ void add_dataset_options(CLI::App& app, DatasetCommand& dataset) {
                               "coco or folder: when the set is complete, also as pictures in that form, in train, val and test")
                    ->check(one_of({"coco", "folder"}));
   app.add_option("--split", dataset.split, "shares of train, val and test, by scene (80,10,10)")->needs(form);
-  app.add_option("--split-by", dataset.split_by, "names of draws that say what a scene is, as bed_seed (equal scenes)")
+  app.add_option("--split-by", dataset.split_by,
+                 "names of draws: pings with equal values are in one split, as with bed_seed (default: equal scenes)")
       ->needs(form);
   app.add_option("--threads", dataset.threads, "pings to make side by side (all processors)")->check(whole_number(1, 1024));
   app.add_flag("--quiet", dataset.quiet, "no progress");

@@ -27,7 +27,7 @@ void add_replay_options(CLI::App& app, ReplayCommand& replay) {
   CLI::Option* speed = app.add_option("--speed", replay.speed, "2 = twice as fast as recorded")
                            ->check(text::number(0.001, 1000))
                            ->capture_default_str();
-  app.add_flag("--stepped", replay.stepped, "no pace: the next message when the driver has taken the last")->excludes(speed);
+  app.add_flag("--stepped", replay.stepped, "no pace: the next message when the driver has received the last")->excludes(speed);
   app.add_flag("--loop", replay.loop, "from the front again and again");
   app.add_option("--rate", replay.rate_hz, "messages a second of raw dumps, which have no times")
       ->check(text::number(0.001, 10000))
