@@ -10,7 +10,7 @@ using Json = nlohmann::ordered_json;
 
 Bytes line_of(const Json& message) { return dvl::line_of(message.dump()); }
 
-/// A member of an object. nullopt: there is none, or it is no finite number below 1e18, so that conversions cannot overflow.
+/// A member of an object. nullopt: there is none, or it is not a finite number below 1e18, so that conversions cannot overflow.
 std::optional<double> number(const Json& from, const char* name) {
   const auto found = from.find(name);
   if (found == from.end() || !found->is_number()) return std::nullopt;

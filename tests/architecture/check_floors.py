@@ -134,7 +134,9 @@ PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
 LONGEST_FILE = 400  # lines; tests may be longer
 # A comment is a sentence, or a noun phrase that names the thing: these beginnings are fragments, these words are of persons.
 FRAGMENT = re.compile(r"[ \t]*//+<?[ \t]*([Oo]f|What|Nothing:)(?=[\s,])")
-PERSONS = re.compile(r"\b(to" + r"ld|no" + r"body|some" + r"body|who" + r"ever|ow" + r"ed)\b", re.I)
+PERSONS = re.compile(r"\b(to" + r"ld|no" + r"body|some" + r"body|who" + r"ever|ow" + r"ed|new" + r"comers?|turned aw" + r"ay)\b", re.I)
+# "is no frame" for "is not a frame", "goes on" for "continues".
+RIDDLES = re.compile(r"(?<!there )\b((?:is|are) none|(?:is|are) no (?!longer|more|less|farther)\w+|go(?:es)? on)\b", re.I)
 
 
 def tracked_files(root):
@@ -230,13 +232,15 @@ def circle_violations(includes, part_of, parts):
 
 
 def wording_violations(name, text):
-    """The first line of a comment must not begin as a fragment; no line may have a word of PERSONS."""
+    """The first line of a comment must not begin as a fragment; no line may have a word of PERSONS or RIDDLES."""
     before = ""
     for number, line in enumerate(comments_of(text).splitlines(), 1):
         if not before.startswith("//") and (match := FRAGMENT.match(line)):
             yield number, f'comment: begins with "{match[1]}"; write a sentence, or a noun phrase that names the thing'
         if match := PERSONS.search(line):
             yield number, f'comment: "{match[1]}"; name the event: sent, reported, logged, refused'
+        if match := RIDDLES.search(line):
+            yield number, f'comment: "{match[1]}"; write "is not a ...", or "continues"'
         before = line.strip()
 
 

@@ -144,12 +144,13 @@ class Planted(unittest.TestCase):
         for line, words in [("/// Of the last ping.", 'begins with "Of"'), ("  // What a ray met.", 'begins with "What"'),
                             ("int x;\n/// Nothing: no such field.", 'begins with "Nothing:"'),
                             ("int x;  // of each beam", 'begins with "of"'),
-                            ("int x;  // the log is to" + "ld", '"to' + 'ld"')]:
+                            ("int x;  // the log is to" + "ld", '"to' + 'ld"'), ("/// nullopt: it is none.", '"is none"'),
+                            ("// Bytes that are no frame.", '"are no frame"'), ("// The scan goes on.", '"goes on"')]:
             with self.subTest(line=line):
                 self.expect("core/base/a.cpp", line + "\n", line.count("\n") + 1, words)
         self.assertEqual(found_in({
             "core/base/a.cpp": "/// Statistics of the last ping.\n/// What follows continues a sentence.\nint Of = 1;\n",
-            "core/base/b.cpp": 'f("What to' + 'ld");\n// Whatever comes.\n// Nothing is lost.\n'}), [])
+            "core/base/b.cpp": 'f("What to' + 'ld");\n// Whatever comes.\n// Nothing is lost. There is no frame; it is no longer there.\n'}), [])
 
     def test_makes_are_named_in_their_folders_only(self):
         for name, line in [("daemon/server/a.cpp", "oculus::Framer framer;"), ("clients/sonarctl/a.cpp", '#include "protocol/ping/messages.hpp"'),

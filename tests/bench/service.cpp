@@ -196,7 +196,7 @@ Result<json> find_first_pings(const ScenePointer& scene, const BenchOptions& opt
   constexpr int warm_pings = 3;
   std::vector<double> first_ms, late_ms, first_cpu_ms, warm_cpu_ms;
   std::string slowest;
-  // The last setting is asked for once before: what a daemon's first ping takes is no matter of settings.
+  // The last setting is requested once before, because the first ping of a daemon takes longer at any setting.
   for (int k = -1; k < settings_in_grid; ++k) {
     const GridSetting setting = grid_setting(k < 0 ? settings_in_grid - 1 : k);
     const double begin_s = now_s(), used_s = processor_s();

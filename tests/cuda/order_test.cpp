@@ -36,7 +36,7 @@ using MachinePointer = std::unique_ptr<cuda::Machine>;
 std::vector<Ping> pings_of(MachinePointer machine, const std::shared_ptr<const Scene>& scene, const std::vector<PingRequest>& all,
                            cuda::DeviceEngineOptions options = {.batch = 3}) {
   Parallel pool(1);
-  // An exception of a machine is no reason to continue with the CPU.
+  // After an exception of a machine the engine does not continue on the CPU.
   options.cpu_after_failure = false;
   const auto engine = cuda::make_device_engine(scene, pool, {.simd = SimdLevel::portable}, std::move(machine), options);
   return engine->run(all);

@@ -46,7 +46,7 @@ class PingReader {
   /// Reads what is there. False when the stream has ended.
   bool read_some();
 
-  std::uint64_t pings = 0, garbled = 0;  // garbled: content, order, or a message that is none
+  std::uint64_t pings = 0, garbled = 0;  // garbled: wrong content or order, or an invalid message
   std::uint64_t ids_skipped = 0;         // between two pings of this stream
   std::uint32_t last_id = 0;
   bool ended = false, was_reset = false;

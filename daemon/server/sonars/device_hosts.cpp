@@ -78,8 +78,8 @@ void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, cons
   datagram_work_ = on_bytes(dialogue->id(), datagram);
 }
 
-/// The computer of a host has answered that a port is closed. For the host's port this is the only sign of its end, because there
-/// is no connection; for the port of look_for_host() it is a sign of life.
+/// The computer of a host has answered that a port is closed. For the host's port this is the only sign of its end, because UDP
+/// has no connection; for the port of look_for_host() it is a sign of life.
 void Device::on_host_closed(const protocol::Port& port, const Endpoint& host) {
   const StreamPointer dialogue = host_of(port);
   if (!dialogue) return;

@@ -41,7 +41,7 @@ TEST(XmlFile, PlainTextIsOneLineOfUtf8) {
   EXPECT_EQ(plain("Gebäude 漁船"), "Gebäude 漁船");
   EXPECT_EQ(plain("a\nb\tc\x7f"), "a_b_c_");
   EXPECT_EQ(plain("\xff\xc3"), "__");
-  EXPECT_EQ(plain("\xe2\x80\xa8 \xc2\x85"), "___ __");  // ends of lines that are none of ASCII's
+  EXPECT_EQ(plain("\xe2\x80\xa8 \xc2\x85"), "___ __");  // ends of lines outside ASCII
   EXPECT_EQ(plain(std::string(100, 'x')).size(), 64u);
   EXPECT_EQ(plain("漁船", 4), "漁");
 }

@@ -31,7 +31,7 @@ TEST(Playback, RunsOnceAndStaysAtTheEnd) {
 }
 
 TEST(Playback, SpeedIsExactForYears) {
-  const Playback p(seconds(10), looped(0.1), Time{});  // 0.1 is no binary number: a thousand days would show it
+  const Playback p(seconds(10), looped(0.1), Time{});  // 0.1 is not exact in binary: a thousand days would show it
   const Ns late = std::chrono::hours(24 * 1000) + Ns(10);
   EXPECT_EQ(p.place(Time{} + late).at, (std::chrono::hours(2400) + Ns(1)) % Ns(seconds(10)));
   EXPECT_FALSE(Speed::from(0));
@@ -70,7 +70,7 @@ TEST(Playback, PausesAndGoesOnWhereItStood) {
   EXPECT_EQ(p.place(at(60)).rate, 0);
   p.resume(at(100));
   EXPECT_EQ(shown(p, 101), seconds(4));
-  p.resume(at(102));  // again is no step
+  p.resume(at(102));  // a second time has no effect
   EXPECT_EQ(shown(p, 102), seconds(5));
 }
 

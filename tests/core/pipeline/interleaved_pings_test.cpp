@@ -210,7 +210,7 @@ TEST(InterleavedPings, ImpossibleOnesAreRefused) {
   Sounding late = over_bed(pings);
   late.request.settings.ping_interval_s = -1;
   EXPECT_NE(why_invalid(late.request), "");
-  Sounding many = over_bed(7);  // beams are no multiple
+  Sounding many = over_bed(7);  // the number of beams is not a multiple of it
   EXPECT_EQ(why_invalid(many.request), "");
   EXPECT_EQ(many.ping().samples.size(), static_cast<std::size_t>(2 * rows * beams));
 }

@@ -102,7 +102,7 @@ TEST_P(BothWays, Oracle12_WallFarFromItsEdges) {
 }
 
 TEST_P(BothWays, PlateBesideTheFoot) {
-  // Turned a little, the foot of the perpendicular leaves the plate: the main lobe goes on beyond its edge.
+  // If the plate is turned a little, the foot of the perpendicular leaves it, and the main lobe continues beyond its edge.
   for (const double tilt : {0.0, 0.004, 0.008, 0.02}) {
     Mirror plate = specular_plane(0.3, 0.1);
     plate.in_world = facing(9, tilt);

@@ -218,7 +218,7 @@ TEST_P(TracerWidth, AgreesWithBruteForce) {
   compare(*scene, rays, {}, draw, 60, 30, false, 1e-4);
 }
 
-// Inactive lanes hold a caller's old bytes: rays of an earlier packet, zeros, or bytes that are no numbers.
+// Inactive lanes hold a caller's old bytes: rays of an earlier packet, zeros, or bytes that are not numbers.
 TEST_P(TracerWidth, LanesThatAreNotActiveAreNotRead) {
   Draw draw(8);
   const auto scene = three_soups(draw, {});

@@ -205,7 +205,7 @@ TEST(EsriGrid, KnowsNoDataInEveryForm) {
        {"-32768", "-99999", "-9999999", "-2147483648", "2147483647", "4294967295", "-3.4028234663852886e+38", "9.96921e+36"})
     EXPECT_EQ(holes_in(grid_of(metre, fill), true), "1") << fill;
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -32768", "-9999"), true), "1");
-  // Ground deeper than 9999 m is none.
+  // Among such depths -9999 m is ground, not a hole.
   const auto trench = read_esri_heights(
       files.write("g.asc",
                   "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 100\nNODATA_value -32768\n-9999 -9998 -9950 -10010\n"),

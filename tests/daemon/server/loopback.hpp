@@ -154,7 +154,7 @@ class Client {
   bool read_to_end(milliseconds timeout = patience);
   std::vector<std::byte> read_raw(std::size_t at_least, milliseconds timeout = patience);
   void reset();           // RST
-  void finish_sending();  // FIN, but go on reading
+  void finish_sending();  // sends a FIN, but continues to read
   /// From now on the client is like a computer without power: not even its kernel receives or acknowledges.
   void die();
   void close();

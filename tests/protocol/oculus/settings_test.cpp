@@ -162,7 +162,7 @@ TEST(Settle, NotANumberIsNoticed) {
 
 TEST(Settle, DeviceComputesItsSoundSpeed) {
   auto state = device();
-  state.water = Water{20, 35, 8, 1234};  // the world's own speed is none of the device's business
+  state.water = Water{20, 35, 8, 1234};  // the device does not use the world's speed
   state.depth_m = 0;
   FireRequest request = fire(0, 1, PingRate::hz10, 0x49, 5, 50);
   EXPECT_NEAR(settings_of(request, state).device_sound_speed_mps, sound_speed_unesco_mps(20, 0, 0), 0.01);

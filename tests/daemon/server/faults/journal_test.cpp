@@ -117,7 +117,7 @@ struct Journalled {
     client.emplace(daemon->address());
     client->fire(fire_at(oculus::PingRate::hz40));
   }
-  /// Pings go on until entries are lost.
+  /// Pings until entries are lost.
   bool loses() {
     const auto deadline = Steady::now() + patience;
     while (daemon->status().notes_size() == 0 && Steady::now() < deadline)

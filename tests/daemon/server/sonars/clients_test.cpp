@@ -25,7 +25,7 @@ oculus::FireRequest large_fire(PingRate rate) {
 bool is_served(Daemon& daemon) {
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
-  return client.next_ping().has_value();  // the stream ends at once when it is turned away
+  return client.next_ping().has_value();  // the stream ends at once when the client is refused
 }
 
 TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {

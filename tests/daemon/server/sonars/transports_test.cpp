@@ -313,7 +313,7 @@ TEST(Transports, AHostByDatagramsWhosePortIsClosedIsGivenUpAndAnotherLosesNothin
   next_ping(host, &first);
   next_ping(host, &second);
   EXPECT_EQ(second, first + 1);
-  // The answer to a stranger's closed port is on the way between the host's datagrams.
+  // The report of another sender's closed port arrives between the host's datagrams.
   for (int i = 0; i < 20; ++i) {
     UdpSocket().send("nothing\n", daemon.address(), data_port);
     host.send("range 6\n", daemon.address(), data_port);
