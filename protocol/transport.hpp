@@ -14,7 +14,7 @@ namespace sonar::protocol {
 /// A transport of the device. A vendor may have several of a kind, but one beacon.
 struct Port {
   enum class Kind {
-    tcp_stream,    // listens at `number`: one Dialogue for each connection; observers have those of the vendor's first
+    tcp_stream,    // listens at `number`: one Dialogue for each connection; observers use the vendor's first such port
     udp_beacon,    // sends Vendor::beacon to `number` of the configured addresses: broadcast, multicast or hosts
     udp_answer,    // passes datagrams that arrive at `number`, broadcast ones too, to Vendor::on_datagram
     udp_stream,    // sends Vendor::datagrams of each ping from `number` (0: any; may be that of a udp_answer) to the receivers

@@ -84,8 +84,9 @@ int run(int argc, char** argv) {
   app.add_option("model", options.models, "model to follow, MODEL or MODEL=VEHICLE of sonard; one for each vehicle")->required();
   app.add_option("--world", options.world, "name of the world")->capture_default_str();
   app.add_option("--topic", options.topic, "topic of the poses; default /world/WORLD/pose/info");
-  app.add_option("--to", options.to,
-                 "HOST or HOST:PORT where sonard takes poses as JSON (poses.json in its configuration); default 127.0.0.1:14771");
+  app.add_option(
+      "--to", options.to,
+      "HOST or HOST:PORT where sonard accepts poses as JSON (poses.json in its configuration); default 127.0.0.1:14771");
   CLI11_PARSE(app, argc, argv);
   return follow(options);
 }

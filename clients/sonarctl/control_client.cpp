@@ -43,7 +43,7 @@ Result<void> judge(const v1::Status& answer) {
     case v1::Status::FAILED:
       return failure(ErrorKind::bad_data, "sonard failed: " + answer.text());
     default:  // UNSUPPORTED, and codes of later versions
-      return failure(ErrorKind::unavailable, "this sonard does not know the request" +
+      return failure(ErrorKind::unavailable, "this sonard does not support the request" +
                                                  (answer.text().empty() ? "" : " (" + answer.text() + ")") +
                                                  ": is it of another version? Compare sonard --version and sonarctl --version");
   }

@@ -1,4 +1,4 @@
-// How much memory this process may still take before the system ends it: what is free in the computer, and in the limits of the
+// Determines how much more memory this process may use before the system ends it: the free memory of the computer and of the
 // control groups of the process. A load that needs more is refused before it affects other programs.
 #pragma once
 

@@ -252,7 +252,7 @@ class Reader {
       wrong_ = name_ + ": the file has no poses; write one pose per line (docs/poses.md)";
     } else if (!frame_ && !asked_.frame) {
       wrong_ = name_ +
-               ": the file does not say in which frame its poses are; begin it with a line \"# frame: ENU_FLU\" or \"# frame: "
+               ": the file does not state the frame of its poses; begin it with a line \"# frame: ENU_FLU\" or \"# frame: "
                "NED_FRD\", or give the frame with the file's name (docs/poses.md)";
     }
   }

@@ -32,14 +32,14 @@ enum class WhenClientsFull { close_new, take_over, queue };
 inline constexpr std::array<std::string_view, 3> when_clients_full_names = {"close_new", "take_over", "queue"};
 enum class OnStale { hold, blank, stop };
 inline constexpr std::array<std::string_view, 3> on_stale_names = {"hold", "blank", "stop"};
-enum class Overload { slow, count };  // ticks without a ping: clients do not see them, or gaps in the ping numbers
+enum class Overload { slow, count };  // ticks without a ping: a lower rate, or gaps in the ping numbers
 inline constexpr std::array<std::string_view, 2> overload_names = {"slow", "count"};
 
 struct VehicleConfig {
   std::string name;
   Pose initial_pose;  // pose in the world
   bool orbits = false;
-  motion::Plan plan{};            // instead
+  motion::Plan plan{};            // its trajectory, if it does not orbit
   bool has_initial_pose = false;  // from the file, not the default
 };
 /// A moving object of the scene that follows a trajectory.
@@ -125,7 +125,7 @@ struct LimitConfig {
 /// Recordings by control requests (docs/recording.md).
 struct RecordingConfig {
   std::filesystem::path folder;  // an existing one; empty = recording is off
-  bool is_made = false;          // when the first recording begins: of the demo
+  bool is_made = false;          // true in the demo: created when the first recording begins
 };
 /// Faults on purpose (docs/faults.md).
 struct FaultConfig {

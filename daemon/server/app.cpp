@@ -144,7 +144,7 @@ void App::wait_for_signal() {
 }
 
 void App::request_stop() {
-  asio::post(io_, [this] { stop("asked to stop"); });
+  asio::post(io_, [this] { stop("stop requested"); });
 }
 
 /// Servers are closed first, so that no request arrives while sonars finish their clients.

@@ -128,7 +128,7 @@ Applied apply(SonarSettings& settings, int head_index, Key key, const Value& val
     return apply_range(head, mode_of(device, head_index), start, stop, strict_range(device), key);
   }
   const auto number = number_in(value);
-  if (!number) return refused(Code::bad_parameter, "key " + std::to_string(static_cast<int>(key)) + " takes a finite number");
+  if (!number) return refused(Code::bad_parameter, "key " + std::to_string(static_cast<int>(key)) + " must be a finite number");
   return apply_number(head, settings, key, *number);
 }
 

@@ -21,7 +21,7 @@ std::string joined(const std::string& path, const FieldDescriptor& field) {
   return path.empty() ? field.name() : path + "." + field.name();
 }
 
-using Predicate = std::function<bool(const Message&, const FieldDescriptor*)>;  // a null field: asks for the message as a whole
+using Predicate = std::function<bool(const Message&, const FieldDescriptor*)>;  // called with null for the message itself
 /// Path of the first field or message for which `bad` is true.
 std::optional<std::string> find_first(const Message& message, const std::string& path, const Predicate& bad) {
   if (bad(message, nullptr)) return path;

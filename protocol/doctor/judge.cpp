@@ -205,7 +205,7 @@ class SonarJudge {
               ", " + std::to_string(client.pings_dropped()) + " since it connected",
           "read its socket without pause, or ask for fewer or smaller pings", client.address());
     else if (client.pings_written() > 0)
-      add(Level::ok, "read", client.address() + " takes the pings of " + sonar_.name(), "", client.address());
+      add(Level::ok, "read", client.address() + " receives the pings of " + sonar_.name(), "", client.address());
   }
 
   void check_settings() {

@@ -112,7 +112,7 @@ Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView fra
       return failure(ErrorKind::bad_data, "a playback control with wrong fields");
     read = std::move(control);
   } else if (opcode == of_viewer_data && reader.ok()) {
-    return failure(ErrorKind::bad_data, "sonard takes no messages of viewers (clientPublish)");
+    return failure(ErrorKind::bad_data, "sonard accepts no messages of viewers (clientPublish)");
   } else if (reader.ok()) {
     return failure(ErrorKind::bad_data, "binary message with opcode " + std::to_string(opcode) + ": unknown");
   }

@@ -13,7 +13,7 @@ namespace {
 class SilentDialogue final : public protocol::Dialogue {
  public:
   protocol::Reaction on_bytes(BytesView received, Time) override {
-    return {{protocol::Notice{std::to_string(received.size()) + " bytes, where drivers send none"}}, {}};
+    return {{protocol::Notice{std::to_string(received.size()) + " bytes at a port where drivers send none"}}, {}};
   }
   protocol::Reaction on_tick(Time, bool) override { return {}; }
   Time next_tick() const override { return Time::max(); }

@@ -164,7 +164,7 @@ class CommandDialogue final : public protocol::Dialogue {
     if (!given.empty()) {
       Settings wanted = s;
       const auto numbers = numbers_of(given);
-      std::string why = format("it takes %zu numbers", command.arguments);
+      std::string why = format("it has %zu numbers", command.arguments);
       if (numbers && numbers->size() == command.arguments) {
         command.set(wanted, *numbers);
         why = complaint(wanted);
@@ -195,7 +195,7 @@ class CommandDialogue final : public protocol::Dialogue {
 class DataDialogue final : public protocol::Dialogue {
  public:
   Reaction on_bytes(BytesView received, Time) override {
-    return {{protocol::Notice{std::to_string(received.size()) + " bytes, where drivers send none"}}, {}};
+    return {{protocol::Notice{std::to_string(received.size()) + " bytes at a port where drivers send none"}}, {}};
   }
   Reaction on_tick(Time, bool) override { return {}; }
   Time next_tick() const override { return Time::max(); }

@@ -159,7 +159,7 @@ class NorbitHost final : public protocol::Host {
     if (image) seen.image = *image;
     ping.picture = [image]() -> Result<PolarImage> {
       if (image) return *image;
-      return failure(ErrorKind::usage, "a picture takes the water column, port 2211: sonarctl listen prints the points");
+      return failure(ErrorKind::usage, "a picture needs the water column, port 2211: sonarctl listen prints the points");
     };
     if (image) ping.drawing = [seen = std::move(seen)] { return seen; };
     actions.emplace_back(std::move(ping));

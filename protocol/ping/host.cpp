@@ -115,7 +115,7 @@ HostPing ping_of(std::uint32_t number, double end_m, Points polar) {
   found.facts.note = polar.empty() ? "no points" : format("points from %.2f to %.2f m", nearest_m, farthest_m);
   found.picture = [image = std::move(image)]() -> Result<PolarImage> {
     if (image.beams >= 2) return image;
-    return failure(ErrorKind::usage, "a picture takes two points at least: sonarctl listen prints those of a Surveyor");
+    return failure(ErrorKind::usage, "a picture needs two points at least: sonarctl listen prints those of a Surveyor");
   };
   seen.points = std::move(polar);
   found.drawing = [seen = std::move(seen)] { return seen; };

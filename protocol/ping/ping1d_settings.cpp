@@ -27,7 +27,7 @@ SonarModel make_model() {
   mode.centre_hz = 115e3f;
   mode.min_range_m = static_cast<float>(nearest_echo_m);
   mode.max_range_m = 1e-3f * most_mm;
-  mode.source_level_db = 190;  // unknown: level and full scale; set so that sand takes the lowest gain at 0.5 m
+  mode.source_level_db = 190;  // unknown: level and full scale; set so that sand needs the lowest gain at 0.5 m
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(30));  // MAN; a newer edition has 25
@@ -56,7 +56,7 @@ bool same_settings(const Settings& a, const Settings& b) { return a.id == b.id &
 std::string complaint(const Parameters& p) {
   if (p.range.length_mm < shortest_range_mm || p.range.length_mm > most_mm || p.range.start_mm > most_mm ||
       end_mm(p.range) > most_mm)
-    return "scan_length is from 1000, its end to 100000";
+    return "scan_length is below 1000, or ends beyond 100000";
   if (p.speed_mm_per_s < 1000000 || p.speed_mm_per_s > 2000000) return "speed_of_sound is not in 1000000..2000000";
   if (p.gain > most_gain) return "gain_setting is not in 0..6";
   if (p.mode_auto > 1) return "mode_auto is 0 or 1";

@@ -196,7 +196,7 @@ class Starting(unittest.TestCase):
             ip, port = other.getsockname()
             done = self.start(f"{{{{stream: off, http: '{ip}:{port}'}}}}")
         self.assertEqual(done.returncode, 69)
-        self.assertIn("control.http in the configuration takes another address, or off", done.stderr)
+        self.assertIn("control.http in the configuration can set another address, or off", done.stderr)
 
 
 if __name__ == "__main__":

@@ -134,7 +134,7 @@ class Stop(unittest.TestCase):
                 while deaf.recv(65536):
                     pass
             deaf.close()
-            self.assertIn("did not take its last message in time", daemon.log())
+            self.assertIn("did not receive its last message in time", daemon.log())
 
     def test_terminate_with_119_descriptors_open(self):
         """9 drivers, 8 viewers, 20 event streams, 64 other control and pose connections, a recording."""

@@ -135,7 +135,7 @@ class Stream(unittest.TestCase):
             numbers = [[driver.next().number for _ in range(3)] for driver in (one, other)]
             for seen in numbers:
                 self.assertEqual(seen, sorted(set(seen)))
-            eventually(lambda: "bytes, where drivers send none" in daemon.log())
+            eventually(lambda: "bytes at a port where drivers send none" in daemon.log())
 
     @unittest.skipIf(shark.why_not(), shark.why_not())
     def test_tshark_reads_the_same(self):

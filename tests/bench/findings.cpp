@@ -180,7 +180,7 @@ Result<json> find_empty_bins(const BenchOptions& options) {
   for (const char* name : {"P1", "P3b", "P4a"})
     for (const int rays : {0, 300}) {
       const BenchCase c = *find_case(name);
-      if (rays == 0 && c.fixed_fan > 0) continue;  // a case of rays: cells as small as its rows would be too many
+      if (rays == 0 && c.fixed_fan > 0) continue;  // this case has rays only, because its rows would need too many cells
       render::RenderJob job = render::over_a_level_bed(c.profile.model, c.settings, name);
       job.config.engine = options.engine;
       job = render::with_bed_only(job);

@@ -51,7 +51,8 @@ Sums exponentials(const Column& c, int count) {
   return sums;
 }
 
-/// Sixteen frequencies side by side, turned on by sixteen at a time. `re`, `im`: [count], a multiple of 16.
+/// Computes sixteen frequencies side by side, and rotates their phases to the next sixteen. `re`, `im`: [count], a multiple
+/// of 16.
 SONAR_CLONES void turn_phases(const Column& c, int count, float* __restrict re, float* __restrict im) {
   constexpr int lanes = 16;
   for (std::size_t e = 0; e < c.turns.size(); ++e) {
@@ -132,7 +133,7 @@ double by_pulses(const std::vector<Column>& columns, const PingPlan& plan, const
   const int count = echoes.count;
   return best_ms(4 * tries, [&] {
     clear_columns(signals, 0, beams);
-    echoes.count = count;  // which is forgotten once they are summed
+    echoes.count = count;  // synthesize() sets it to 0
     synthesize(echoes, plan.pulse(), kernels, signals);
   });
 }

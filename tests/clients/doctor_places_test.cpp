@@ -66,7 +66,7 @@ TEST(DoctorPlaces, AHostThatBeganAtTheSameTimeIsNamedAndTheComputerNotBlamed) {
   EXPECT_THAT(report(R"(clients { address: "127.0.0.1:50001" pings_written: 4 })"), HasSubstr("overloaded"));
   EXPECT_THAT(
       report(R"(clients { address: "127.0.0.1:50001" } clients { address: "127.0.0.1:50002" pings_written: 4 })"),
-      AllOf(HasSubstr("127.0.0.1:50002 began to ask it at the same time, and gets its pings"), Not(HasSubstr("overloaded"))));
+      AllOf(HasSubstr("127.0.0.1:50002 sent it requests at the same time, and gets its pings"), Not(HasSubstr("overloaded"))));
 }
 
 }  // namespace

@@ -5,7 +5,7 @@ usage: run_programs.py BUILD_FOLDER NAME...        --list KIND... [--without KIN
 The names are of BUILD_FOLDER/tests/programs, which CMake writes: its kinds, then the program and its arguments (tests/CMakeLists.txt).
 A GoogleTest program is run in parts, by GTEST_TOTAL_SHARDS, and before the others, which are short: so no processor is idle at the end.
 The tests that failed are added to the file that SONARD_FAILED names.
-  SONARD_TEST_JOBS      programs at once (a processor's each)
+  SONARD_TEST_JOBS      programs at once (default: the number of processors)
   SONARD_TEST_SECONDS   the longest a program may take (1800)
 """
 import argparse
@@ -24,7 +24,7 @@ LONGEST_S = float(os.environ.get("SONARD_TEST_SECONDS") or 1800)
 
 
 def programs_of(build):
-    """Of each name: its kinds and its command."""
+    """Returns the kinds and the command for each name."""
     path = pathlib.Path(build) / "tests/programs"
     if not path.is_file():
         sys.exit(f"{path}: not there; configure the build folder first")

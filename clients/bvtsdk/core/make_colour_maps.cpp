@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder = argv[1];
-  std::error_code ignored;  // a folder that is missing after all fails the saving
+  std::error_code ignored;  // if the folder cannot be created, save_colour_map() fails
   std::filesystem::create_directories(folder, ignored);
   for (const std::string_view name : colour_map_names) {
     const std::filesystem::path path = folder / (std::string(name) + ".cmap");

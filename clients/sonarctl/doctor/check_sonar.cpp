@@ -82,7 +82,7 @@ class SonarChecks {
                  std::string(sonar_.make->remedy) + ", of " + sonar_.at.host);
     }
     const double asked_hz = sonar_.reported->rate_hz();
-    const std::string text = at + ": images by UDP, " + format("%g", asked_hz) + " Hz asked, " +
+    const std::string text = at + ": images by UDP, " + format("%g", asked_hz) + " Hz requested, " +
                              std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped";
     if (too_slow_for(asked_hz))
       add(Level::warn, "ping", text + ", " + computing_text(computing_ms()), less_to_compute);
@@ -198,7 +198,7 @@ class SonarChecks {
                      (clock() == "lockstep" ? "a client requests a step" : "the next pose comes"),
                  clock() == "lockstep" ? "advance it meanwhile: sonarctl step 0.1 --count 20" : "start the sender of poses");
     if (const std::string rivals = clients_beside_us(); !rivals.empty())
-      return add(Level::warn, "ping", text + ": " + rivals + " began to ask it at the same time, and gets its pings",
+      return add(Level::warn, "ping", text + ": " + rivals + " sent it requests at the same time, and gets its pings",
                  "run the doctor once more: it leaves a busy sonar to its driver");
     add(Level::fail, "ping", text,
         s.asked ? "is the computer overloaded, or sonard stopped (SIGSTOP, a debugger)? See its log"

@@ -142,7 +142,7 @@ Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const He
   auto grid = finish_heights(std::move(raw), options);
   if (!grid) return bad(grid.error().text);
   if (!header->has_place && !options.centred)
-    grid->notes.push_back("its header has neither xllcorner nor yllcorner; they are taken as 0");
+    grid->notes.push_back("its header has neither xllcorner nor yllcorner; they are read as 0");
   return grid;
 }
 

@@ -51,10 +51,10 @@ void take_out_fills(RawHeights& raw, std::vector<std::string>& notes) {
   for (std::size_t k = 0; k < cells.size(); ++k)
     if (cells[k] > 0)
       notes.push_back(
-          text::format("%zu cell%s of %.0f, far from all heights, taken as no data, although the file does not declare it",
+          text::format("%zu cell%s of %.0f, far from all heights, treated as missing, although the file does not declare it",
                        cells[k], cells[k] == 1 ? "" : "s", static_cast<double>(usual_fills[k])));
   if (raw.fill_values > 0)
-    notes.push_back(text::format("%zu cell%s beyond every height taken as no data, although the file does not declare it",
+    notes.push_back(text::format("%zu cell%s beyond every height treated as missing, although the file does not declare it",
                                  raw.fill_values, raw.fill_values == 1 ? "" : "s"));
 }
 
@@ -128,7 +128,7 @@ std::string note_of_system(const CoordinateSystem& system) {
                    ", are taken as those of WGS 84, from which they may be some 100 m away; convert them: gdalwarp "
                    "-t_srs EPSG:4326 IN OUT.tif"
              : "its coordinates, of " + name +
-                   ", are taken as plain metres, with the scale of that projection; to place it by latitude and "
+                   ", are read as plain metres, with the scale of that projection; to place it by latitude and "
                    "longitude: gdalwarp -t_srs EPSG:4326 IN OUT.tif";
 }
 
@@ -183,7 +183,7 @@ Result<void> set_origin_of_degrees(HeightGrid& grid, const HeightOptions& option
   const double longitude = 0.5 * (grid.x.front() + grid.x.back()), latitude = 0.5 * (grid.y.front() + grid.y.back());
   if (guessed)
     grid.notes.push_back(
-        text::format("its coordinates (%.6g, %.6g, cells of %.6g) are taken as degrees; write geographic: true, or "
+        text::format("its coordinates (%.6g, %.6g, cells of %.6g) are read as degrees; write geographic: true, or "
                      "false if they are metres",
                      grid.x.front(), grid.y.front(), grid.x[1] - grid.x[0]));
   choose_origin(grid, options, {rad_from_deg(latitude), rad_from_deg(longitude), 0});

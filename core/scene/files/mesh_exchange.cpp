@@ -15,7 +15,7 @@ namespace {
 
 constexpr const char* version = "sonard-mesh-3";
 constexpr std::uint64_t magic = 0x3168'7365'6d64'7273;
-constexpr std::uint64_t most_text = std::uint64_t{256} << 20;  // bytes, of an error or of the materials' names
+constexpr std::uint64_t most_text = std::uint64_t{256} << 20;  // limit in bytes for an error or the materials' names
 
 struct Head {
   std::uint64_t magic = 0;
@@ -62,7 +62,7 @@ Result<LoadedMesh> broken() {
   return failure(ErrorKind::bug, "the program that imports meshes gave an invalid answer (this is a bug, please report it)");
 }
 
-/// Every user of a mesh relies on this.
+/// Returns whether the mesh is valid. Every user of a mesh relies on this.
 bool is_sound(const LoadedMesh& mesh) {
   const Mesh& m = mesh.centred.mesh;
   return is_finite(mesh.centred.centre_m) &&

@@ -34,7 +34,7 @@ std::vector<Variation> read_variations(const text::Node& node);
 
 /// Draws for a ping, from 1; attempts count from 0.
 Draws draw(const std::vector<Variation>& variations, Seed seed, std::uint64_t ping, std::uint32_t attempt);
-/// A value in (0, 1) of the same kind, for decisions that have a name.
+/// Returns a value in (0, 1), a function of the same arguments, for decisions with a name.
 double draw_uniform(Seed seed, std::uint64_t ping, std::uint32_t attempt, std::string_view name);
 
 /// The text with every $name of a word replaced; other references are left to the formulas.

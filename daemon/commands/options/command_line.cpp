@@ -92,7 +92,7 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
                "also which object's echo each sample holds, with boxes and polygons (docs/datasets.md)");
   app.add_option("--sonar", render.sonar, "which sonar of the configuration, when it has several");
   app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, TUM, EuRoC, KITTI");
-  app.add_option("--pose-frame", render.pose_frame, "of that file, when it does not say so itself")
+  app.add_option("--pose-frame", render.pose_frame, "frame of that file, if the file does not state it")
       ->check(one_of({"ENU_FLU", "NED_FRD"}));
   app.add_option("--pose-rate", render.pose_rate_hz, "of that file, lines a second: KITTI files have no times")
       ->check(number(0.001, 10000.0));
@@ -172,7 +172,7 @@ void add_farm_options(CLI::App& app, FarmCommand& farm) {
 std::string complaint(const RenderCommand& render) {
   const bool writes = render.report.empty();
   if (render.config.empty() && render.report.empty()) return "it needs a configuration or render file: sonard render FILE";
-  if (writes && render.out.empty()) return "say where the files go: --out DIR";
+  if (writes && render.out.empty()) return "give the folder for the files: --out DIR";
   if (!writes && !render.out.empty()) return "--report writes no files: leave out --out";
   if (render.pose_rate_hz && render.poses.empty()) return "--pose-rate is about --poses FILE, which is not given";
   if (render.first - 1 + render.pings.value_or(1) > most_rendered_pings)

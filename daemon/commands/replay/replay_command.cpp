@@ -62,7 +62,7 @@ Result<std::string> open_page(ReplayPage& page, const ReplayCommand& command, Lo
   const auto at = endpoint_from(command.http, "--http");
   if (!at) return tl::make_unexpected(at.error());
   if (const auto opened = page.open(*at); !opened) {
-    const std::string what = opened.error().text + "; --http takes another address, or off";
+    const std::string what = opened.error().text + "; --http can set another address, or off";
     if (command.http != ReplayCommand::default_page) return failure(opened.error().kind, what);
     log.warning("continuing without the page: " + what);
     return std::string();

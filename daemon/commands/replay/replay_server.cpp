@@ -301,7 +301,7 @@ void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
   for (const protocol::Bytes& reply : reaction.replies) client.replies.insert(client.replies.end(), reply.begin(), reply.end());
   if (client.replies.size() > Outbox::most_reply_bytes) {
     ++figures_.greedy;
-    log_limited(log_, notice_limit_, LogLevel::warning, "client closed: it asks faster than it reads the answers",
+    log_limited(log_, notice_limit_, LogLevel::warning, "client closed: it sends requests faster than it reads the answers",
                 {{"client", client.name}});
     error_code ignored;
     client.socket.close(ignored);

@@ -176,7 +176,7 @@ constexpr FaultKind table[] = {
      "checks their order", 5, {}, {P{.name = "how", .value = "reversed", .words = "reversed zero shuffled changing"}}, "bearings"},
     {"D30", "log-messages", 2, S::framing, E::insert_message, "Text messages precede a ping.", "limits what it prints", 0,
      F::message_type, {whole("type", "0x80", 0, 65535), whole("bytes", "64", 0, 65536)}, "front"},
-    {"D32", "part-failed", 2, S::framing, E::set_field, "The header of a ping says that a part of the device failed.",
+    {"D32", "part-failed", 2, S::framing, E::set_field, "The header of a ping states that a part of the device failed.",
      "reports it; continues", 5, F::ping_status, {whole("value", "1", 0, 65535)}, "ping_status"},
 
     // ---- status messages

@@ -258,7 +258,7 @@ void Sonar::handle(Connection& from, protocol::Reaction reaction, Time now, Acti
   }
   for (protocol::Bytes& reply : reaction.replies)
     if (!from.outbox.push_reply(std::move(reply))) {
-      actions.emplace_back(Reset{from.id, "asks faster than it reads the answers"});
+      actions.emplace_back(Reset{from.id, "sends requests faster than it reads the answers"});
       return;
     }
   if (!close_why.empty()) return audience_.begin_finish(from, close_why, actions);

@@ -22,7 +22,7 @@ std::string World::steer(const control::SetTrajectory& asked, Time now) {
   if (!track->body.plan) return name + " follows no trajectory; the configuration gives it one (docs/poses.md)";
   if (!track->history.empty())
     return name + " is moved by poses from " + track->source + "; its trajectory plays only until the first of them";
-  if (!asked.paused && !asked.position_s && !asked.speed) return "say what to do: paused, position_s or speed";
+  if (!asked.paused && !asked.position_s && !asked.speed) return "give at least one of: paused, position_s or speed";
   motion::Playback& playback = track->playback;
   const double length_s = seconds(playback.duration());
   if (asked.position_s && !(*asked.position_s >= 0 && *asked.position_s <= length_s))

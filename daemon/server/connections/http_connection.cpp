@@ -13,7 +13,7 @@ namespace sonar {
 namespace {
 
 namespace http = boost::beast::http;
-constexpr std::chrono::seconds drain_limit{2};  // discards what the client still sends after our last answer
+constexpr std::chrono::seconds drain_limit{2};  // for discarding what the client still sends after our last answer
 
 const HttpRefusal too_many{503, "too many connections are open"};
 
@@ -110,10 +110,10 @@ void HttpConnection::reject() {
 
 // ---- requests
 
-// Two coroutines: read() fills the parser and hands one request over; write() answers it and asks for the next. While a request
-// is answered (busy_), nothing is read, so pipelined requests wait in the parser and in the kernel, and are answered in order
-// (RFC 9112, 9.3.2). Time limits: greeting_limit for a request to be complete, keep_alive_limit between requests, none while an
-// answer is made.
+// Two coroutines: read() fills the parser and hands one request over; write() answers it and calls next_request(). While a
+// request is answered (busy_), nothing is read, so pipelined requests wait in the parser and in the kernel, and are answered in
+// order (RFC 9112, 9.3.2). Time limits: greeting_limit for a request to be complete, keep_alive_limit between requests, none
+// while an answer is made.
 asio::awaitable<void> HttpConnection::read() {
   std::vector<std::byte> buffer(16384);
   request_limit_->within(greeting_limit);
@@ -193,8 +193,7 @@ void HttpConnection::finish_sending() {
 
 // ---- answers
 
-/// read() and write() take turns: read() sets `request_` or `refusal_` and waits while `busy_`; write() answers and lets it go
-/// on.
+/// read() and write() take turns: read() sets `request_` or `refusal_` and waits while `busy_`; write() answers and wakes read().
 asio::awaitable<void> HttpConnection::write() {
   while (!over() && !all_sent_) {
     if (std::exchange(continue_asked_, false)) {

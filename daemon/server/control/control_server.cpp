@@ -33,7 +33,7 @@ Result<void> ControlServer::open(ConnectionListener<Connection>& listener, const
   if (!wanted.enabled) return {};
   const auto opened = listener.open(wanted.at);
   if (opened) return {};
-  const std::string what = opened.error().text + "; " + key + " in the configuration takes another address, or off";
+  const std::string what = opened.error().text + "; " + key + " in the configuration can set another address, or off";
   if (given) return failure(opened.error().kind, what);
   services_.log.warning("continuing without " + key + ": " + what);
   return {};

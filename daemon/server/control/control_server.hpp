@@ -12,7 +12,7 @@ namespace sonar {
 
 class ControlServer {
  public:
-  /// All of it outlives the server.
+  /// The arguments outlive the server.
   ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Admission& admission,
                 Operations& operations, Events& events, PoseIntake& poses, Log& log, ViewFeed* view = nullptr);
 

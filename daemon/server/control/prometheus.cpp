@@ -200,7 +200,8 @@ void write_faults(PrometheusText& text, const DaemonFigures& figures) {
   for (const auto& [sonar, count] : figures.active_faults) text.sample({{"sonar", sonar}}, static_cast<double>(count));
   text.family("sonard_fault_injections_total", Type::counter, "What faults on purpose did, by kind.");
   for (const auto& [code, count] : figures.fault_injections) text.sample({{"kind", code}}, static_cast<double>(count));
-  text.family("sonard_fault_entries_lost_total", Type::counter, "Entries of the journal of faults that its file did not take.");
+  text.family("sonard_fault_entries_lost_total", Type::counter,
+              "Entries of the journal of faults that were not written to its file.");
   text.sample({}, static_cast<double>(figures.fault_entries_lost));
 }
 

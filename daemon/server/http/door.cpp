@@ -47,7 +47,7 @@ std::optional<HttpAnswer> wrong_handshake(const HttpRequest& request) {
   if (request.http_1_0) return socket_refusal(400, "a WebSocket needs HTTP/1.1");
   if (!header_names(request.connection, "upgrade")) return socket_refusal(400, "a WebSocket needs Connection: Upgrade");
   if (request.socket_version != "13") {
-    HttpAnswer answer = socket_refusal(426, "say Sec-WebSocket-Version: 13");
+    HttpAnswer answer = socket_refusal(426, "send Sec-WebSocket-Version: 13");
     answer.headers.emplace_back("Sec-WebSocket-Version", "13");
     return answer;
   }
@@ -96,7 +96,7 @@ std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
     if (welcome.protocol.empty() && std::find(protocols.begin(), protocols.end(), offered) != protocols.end())
       welcome.protocol = offered;
   if (welcome.protocol.empty())
-    return socket_refusal(400, "say Sec-WebSocket-Protocol: foxglove.sdk.v1 or foxglove.websocket.v1");
+    return socket_refusal(400, "send Sec-WebSocket-Protocol: foxglove.sdk.v1 or foxglove.websocket.v1");
   if (const std::string most = value_of(query, "max_hz"); !most.empty()) {
     const auto number = text::parse_decimal(most);
     if (!number || !(*number > 0 && *number <= 1000)) return socket_refusal(400, "max_hz must be a number above 0, at most 1000");

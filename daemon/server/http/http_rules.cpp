@@ -177,7 +177,7 @@ Result<control::Subscribe> subscription_of(const Target& target) {
     *kind = value == "1" || value == "true";
   }
   if (!wanted.pings && !wanted.clients && !wanted.poses && !wanted.scene && !wanted.faults)
-    return failure(ErrorKind::bad_data, "no events asked for: pings=1, clients=1, poses=1, scene=1, faults=1");
+    return failure(ErrorKind::bad_data, "no events requested: pings=1, clients=1, poses=1, scene=1, faults=1");
   return wanted;
 }
 

@@ -15,7 +15,7 @@ Result<Device*> SonarOperations::find(const std::string& name) {
   std::string names;
   for (const Device& d : sonars) names += (names.empty() ? "" : ", ") + d.config().name;
   return failure(ErrorKind::usage,
-                 (name.empty() ? std::string("say which sonar") : "no sonar is called \"" + name.substr(0, 64) + "\"") +
+                 (name.empty() ? std::string("name the sonar") : "no sonar is called \"" + name.substr(0, 64) + "\"") +
                      "; there are: " + names);
 }
 

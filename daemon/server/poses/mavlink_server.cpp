@@ -47,7 +47,7 @@ Result<void> MavlinkServer::open() {
                                           {}});
     const Endpoint at = wanted.dials ? Endpoint{} : wanted.at;
     if (auto r = bind_udp(link.socket, at, false); !r)
-      return failure(r.error().kind, r.error().text + "; poses.mavlink in the configuration takes another address");
+      return failure(r.error().kind, r.error().text + "; poses.mavlink in the configuration can set another address");
     if (wanted.dials)
       link.peer = udp::endpoint(address_of(wanted.at.ip), wanted.at.port);
     else

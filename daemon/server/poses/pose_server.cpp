@@ -22,7 +22,7 @@ constexpr int most_not_json = 8;                        // lines in a row that a
 constexpr std::size_t dropped_per_s = 1024u << 20;      // limit of discarded bytes: 32 floods hold 0.1 to 1 GB in the kernel
 constexpr std::chrono::milliseconds between_looks{10};  // pause before the next look for new input
 constexpr std::chrono::milliseconds longest_wait{100};  // limit for poses that wait in the kernel
-constexpr const char* no_json = "not JSON: this port takes poses as lines of JSON";
+constexpr const char* no_json = "not JSON: this port accepts poses as lines of JSON";
 
 std::size_t waiting_bytes(tcp::socket& socket) {
   int waiting = 0;
@@ -66,7 +66,7 @@ Result<void> PoseServer::open() {
     const auto at = open(port, wanted.at);
     if (!at) {
       const std::string key = encoding == Encoding::json ? "poses.json" : "poses.protobuf";
-      return failure(at.error().kind, at.error().text + "; " + key + " in the configuration takes another address, or off");
+      return failure(at.error().kind, at.error().text + "; " + key + " in the configuration can set another address, or off");
     }
     out = *at;
     return {};

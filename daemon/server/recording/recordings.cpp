@@ -178,7 +178,7 @@ void Recordings::stop(const control::StopRecording& asked, Done done) {
       if (!outcome && all->first_error) all->first_error = outcome;
       if (--all->left == 0) done(all->first_error);
     });
-    end(r, "asked to stop");
+    end(r, "stop requested");
   }
 }
 

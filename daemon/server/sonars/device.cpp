@@ -107,7 +107,7 @@ Result<DatagramPort*> Device::datagram_port(std::uint16_t number) {
 Result<void> Device::open_observers() {
   if (config().max_observers == 0 || tcp_ports_.empty()) return {};
   if (auto r = observer_listener_.open({config().bind_ip, config().observer_port}); !r)
-    return failure(r.error().kind, r.error().text + "; observers: {port: 0} in the configuration takes any that is free");
+    return failure(r.error().kind, r.error().text + "; observers: {port: 0} in the configuration selects any free port");
   return {};
 }
 

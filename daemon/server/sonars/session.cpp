@@ -273,7 +273,7 @@ asio::awaitable<void> Session::watch() {
     if (over_) co_return;
     const auto now = Steady::now();
     if (finishing_ && (now >= finish_by_ || has_all(now))) {
-      if (!sent_fin_) reset("did not take its last message in time");
+      if (!sent_fin_) reset("did not receive its last message in time");
       over(why_);
     } else if (writing_ && now - progress_at_ > setup_.limits.stall) {
       reset("took no byte for " + std::to_string(setup_.limits.stall.count()) + " ms");

@@ -25,7 +25,7 @@ asio::awaitable<HttpOutcome> SonarHttp::answer(const HttpRequest& request, HttpC
     HttpAnswer refused{403, "a web page of another site may not use this sonar\n", "text/plain"};
     refused.why = std::string("HTTP by ") +
                   (host ? "a page of Origin " + request.origin.substr(0, 200) : "the name " + request.host.substr(0, 200)) +
-                  "; control.hosts in the configuration takes further names";
+                  "; control.hosts in the configuration permits further names";
     co_return refused;
   }
   const std::size_t path_end = std::min(request.target.find('?'), request.target.size());

@@ -24,7 +24,7 @@ using Steady = std::chrono::steady_clock;
 
 constexpr milliseconds look_every{40}, say_status_every{500}, longest_slice{20};
 constexpr double picture_hz = 25;
-constexpr const char *sonar_name = "recording", *no_requests = "a recording takes no settings";
+constexpr const char *sonar_name = "recording", *no_requests = "a recording has no settings";
 constexpr std::uint32_t picture_channel = 1, fan_channel = 2, ping_channel = 3, status_channel = 4;
 
 Time now() { return Time{Steady::now().time_since_epoch()}; }
@@ -334,15 +334,15 @@ std::string RecordingViews::Seen::set_parameter(Viewer&, const foxglove::Paramet
   const auto number = number_of(wanted.value);
   if (wanted.name.ends_with("/trajectory/paused")) {
     const bool* const paused = std::get_if<bool>(&wanted.value);
-    if (paused == nullptr) return "takes true or false";
+    if (paused == nullptr) return "must be true or false";
     play(!*paused);
   } else if (wanted.name.ends_with("/trajectory/position_s")) {
-    if (!number) return "takes a number of seconds";
+    if (!number) return "must be a number of seconds";
     const double at_s = std::clamp(*number, 0.0, seconds(line().duration()));
     line().seek(now(), std::min(nanoseconds_from(at_s), line().duration()));
   } else if (wanted.name.ends_with("/trajectory/speed")) {
     const auto speed = number ? motion::Speed::from(*number) : std::nullopt;
-    if (!speed) return "takes a number from 0.001 to 1000";
+    if (!speed) return "must be a number from 0.001 to 1000";
     line().use_speed(now(), *speed);
   } else {
     return no_requests;

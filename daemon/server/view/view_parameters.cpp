@@ -85,9 +85,9 @@ std::optional<bool> flag_of(const Value& value) {
 template <class Op, class T>
 Result<control::Operation> with(Op operation, std::optional<T> Op::*member, const std::optional<T>& value) {
   if (!value)
-    return refused("takes " + std::string(std::is_same_v<T, bool>     ? "true or false"
-                                          : std::is_same_v<T, double> ? "a number"
-                                                                      : "a whole number"));
+    return refused("must be " + std::string(std::is_same_v<T, bool>     ? "true or false"
+                                            : std::is_same_v<T, double> ? "a number"
+                                                                        : "a whole number"));
   operation.*member = value;
   return control::Operation(std::move(operation));
 }
@@ -132,7 +132,7 @@ Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSou
   if (wanted.name == "/faults/armed") return refused("cannot be set: start sonard with --faults");
   if (!of.config.faults.armed) return refused("start sonard with --faults");
   if (wanted.name == "/faults/clear_all") {
-    if (!flag_of(wanted.value)) return refused("takes true or false");
+    if (!flag_of(wanted.value)) return refused("must be true or false");
     return *flag_of(wanted.value) ? control::Operation(control::EndFaults{}) : control::Operation(control::GetFaults{});
   }
   for (const Device& device : of.fleet.devices()) {
@@ -142,7 +142,7 @@ Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSou
       const auto lasts = number_of(wanted.value);
       const auto longest = static_cast<double>(longest_manual_fault.count());
       if (!lasts || *lasts < 0 || *lasts > longest)
-        return refused("takes seconds from 0 to " + std::to_string(longest_manual_fault.count()));
+        return refused("must be a number of seconds from 0 to " + std::to_string(longest_manual_fault.count()));
       const std::string name = fault_name(trouble.name, sonar);
       if (*lasts == 0 && seconds_left(device, name, of.clock.now()) == 0) return control::Operation(control::GetFaults{});
       if (*lasts == 0) return control::Operation(control::EndFaults{name});

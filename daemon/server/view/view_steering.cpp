@@ -81,7 +81,7 @@ std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Par
   for (SonarView& sonar : sonars_) {
     if (wanted.name != sonar.points.threshold) continue;
     const auto part = number_of(wanted.value);
-    if (!part || !(*part >= 0 && *part <= 1)) return "takes a number from 0 to 1";
+    if (!part || !(*part >= 0 && *part <= 1)) return "must be a number from 0 to 1";
     viewer.choose(wanted.name, *part);
     begin_slow_ones(sonar);
     return "";
@@ -90,7 +90,7 @@ std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Par
     if (wanted.name != "/" + device.config().name + "/preview") continue;
     const bool* const on = std::get_if<bool>(&wanted.value);
     if (of_.clock.stepped()) return "there is a preview with clock: realtime only";
-    return on == nullptr ? "takes true or false" : set_preview(viewer, device, *on);
+    return on == nullptr ? "must be true or false" : set_preview(viewer, device, *on);
   }
   return std::nullopt;
 }

@@ -112,7 +112,7 @@ TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
   const Remarks right = remarks("objects: [{name: bed, type: heightmap, file: g.asc, material: sand, z_scale: -1}]\n");
   EXPECT_THAT(right.warnings, IsEmpty());
   EXPECT_THAT(right.notes,
-              ElementsAre(HasSubstr("g.asc: its coordinates (5.00014, 60.0001, cells of 0.000277778) are taken as degrees"),
+              ElementsAre(HasSubstr("g.asc: its coordinates (5.00014, 60.0001, cells of 0.000277778) are read as degrees"),
                           HasSubstr("g.asc: x and y are relative to its middle, latitude 60.000278, longitude 5.000278")));
   files.write("km.asc", "ncols 2\nnrows 2\ncellsize 0.5\n-20 -40 -22 -23\n");
   EXPECT_THAT(remarks("objects: [{name: bed, type: heightmap, file: km.asc, material: sand, geographic: false}]\n").warnings,

@@ -186,7 +186,7 @@ TEST(TrajectoryFile, TakesTheFrameFromTheFileOrFromWhoAsks) {
     expect_near(ahead(points(file).poses[0]), {1, 0, 0});
   }
   EXPECT_THAT(refusal(line, {}),
-              HasSubstr("p.csv: the file does not say in which frame its poses are; begin it with a line \"# frame: "
+              HasSubstr("p.csv: the file does not state the frame of its poses; begin it with a line \"# frame: "
                         "ENU_FLU\" or \"# frame: NED_FRD\""));
   EXPECT_THAT(refusal("# frame: ENU_FLU\n" + line, {.frame = Frame::ned_frd}),
               "p.csv:1: the file says ENU_FLU, but it was to be read as NED_FRD");

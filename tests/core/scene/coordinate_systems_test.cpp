@@ -117,7 +117,7 @@ struct UnknownSystem : ::testing::Test {
 
 TEST_F(UnknownSystem, IsNamedWithTheCommandThatConvertsIt) {
   const std::string prj = wkt("British_National_Grid", bessel, transverse);
-  EXPECT_THAT(said(prj, {}), HasSubstr("of British_National_Grid, are taken as plain metres"));
+  EXPECT_THAT(said(prj, {}), HasSubstr("of British_National_Grid, are read as plain metres"));
   EXPECT_THAT(said(prj, {}), HasSubstr("gdalwarp -t_srs EPSG:4326"));
   EXPECT_EQ(said(prj, {.geographic = false}), "");
   EXPECT_THAT(said(prj, {.origin = Geodetic{1, 0, 0}}), HasSubstr("this is in British_National_Grid; convert it to degrees"));

@@ -349,7 +349,7 @@ TEST_F(GeoTiff, ASystemThatIsOnlyCitedIsRead) {
   }
   const auto nameless = read(TiffFile::of(3, 2, six).at(0, 100, 10, 10).cited({{{1024, 1}, {3075, 1}}}, 1026, "unknown"));
   ASSERT_TRUE(nameless) << nameless.error().text;
-  EXPECT_THAT(nameless->notes, ::testing::Contains(HasSubstr("of a system without a name, are taken as plain metres")));
+  EXPECT_THAT(nameless->notes, ::testing::Contains(HasSubstr("of a system without a name, are read as plain metres")));
 }
 
 TEST_F(GeoTiff, AWorldFileBesideATiffGivesItsPlace) {

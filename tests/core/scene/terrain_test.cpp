@@ -239,7 +239,7 @@ TEST(EsriGrid, DegreesBecomeMetresAboutAnOrigin) {
   const auto grid = read_esri_heights(files.write("g.asc", text), {});
   ASSERT_TRUE(grid) << grid.error().text;
   ASSERT_EQ(grid->notes.size(), 2u);
-  EXPECT_THAT(grid->notes[0], HasSubstr("taken as degrees"));
+  EXPECT_THAT(grid->notes[0], HasSubstr("read as degrees"));
   EXPECT_THAT(grid->notes[1], HasSubstr("relative to its middle, latitude 60.005556, longitude 5.005556"));
   const auto mesh = mesh_from_grid(*grid);
   ASSERT_TRUE(mesh);
@@ -561,7 +561,7 @@ TEST(EsriGrid, LengthsOfItsPrjBecomeMetres) {
   grid = read("PROJCS[\"P\",UNIT[\"km\",1000]]");
   ASSERT_TRUE(grid) << grid.error().text;
   EXPECT_NEAR(grid->x.back(), 1010e3, 1e-6);
-  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("in units of 1000 m, become metres"), HasSubstr("of P, are taken"),
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("in units of 1000 m, become metres"), HasSubstr("of P, are read"),
                                                   HasSubstr("are missing")));
 }
 
@@ -584,7 +584,7 @@ TEST(EsriGrid, VerticalSystemsOfItsPrjAreRead) {
   const std::string feet = lengths + ",VERTCS[\"H\",PARAMETER[\"Direction\",1.0],UNIT[\"Foot\",0.3048]]";
   EXPECT_THAT(read(feet)->notes, ::testing::Not(::testing::Contains(depths)));
   EXPECT_NEAR(read(feet)->z_m[2], 3 * 0.3048, 1e-6);
-  EXPECT_THAT(read(feet)->notes, ::testing::Contains(HasSubstr("its coordinates, of P, are taken")));
+  EXPECT_THAT(read(feet)->notes, ::testing::Contains(HasSubstr("its coordinates, of P, are read")));
 }
 
 TEST(HeightGrid, TooManyTrianglesAreRefused) {

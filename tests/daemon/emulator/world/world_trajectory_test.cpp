@@ -78,7 +78,7 @@ TEST(WorldTrajectory, IsSteered) {
 
 TEST(WorldTrajectory, RefusesWithASentence) {
   World w = with_rov();
-  EXPECT_THAT(w.steer(asked({}), t0), HasSubstr("say what to do"));
+  EXPECT_THAT(w.steer(asked({}), t0), HasSubstr("give at least one of"));
   EXPECT_THAT(w.steer(asked({}, 10.5), t0), HasSubstr("from 0 to 10"));
   EXPECT_THAT(w.steer(asked({}, -1), t0), HasSubstr("from 0 to 10"));
   EXPECT_THAT(w.steer(asked({}, 5, 0), t0), HasSubstr("0.001 to 1000"));

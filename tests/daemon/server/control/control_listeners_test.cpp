@@ -53,7 +53,7 @@ TEST_F(Listeners, TakenAddressesOfTheFileAreAnError) {
   const auto r = open();
   ASSERT_FALSE(r);
   EXPECT_EQ(r.error().kind, ErrorKind::unavailable);
-  EXPECT_THAT(r.error().text, HasSubstr("control.http in the configuration takes another address, or off"));
+  EXPECT_THAT(r.error().text, HasSubstr("control.http in the configuration can set another address, or off"));
 }
 
 TEST_F(Listeners, OffIsOff) {

@@ -112,7 +112,7 @@ TEST(HttpRules, Subscriptions) {
   EXPECT_TRUE(some->pings && some->scene && !some->poses && !some->clients);
   EXPECT_THAT(of("/e?ping=1").error().text, HasSubstr("\"ping\": unknown"));
   EXPECT_THAT(of("/e?pings=yes").error().text, HasSubstr("1 or 0"));
-  EXPECT_THAT(of("/e?pings=0").error().text, HasSubstr("no events asked for"));
+  EXPECT_THAT(of("/e?pings=0").error().text, HasSubstr("no events requested"));
 }
 
 TEST(HttpRules, OnlyJsonIsJson) {

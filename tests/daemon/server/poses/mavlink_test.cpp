@@ -285,7 +285,7 @@ TEST_F(Mavlink, AnEndpointThatIsTakenIsOneSentence) {
     Daemon daemon(with_link("udpin:" + here + ":" + std::to_string(first.port)));
     FAIL() << "the port was taken";
   } catch (const std::runtime_error& e) {
-    EXPECT_THAT(e.what(), HasSubstr("poses.mavlink in the configuration takes another address"));
+    EXPECT_THAT(e.what(), HasSubstr("poses.mavlink in the configuration can set another address"));
   }
 }
 

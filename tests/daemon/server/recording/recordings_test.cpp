@@ -267,7 +267,7 @@ TEST(Recordings, FewAtATimeAndOnlyWhereTheConfigurationSays) {
   }
   EXPECT_EQ(std::count(answers.begin(), answers.end(), "ok"), 12);
   EXPECT_EQ(q.recordings->status().size(), Recordings::most_remembered);
-  EXPECT_EQ(q.recordings->status().back().why(), "asked to stop");
+  EXPECT_EQ(q.recordings->status().back().why(), "stop requested");
   answers.clear();
   q.config.recording.folder.clear();
   start("6.raw");
@@ -360,7 +360,7 @@ TEST(RecordedDaemon, IsListedInTheStatusAndStopsWhenRequested) {
   EXPECT_EQ(daemon.ask(control::StopRecording{"run.mcap"}).code, OperationResult::Code::done);
   const auto told = daemon.status().recordings().at(0);
   EXPECT_FALSE(told.running());
-  EXPECT_EQ(told.why(), "asked to stop");
+  EXPECT_EQ(told.why(), "stop requested");
   EXPECT_EQ(told.file(), folder.path + "/run.mcap");
   EXPECT_EQ(messages_in(told.file()), told.pings()) << "complete when the stop was answered";
   EXPECT_EQ(std::filesystem::file_size(told.file()), told.bytes());

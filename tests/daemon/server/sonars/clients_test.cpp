@@ -340,7 +340,7 @@ TEST(GracefulStop, ReadingClientsGetAWholeLastMessageAndStalledOnesAReset) {
   EXPECT_EQ(healthy.decoder.buffered_bytes(), 0u) << "no message was cut";
   EXPECT_GE(took, Session::finish_limit) << "the stalled one had its time";
   EXPECT_LT(took, patience) << "the promise is 2 s; this allows for a busy machine";
-  EXPECT_THAT(daemon.log_text(), HasSubstr("did not take its last message in time"));
+  EXPECT_THAT(daemon.log_text(), HasSubstr("did not receive its last message in time"));
 }
 
 TEST(GracefulStop, WithoutClientsItIsImmediate) {
