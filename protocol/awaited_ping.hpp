@@ -28,7 +28,7 @@ class AwaitedPing {
     late_ = std::exchange(fired_, nullptr);
     return true;
   }
-  /// A ping that came: `other` was made for a request that a newer one has replaced, `late` was taken as lost.
+  /// A ping that came: `other` was made for a request that a newer one has replaced, `late` had been counted as lost.
   enum class Arrival { other, late, awaited };
   Arrival arrive(const VendorSettings* made_with) {
     if (late_ && made_with == late_.get()) return late_.reset(), Arrival::late;

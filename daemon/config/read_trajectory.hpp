@@ -32,8 +32,8 @@ class TrajectoryFiles {
   Named read(const text::Node& file, const motion::ReadOptions& options);
   Named read(const TrajectoryKeys& keys);
 
-  /// Reads a body's plan: `none`, a file, or a map of the keys above with `speed`, `loop` and `start_s`. `body` asks:
-  /// the body taken from a file of several when none is named. With `orbits`, `orbit` is a word too, and sets it.
+  /// Reads a body's plan: `none`, a file, or a map of the keys above with `speed`, `loop` and `start_s`. `body`: the body to use
+  /// if the file has several and none is named. With `orbits`, the word `orbit` is permitted, and sets it.
   motion::Plan read_plan(const text::Node& node, const std::string& body, bool* orbits = nullptr);
 
  private:

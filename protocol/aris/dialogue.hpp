@@ -10,7 +10,7 @@ namespace sonar::aris {
 /// The state must outlive the dialogue.
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device);
 
-/// The time in a text such as "2014-Jan-31 23:58:15", taken as UTC. nullopt: the text has another form.
+/// The time in a text such as "2014-Jan-31 23:58:15", read as UTC. nullopt: the text has another form.
 std::optional<Time> parse_date_time(const std::string& text);
 
 }  // namespace sonar::aris

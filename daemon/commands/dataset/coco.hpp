@@ -15,7 +15,7 @@ namespace sonar::dataset {
 
 /// Number of visible things by class.
 using Instances = std::map<std::string, std::uint64_t>;
-/// Adds those of a shard's notes (parts.hpp).
+/// Adds the things in a shard's notes (parts.hpp).
 void count_instances(const nlohmann::json& part, Instances& instances);
 
 struct CocoFile {

@@ -31,8 +31,9 @@ struct Unmet {
   std::string sentence() const;
 };
 
-/// in_view: of each name one visible object has the middle of its box in the fan. above_bed: so are the middles of all visible
-/// ones, and the sonar. no_overlap: the boxes along the world's axes of all visible ones are apart. Hidden objects meet all.
+/// in_view: for each name, one visible object has the middle of its box in the fan. above_bed: the middles of all visible ones,
+/// and the sonar, are above the bed. no_overlap: the boxes of all visible ones, along the world's axes, are apart. Hidden objects
+/// satisfy every constraint.
 bool meets(const Constraints& constraints, const PingRequest& request, const Scene& scene, Unmet& unmet);
 
 }  // namespace sonar::dataset

@@ -48,7 +48,7 @@ struct NamedFile {
   std::filesystem::path file;  // below the folder of what names it
   std::string digest;          // SHA-256; "unreadable"
 };
-/// All, whichever ping draws them, and those that the YAML among them names: words of the text that are files.
+/// All files that a ping may draw, and those that YAML files among them name: every word of their text that is a file.
 std::vector<NamedFile> named_files(const DatasetJob& job);
 
 /// A ping that met the constraints.

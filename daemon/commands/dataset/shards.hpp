@@ -77,7 +77,7 @@ class ShardWriter {
   Sha256 hash_;
 };
 
-/// Takes the name and the contents of a file of an archive.
+/// Called with the name and the contents of a file of an archive.
 using ArchiveSink = std::function<Result<void>(const std::string&, std::span<const std::byte>)>;
 /// Reads the files of an archive that ShardWriter wrote, in order. Fails with ErrorKind::bad_data if the archive is damaged, and
 /// with the error that the sink returns.

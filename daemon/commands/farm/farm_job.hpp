@@ -39,7 +39,7 @@ Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& inst
 /// the job's folder.
 Result<FarmJob> parse_farm_job(const std::string& id, const std::string& json);
 
-/// Copies the job's files to `files`, and into the queue when they are small enough; says so in the record.
+/// Copies the job's files to `files`, and into the queue when they are small enough, which the record states.
 Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const std::filesystem::path& files, Queue& queue);
 /// Fetches files from the queue that the folder `files` lacks. Returns the path of the job file. Error missing_file: a file is
 /// in neither.

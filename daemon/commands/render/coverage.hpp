@@ -23,7 +23,7 @@ struct Coverage {
 RenderJob with_bed_only(RenderJob job);
 
 /// The ping must be of with_bed_only(job). Bins count whose whole footprint, two pulses and a beam to either side, lies on the
-/// bed where the two-way pattern is above -20 dB: the closed form takes the pattern as even over the footprint. Errors: no level
+/// bed where the two-way pattern is above -20 dB: the closed form assumes an even pattern over the footprint. Errors: no level
 /// plane below the sonar, a sonar that rolls, flat beams, the comparison modes, beams without a width.
 Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
 

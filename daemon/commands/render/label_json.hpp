@@ -15,7 +15,7 @@ inline constexpr int cartesian_width_px = 1000;  // width of the fan to which `c
 nlohmann::json instances_of(const Scene& scene);
 
 /// Every thing that is seen: `bbox`, `area` and `segmentation` in pixels of the samples, x = beam, y = row; the same under
-/// `cartesian` in pixels of the fan; `visible`, the share of its energy that nothing in the way takes.
+/// `cartesian` in pixels of the fan; `visible`, the share of its energy that is not blocked.
 nlohmann::json annotations_of(const PingLabels& labels, const Ping& ping, const Scene& scene);
 
 /// Returns the scale and origin of the Cartesian picture, which is the fan of --image-rings off.

@@ -33,8 +33,8 @@ class PlayedPings {
   /// True if next() has returned the last ping.
   bool at_end() const { return !ahead_; }
   void rewind();
-  /// The line whose direction is nearest to `head_rad`; of several, the first after the line that was returned last, and after
-  /// the last the first of all.
+  /// The line whose direction is nearest to `head_rad`; of several equally near ones, the next after the line that was returned
+  /// last, cyclically.
   const PlayedPing& nearest(double head_rad);
 
  private:

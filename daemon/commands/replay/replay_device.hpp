@@ -29,7 +29,7 @@ struct ReplayDevice {
   std::uint16_t tcp_port() const;
   /// 0: it sends no status.
   std::uint16_t status_port() const;
-  /// 142 bytes of an Oculus: drivers connect to the address in it, and take nothing from a device of another id. Else the beacon.
+  /// 142 bytes of an Oculus: drivers connect to the address in it, and ignore a device of another id. Else the beacon.
   protocol::Bytes status_at(Ipv4 ip, Ipv4 mask, Ipv4 client) const;
 };
 

@@ -281,7 +281,7 @@ asio::awaitable<bool> ReplayServer::write(ClientPointer client, protocol::BytesV
   co_return !ec;
 }
 
-/// A client that reads nothing would keep the only place. It is reset, as by a sonar of sonard.
+/// A client that reads nothing would keep the only slot. It is reset, as by a sonar of sonard.
 void ReplayServer::watch_stall(const ClientPointer& client) {
   client->stall.expires_after(options_.stall);
   client->stall.async_wait([this, client](const error_code& ec) {

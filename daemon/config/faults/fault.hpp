@@ -1,5 +1,5 @@
 // A fault: one way in which an emulated sonar misbehaves on purpose, when, for how long and towards whom. check_fault() makes it
-// from what a user wrote, or says what is wrong.
+// from a user's record, or returns an error.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,5 @@
-// The catalogue of faults as one table: what each kind does, its parameters with limits and defaults, and what of a vendor it
-// needs. Codes and names are stable: users write them. Sources: public issue threads and measurements of open drivers.
+// The catalogue of faults as one table: what each kind does, its parameters with limits and defaults, and the part of a vendor
+// that it needs. Codes and names are stable: users write them. Sources: public issue threads and measurements of open drivers.
 #pragma once
 
 #include <array>

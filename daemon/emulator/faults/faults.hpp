@@ -61,7 +61,7 @@ struct FaultRefusal {
 
 class Faults {
  public:
-  /// All outlive it. `index` and `seed` key what is random.
+  /// The references outlive the object. `index` and `seed` key the random numbers.
   struct Around {
     const protocol::Vendor& vendor;
     const Connections& connections;

@@ -16,7 +16,7 @@ namespace sonar {
 
 class PingSource {
  public:
-  /// All outlive it.
+  /// The arguments outlive the object.
   PingSource(SonarData& sonar, Audience& audience, const Faults& faults);
 
   // ---- settings

@@ -1,4 +1,4 @@
-// Finds probable mistakes: poses above the water, degrees taken for radians, quaternions in the wrong order,
+// Finds probable mistakes: poses above the water, degrees instead of radians, quaternions in the wrong order,
 // sonars upside down, meshes in millimetres. Pure functions from facts to notes; `sonard check`, the log at the start, the log
 // when a pose shows it and the daemon's status (for `sonarctl doctor`) use them.
 #pragma once

@@ -1,4 +1,4 @@
-// The poses of vehicles and moving objects. They are taken from senders by the rules of docs/poses.md, "Time and order", and
+// The poses of vehicles and moving objects. They are accepted from senders by the rules of docs/poses.md, "Time and order", and
 // returned for any moment. Pure: time is passed in; the daemon's I/O thread owns the only one.
 #pragma once
 

@@ -85,7 +85,7 @@ bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
   return false;
 }
 
-/// The descriptors just below the spare ones are for drivers. A socket whose number is one of them takes a place from drivers.
+/// The descriptors just below the spare ones are for drivers. A socket whose number is one of them uses one of the drivers.
 bool Admission::is_drivers(const tcp::socket& socket) const {
   const std::uint64_t for_drivers = std::min(most_kept_for_drivers, most_descriptors() / 8);
   return number_of(socket) >= first_spare(limits_, Purpose::client) - for_drivers;

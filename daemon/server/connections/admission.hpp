@@ -25,7 +25,7 @@ void raise_descriptor_limit();
 
 class Admission {
  public:
-  /// A place of a client. The owner of the socket holds it; it is free when the last copy is destroyed. Empty = no place.
+  /// The slot of a client. The owner of the socket holds it; it is free when the last copy is destroyed. Empty = no slot.
   using Place = std::shared_ptr<const void>;
 
   Admission(const LimitConfig& limits, Log& log);

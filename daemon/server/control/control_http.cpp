@@ -46,7 +46,7 @@ HttpOutcome ControlHttp::open_socket(const HttpRequest& request, const SocketAct
   if (view_->is_full() || !from.claim_slot()) {
     HttpAnswer full =
         answer_of(503, StatusCode::failed, "all slots of viewers are in use; raise limits.viewers in the configuration");
-    full.why = "all " + std::to_string(services_.limits.viewers) + " places of viewers are taken: limits.viewers";
+    full.why = "all " + std::to_string(services_.limits.viewers) + " viewer slots are in use: limits.viewers";
     return full;
   }
   const ViewWelcome& welcome = std::get<ViewWelcome>(opened);

@@ -21,7 +21,7 @@ class PoseIntake {
              Plausibility* plausibility = nullptr)
       : world_(world), clock_(clock), log_(log), on_pose_(std::move(on_pose)), events_(events), plausibility_(plausibility) {}
 
-  /// Takes a pose. Returns the sentence of a refusal, or an empty text.
+  /// Accepts or refuses a pose. Returns the sentence of a refusal, or an empty text.
   std::string take(control::PoseSample sample, const Sender& sender);
   /// Places, shows or hides a moving object of the scene, body `body` of the world. Returns as take().
   std::string place(const control::SetObject& asked, std::size_t body, const Sender& sender);

@@ -33,7 +33,7 @@ class PoseServer {
   void start();
   void stop();
 
-  /// These return the address at which it listens, with the port that the system chose if 0 was configured. Port 0 means off.
+  /// The listening addresses, with the port that the system chose if 0 was configured. Port 0: off.
   Endpoint protobuf() const { return protobuf_at_; }
   Endpoint json() const { return json_at_; }
 

@@ -24,7 +24,7 @@ class Fleet final : public DeviceParent {
     /// A ping of a range finder; its distance is absent when a fault withholds it.
     std::function<void(const SonarConfig& of, const PingQueued& ping)> on_distance = {};
   };
-  /// All of it outlives the fleet.
+  /// The arguments outlive the fleet.
   Fleet(DeviceNetwork network, const Config& config, const World& world, Simulator& simulator, Recordings& recordings,
         Events& events, FaultJournal& faults, Handlers handlers)
       : network_(network),
