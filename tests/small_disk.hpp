@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-/// Files may grow to so many bytes for as long as it lives, as if the disk ended there.
+/// While it exists, files may grow to this many bytes, as if the disk ended there.
 class SmallDisk {
  public:
   explicit SmallDisk(rlim_t bytes) {

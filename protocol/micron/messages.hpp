@@ -74,7 +74,7 @@ struct HeadCommand {
   std::uint8_t device_type = 0x11;
   std::array<std::uint32_t, 4> carriers{};  // transmitter, receiver; not used by this product
   std::uint16_t pulse_us = 0;
-  std::uint16_t range_dm = 100;             // for people; upper 2 bits: the unit
+  std::uint16_t range_dm = 100;             // only displayed; upper 2 bits: the unit
   std::uint16_t left = 0, right = 0;        // 1/16 grad
   std::uint8_t ad_span = 255, ad_low = 0;   // window of 4-bit bins
   std::uint8_t gain = 105, gain2 = 105;     // 0 to 210
@@ -210,7 +210,7 @@ std::optional<M> read_front(BytesView payload) {
 
 extern const recording::Framing framing;
 
-/// Bins of 4 bits, two in a byte, the nearer one in the upper half if `upper_first`. A last one alone shares with a 0.
+/// Bins of 4 bits, two in a byte, the nearer one in the upper half if `upper_first`. A single last bin is padded with a 0.
 Bytes packed(BytesView bins, bool upper_first);
 Bytes unpacked(BytesView bytes);
 

@@ -10,7 +10,7 @@ from running_sonard import Sonard
 
 
 class Doctor(unittest.TestCase):
-    """What keeps a driver from its pings is named within 5 s."""
+    """The cause that keeps a driver from its pings is named within 5 s."""
 
     @contextlib.contextmanager
     def daemon_and_viewer(self, **options):
@@ -22,7 +22,7 @@ class Doctor(unittest.TestCase):
             yield daemon, viewer
 
     def named(self, viewer, check, *words):
-        """The first finding of that check that is not well and has these words."""
+        """Returns the first finding of that check above level ok with these words."""
         found = []
 
         def is_it(kind, value):

@@ -63,7 +63,7 @@ std::span<const BenchScene> bench_scenes() {
 }
 
 Pose bench_pose_at(const BenchCase& c, const BenchScene& scene, double x_m, double y_m, double yaw_rad) {
-  const double height = c.near_bottom ? 0.9 : 2.0, pitch = c.near_bottom ? 0.6 : 0.25;  // nose down as one looks at a bed
+  const double height = c.near_bottom ? 0.9 : 2.0, pitch = c.near_bottom ? 0.6 : 0.25;  // nose down, towards the bed
   return {{x_m, y_m, scene.bed_z_m + height}, quat_from_rpy({0, pitch, yaw_rad})};
 }
 

@@ -82,7 +82,7 @@ v1::SonarStatus status_of(Service& service, const Clock& clock) {
   return status.get_future().get();
 }
 
-/// `rate_hz`: absent = what a usual driver requests.
+/// `rate_hz`: absent = the rate that a usual driver requests.
 Result<json> serve(const protocol::Make& make, const std::string& profile, std::optional<double> rate_hz,
                    const ScenePointer& scene, const BenchOptions& options) {
   auto config = demo_of(profile, options);

@@ -160,7 +160,7 @@ Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, c
   return all_hold;
 }
 
-/// A device that is not there is known before anything is measured; `automatic` becomes what there is.
+/// Reports a missing device before anything is measured; `automatic` becomes the engine that is used.
 Result<void> find_device(BenchOptions& options) {
   if (options.engine.device == EngineDevice::cpu) {
     if (!options.cases.empty() && wanted(options.cases, "P10"))

@@ -21,7 +21,7 @@ double processor_s();     // processor time of all threads of this process
 double this_thread_s();   // processor time of the calling thread
 std::string processor();  // its name and number
 
-/// Sorted at once: what half, nine tenths and all of them were below.
+/// Least, median, percentiles and largest of times.
 struct Times {
   explicit Times(std::vector<double> ms);
   double min = 0, median = 0, p90 = 0, p95 = 0, p99 = 0, max = 0;

@@ -64,7 +64,7 @@ bvt::PolarPing ping_of(std::uint32_t number) {
   return ping;
 }
 
-/// Serves one host after another; what a host set and how often it asked for a ping can be looked at.
+/// Serves one host after another; stores the settings of a host and the number of its requests for pings.
 class FakeHead {
  public:
   explicit FakeHead(bool closes = false) : listener_(listening(blueview::tcp_port)), closes_(closes) {

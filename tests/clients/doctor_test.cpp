@@ -433,7 +433,7 @@ TEST(Doctor, FindsBlueViewHeads) {
   expect(line(facts, "blueview"), Level::ok, "BlueView head P900-90 (123) answers discovery at tcp 127.0.0.4:14750", "");
 }
 
-/// A BlueView head that pings, and the daemon that says so.
+/// A BlueView head that pings, and the daemon's report of it.
 Facts healthy_head() {
   Facts facts = healthy();
   facts.status.received.clear();  // heads send no status

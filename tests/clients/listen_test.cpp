@@ -56,9 +56,9 @@ wire::Bytes ping_bytes(std::uint32_t id, const oculus::FireSettings& echo) {
   return oculus::encode_ping(head, {bearings, {}, samples});
 }
 
-/// Accepts one client, waits for its fire message and sends what `answer` makes of it, then waits until the client leaves. Later
-/// clients are connected, and hear nothing. With `visits` > 1 it ends the connection instead, and so on for so many clients; then
-/// it is gone.
+/// Accepts one client, waits for its fire message and sends the result of `answer`, then waits until the client leaves. Later
+/// clients are connected, and receive nothing. With `visits` > 1 it ends the connection instead, and so on for so many clients;
+/// then it is gone.
 class FakeDevice {
  public:
   using Answer = std::function<wire::Bytes(std::uint32_t number, const oculus::FireSettings& asked)>;

@@ -58,7 +58,7 @@ bool refuse_as_a_web_server(const Socket& client) {
   return write_all(client, std::as_bytes(std::span(reply.data(), reply.size()))).has_value();
 }
 
-/// A Ping360 as far as a host can tell; what it was sent.
+/// A Ping360 that is sufficient for a host; stores the received messages.
 class Ping360 {
  public:
   explicit Ping360(bool answers) : socket_(bound(SOCK_DGRAM, 12345)) {

@@ -16,7 +16,7 @@ class FailingMachine final : public cuda::Machine {
  public:
   /// If set, transforms fail with this reason.
   std::string no_transforms;
-  /// Bytes of the device; more is DeviceMemoryFull. `tells_bytes`: what it claims to have free at the start.
+  /// Bytes of the device; more is DeviceMemoryFull. `tells_bytes`: the free bytes that it reports at the start.
   std::size_t room_bytes = std::numeric_limits<std::size_t>::max(), tells_bytes = room_bytes;
   /// A fault of the program instead of a lost device: std::logic_error at the call `last`, and none after it.
   bool has_fault = false;

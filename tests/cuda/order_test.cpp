@@ -73,7 +73,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Device{"Piecewise", []() -> MachinePointer { return std::make_unique<PiecewiseMachine>(); }}),
     [](const auto& of) { return std::string(of.param.name); });
 
-// A source of a copy that is used again too early, and an order that is forgotten, would show.
+// The test would detect a source of a copy that is used again too early, and a missing order.
 TEST(DeferringDevice, DoesAllWorkAsLateAsTheOrderAllows) {
   DeferringMachine machine;
   auto* host = static_cast<int*>(machine.allocate_host(sizeof(int)));
@@ -84,7 +84,7 @@ TEST(DeferringDevice, DoesAllWorkAsLateAsTheOrderAllows) {
   machine.download(0, back, device, sizeof(int));
   *host = 2;
   machine.wait(0);
-  EXPECT_EQ(*back, -1) << "nothing orders lane 0 after lane 2";
+  EXPECT_EQ(*back, -1) << "lane 0 need not wait for lane 2";
   machine.order(0, 2);
   machine.download(0, back, device, sizeof(int));
   *host = 3;
@@ -97,8 +97,8 @@ TEST(DeferringDevice, DoesAllWorkAsLateAsTheOrderAllows) {
   machine.release_host(back);
 }
 
-// Cells that are forgotten and sent again, more sets of settings than are kept, batches of every size: what is queued late must
-// find what it needs.
+// Cells that are evicted and sent again, more sets of settings than are kept, batches of every size: late steps must find their
+// data.
 TEST(DeferringDevice, FindsEverythingAsItWasQueued) {
   const auto scene = basin();
   std::vector<PingRequest> all;

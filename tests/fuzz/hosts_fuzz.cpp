@@ -9,7 +9,7 @@ namespace {
 
 using namespace sonar;
 
-/// The host's requests are dropped; what it decoded must be whole.
+/// The host's requests are dropped; decoded pings must be whole.
 void check(const protocol::HostActions& actions, std::size_t ports) {
   for (const protocol::HostAction& action : actions) {
     if (const auto* send = std::get_if<protocol::HostSend>(&action); send != nullptr && send->port >= ports) std::abort();

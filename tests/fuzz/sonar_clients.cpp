@@ -134,7 +134,7 @@ void SonarClients::tick(std::size_t place) {
   tick_all_due();
 }
 
-/// A conversation that is ticked when it is due asks for a later time before long; else the daemon would spin.
+/// A conversation that is ticked when it is due soon requests a later time; else the daemon would spin.
 void SonarClients::tick_all_due() {
   for (int n = 0;; ++n) {
     perform(sonar_.on_tick(now_));

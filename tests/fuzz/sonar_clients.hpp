@@ -36,10 +36,10 @@ class SonarClients {
   void tick(std::size_t place);                                // at its next tick, which may be later than now
   void wait(std::chrono::nanoseconds time);                    // whatever falls due on the way is done, up to a bound
   void fire();                                                 // the engine is done with a ping
-  void write(std::size_t place, std::size_t bytes);            // the client takes so many
+  void write(std::size_t place, std::size_t bytes);            // the client reads that many
   void finish(std::size_t place);                              // as when its peer is silent
   void disconnect(std::size_t place);
-  /// The sonar stops; everybody takes what is left and goes; nothing may be missing.
+  /// The sonar stops; all clients read the rest and disconnect; nothing may be missing.
   void end();
 
  private:

@@ -37,7 +37,7 @@ std::string number_text(double value) {
 }
 
 /// One file per oracle and test: ctest runs tests at the same time, each in its own process. The first record of a process
-/// replaces what an earlier run of the same test left.
+/// replaces the record of an earlier run of the same test.
 void append(int number, const std::string& line) {
   const char* folder = std::getenv("SONARD_ORACLES");
   if (folder == nullptr || *folder == 0) return;

@@ -12,7 +12,7 @@ struct Place {
   int line;
 };
 
-/// Truths beyond the 46 of the table are recorded under this number, distinguished by `what`.
+/// Checks beyond the 46 of the table are recorded under this number, distinguished by `what`.
 inline constexpr int no_number = 0;
 
 /// Fails the running test unless |measured - expected| <= tolerance, and appends the figures to the folder that the environment

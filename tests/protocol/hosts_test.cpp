@@ -61,7 +61,7 @@ void fill_with_pattern(std::vector<std::byte>& samples) {
 
 class Talk {
  public:
-  /// Streams arrive in pieces of so many bytes; 0: as they are written.
+  /// Streams arrive in pieces of this many bytes; 0: as they are written.
   Talk(const Make& of, const Wanted& wanted, std::size_t piece = 0, std::size_t model = 0)
       : make(of), device(*of.device), piece_(piece), host(*of.host(sets_nothing(of) ? Wanted{} : wanted)) {
     state.name = "front";
@@ -78,7 +78,7 @@ class Talk {
     carry_out(host->on_open(own, now));
   }
 
-  /// A tenth of a second at a time, with a ping in each where the device is not asked for single ones.
+  /// Steps of a tenth of a second, with a ping in each unless the device pings on request.
   void run(int steps) {
     for (int i = 0; i < steps && !error; ++i) {
       now += 100ms;

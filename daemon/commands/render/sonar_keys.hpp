@@ -14,7 +14,7 @@ void read_model(text::Map keys, FrequencyMode& mode);
 
 /// How rows and pulse that are not given follow from the range.
 enum class RowsOf {
-  no_device,    // rows follow the pulse, two samples to its b (docs/acoustics.md, section 4)
+  no_device,    // rows follow the pulse: their rate is 2 b (docs/acoustics.md, section 4)
   device,       // rows and pulse are proportional to the range
   range_image,  // rows are elevations and the pulse is the product's range cell: neither changes
 };

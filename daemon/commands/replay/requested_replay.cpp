@@ -72,7 +72,7 @@ void RequestedReplay::start() {
 
 void RequestedReplay::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
-  due_.cancel();  // a ping that waits for its time is done at once: the device ends when none is under way
+  due_.cancel();  // a waiting ping is completed at once, because the device ends only when none is under way
   device_->stop(why);
   end_when_gone();
 }
@@ -85,7 +85,7 @@ void RequestedReplay::end_when_gone() {
   if (options_.on_end) options_.on_end();
 }
 
-/// All pings were sent when the last one was, and every client has taken what it was sent.
+/// Returns whether the last ping was sent, and every client has received its messages.
 void RequestedReplay::on_change() {
   if (device_ == nullptr) return;
   if (was_last_ && !stopping_ && device_->sonar().settled())

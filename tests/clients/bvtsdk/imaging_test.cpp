@@ -25,7 +25,7 @@ struct Spot {
   std::uint16_t strongest = 0;
 };
 
-/// Centre of gravity of what is bright.
+/// Centre of gravity of the bright pixels.
 Spot spot_of(const MagImage& image) {
   Spot spot;
   double weight = 0;
@@ -55,7 +55,7 @@ TEST(XyImage, ShowsATargetWhereItIsAndNotMirrored) {
       const int row = static_cast<int>(std::lround(spot.row)), col = static_cast<int>(std::lround(spot.col));
       EXPECT_NEAR(image.pixel_range_m(row, col), range, 0.04) << range << " " << bearing;
       EXPECT_NEAR(image.pixel_bearing_deg(row, col), bearing, 0.6) << range << " " << bearing;
-      // The picture itself, as an eye or OpenCV takes it: up is ahead, right is starboard.
+      // The picture itself, as OpenCV shows it: up is ahead, right is starboard.
       const double ahead = (image.origin_row - spot.row) * image.range_resolution_m;
       const double starboard = (spot.col - image.origin_col) * image.range_resolution_m;
       EXPECT_NEAR(ahead, range * std::cos(bearing / 57.29578), 0.04);

@@ -86,7 +86,7 @@ class Peer {
   Descriptor socket_;
 };
 
-/// Takes one host and does with it what the test says.
+/// Accepts one host and calls the test's function with it.
 class FakeSonar {
  public:
   explicit FakeSonar(std::function<void(Peer&)> behave) : listener_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {

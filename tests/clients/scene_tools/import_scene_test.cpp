@@ -310,7 +310,7 @@ TEST_F(ImportScene, MaterialsByWordsThatMeanThem) {
                                        {"terrain mud", "mud"},
                                        {"pier", "concrete"}})
     EXPECT_EQ(material_of(sdf(model(name, link("l")))), material) << name;
-  // A library's name of a model says more than the names inside it.
+  // The name of a model in a library is more descriptive than the names inside it.
   write("lib/Sand Heightmap/model.sdf", "<sdf version='1.9'><model name='m'>" + mesh("hill.stl") + "</model></sdf>");
   write("lib/Sand Heightmap/hill.stl", triangle);
   options.model_folders = {files.path("lib")};

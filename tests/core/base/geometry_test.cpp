@@ -95,7 +95,7 @@ TEST_F(Geometry, NorthEastDownConversions) {
   }
 }
 
-// A vehicle that heads east, nose 10 degrees up, right side 20 degrees down, as ArduPilot and as we say it.
+// A vehicle that heads east, nose 10 degrees up, right side 20 degrees down, in ArduPilot's convention and in ours.
 TEST_F(Geometry, AttitudeOfAVehicleInBothConventions) {
   const Quatd frd_in_ned = quat_from_rpy({rad_from_deg(20), rad_from_deg(10), rad_from_deg(90)});
   const Quatd flu_in_enu = enu_flu_from_ned_frd(frd_in_ned);

@@ -371,7 +371,7 @@ TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
     EXPECT_NEAR(counted(from_fine, whole_scene(level)), expected, 0.1 * expected + 3 * std::sqrt(expected)) << level;
   }
   EXPECT_GT(coarse, 0);
-  // The order is the same whichever level was asked for first.
+  // The order is the same whichever level was requested first.
   const CellView view = whole_scene(1);
   counted(from_fine, whole_scene(0));
   const auto first = from_coarse.in_view(view, pool), second = from_fine.in_view(view, pool);
@@ -380,14 +380,14 @@ TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
     ASSERT_EQ(first[t].tile->bytes(), second[t].tile->bytes());
     EXPECT_EQ(std::memcmp(first[t].tile->data.get(), second[t].tile->data.get(), first[t].tile->bytes()), 0);
   }
-  // Also where only the side lobes want them so coarse, and beside a finer level.
+  // Also if only the side lobes request such coarse cells, and beside a finer level.
   CellView sides = whole_scene(4, {-10, 0, -10});
   sides.main_elevation_rad = 0.1f, sides.side_from_rad = 0.1f, sides.side_area_per_range_m = 1e6f, sides.side_coarser = 2;
   SurfaceCells beside(scene, Seed{9}, 1u << 30);
   EXPECT_EQ(counted(beside, sides), counted(from_fine, whole_scene(2)));
 }
 
-// Scenes in turns: what is kept of those before is what a new one makes, in the same order, at coarse and fine levels.
+// Scenes in turn: tiles kept from earlier ones are equal to newly made ones, in the same order, at coarse and fine levels.
 TEST(SurfaceCells, AnotherSceneHasTheCellsOfANewOne) {
   const auto one = terrain(20, 4.0, gentle), other = terrain(16, 4.0, gentle), ball = sphere(0.5, 12);
   const auto with = [&](std::vector<std::shared_ptr<const Mesh>> meshes, std::uint32_t texture_seed, float shape) {
@@ -449,7 +449,7 @@ TEST(SurfaceCells, AnotherSceneWithTheSameSurfacesBuildsNoCells) {
   EXPECT_EQ(cells.built_last_time(), 0u);
 }
 
-// Every scene has a surface of its own: none of the many is kept for ever.
+// Every scene has a surface of its own, and none of them is kept for ever.
 TEST(SurfaceCells, ScenesThatDoNotComeBackAreForgotten) {
   constexpr std::size_t budget = 1u << 20;
   SurfaceCells cells(scene_of(terrain(20, 4.0, gentle)), Seed{4}, budget);

@@ -310,7 +310,7 @@ TEST(TrajectoryFile, PosesThatTheMemoryDoesNotSufficeForAreRefused) {
   EXPECT_TRUE(read);
 }
 
-/// The page shows what can be read: every block of it that is marked with a format.
+/// Reads the examples of the page: every block that is marked with a format.
 TEST(TrajectoryFile, TheManualsExamplesAreRead) {
   std::ifstream in(std::string(SONARD_SOURCE_DIR) + "/docs/poses.md");
   std::string line, block, format;
@@ -334,7 +334,7 @@ TEST(TrajectoryFile, TheManualsExamplesAreRead) {
   EXPECT_EQ(read, (std::vector<std::string>{"csv", "csv", "tum", "euroc", "kitti"}));
 }
 
-/// An hour at 100 Hz; the deadline is some twenty times what a slow computer takes.
+/// An hour at 100 Hz; the deadline is about twenty times the time of a slow computer.
 TEST(TrajectoryFile, AnHourIsReadInNoTime) {
   constexpr int lines = 360000;
   const std::string name = testing::TempDir() + "hour" + std::to_string(getpid()) + ".tum";

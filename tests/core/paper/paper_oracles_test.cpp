@@ -120,7 +120,7 @@ TEST(PaperOracles, Oracle46_APointAppearsAtItsAzimuthUnlessBeamsAreCones) {
 }
 
 TEST(PaperEngine, APointsLevelIsThePrintedOneOverTheCorrectionsNorm) {
-  // One beam: the correction is 1. Two equal ones far apart: 1 over the root of 2 and what |sinc| lets over.
+  // One beam: the correction is 1. Two equal ones far apart: 1 over the root of 2, times the rest of |sinc|.
   PingSettings settings = small_settings(1);
   const double range = (60 + settings.row_centre) * settings.range_bin_m;
   const auto scene = SceneMaker().add_point({range, 0, 0}, -12).make();

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double lambert_db = -10;  // mu 0.1
 
-/// Front at 0.5 m where it stands square; 4 x 7 inches.
+/// Its front is at 0.5 m if it is not turned; 4 x 7 inches.
 std::shared_ptr<const Scene> rod(const std::string& rpy_deg) {
   const std::string yaml =
       "name: rod\n"

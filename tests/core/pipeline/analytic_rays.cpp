@@ -28,7 +28,7 @@ struct Ray {
   Vec3d at(double t) const { return from + t * direction; }
 };
 
-/// The face of an axis, where `covers` says that it is.
+/// The face of an axis, if `covers` is true there.
 template <class Covers>
 void try_face(const Ray& ray, int axis, double at_m, Hit& best, Covers&& covers) {
   const double speed = along(ray.direction, axis);
@@ -80,7 +80,7 @@ Hit hit(const Primitive& shape, const Ray& ray) {
   return best;
 }
 
-/// The first triangle of the mesh in each flat face that rays may hit: who asks for a triangle wants its material or its face.
+/// The first triangle of the mesh in each flat face that rays may hit: callers use a triangle only for its material or its face.
 struct Faces {
   struct Face {
     int axis = 0;

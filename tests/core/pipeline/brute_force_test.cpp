@@ -20,7 +20,7 @@ namespace {
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
 
-/// Upright, round, about the origin.
+/// A round upright rod at the origin.
 Mesh pole(double radius_m, double half_height_m, int sides) {
   Mesh mesh;
   for (int i = 0; i < sides; ++i) {
@@ -71,7 +71,7 @@ TEST(Truths, AThinPoleIsInEveryFrame) {
   }
 }
 
-/// Heights on a grid, straight in between: what the mesh is made of, quick to ask for.
+/// Heights on a grid with linear interpolation, as in the mesh, for quick access.
 class Relief {
  public:
   Relief(double x0, double x1, double y0, double y1, double step_m, const std::function<double(double, double)>& z)
@@ -97,14 +97,14 @@ class Relief {
   std::vector<double> heights_;
 };
 
-/// A relief as brute force sees it: every square of a fine grid one scatterer, with one shadow ray of its own, in double.
+/// A relief by brute force: every square of a fine grid is a scatterer with a shadow ray of its own, in double.
 struct BruteForce {
   Vec3d sonar;
   double tilt_rad, lambert_db;
   const Relief& z;
   double step_m = 0.0125, march_m = 0.015;
 
-  /// Whether nothing of the relief stands between: it is marched along the whole ray.
+  /// Returns whether the relief does not block the ray, by steps along the whole ray.
   bool sees(Vec3d p) const {
     const Vec3d to = sonar - p;
     const double far = length(to);
@@ -177,7 +177,7 @@ FrequencyMode narrow_p900() {
   return mode;
 }
 
-// 0.4 and 0.45 m: even steps of the fan's refinement meet nothing but crests somewhere along the bed.
+// 0.4 and 0.45 m: somewhere along the bed, even steps of the fan's refinement hit only crests.
 TEST(Truths, ARippledBottomIsAsBruteForceSeesIt) {
   for (const double period_m : {0.5, 0.45, 0.4}) {
     const auto ripples = [period_m](double x, double) { return 0.01 * std::cos(2 * pi * x / period_m); };

@@ -19,7 +19,7 @@ struct PlacedScatterer {
 
 class ElementArray {
  public:
-  /// Elements along y, `pitch_wavelengths` apart, on the aperture that the pattern's azimuth width asks for, shaded by its taper.
+  /// Elements along y, `pitch_wavelengths` apart, on the aperture of the pattern's azimuth width, shaded by its taper.
   ElementArray(const FrequencyMode& mode, double sound_speed_mps, double pitch_wavelengths = 0.5);
   int elements() const { return static_cast<int>(place_m_.size()); }
 

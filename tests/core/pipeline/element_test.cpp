@@ -144,7 +144,7 @@ double loudest_elsewhere_db(double pitch_wavelengths, double& at_sine) {
   for (double other = -0.95; other < 0.95; other += 0.002)
     if (std::abs(other - u) > 0.1) sines.push_back(other);
   const std::vector<PlacedScatterer> point{{{r * u, r * u, 0}, 1}};
-  // A tone without end: the pattern alone, not what a short pulse makes of it on its way across the array.
+  // An endless tone shows the pattern alone, without the effect of a short pulse's travel across the array.
   const Signals s = array.beams(
       point, sines, {1500, 1, r, 1, 1}, [](double) { return Complex(1); }, 1);
   double loudest = 0;

@@ -196,7 +196,7 @@ TEST(Interference, IsAStreakOfItsPulseAtItsBearingAndLevel) {
                           20 * std::log10(weight);
   EXPECT_NEAR(db(s.power(middle, beam)), expected, 0.3);
   EXPECT_EQ(s.loudest_beam(middle), beam);
-  // Side lobes: far from it, what the pattern says, -30 dB and less.
+  // Side lobes: far from it, the level of the pattern, -30 dB and less.
   const int aside = s.beam_at(rad_from_deg(10.9));
   const double lobe = receive_pattern(s.mode().pattern)(std::sin(azimuth) - s.beam_sine(aside));
   EXPECT_NEAR(s.pressure(middle, aside), std::abs(lobe / weight) * s.pressure(middle, beam), 1e-3 * s.pressure(middle, beam));

@@ -84,7 +84,7 @@ TEST(InterleavedPings, EachBeamIsAsItsOwnPingFoundIt) {
   }
 }
 
-/// Beams of widths of their own, of eight pings: between a ping's beams there are columns that none of them hears.
+/// Beams of widths of their own, of eight pings: between a ping's beams there are columns that none of them uses.
 Sounding of_eight_pings(int threads) {
   FrequencyMode mode = p900();
   mode.interleaved_pings = 8;

@@ -77,7 +77,7 @@ TEST_P(Interrupted, PingsAreAsTheyAreAlone) {
     return make_cpu_engine(scene, pool)->run({&request, 1}).at(0).samples;
   };
   Parallel pool(GetParam());
-  // Room for hardly a tile: what is not in use is forgotten at once.
+  // There is room for hardly one tile, so unused tiles are evicted at once.
   const auto engine = make_cpu_engine(scene, pool, {.cell_cache_bytes = 1 << 12});
   Other other(*engine, quick);
   engine->set_interruption(&other);

@@ -151,7 +151,7 @@ TEST(KernelSets, AFixedFanOfAnyNumberOfRaysIsTraced) {
   }
 }
 
-// SONARD_SIMD holds everything that does not say otherwise, the tests' engines included.
+// SONARD_SIMD limits every engine without an explicit level, those of the tests included.
 TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
   for (const auto& [name, level] : {std::pair{"portable", SimdLevel::portable},
                                     {"avx2", SimdLevel::avx2},

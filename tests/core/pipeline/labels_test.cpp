@@ -66,7 +66,7 @@ TEST(Labels, ASphereOnSandIsTheArcThatGeometrySays) {
   const PingLabels& labels = l.run();
   (void)l.s.ping();  // the bearings of the beams
   ASSERT_EQ(labels.rows, l.s.rows());
-  // The front of the sphere where the line of sight meets it squarely, and the widest bearing of its limb.
+  // The front of the sphere, where the line of sight is normal to it, and the largest bearing of its limb.
   const double distance = std::hypot(sphere_x_m, height_m - radius_m);
   const double first_m = distance - radius_m, limb_m = std::sqrt(distance * distance - radius_m * radius_m);
   const double half_sine = radius_m / distance;
@@ -111,7 +111,7 @@ TEST(Labels, TheShadowLiesBehindTheSphereAndNamesIt) {
   EXPECT_EQ(labels.instance[after], 1);
 }
 
-/// A sphere in front of a box, on sand: what of both a straight line from the sonar to a place of the bed meets first.
+/// A sphere in front of a box, on sand: which of the two a straight line from the sonar to a point of the bed hits first.
 struct SphereBeforeBox {
   static constexpr double box_x_m = 8, box_half_m[3] = {0.2, 1.5, 0.6};
 

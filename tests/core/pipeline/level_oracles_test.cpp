@@ -203,7 +203,7 @@ TEST(LevelOracles, EdgeBeamsAreNotDimAndNothingComesFromBeyond) {
   }
 }
 
-// The shadow may hold what the rest of the bed leaks into it through side lobes and pulse, and 1 dB more.
+// The shadow may contain the leak of the rest of the bed through side lobes and pulse, and 1 dB more.
 TEST(LevelOracles, Oracle33_ShadowBehindABox) {
   const double height = 2, lambert_db = -20;
   const Vec3d half{0.3, 0.6, 0.6}, place{4, 0.8, 0.6};  // to port: a mirrored shadow would lie elsewhere
@@ -213,7 +213,7 @@ TEST(LevelOracles, Oracle33_ShadowBehindABox) {
   s.request.switches.expected_power = true;
   s.ping_from({0, 0, height}, {0, 0.25, 0});
 
-  // The bed as points of equal area, without what the box hides (seen from the sonar, by the slab test).
+  // The bed as points of equal area, without the part that the box hides from the sonar (by the slab test).
   const auto hidden = [&](Vec3d p) {
     const Vec3d from{0, 0, height}, step = p - from;
     double enter = 0, leave = 1;

@@ -37,7 +37,7 @@ Peak peak_near(const Sounding& s, double row, int beam) {
   return p;
 }
 
-/// Azimuth of the middle beam, on which the targets of most tests stand.
+/// Azimuth of the middle beam, in which the targets of most tests lie.
 double middle_azimuth(const FrequencyMode& mode, const PingSettings& settings) {
   Sounding empty(SceneMaker().make(), mode, settings);
   return static_cast<double>(empty.ping().beam_azimuth_rad[static_cast<std::size_t>(settings.beam_count / 2)]);

@@ -96,7 +96,7 @@ TEST_P(EveryShape, Oracle8_LevelOfABed) {
   }
 }
 
-// The mean of many pings of speckle has the level that expected power says: both ways of summing agree.
+// The mean of many pings of speckle has the level of expected power: both ways of summing agree.
 TEST_P(EveryShape, SpeckleHasTheExpectedPower) {
   Sounding s(flat_bed(), p900_with(GetParam()), default_rows(8, 300));
   const auto mean_power = [&](bool expected) {

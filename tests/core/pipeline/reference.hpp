@@ -51,7 +51,7 @@ std::vector<std::vector<Complex>> beams(std::span<const Scatterer> scatterers, s
 std::vector<std::vector<double>> expected_power(std::span<const Scatterer> scatterers, std::span<const double> beam_sines,
                                                 const BeamPattern& pattern, const Grid& grid);
 
-// Closed forms, all as expected power E|s|^2 in dB re 1 uPa^2 unless said otherwise.
+// Closed forms, all as expected power E|s|^2 in dB re 1 uPa^2 unless stated otherwise.
 
 /// Oracle 8: flat seabed at `height_m` below the sonar, Lambert 10 log10 mu, conical columns, range r:
 /// SL - 40 log r - 2 alpha r + S_b + 10 log10(theta_eff r (c / 2) tau_eff F), sin g = h / r, F = 1 / cos g at azimuth 0 and

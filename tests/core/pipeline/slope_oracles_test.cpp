@@ -35,7 +35,7 @@ TEST(SlopeOracles, Oracle06_FirstCellOfAWallFallsAs25LogR) {
   std::vector<double> level;
   for (int octave = 0; octave <= 5; ++octave) {
     PingSettings settings = few_beams(std::ldexp(1.0, octave) + 0.3);
-    // The wall stands on the middle of a row, whatever its range: the first cell is sampled alike.
+    // The wall is at the middle of a row at every range, so that the first cell is sampled in the same way.
     const double distance = (std::floor(std::ldexp(1.0, octave) / settings.range_bin_m) + 0.5) * settings.range_bin_m;
     Sounding s(SceneMaker().add(wall(2.5, 4), -20, {distance, 0, 0}).make(), silent(narrow(p900())), settings);
     s.request.switches.expected_power = true;

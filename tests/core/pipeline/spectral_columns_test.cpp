@@ -36,7 +36,7 @@ std::vector<Arrived> scattered(int n, double from_sample, double to_sample) {
   return all;
 }
 
-/// p(t) itself, as a formula: what both ways are held against.
+/// p(t) as a formula, with which both ways are compared.
 Complex formula(Shape shape, const Pulse& pulse, double time_s) {
   return shape == Shape::measured ? measured_envelope(time_s) : pulse.at(time_s);
 }

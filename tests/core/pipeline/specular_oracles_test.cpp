@@ -15,7 +15,7 @@ namespace {
 class BothWays : public testing::TestWithParam<bool> {
  protected:
   bool as_meshes() const { return GetParam(); }
-  /// 0.1 dB for exact shapes, 1 dB for what is recovered from facets.
+  /// 0.1 dB for exact shapes, 1 dB for shapes that are recovered from facets.
   double within_db(double exact) const { return as_meshes() ? 1.0 : exact; }
   void record(int number, const std::string& what, double expected_db, double measured_db, double tolerance_db) const {
     record_oracle(number, what + (as_meshes() ? ", as a mesh" : ""), expected_db, measured_db, within_db(tolerance_db), "dB");

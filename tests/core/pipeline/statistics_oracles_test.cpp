@@ -213,7 +213,7 @@ TEST(StatisticsOracles, Oracle34_StillSceneStillPing) {
     s.request.fired_at += std::chrono::seconds(3);
     EXPECT_EQ(s.ping().pressure_upa, pressure);
     record_oracle(34, "samples that differ", 0, differences(s.last().samples, samples), 0, "");
-    // Elsewhere and back: what is kept between pings must not show.
+    // To another place and back: values kept between pings must not change the result.
     s.ping_from({1, 1, 3}, {0, 0.4, 1});
     EXPECT_EQ(s.ping_from({0, 0, 2}, {0.02, 0.25, 0.1}).pressure_upa, pressure);
     if (first.empty()) first = pressure;

@@ -212,7 +212,7 @@ TEST(ThinObjects, WhichMeshesAreClosed) {
   EXPECT_FALSE(encloses(soup, {1.1, 0, 0}));
 }
 
-/// Energy of a plate with the screen before it over that without [dB]; their numbers are so much apart.
+/// Energy of a plate with the screen before it over that without [dB]; their numbers differ by that much.
 double heard_behind_screen_db(const Look& look, double yaw, double gap_m, int apart, SimdLevel level = SimdLevel::automatic) {
   const auto heard = [&](bool screened) {
     const Quatd turn = quat_from_rpy({0, 0, yaw});

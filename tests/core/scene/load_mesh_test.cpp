@@ -67,7 +67,7 @@ std::string collada(const std::string& axis) {
          "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
 }
 
-// A GLB with the wedge's vertices and triangles, as the glTF 2.0 container asks; so many nodes show it.
+// A GLB with the wedge's vertices and triangles, in the glTF 2.0 container; that many nodes show it.
 std::string glb(int nodes = 1) {
   const float vertices[12] = {0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 3};
   const std::uint16_t indices[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};

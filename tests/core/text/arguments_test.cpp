@@ -14,7 +14,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-/// A program with one command; what it objects to in `words`, or empty.
+/// A program with one command; returns its error for `words`, or empty.
 std::string complaint(const std::vector<std::string>& words) {
   CLI::App app("", "tool");
   app.require_subcommand(1);

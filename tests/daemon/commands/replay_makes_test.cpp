@@ -39,7 +39,7 @@ Bytes aris_file(std::int32_t frames, milliseconds period) {
   return file;
 }
 
-/// A controller that asks for frames at a port of its own.
+/// A controller that requests frames at a port of its own.
 class Controller {
  public:
   explicit Controller(const Replay& replay) : frames_(io_, udp::endpoint(asio::ip::address_v4::loopback(), 0)), commands_(io_) {

@@ -92,7 +92,7 @@ TEST(ReplayBesideStrangers, AHostThatReadsNoAnswersIsClosedAndFillsNoLog) {
   EXPECT_LT(replay.lines, 100) << "of 200,000 messages that were refused";
 }
 
-/// A recording of Oculus pings of 64 kB without end, on a disk that stands still while the test wants it.
+/// A recording of Oculus pings of 64 kB without end, on a disk that stops while the test requests it.
 class SlowDisk final : public recording::RecordingReader {
  public:
   explicit SlowDisk(std::shared_future<void> goes_on = {}) : goes_on_(std::move(goes_on)) {}

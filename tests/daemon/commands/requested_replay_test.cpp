@@ -193,7 +193,7 @@ Bytes micron_line(int bearing, char bin) {
   return *micron::vendor().frame(ping, state);
 }
 
-/// A driver asks for lines to port of ahead; the head turns on by a grad after each.
+/// A driver requests lines to port of ahead; the head turns by a grad after each.
 TEST(ReplayOfMicron, ASendDataGetsTheRecordedLineOfItsDirection) {
   std::vector<Bytes> lines;
   for (int bearing = 2400; bearing <= 4000; bearing += 16) lines.push_back(micron_line(bearing, static_cast<char>(bearing / 16)));

@@ -28,7 +28,7 @@ constexpr milliseconds patience{20000};  // for anything that must happen
 /// A path in the folder for temporary files that no other test uses, in this process or another one.
 std::string own_path(const std::string& name);
 
-/// Pings without physics: sample = a pattern of ping number, row and beam. Remembers what it was asked.
+/// Pings without physics: sample = a pattern of ping number, row and beam. Stores its requests.
 class FakeEngine final : public PingEngine {
  public:
   struct Record {
@@ -93,7 +93,7 @@ struct DaemonSetup {
   bool config_file = false;                         // the configuration is in a file and can be read again
   std::function<void(Config&)> edit_config;         // before the daemon starts
 };
-/// The configuration of a setup: what Daemon starts with.
+/// The configuration with which Daemon starts.
 std::string yaml_of(const DaemonSetup& setup);
 
 class Daemon {
@@ -150,7 +150,7 @@ class Client {
   /// Skips everything but pings.
   std::optional<oculus::DecodedPing> next_ping(milliseconds timeout = patience);
   /// Reads to the end of the stream; true = FIN, false = reset or deadline. Bytes are decoded after the end: a daemon that stops
-  /// gives a client less than a second to take its last message, and decoding may take longer on a busy machine.
+  /// gives a client less than a second to receive its last message, and decoding may take longer on a busy machine.
   bool read_to_end(milliseconds timeout = patience);
   std::vector<std::byte> read_raw(std::size_t at_least, milliseconds timeout = patience);
   void reset();           // RST

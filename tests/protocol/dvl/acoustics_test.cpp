@@ -39,7 +39,7 @@ struct Dvl {
     settings = next->settings;
     return m;
   }
-  /// After so many pings by which it has found the ground, or not.
+  /// After this many pings, in which it may have found the ground.
   Measurement settled(Vec3d at, RollPitchYaw vehicle = {}, Vec3d moves_mps = {}) {
     for (int i = 0; i < 8; ++i) ping(at, vehicle, moves_mps);
     return ping(at, vehicle, moves_mps);

@@ -49,7 +49,7 @@ inline Ping ping_with(const Settings& settings, const protocol::DeviceState& sta
   return ping;
 }
 
-/// A host at one of the ports; applies what it causes, as the daemon does.
+/// A host at one of the ports; applies its events, as the daemon does.
 struct Talk {
   explicit Talk(std::uint16_t number = command_port) {
     for (const protocol::Port& port : vendor().ports())

@@ -94,7 +94,7 @@ TEST_F(Capture, OurBearingsAreTheDevices) {
   EXPECT_EQ(answer(device(), request).bearings_cdeg, pings_[0].bearings_cdeg);
 }
 
-// The captured request through our own device: everything the law decides comes out as captured.
+// The captured request through our own device: every computed field is as captured.
 TEST_F(Capture, OurDeviceAnswersTheSameRequestAlike) {
   FireRequest request = fire(0, 2, PingRate{195}, 0x19, 2, 50);
   request.settings.network_speed = 25;

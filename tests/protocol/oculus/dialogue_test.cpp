@@ -24,7 +24,7 @@ struct Conversation {
   Reaction say(BytesView bytes, double when_s = 0) { return dialogue->on_bytes(Exact(bytes).view(), at(when_s)); }
 };
 
-// Defaults of the public clients (docs/protocols/oculus.md names them): what each sends, and what it must mean.
+// Defaults of the public clients (docs/protocols/oculus.md names them): the message of each, and the settings that it must give.
 struct Client {
   const char* name;
   int version;
@@ -162,7 +162,7 @@ struct Asking : Conversation {
   }
 };
 
-// ENS stores standby as its rate when a dummy comes, and asks for it when it connects again.
+// ENS stores standby as its rate when a dummy arrives, and requests it when it connects again.
 TEST(Dialogue, NoDummyComesWhileARateIsAsked) {
   Asking talk;
   EXPECT_EQ(talk.dummies(0, 3.05), 3u) << "before the first fire message";
@@ -240,7 +240,7 @@ TEST(Dialogue, ShortAndForeignMessagesAreNoticed) {
   EXPECT_THAT(talk.say(hex("53 4F 00 00 00 00 FF 00 00 00 00 00 00 00 00 00")).events, IsEmpty()) << "a dummy is no news";
 }
 
-// VND asks for the configuration with payload size 0 and takes the first 28 bytes it gets.
+// VND requests the configuration with payload size 0 and reads the first 28 bytes that it gets.
 TEST(Dialogue, UserConfigIsReadAndWritten) {
   Conversation talk;
   const Bytes read = hex("53 4F 00 00 00 00 55 00 00 00 00 00 00 00 00 00  00 00 00 00 00 00 00 00 00 00 00 00");

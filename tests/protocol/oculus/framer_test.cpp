@@ -79,7 +79,7 @@ TEST(Framer, JunkBetweenMessagesIsSkippedByteByByte) {
   for (const Bytes& junk : decoys) {
     std::uint64_t skipped = 0;
     const auto messages = cut(Sender::client, {joined({junk, short_fire, junk, dummy, short_fire})}, &skipped);
-    // 53 4F 53 looks like a header and may swallow what follows; a stream must still find its way back.
+    // 53 4F 53 looks like a header and may swallow the next bytes; the framer must still find the next message.
     ASSERT_FALSE(messages.empty());
     EXPECT_EQ(messages.back(), short_fire) << junk.size();
     if (junk != hex("53 4F 53")) {
@@ -100,7 +100,7 @@ TEST(Framer, AHugeLengthCostsNoMemory) {
   EXPECT_TRUE(framer.next().has_value());
 }
 
-// Waiting bytes are always less than one message, whatever arrives.
+// Waiting bytes are always less than one message, for any input.
 TEST(Framer, NeverKeepsMoreThanAMessage) {
   Framer framer(Sender::client);
   for (std::uint32_t i = 0; i < 20000; ++i) {

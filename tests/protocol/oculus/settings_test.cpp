@@ -24,7 +24,7 @@ TEST(RowGrid, IsTheCapturedOne) {
   EXPECT_DOUBLE_EQ(law.spacing_m, 0.0028421889710794315);
 }
 
-// The capture's request: its own double must come back in the packet, bit for bit.
+// The capture's request: its double must be echoed in the packet, bit for bit.
 TEST(RowGrid, SpacingReachesThePacketUnrounded) {
   FireRequest request = fire(0, 2, PingRate{195}, 0x19, 2, 50);
   request.settings.sound_speed_mps = 1490.658551265436;

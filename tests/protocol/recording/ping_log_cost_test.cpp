@@ -27,7 +27,7 @@ void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 namespace sonar::recording {
 namespace {
 
-/// Two messages: what describes the file, and the temperature.
+/// Two messages: the description of the file, and the temperature.
 Bytes short_log() {
   Bytes file;
   const auto writer = write_ping_log(sink_into(file));

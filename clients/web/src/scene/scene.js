@@ -203,7 +203,7 @@ export class Scene {
     this.interval_ms = Math.max(least_interval_ms, 5 * cost_ms);
     if (cost_ms > slow_ms && this.coarse === 1) {
       this.coarse = 0.5;
-      this.width = 0;  // sized anew
+      this.width = 0;  // 0: the size is set again
     }
     return true;
   }

@@ -82,7 +82,7 @@ TEST(SideLobesOfProducts, SwitchedOffAPingHasTheBytesOfTheCanonicalModel) {
   EXPECT_NE(ping_of(on, pool).samples, expected.samples);
 }
 
-// The fan of the main lobe ends where the two-way pattern is at -20 dB: a bed that is heard there alone begins with a step. With
+// The fan of the main lobe ends where the two-way pattern is at -20 dB: a bed that echoes only there begins with a step. With
 // the side lobes it changes across that edge as the closed form does, about 3 dB in 15 cm. What is heard before the edge without
 // side lobes is noise alone, and is subtracted. Speckle has a sigma of 0.2 dB (8 pings, some 800 looks each side): 1 dB is five.
 TEST(SideLobesOfProducts, ABedBeginsWithoutAStep) {

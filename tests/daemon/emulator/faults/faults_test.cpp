@@ -301,7 +301,7 @@ TEST(FaultJournals, NameTheLastByteOfAnEndedConnection) {
   EXPECT_TRUE(reset.time.clients[reset.front].reset);
 }
 
-// ---- what they do
+// ---- effects
 
 TEST(Faults, SilenceLeavesTheConnectionOpenAndCountsWhatIsDropped) {
   FaultRecord fault = at_ping("silent-open", 5);

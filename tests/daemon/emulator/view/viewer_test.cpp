@@ -70,7 +70,7 @@ struct OneViewer : testing::Test {
     const auto message = viewer.next(now);
     return message && message->is_text ? json::parse(text_of(*message)) : json();
   }
-  /// Payloads of what waits, as letters.
+  /// Payloads of waiting messages, as letters.
   std::string rest() {
     std::string letters;
     while (const auto message = viewer.next(now))

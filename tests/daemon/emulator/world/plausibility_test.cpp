@@ -31,7 +31,7 @@ Config config_with(const std::string& vehicle, const std::string& mount = "{fram
   return *std::move(config);
 }
 
-/// A bed of 40 x 30 m at z = -5, and what else is asked for.
+/// A bed of 40 x 30 m at z = -5, and further objects.
 Scene bed_scene(std::vector<Object> more = {}) {
   auto mesh = std::make_shared<Mesh>();
   mesh->vertices = {{-20, -15, 0}, {20, -15, 0}, {20, 15, 0}, {-20, 15, 0}};
@@ -198,7 +198,7 @@ Config playing(const std::string& lines, const std::string& name = "dive.tum") {
   if (!config) throw std::runtime_error(config.error().text);
   return *std::move(config);
 }
-/// A turn of 360 deg on the spot, nodding a little, w where it is asked for; in FRD the body's z is down as NED's is.
+/// A turn of 360 deg on the spot with small pitch changes, w at the given end; in FRD the body's z is down as NED's is.
 std::string turning(bool w_first, const char* frame, double z_m, const char* comma = " ", const char* unit = "") {
   std::string lines = std::string("# frame: ") + frame + "\n";
   for (int i = 0; i < 36; ++i) {

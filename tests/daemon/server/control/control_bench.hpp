@@ -15,7 +15,7 @@
 
 namespace sonar::testing_daemon {
 
-/// Remembers what it was asked; tests say what it answers, and when. I/O thread only, but for what is marked.
+/// Stores its requests; tests set its answers, and when they come. I/O thread only, except where marked.
 class FakeOperations final : public Operations {
  public:
   void perform(const control::Operation& operation, const Sender& sender, Done done) override {

@@ -29,7 +29,7 @@ struct HttpClient {
     for (const std::byte b : raw) received += static_cast<char>(b);
     return !raw.empty();
   }
-  /// Until `end` has come; what comes before it, and it.
+  /// Reads until `end`; returns all bytes up to and including it.
   std::string until(const std::string& end) {
     while (received.find(end) == std::string::npos)
       if (!more()) return "";

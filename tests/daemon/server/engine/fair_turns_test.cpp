@@ -49,7 +49,7 @@ TEST(FairTurns, WhoseTimeIsUnknownIsNotLetIn) {
   EXPECT_FALSE(turns.goes_first(quick, slow, 0));
 }
 
-/// Takes 100 ms for the slow sonar, in parts of 5 ms, and 1 ms for the quick one. Each part ends when the quick sonar asks for a
+/// Takes 100 ms for the slow sonar, in parts of 5 ms, and 1 ms for the quick one. Each part ends when the quick sonar requests a
 /// ping, so that a busy machine does not delay the quick one's requests beyond the parts.
 class Parts final : public PingEngine {
  public:
@@ -101,7 +101,7 @@ TEST(Simulator, AQuickSonarKeepsItsRateBesideASlowOne) {
 
 constexpr std::uint32_t wrong = 99, large = 98;
 
-/// Up to three of a size together; a wrong one spoils the call. The first call waits until all have asked.
+/// Up to three of a size together; a wrong one spoils the call. The first call waits for the requests of all.
 class Together final : public PingEngine {
  public:
   Together(std::vector<std::vector<std::uint32_t>>& calls, std::shared_future<void> all_asked)

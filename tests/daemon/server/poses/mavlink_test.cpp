@@ -94,7 +94,7 @@ mavlink::Odometry odometry_at(float north_m, std::uint64_t time_us) {
 }
 
 struct Mavlink : ::testing::Test {
-  /// A later ping was asked for from y metres north.
+  /// A later ping was requested at y metres north.
   static bool asked_from(Daemon& daemon, Client& client, double y) {
     return eventually([&] {
       client.next_ping(milliseconds(100));
@@ -130,7 +130,7 @@ TEST_F(Mavlink, AListeningLinkMovesTheSonarAndAnswersWithHeartbeats) {
   EXPECT_EQ(daemon.status().vehicles().at(0).source(), source);
 }
 
-/// A BlueROV2 without DVL, with nothing said about it.
+/// A BlueROV2 without DVL, with no further configuration.
 TEST_F(Mavlink, DepthAndAttitudeMoveAVehicleAtItsInitialPlace) {
   DaemonSetup setup = with_link("udpin:HERE:0");
   setup.edit_config = [](Config& config) { config.vehicles.front().initial_pose.position_m = {5, 6, -1}; };

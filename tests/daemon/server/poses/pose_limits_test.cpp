@@ -37,7 +37,7 @@ struct PoseLimits : ::testing::Test {
   bool is_at_x(int x, int vehicle = 0, milliseconds timeout = patience) {
     return eventually([&] { return daemon->status().vehicles().at(vehicle).position().x() == x; }, timeout);
   }
-  /// Comes again until it is let in: there may be no connection yet that can be closed. `meanwhile` is done before each time.
+  /// Connects until it is accepted: there may be no connection yet that can be closed. `meanwhile` is called before each attempt.
   bool a_newcomer_moves_the_boat(const std::function<void()>& meanwhile = [] {}) {
     return eventually([&] {
       meanwhile();
@@ -73,7 +73,7 @@ TEST_F(PoseLimits, ManyTogetherAreReadSlowlyAndTheirEndChangesNothing) {
   EXPECT_LT(lines_heard * 50, most_bytes + 8 * 8192);
 }
 
-/// Poses of a sender act while they are news: of a flood that has ended only the last burst does, and its place is free.
+/// After a flood has ended, only its last burst has an effect, and its slot is free.
 TEST_F(PoseLimits, FloodsThatHaveEndedSteerNothingAndHoldNoPlace) {
   begin("input_bytes_per_s: 131072, pose_bytes_per_s: 262144");
   const std::string megabyte = lines(1000000);
@@ -110,7 +110,7 @@ TEST_F(PoseLimits, TheLastPoseOfOneThatSendsAndLeavesActs) {
     EXPECT_TRUE(is_at_x(100 * i)) << "as by echo and nc";
   }
   Client(daemon->address(), port).send(lines(3000000) + line_at_x(77));
-  EXPECT_TRUE(is_at_x(77)) << "as by cat and nc, of more than the limits allow";
+  EXPECT_TRUE(is_at_x(77)) << "the last of more lines than the limits allow, as cat and nc send them";
 }
 
 TEST_F(PoseLimits, ThoseBehindGiveTheirPlacesToNewcomers) {
@@ -203,7 +203,7 @@ TEST_F(PoseLimits, APageOfTheWebMovesNothing) {
   EXPECT_EQ(daemon->status().poses().refused(), 3u);
   Client friendly(daemon->address(), port);
   friendly.send("{\"no\":\"pose\"}\n" + line_at_x(7));
-  EXPECT_TRUE(is_at_x(7)) << "JSON that is no pose is refused, and costs the connection nothing";
+  EXPECT_TRUE(is_at_x(7)) << "JSON that is not a pose is refused, and the connection stays";
 }
 
 TEST_F(PoseLimits, ABadLineOfADatagramCostsTheOthersNothing) {

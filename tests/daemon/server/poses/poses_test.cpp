@@ -31,7 +31,7 @@ struct Poses : ::testing::Test {
     stream_port = daemon.app().control().stream().port;
     json_port = daemon.app().poses().json().port;
   }
-  /// A later ping was asked for from x.
+  /// A later ping was requested at x.
   bool asked_from(double x) {
     return eventually([&] {
       client.next_ping(milliseconds(100));

@@ -400,7 +400,7 @@ TEST(Transports, PagesOfTheWebReadAndChangeNothingByHttp) {
     EXPECT_EQ(body_of(http(at, "GET", "/range", "", host)), "5") << host;
 }
 
-/// The same in all makes' ports: what a page makes a browser send must neither act nor hold a driver's place.
+/// The same in all makes' ports: requests that a page makes a browser send must have no effect and occupy no driver's slot.
 TEST(Transports, ARequestOfHttpEndsAClientsConnection) {
   Daemon daemon(made_up());
   for (const std::string method : {"GET", "POST", "HEAD", "PUT", "DELETE", "OPTIONS", "CONNECT", "TRACE", "PATCH"})

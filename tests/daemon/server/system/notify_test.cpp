@@ -38,7 +38,7 @@ class Manager {
     std::error_code ec;
     if (name_[0] != '@') std::filesystem::remove(name_, ec);
   }
-  /// The next message; empty when none came in time.
+  /// The next message; empty if none arrived in time.
   std::string next() {
     std::string text(4096, '\0');
     const auto size = ::recv(fd_, text.data(), text.size(), 0);

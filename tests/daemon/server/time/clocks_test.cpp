@@ -24,7 +24,7 @@ DaemonSetup with_clock(const std::string& mode, const std::string& more = "") {
   return setup;
 }
 
-/// A daemon with one client that asked for 40 Hz, once the sonar has served it. It reads all the time, because time waits for
+/// A daemon with one client that requested 40 Hz, once the sonar has served it. It reads all the time, because time waits for
 /// readers.
 struct Pinging {
   explicit Pinging(DaemonSetup setup) : daemon(std::move(setup)), client(daemon.address()) {

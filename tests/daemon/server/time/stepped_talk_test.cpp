@@ -27,7 +27,7 @@ DaemonSetup head(const std::string& clock) {
   return setup;
 }
 
-/// A host that greets, subscribes and then reads whatever comes.
+/// A host that greets, subscribes and then reads everything.
 struct Host {
   explicit Host(const Daemon& daemon, std::uint32_t interval_ms = 0) : link(daemon.address(), blueview::tcp_port) {
     link.send(bv::hello());
