@@ -21,21 +21,22 @@ def roff(text):
     return "\n".join(textwrap.wrap(text, 130, break_on_hyphens=False))
 
 
-def texts(makes):
-    """{file: [(regular expression of what is replaced, with what)]}"""
+def texts(makes, demos):
+    """{file: [(regular expression of the replaced text, new text)]}"""
     sonars = listed([title for title, _ in makes], "or")
     plural = listed([re.sub(r"^an? ", "", title) for title, _ in makes], "and")
     table = "\n".join(f".It {title.split(' ', 1)[1]}\n{roff(', '.join(products))}" for title, products in makes)
-    package = "\n".join(textwrap.wrap("sonard holds a 3D scene, takes the pose of a vehicle, computes what a multibeam sonar would hear, and "
-                                      f"serves it as {sonars}: drivers written for the real device connect unchanged, those of BlueView "
+    package = "\n".join(textwrap.wrap("sonard holds a 3D scene, receives the pose of a vehicle, computes the echoes that a multibeam sonar would "
+                                      f"receive, and serves them as {sonars}: drivers written for the real device connect unchanged, those of BlueView "
                                       "with libraries of sonard's. With sonarctl, which listens to, looks at and steers sonars, and with a "
                                       "systemd unit, which is not started by the installation.", 78, break_on_hyphens=False))
     return {
         "docs/man/sonard.8": [
-            (r"(?<=holds a 3D scene, takes the pose)(?s:.*?)(?=\n\.Pp\nWithout\n)",
+            (r"(?<=holds a 3D scene, receives the pose)(?s:.*?)(?=\n\.Pp\nWithout\n)",
              " of a vehicle, computes the echoes that a multibeam sonar would receive, and serves them as\n" + roff(sonars + ".")
              + "\nDrivers written for the real device connect unchanged, those of BlueView with libraries of sonard's.\n"
              "The viewer ViewPoint of Oculus very likely shows no picture."),
+            (r"(?<=\n\.It Fl -demo Op Ar )[^\n]*", " | ".join(demos)),
             (r"(?<=\n\.Sh PRODUCTS\nOf\n\.Fl -profile\nand of the key\n\.Li profile :\n\.Bl -tag -width Ds\n)(?s:.*?)(?=\n\.El\n)", table)],
         "docs/man/sonarctl.1": [(r"(?<=connects to sonars as a driver \()[^)]*(?=\))", "\n" + roff(plural) + "\n")],
         "daemon/package.cmake": [(r"(?<=from a 3D scene\n)(?s:sonard holds.*?)(?=\"\))", package)],
@@ -43,10 +44,13 @@ def texts(makes):
 
 
 def main():
-    lines = subprocess.run([sys.argv[1]], capture_output=True, text=True, check=True, timeout=60).stdout.splitlines()
+    def printed(*options):
+        return subprocess.run([sys.argv[1], *options], capture_output=True, text=True, check=True, timeout=60).stdout.splitlines()
+
+    lines, demos = printed(), printed("--demos")
     makes = [(title, products.split()) for title, _, products in (line.partition(":") for line in lines)]
     wrong = 0
-    for name, changes in texts(makes).items():
+    for name, changes in texts(makes, demos).items():
         path = ROOT / name
         there = text = path.read_text(encoding="utf-8")
         for pattern, by in changes:
