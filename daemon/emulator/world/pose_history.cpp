@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/motion/jump.hpp"
+
 namespace sonar {
 namespace {
 // Two samples closer in time than this give no speed, because the difference of their stamps is mostly jitter.
@@ -27,11 +29,13 @@ PoseHistory::Motion PoseHistory::between(const Sample& before, const Sample& aft
           per_s * rotation_between(before.pose.orientation, after.pose.orientation)};
 }
 
-/// Velocities that the sender states replace the difference of the last two poses.
+/// Velocities that the sender states replace the difference of the last two poses. A difference that is a jump is not a motion:
+/// a vehicle that was put elsewhere stays there.
 PoseHistory::Motion PoseHistory::newest_motion() const {
   const Sample& last = samples_.back();
   Motion motion;
   if (samples_.size() > 1) motion = between(samples_[samples_.size() - 2], last);
+  if (motion::is_jump(motion.velocity_mps, motion.angular_velocity_radps)) motion = {};
   if (last.velocity_mps) motion.velocity_mps = rotate(last.pose.orientation, *last.velocity_mps);
   if (last.angular_velocity_radps) motion.angular_velocity_radps = *last.angular_velocity_radps;
   return motion;

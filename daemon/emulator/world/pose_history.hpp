@@ -34,7 +34,8 @@ class PoseHistory {
   /// Replaces newest(), for poses that come too fast. `sample.at` must not be before newest().at; the history must not be empty.
   void replace_newest(const Sample& sample) { samples_.back() = sample; }
   /// Between samples: interpolated (lerp, slerp). Before the first: held. After the last: extrapolated by its velocity, or by
-  /// the difference of the last two, for at most `extrapolate_max`, then held. The history must not be empty.
+  /// the difference of the last two unless that is a jump, for at most `extrapolate_max`, then held. The history must not be
+  /// empty.
   Pose at(Time t, std::chrono::nanoseconds extrapolate_max) const;
   /// The motion of the pose of at(): between samples, their difference over time; after the newest, its velocity; before the
   /// first and where it is held, none.

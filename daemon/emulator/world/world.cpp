@@ -79,6 +79,19 @@ bool World::continues(const Track& track, const PoseSample& sample, const Sender
   return rules_.follows ? at >= track.history.newest().at - rules_.stale_after : now - track.last_arrival <= rules_.stale_after;
 }
 
+/// Notes who sends, and returns true once while two senders alternate.
+bool World::has_rival(Track& track, const Sender& sender, Time now) const {
+  const bool silent = now - track.last_arrival > rules_.stale_after;
+  if (silent) {
+    track.earlier_sender_id.clear();
+    track.rival_reported = false;
+  }
+  if (track.sender_id == sender.id) return false;
+  const bool alternate = track.earlier_sender_id == sender.id;
+  track.earlier_sender_id = silent ? std::string() : track.sender_id;
+  return alternate && !std::exchange(track.rival_reported, true);
+}
+
 /// The sender's clock is mapped by the least delay seen. A delay that grows by more than extrapolate_max is a jump of that clock.
 World::Ns World::offset_for(const Track& track, Time at, Time now, bool goes_on) {
   if (rules_.follows) return followed_offset_for(track, at, now);
@@ -163,7 +176,10 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
                  " do not continue from the last one: they are shifted, and sonard's time continues without a jump";
   track.offset = offset;
 
-  if (track.source != sender.source) {
+  if (has_rival(track, sender, now)) {
+    out.notice = track.body.name + " receives poses from two senders in turns, " + track.sender_id + " and " + sender.id +
+                 ": let only one of them send";
+  } else if (track.source != sender.source) {
     out.notice = "pose source of " + track.body.name + " changed: " + track.source + " -> " + sender.source +
                  (sample.fields.empty() ? "" : "; fields: " + sample.fields) + " (" +
                  std::string(control::name_of(sample.sent_in)) + ")";
@@ -224,10 +240,14 @@ std::vector<World::Stale> World::newly_stale(Time now) {
 }
 
 /// The first of these that applies: hidden far above the scene, received poses, a trajectory, the orbit of the demo, the
-/// initial pose.
+/// initial pose. Without news for stale_after a body is where its newest pose put it, not where it was extrapolated to.
 Pose World::pose_at(const Track& track, Time t) const {
   if (track.hidden) return {{0, 0, hidden_height_m}, {}};
-  if (!track.history.empty()) return track.history.at(t - track.offset, rules_.extrapolate_max);
+  if (!track.history.empty()) {
+    const Time at = t - track.offset;
+    if (at - track.history.newest().at > rules_.stale_after) return track.history.newest().pose;
+    return track.history.at(at, rules_.extrapolate_max);
+  }
   if (track.body.plan) return played(track, t).body_in_world;
   return track.body.orbits ? orbit(track.body.initial_pose, t) : track.body.initial_pose;
 }
@@ -250,7 +270,8 @@ PoseHistory::Motion World::vehicle_moves(std::size_t vehicle, Time t) const {
     return {{-per_s * p.y, per_s * p.x, 0}, {0, 0, per_s}};
   }
   const PoseHistory::Motion moves =
-      track.history.empty() ? played(track, t).moves : track.history.motion_at(t - track.offset, rules_.extrapolate_max);
+      track.history.empty() ? played(track, t).moves
+                            : track.history.motion_at(t - track.offset, std::min(rules_.extrapolate_max, rules_.stale_after));
   return motion::is_jump(moves.velocity_mps, moves.angular_velocity_radps) ? PoseHistory::Motion{} : moves;
 }
 

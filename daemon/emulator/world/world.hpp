@@ -122,6 +122,8 @@ class World {
     PoseHistory history;
     motion::Playback playback{};  // playback of body.plan
     std::string sender_id, source;
+    std::string earlier_sender_id;  // the sender before the last change; empty after silence
+    bool rival_reported = false;    // that two senders alternate
     std::uint64_t seq = 0;
     std::uint32_t reset_counter = 0;
     control::ClockDomain domain{};
@@ -144,6 +146,7 @@ class World {
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now) const;
   /// Returns whether the pose continues the history. Refuses late poses, and clears the history at a jump.
   bool is_next(Track& track, const control::PoseSample& sample, Time at, PoseOutcome& out);
+  bool has_rival(Track& track, const Sender& sender, Time now) const;
   void keep(Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now);
   /// Returns the offset of our time from the sender's clock, which stamped a pose with `at`.
   Ns offset_for(const Track& track, Time at, Time now, bool goes_on);

@@ -74,6 +74,22 @@ TEST(PoseHistory, SamplesMicrosecondsApartSayNothingAboutSpeed) {
   EXPECT_EQ(h.at(t0 + milliseconds(100), limit).position_m.x, 0.01);
 }
 
+TEST(PoseHistory, AJumpIsNotExtrapolated) {
+  PoseHistory placed;  // 400 m/s
+  placed.put({t0, pose(0), {}, {}});
+  placed.put({t0 + milliseconds(50), pose(20), {}, {}});
+  EXPECT_EQ(placed.at(t0 + milliseconds(150), limit).position_m.x, 20);
+  EXPECT_EQ(placed.motion_at(t0 + milliseconds(150), limit).velocity_mps.x, 0);
+  PoseHistory turned;  // 180 degrees in 0.1 s
+  turned.put({t0, pose(0, 0), {}, {}});
+  turned.put({t0 + milliseconds(100), pose(1, 180), {}, {}});
+  EXPECT_NEAR(std::abs(yaw_deg(turned.at(t0 + milliseconds(200), limit))), 180, 1e-9);
+  PoseHistory thrown;  // a stated velocity counts all the same
+  thrown.put({t0, pose(0), {}, {}});
+  thrown.put({t0 + milliseconds(50), pose(20), Vec3d{1, 0, 0}, {}});
+  EXPECT_NEAR(thrown.at(t0 + milliseconds(150), limit).position_m.x, 20.1, 1e-12);
+}
+
 TEST(PoseHistory, EqualTimesReplaceAndOldSamplesGo) {
   PoseHistory h;
   h.put({t0, pose(1), {}, {}});

@@ -176,6 +176,34 @@ TEST(World, AChangedResetCounterOrAJumpClearsTheHistory) {
   EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(400)).position_m.x, 60) << "no extrapolation across the jump";
 }
 
+TEST(World, AVehicleWithoutNewsRestsAtItsNewestPose) {
+  World w = one_rov();
+  w.accept(at_x(0, 1), udp, t0);
+  w.accept(at_x(1, 2), udp, t0 + milliseconds(100));
+  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(1000)).position_m.x, 3, 1e-9) << "extrapolated for 0.2 s, then held";
+  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(1101)).position_m.x, 1) << "stale";
+  EXPECT_EQ(length(w.vehicle_moves(0, t0 + milliseconds(1101)).velocity_mps), 0);
+  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(300)).position_m.x, 3, 1e-9) << "earlier times stay as they were";
+}
+
+TEST(World, TwoSendersInTurnsAreReportedOnce) {
+  const Sender one{"json udp 127.0.0.1:40001", "json 127.0.0.1"}, other{"json udp 127.0.0.1:40002", "json 127.0.0.1"};
+  World w = one_rov();
+  std::vector<std::string> notices;
+  const auto sent = [&](const Sender& sender, int ms) {
+    const std::string notice = w.accept(stamped(1, ClockDomain::arrival, {}), sender, t0 + milliseconds(ms)).notice;
+    if (notice.find("in turns") != std::string::npos) notices.push_back(notice);
+  };
+  for (int i = 0; i < 20; ++i) sent(i % 2 == 0 ? one : other, 50 * i);
+  ASSERT_EQ(notices.size(), 1u);
+  EXPECT_THAT(notices[0], AllOf(HasSubstr(one.id), HasSubstr(other.id)));
+  sent(one, 5000);  // a program that starts again has another port and is not a rival
+  sent(other, 5100);
+  EXPECT_EQ(notices.size(), 1u);
+  sent(one, 5200);
+  EXPECT_EQ(notices.size(), 2u);
+}
+
 TEST(World, PosesBeyondOneKilohertzReplaceTheNewestAndAreCounted) {
   PoseRules rules;
   rules.burst = 4;
