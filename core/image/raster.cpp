@@ -52,6 +52,21 @@ int open_alone(const std::filesystem::path& file) {
   }
 }
 
+/// The file behind symbolic links, which need not exist.
+std::filesystem::path behind_links(std::filesystem::path file) {
+  constexpr int most_links = 40;  // as many as the system follows
+  std::error_code error;
+  for (int i = 0; i < most_links && std::filesystem::is_symlink(file, error); ++i)
+    file = file.parent_path() / std::filesystem::read_symlink(file, error);
+  return file;
+}
+
+bool is_device_or_pipe(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status) && !std::filesystem::is_directory(status);
+}
+
 }  // namespace
 
 void blend(Raster& raster, int x, int y, Rgb colour, float opacity) {
@@ -92,11 +107,14 @@ Result<std::vector<std::byte>> encode_png(const Raster& raster) {
 }
 
 Result<void> write_whole_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts) {
-  const std::filesystem::path unfinished = file.string() + ".tmp";
-  const int lock = open_alone(unfinished);
+  const bool replaces = !is_device_or_pipe(file);  // a device or a pipe stays what it is, and is written
+  const std::filesystem::path target = replaces ? behind_links(file) : file;
+  const std::filesystem::path unfinished = replaces ? target.string() + ".tmp" : target.string();
+  const int lock = replaces ? open_alone(unfinished) : ::open(target.c_str(), O_WRONLY | O_CLOEXEC);
   const auto failed = [&](int why) {
     std::error_code ignored;
-    if (lock >= 0) std::filesystem::remove(unfinished, ignored), ::close(lock);
+    if (lock >= 0 && replaces) std::filesystem::remove(unfinished, ignored);
+    if (lock >= 0) ::close(lock);
     return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(why));
   };
   if (lock < 0) return failed(errno);
@@ -108,7 +126,7 @@ Result<void> write_whole_file(const std::filesystem::path& file, std::initialize
     if (why == 0 && std::fwrite(part.data(), 1, part.size(), out) != part.size()) why = errno;
   if (std::fclose(out) != 0 && why == 0) why = errno;  // the buffered bytes did not fit on the disk
   std::error_code error;
-  if (why == 0) std::filesystem::rename(unfinished, file, error);
+  if (why == 0 && replaces) std::filesystem::rename(unfinished, target, error);
   if (why != 0 || error) return failed(why != 0 ? why : error.value());
   ::close(lock);
   return {};

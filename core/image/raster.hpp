@@ -36,8 +36,9 @@ int text_width(std::string_view text, int scale);
 /// The bytes of a PNG file.
 Result<std::vector<std::byte>> encode_png(const Raster& raster);
 
-/// Writes the parts to a temporary file and renames it, so that `file` is always complete. Error io: the file and the system's
-/// reason; the temporary file is then removed.
+/// Writes the parts to a temporary file and renames it, so that `file` is always complete. The file behind a symbolic link is
+/// replaced, not the link; a device or a pipe is written. Error io: the file and the system's reason; the temporary file is then
+/// removed.
 Result<void> write_whole_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts);
 
 /// Writes a PNG file by write_whole_file(). Makes its folder if needed.

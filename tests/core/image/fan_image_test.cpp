@@ -1,9 +1,13 @@
 // The fan: port must be left, far must be up, and no sample may be missing in the pixels.
 #include "core/image/draw_fan.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -181,6 +185,28 @@ TEST(Png, IsWrittenWholeOrRefusedWithASentence) {
   EXPECT_EQ(start, "\x89PNG\r\n\x1a\n");
   EXPECT_FALSE(std::filesystem::exists(file.string() + ".tmp"));
   EXPECT_EQ(write_png(Raster(4, 4), "/dev/null/fan.png").error().kind, ErrorKind::io);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Png, LinksAndPipesStayWhatTheyAre) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / "fan_image_test_links";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder / "pictures");
+  std::filesystem::create_symlink("pictures/real.png", folder / "link.png");
+  for (int i = 0; i < 2; ++i) {  // at first the link leads nowhere
+    ASSERT_TRUE(write_png(Raster(4, 4), folder / "link.png"));
+    EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.png"));
+    EXPECT_GT(std::filesystem::file_size(folder / "pictures/real.png"), 8u);
+  }
+  const std::string pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_TRUE(write_png(Raster(4, 4), pipe));
+  std::array<char, 8> start{};
+  EXPECT_EQ(::read(reader, start.data(), start.size()), 8);
+  EXPECT_EQ(start[1], 'P');
+  ::close(reader);
+  EXPECT_EQ(std::filesystem::status(pipe).type(), std::filesystem::file_type::fifo);
   std::filesystem::remove_all(folder);
 }
 
