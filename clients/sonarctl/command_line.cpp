@@ -6,6 +6,7 @@
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/scene_command.hpp"
+#include "core/base/standard_streams.hpp"
 #include "core/text/arguments.hpp"
 
 namespace sonar::clients {
@@ -44,12 +45,16 @@ int run(int argc, char** argv) {
     text::parse(app, is_other_program ? 2 : argc, argv);
   } catch (const CLI::ParseError& error) {
     const std::string complaint = text::complaint_about(app, error, words);
-    return complaint.empty() ? app.exit(error) : complain(complaint, ErrorKind::usage);
+    if (!complaint.empty()) return complain(complaint, ErrorKind::usage);
+    const int code = app.exit(error);
+    const Result<void> printed = flush_standard_output();
+    return code == 0 && !printed ? complain(printed.error().text, printed.error().kind) : code;
   }
   for (const auto& [name, command] : commands) {
     if (!app.got_subcommand(name)) continue;
-    const Result<void> done = command();
-    std::fflush(stdout);
+    Result<void> done = command();
+    const Result<void> printed = flush_standard_output();
+    if (done) done = printed;
     return done ? 0 : complain(done.error().text, done.error().kind);
   }
   return exit_code(ErrorKind::bug);

@@ -3,6 +3,7 @@
 
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
+#include "core/base/standard_streams.hpp"
 
 int main(int argc, char** argv) {
   struct sigaction on_interrupt {};
@@ -12,5 +13,6 @@ int main(int argc, char** argv) {
   sigaction(SIGINT, &on_interrupt, nullptr);
   sigaction(SIGTERM, &on_interrupt, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
+  sonar::open_closed_standard_streams();
   return sonar::clients::run(argc, argv);
 }

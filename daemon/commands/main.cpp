@@ -7,6 +7,7 @@
 
 #include <boost/system/system_error.hpp>
 
+#include "core/base/standard_streams.hpp"
 #include "daemon/commands/check_command.hpp"
 #include "daemon/commands/dataset/dataset_command.hpp"
 #include "daemon/commands/farm/farm_command.hpp"
@@ -15,7 +16,6 @@
 #include "daemon/commands/render/render_command.hpp"
 #include "daemon/commands/run/run_command.hpp"
 #include "daemon/server/system/log.hpp"
-#include "daemon/server/system/standard_streams.hpp"
 
 namespace sonar {
 namespace {
@@ -46,7 +46,7 @@ Result<int> code_of(const Result<void>& done) {
 
 /// Returns the exit code. Sets `json` if the caller must write errors as JSON, thrown exceptions included.
 Result<int> run_command(const Command& command, std::chrono::steady_clock::time_point begin, bool& json) {
-  if (const auto* leave = std::get_if<Leave>(&command)) return leave->exit_code;
+  if (const auto* leave = std::get_if<Leave>(&command)) return leave->exit_code;  // --help, --version or a reported error
   if (const auto* check = std::get_if<CheckCommand>(&command)) return code_of(run_check(*check));
   if (const auto* render = std::get_if<RenderCommand>(&command)) return code_of(render::run_render(*render));
   if (const auto* dataset = std::get_if<DatasetCommand>(&command)) return dataset::run_dataset(*dataset);
@@ -67,8 +67,12 @@ int main(int argc, char** argv) {
   const auto begin = std::chrono::steady_clock::now();
   bool json = false;
   try {
-    const auto code = sonar::run_command(sonar::parse_command_line(argc, argv), begin, json);
-    return code ? *code : sonar::report_error(code.error(), json);
+    const auto command = sonar::parse_command_line(argc, argv);
+    const auto code = sonar::run_command(command, begin, json);
+    if (!code) return sonar::report_error(code.error(), json);
+    const auto printed = sonar::flush_standard_output();
+    const bool is_lost = !printed && *code == 0 && !std::holds_alternative<sonar::RunCommand>(command);  // that writes a log
+    return is_lost ? sonar::report_error(printed.error(), json) : *code;
   } catch (const std::bad_alloc&) {
     return sonar::report_error({sonar::ErrorKind::unavailable, "not enough memory; use a smaller scene or free some"}, json);
   } catch (const std::exception& e) {

@@ -1,6 +1,8 @@
 """Errors of the command lines: one sentence with what, where and what to do, and the exit code of its class."""
 import os
 import pathlib
+import signal
+import subprocess
 import tempfile
 import unittest
 
@@ -42,6 +44,17 @@ class Help(unittest.TestCase):
         for words in [[], *([name] for name in names), ["set", "sonar"], ["set", "water"], ["object", "add"]]:
             with self.subTest(words=words):
                 self.assertIn("examples:", run(SONARCTL, *words, "--help").stdout)
+
+    def test_output_that_is_lost_is_an_error(self):
+        for command in [(SONARD, "--help"), (SONARCTL, "--help"), (SONARCTL, "scene", "info", ROOT / "scenes/demo.yaml")]:
+            words = [str(c) for c in command]
+            with self.subTest(command=words), open("/dev/full", "w", encoding="utf-8") as full:
+                result = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+                self.assertEqual(result.returncode, 74)
+                self.assertIn("standard output cannot be written", result.stderr)
+            with self.subTest(reader="gone", command=words), subprocess.Popen(words, stdout=subprocess.PIPE) as gone:
+                gone.stdout.close()
+                self.assertIn(gone.wait(120), (0, -signal.SIGPIPE))
 
     def test_version(self):
         self.assertRegex(run(SONARD, "--version").stdout, r"^sonard \d+\.\d+\.\d+\nhot loops: (portable|avx2|avx512|neon)\n$")

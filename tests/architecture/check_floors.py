@@ -101,8 +101,8 @@ FORBIDDEN = [
      "only daemon/ and clients/ print or log"),
     ("thread", r"core/|protocol/|cuda/|clients/", r"core/base/parallel\.|clients/bvtsdk/core/link\.", r"\bstd::(j?thread|async)\b|\bpthread_create\b",
      "compute threads live in core/base/parallel.* only, the keep-alive thread of a link in its own file"),
-    ("socket", r"core/|protocol/", None, r"#\s*include\s*<(sys/socket|netinet/|arpa/|poll|netdb)", "only daemon/ and clients/ touch sockets"),
-    ("file", r"core/|protocol/", r"core/base/(regular_file|memory_left|child_process)\.cpp|core/image/raster\.cpp|protocol/recorded/byte_source\.cpp",
+    ("socket", r"core/|protocol/", r"core/base/standard_streams\.cpp", r"#\s*include\s*<(sys/socket|netinet/|arpa/|poll|netdb)", "only daemon/ and clients/ touch sockets"),
+    ("file", r"core/|protocol/", r"core/base/(regular_file|memory_left|child_process|standard_streams)\.cpp|core/image/raster\.cpp|protocol/recorded/byte_source\.cpp",
      r"\bstd::[io]?fstream\b|(?<![\w:>.])(std::|::)?fopen\s*\(|(?<![\w>])::open(at)?\s*\(|#\s*include\s*<fcntl\.h>",
      "bytes come in as arguments; only the loaders named in this rule, and recordings through protocol/recorded/byte_source.cpp, open files "
      "(docs/decisions/0015-recording-files-behind-two-interfaces.md)"),

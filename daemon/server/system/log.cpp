@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "daemon/server/system/standard_streams.hpp"
+#include "core/base/standard_streams.hpp"
 
 namespace sonar {
 namespace {
