@@ -1,6 +1,7 @@
 #include "protocol/recorded/byte_source.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -157,12 +158,21 @@ Result<std::unique_ptr<Sink>> sink_to(const std::filesystem::path& file, int mor
   const int error = errno;
   if (fd < 0 && error == EEXIST) return failure(ErrorKind::io, file.string() + " exists already: give another name");
   if (fd < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(error));
+  Descriptor opened(fd);
+  struct stat about {};
+  if (::fstat(fd, &about) == 0 && S_ISREG(about.st_mode)) {
+    // A file is emptied once no other program that writes it holds its lock. File systems without locks have no check.
+    if (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+      return failure(ErrorKind::io, file.string() + " is being written by another program: give another name");
+    if (::ftruncate(fd, 0) != 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(errno));
+  }
+  opened.release();
   return std::make_unique<FileSink>(file.string(), fd);
 }
 
 }  // namespace
 
-Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file) { return sink_to(file, O_TRUNC); }
+Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file) { return sink_to(file, 0); }
 
 Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file) { return sink_to(file, O_EXCL); }
 

@@ -106,6 +106,21 @@ TEST_P(EveryFormat, AFullDiskLeavesWhatWasWritten) {
   expect_same(found, written, opened->reader->knows_times());
 }
 
+TEST(Recording, AFileThatIsBeingWrittenIsRefusedAndKept) {
+  const TemporaryFile file("written.bin");
+  auto first = create_sink(file.path());
+  ASSERT_TRUE(first);
+  ASSERT_TRUE((*first)->append(std::as_bytes(std::span("first", 5))));
+  const auto second = create_sink(file.path());
+  ASSERT_FALSE(second);
+  EXPECT_THAT(second.error().text, HasSubstr("is being written by another program"));
+  ASSERT_TRUE((*first)->close());
+  EXPECT_EQ(std::filesystem::file_size(file.path()), 5u);
+  first->reset();
+  EXPECT_TRUE(create_sink(file.path()));
+  EXPECT_EQ(std::filesystem::file_size(file.path()), 0u);
+}
+
 TEST(Recording, RefusesOtherFiles) {
   const auto text_of = [](const std::string& content) {
     auto opened = open_bytes(bytes_of(content));
