@@ -27,11 +27,11 @@ void repair_texts(google::protobuf::Message& message);
 Result<PoseSample> from(const v1::PoseUpdate& message);
 Result<PoseSample> from(const v1::ObjectUpdate& message);
 Result<Pose> from(const v1::Placement& message);
-Result<Pose> from(const v1::Mount& message);
+Result<MountChange> from(const v1::Mount& message);
 void fill(v1::PoseUpdate& out, const PoseSample& sample);
 void fill(v1::ObjectUpdate& out, const PoseSample& sample);
 void fill(v1::Placement& out, const Pose& in_world);
-void fill(v1::Mount& out, const Pose& in_vehicle);
+void fill(v1::Mount& out, const MountChange& change);
 
 // ---- requests (request_messages.cpp)
 tl::expected<Request, RefusedRequest> from(const v1::Request& message);

@@ -16,13 +16,19 @@ namespace sonar::control {
 
 struct GetStatus {};
 
+/// Sonar in vehicle, FLU. What is not given stays.
+struct MountChange {
+  std::optional<Vec3d> position_m;
+  std::optional<Quatd> orientation;
+};
+
 /// Fields that are not given keep their values. Finite numbers only; the daemon checks them against the product.
 struct SetSonar {
   std::string sonar;  // empty = the only one there is
   std::optional<double> range_m, rate_hz, gain_percent;
   std::optional<std::uint32_t> mode, beams;
   std::optional<bool> transmit;
-  std::optional<Pose> mount;  // sonar in vehicle, FLU
+  std::optional<MountChange> mount;
 };
 struct SetEnvironment {
   std::optional<double> temperature_c, salinity_psu, ph, sound_speed_mps;

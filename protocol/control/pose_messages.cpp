@@ -117,15 +117,18 @@ Result<Pose> from(const v1::Placement& message) {
   return sample->pose;
 }
 
-// Zeros are missing fields in proto3, so a mount without position and angles is level at the origin of the vehicle.
-Result<Pose> from(const v1::Mount& message) {
+Result<MountChange> from(const v1::Mount& message) {
   if (message.frame() == v1::Mount::FRAME_UNSPECIFIED) return refused("mount.frame is missing: give FRD or FLU");
   if (message.frame() != v1::Mount::FRD && message.frame() != v1::Mount::FLU) return refused("mount.frame has an unknown value");
   if (!all_within(message.position(), furthest_mount_m)) return refused("mount.position is beyond 1000 m");
   if (!all_within(message.rpy_deg(), most_degrees)) return refused("mount.rpy_deg is beyond 360 degrees");
   const v1::Vec3 &p = message.position(), &a = message.rpy_deg();
   const Pose pose{{p.x(), p.y(), p.z()}, quat_from_rpy({rad_from_deg(a.x()), rad_from_deg(a.y()), rad_from_deg(a.z())})};
-  return message.frame() == v1::Mount::FRD ? flu_from_frd(pose) : pose;
+  const Pose mount = message.frame() == v1::Mount::FRD ? flu_from_frd(pose) : pose;
+  MountChange change;
+  if (message.has_position()) change.position_m = mount.position_m;
+  if (message.has_rpy_deg()) change.orientation = mount.orientation;
+  return change;
 }
 
 void fill(v1::PoseUpdate& out, const PoseSample& sample) {
@@ -144,10 +147,11 @@ void fill(v1::Placement& out, const Pose& in_world) {
   fill(*out.mutable_orientation(), in_world.orientation);
 }
 
-void fill(v1::Mount& out, const Pose& in_vehicle) {
-  const RollPitchYaw a = rpy_from_quat(in_vehicle.orientation);
+void fill(v1::Mount& out, const MountChange& change) {
   out.set_frame(v1::Mount::FLU);
-  fill(*out.mutable_position(), in_vehicle.position_m);
+  if (change.position_m) fill(*out.mutable_position(), *change.position_m);
+  if (!change.orientation) return;
+  const RollPitchYaw a = rpy_from_quat(*change.orientation);
   fill(*out.mutable_rpy_deg(), Vec3d{deg_from_rad(a.roll_rad), deg_from_rad(a.pitch_rad), deg_from_rad(a.yaw_rad)});
 }
 

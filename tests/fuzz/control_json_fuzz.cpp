@@ -21,7 +21,9 @@ struct Check {
   void operator()(const control::AddObject& op) const { require(usable(op.in_world)); }
   void operator()(const control::SetObject& op) const { require(!op.in_world || usable(*op.in_world)); }
   void operator()(const control::SetSonar& op) const {
-    require(finite(op.range_m) && finite(op.rate_hz) && finite(op.gain_percent) && (!op.mount || usable(*op.mount)));
+    require(finite(op.range_m) && finite(op.rate_hz) && finite(op.gain_percent));
+    const control::MountChange mount = op.mount.value_or(control::MountChange{});
+    require(usable(Pose{mount.position_m.value_or(Vec3d{}), mount.orientation.value_or(Quatd{})}));
   }
   void operator()(const control::SetEnvironment& op) const {
     require(finite(op.temperature_c) && finite(op.salinity_psu) && finite(op.ph) && finite(op.sound_speed_mps));

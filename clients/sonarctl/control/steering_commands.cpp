@@ -58,21 +58,26 @@ struct Steering {
 struct SonarArguments {
   control::SetSonar sonar;
   std::string transmit;
-  std::vector<double> mount_xyz_m, mount_rpy_deg{0, 0, 0};
+  std::vector<double> mount_xyz_m, mount_rpy_deg;
   std::string mount_frame = "frd";
 
   Result<control::SetSonar> finish() const {
     control::SetSonar finished = sonar;
     if (!transmit.empty()) finished.transmit = transmit == "on";
-    if (!mount_xyz_m.empty()) {
-      const RollPitchYaw rpy{rad_from_deg(mount_rpy_deg[0]), rad_from_deg(mount_rpy_deg[1]), rad_from_deg(mount_rpy_deg[2])};
-      const Pose given{{mount_xyz_m[0], mount_xyz_m[1], mount_xyz_m[2]}, quat_from_rpy(rpy)};
-      finished.mount = mount_frame == "frd" ? flu_from_frd(given) : given;
-    }
+    const std::vector<double>&at = mount_xyz_m, &rpy_deg = mount_rpy_deg;
+    Pose given;
+    if (!at.empty()) given.position_m = {at[0], at[1], at[2]};
+    if (!rpy_deg.empty())
+      given.orientation = quat_from_rpy({rad_from_deg(rpy_deg[0]), rad_from_deg(rpy_deg[1]), rad_from_deg(rpy_deg[2])});
+    const Pose mount = mount_frame == "frd" ? flu_from_frd(given) : given;
+    if (!at.empty() || !rpy_deg.empty()) finished.mount.emplace();
+    if (!at.empty()) finished.mount->position_m = mount.position_m;
+    if (!rpy_deg.empty()) finished.mount->orientation = mount.orientation;
     const bool any = finished.range_m || finished.rate_hz || finished.gain_percent || finished.mode || finished.beams ||
                      finished.transmit || finished.mount;
     if (!any)
-      return failure(ErrorKind::usage, "nothing to set: give --range, --rate, --gain, --mode, --beams, --transmit or --mount");
+      return failure(ErrorKind::usage,
+                     "nothing to set: give --range, --rate, --gain, --mode, --beams, --transmit, --mount or --mount-rpy");
     return finished;
   }
 };
@@ -95,16 +100,16 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
   add_optional(command, "--beams", s.beams, "number of beams; depends on the product")->check(whole_number(0, 65535));
   command.add_option("--transmit", arguments->transmit, "on, or off: receive only noise, for all clients")
       ->check(one_of({"on", "off"}));
-  CLI::Option* mount = command.add_option("--mount", arguments->mount_xyz_m, "X,Y,Z of the sonar on its vehicle, m");
-  mount->expected(3)->delimiter(',')->check(number());
-  command.add_option("--mount-rpy", arguments->mount_rpy_deg, "roll, pitch, yaw in degrees (default 0,0,0)")
+  command.add_option("--mount", arguments->mount_xyz_m, "X,Y,Z of the sonar on its vehicle, m")
       ->expected(3)
       ->delimiter(',')
-      ->check(number())
-      ->needs(mount);
+      ->check(number());
+  command.add_option("--mount-rpy", arguments->mount_rpy_deg, "roll, pitch, yaw of the sonar on its vehicle, degrees")
+      ->expected(3)
+      ->delimiter(',')
+      ->check(number());
   command.add_option("--mount-frame", arguments->mount_frame, "frame of the mount: frd (default) or flu")
-      ->check(one_of({"frd", "flu"}))
-      ->needs(mount);
+      ->check(one_of({"frd", "flu"}));
   command.callback([steering, arguments] {
     steering->what = [steering, arguments]() -> Result<void> {
       const Result<control::SetSonar> wanted = arguments->finish();

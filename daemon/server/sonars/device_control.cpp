@@ -152,7 +152,11 @@ Result<void> Device::ask(const control::SetSonar& asked, const std::string& who)
   if (asked.transmit && sonar_.set_transmit(*asked.transmit))
     network_.log.info(*asked.transmit ? "transmits again" : "does not transmit any more",
                       {{"sonar", config().name}, {"client", who}});
-  if (asked.mount) sonar_.move_mount(*asked.mount, now);
+  if (asked.mount) {
+    const Pose& old = config().mount;
+    sonar_.move_mount({asked.mount->position_m.value_or(old.position_m), asked.mount->orientation.value_or(old.orientation)},
+                      now);
+  }
   perform(std::move(actions));
   return {};
 }

@@ -142,20 +142,25 @@ TEST(SetSonar, MovesItOnItsVehicle) {
   client.fire(fire_at(PingRate::hz40));
   ASSERT_TRUE(client.next_ping());
   control::SetSonar tilt;
-  tilt.mount = Pose{{0.5, 0, 0}, quat_from_rpy({0, rad_from_deg(30), 0})};
+  tilt.mount = control::MountChange{Vec3d{0.5, 0, 0}, quat_from_rpy({0, rad_from_deg(30), 0})};
   ASSERT_EQ(daemon.ask(tilt).code, Code::done);
   const std::size_t by_now = daemon.requests().size() + 1;  // one may be on its way to the engine
   ASSERT_TRUE(eventually([&] { return daemon.requests().size() > by_now; }));
   const Pose sonar = daemon.requests().back().sonar_in_world;
   EXPECT_NEAR(sonar.position_m.x, 0.5, 1e-12);
   EXPECT_NEAR(rpy_from_quat(sonar.orientation).pitch_rad, rad_from_deg(30), 1e-12);
+
+  tilt.mount = control::MountChange{Vec3d{0.7, 0, 0}, {}};  // the angles stay
+  ASSERT_EQ(daemon.ask(tilt).code, Code::done);
+  ASSERT_TRUE(eventually([&] { return std::abs(daemon.requests().back().sonar_in_world.position_m.x - 0.7) < 1e-12; }));
+  EXPECT_NEAR(rpy_from_quat(daemon.requests().back().sonar_in_world.orientation).pitch_rad, rad_from_deg(30), 1e-12);
 }
 
 TEST(SetSonar, WhatCannotBeIsRefusedWithWhatCanAndNothingChanges) {
   Daemon daemon;
   const auto before = daemon.status().sonars(0);
   control::SetSonar wrong = set_range(300);
-  wrong.mount = Pose{{1, 2, 3}, {}};
+  wrong.mount = control::MountChange{Vec3d{1, 2, 3}, {}};
   wrong.transmit = false;
   const OperationResult far = daemon.ask(wrong);
   EXPECT_EQ(far.code, Code::refused);

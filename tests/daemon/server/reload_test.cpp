@@ -321,7 +321,7 @@ TEST(Reload, WhatControlChangedIsAsTheFileSaysAgain) {
   DaemonSetup setup = with_file();
   Daemon daemon(setup);
   control::SetSonar tilt;
-  tilt.mount = Pose{{0, 0, 5}, {}};
+  tilt.mount = control::MountChange{Vec3d{0, 0, 5}, {}};
   ASSERT_EQ(daemon.ask(tilt).code, OperationResult::Code::done);
   control::SetEnvironment cold;
   cold.temperature_c = 1;

@@ -18,7 +18,7 @@ inline std::vector<Request> every_request() {
   sonar.mode = 1;
   sonar.beams = 256;
   sonar.transmit = false;
-  sonar.mount = tilted;
+  sonar.mount = MountChange{tilted.position_m, tilted.orientation};
   SetEnvironment water;
   water.temperature_c = 4;
   water.sound_speed_mps = 0;

@@ -26,6 +26,10 @@ std::string refusal_of(const decltype(Request::op)& op) {
   EXPECT_EQ(back.error().id, 77u);
   return back.error().why;
 }
+void expect_near(const MountChange& a, const MountChange& b) {
+  EXPECT_NEAR(length(*a.position_m - *b.position_m), 0, 1e-12);
+  EXPECT_NEAR(std::abs((conjugate(*a.orientation) * *b.orientation).w), 1, 1e-12);
+}
 void expect_near(const Pose& a, const Pose& b) {
   EXPECT_NEAR(length(a.position_m - b.position_m), 0, 1e-12);
   EXPECT_NEAR(std::abs((conjugate(a.orientation) * b.orientation).w), 1, 1e-12);
@@ -44,6 +48,11 @@ TEST(ControlRequests, SettingsOfASonarArriveAsAskedFor) {
   EXPECT_EQ(b.beams, 256u);
   EXPECT_EQ(b.transmit, false);
   expect_near(*b.mount, *a.mount);
+  SetSonar moved;
+  moved.mount = MountChange{Vec3d{0, 0, 0}, {}};
+  const auto kept = std::get<SetSonar>(round_trip({1, moved}).op);
+  EXPECT_EQ(kept.mount->position_m, Vec3d{}) << "the origin is a position";
+  EXPECT_FALSE(kept.mount->orientation) << "what is not given stays";
   const auto none = std::get<SetSonar>(round_trip({1, SetSonar{}}).op);
   EXPECT_FALSE(none.range_m || none.rate_hz || none.gain_percent || none.mode || none.beams || none.transmit || none.mount);
 }
@@ -95,9 +104,9 @@ TEST(ControlRequests, RefusedWithASentenceThatNamesTheKey) {
   sonar.range_m = nan;
   EXPECT_EQ(refusal_of(sonar), "sonar.range_m is NaN or infinite");
   sonar = {};
-  sonar.mount = Pose{{0, 2000, 0}, {}};
+  sonar.mount = MountChange{Vec3d{0, 2000, 0}, {}};
   EXPECT_THAT(refusal_of(sonar), HasSubstr("mount.position is beyond 1000 m"));
-  sonar.mount = Pose{{nan, 0, 0}, {}};
+  sonar.mount = MountChange{Vec3d{nan, 0, 0}, {}};
   EXPECT_THAT(refusal_of(sonar), HasSubstr("mount.position"));
   sonar = {};
   sonar.sonar = "front\nready";
