@@ -3,6 +3,7 @@
 #include <array>
 #include <cstring>
 
+#include "clients/sonarctl/commands.hpp"
 #include "core/base/regular_file.hpp"
 #include "protocol/control/answers.hpp"
 
@@ -81,8 +82,11 @@ Result<ControlClient::Response> ControlClient::request(Operation operation, std:
   if (Result<void> sent = write_all(socket_, control::delimited(message)); !sent) return tl::unexpected(sent.error());
   const auto deadline = Clock::now() + patience;
   for (;;) {
-    const Result<Response> answer = next_message(deadline, false);
+    const Result<Response> answer = next_message(deadline, true);
     if (!answer) return tl::unexpected(answer.error());
+    if (!*answer && interrupted != 0)
+      return failure(ErrorKind::unavailable, "interrupted before sonard at " + text_from(at_) +
+                                                 " answered: sonard completes the request, sonarctl does not wait for it");
     if (!*answer && last_id_ == 1)  // the answer to Hello
       return tl::unexpected(no_control_stream("no greeting within " + std::to_string(patience.count() / 1000) + " s"));
     if (!*answer)

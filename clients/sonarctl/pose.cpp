@@ -145,7 +145,8 @@ Result<void> send_poses(const PoseOptions& options) {
   for (double time_s = 0; interrupted == 0; time_s = static_cast<double>(sent) / options.rate_hz) {
     std::this_thread::sleep_until(start +
                                   std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(time_s)));
-    if (Result<void> done = (*send)(sample_of(options, moment_at(options, time_s), ++sent)); !done) return done;
+    if (Result<void> done = (*send)(sample_of(options, moment_at(options, time_s), ++sent)); !done)
+      return interrupted != 0 ? Result<void>() : done;
     if (time_s >= duration_s(options)) break;
   }
   std::printf("%s sent to %s %s as %s\n", text::counted(sent, "pose").c_str(), stream ? "tcp" : "udp", text_from(*to).c_str(),

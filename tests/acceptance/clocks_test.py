@@ -1,13 +1,15 @@
 """Time that programs advance. lockstep: a program sends a pose, requests a step, and has every ping due in it; follow: a simulator
 stamps its poses and waits for each answer. Both give the same bytes in every run, independent of the wall clock."""
 import re
+import signal
+import subprocess
 import sys
 import threading
 import time
 import unittest
 
 from oculus_reader import Client, fire_message
-from running_sonard import ROOT, SONARCTL, Sonard, run
+from running_sonard import ROOT, SONARCTL, Sonard, eventually, run
 
 sys.path.insert(0, str(ROOT / "clients/python"))
 from sonard_client import Control  # noqa: E402
@@ -91,6 +93,12 @@ class Clocks(unittest.TestCase):
             self.assertEqual(result.stdout, "0.250000000 s  1 ping\n")
             reader.join(20)
             self.assertIn("clock lockstep at 0.250 s", run(SONARCTL, "status", "--control", control).stdout)
+            # Nobody takes the pings of this step: it does not end, but Ctrl-C ends the command.
+            with subprocess.Popen([str(SONARCTL), "step", "3000", "--control", control], stderr=subprocess.PIPE) as waiting:
+                eventually(lambda: "clock lockstep at 0.250 s" not in run(SONARCTL, "status", "--control", control).stdout)
+                waiting.send_signal(signal.SIGINT)
+                self.assertEqual(waiting.wait(60), 69)
+                self.assertIn(b"interrupted before", waiting.stderr.read())
         with Sonard(arguments=["--clock", "stepped"]) as daemon:
             result = run(SONARCTL, "step", "0.1", "--control", f"{daemon.address}:14770")
             self.assertNotEqual(result.returncode, 0)

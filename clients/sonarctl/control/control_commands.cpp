@@ -35,6 +35,7 @@ Result<void> watch(ControlClient& client, const StatusOptions& options) {
   const LiveScreen screen(!options.json && terminal_facts().is_terminal);
   while (interrupted == 0) {
     const auto status = client.status();
+    if (!status && interrupted != 0) break;
     if (!status) return tl::unexpected(status.error());
     const bool read = options.json ? std::puts(control::json_of(**status).c_str()) >= 0 && std::fflush(stdout) == 0
                                    : screen.show(lines_of(text_from(**status), terminal_size().lines - 1));
