@@ -96,7 +96,7 @@ class Listener {
   bool finished() const {
     const bool enough = options_.pings > 0 && log_.counts().pings >= options_.pings;
     const bool over = options_.seconds > 0 && seconds_since(start_) >= options_.seconds;
-    return enough || over || interrupted != 0;
+    return enough || over || interrupted != 0 || output_closed_;
   }
 
   std::string closed_text(const std::string& error) const {
@@ -113,6 +113,7 @@ class Listener {
     outage_.ends();
     if (options_.json && !options_.quiet) std::puts(json_from(ping, at_s).c_str());
     if (!options_.json && (!options_.quiet || !ping.errors.empty())) std::puts(line_from(ping).c_str());
+    output_closed_ = std::fflush(stdout) != 0;
   }
 
   double first_ping_time() const {
@@ -124,7 +125,7 @@ class Listener {
   const ListenOptions& options_;
   std::optional<PingStream> stream_;
   std::optional<protocol::Host::Counts> before_;  // counts of connections that are lost
-  bool received_ = false, asked_ = false;
+  bool received_ = false, asked_ = false, output_closed_ = false;
   std::string_view rate_unit_;
   Outage outage_;
   PingLog log_;

@@ -197,6 +197,8 @@ Result<void> record_device(const RecordOptions& options) {
   const double took_s = recorder.seconds();
   const Result<void> closed = files->close();
   report(*files, took_s);
+  if (ran && closed && files->messages() == 0)
+    return failure(ErrorKind::unavailable, "no message came from " + at + ", so the files hold none: is the sonar suspended?");
   return ran ? closed : ran;
 }
 
@@ -271,13 +273,9 @@ Result<void> record(const RecordOptions& options) {
     for (std::size_t k = 0; k < i; ++k)
       if (is_same_file(paths[i], paths[k]))
         return failure(ErrorKind::usage, paths[i].string() + " is named for two kinds of files: give each its own name");
-  const std::filesystem::path& from = options.source.recording;
-  for (const auto& path : paths) {
-    std::error_code ec;
-    if (!from.empty() && std::filesystem::equivalent(from, path, ec))
-      return failure(ErrorKind::usage, path.string() + " is the recording that is read: name another file");
-  }
-  return from.empty() ? record_device(options) : convert(options);
+  for (const auto& path : paths)
+    if (Result<void> other = check_output(options.source, path); !other) return other;
+  return options.source.recording.empty() ? record_device(options) : convert(options);
 }
 
 }  // namespace sonar::clients

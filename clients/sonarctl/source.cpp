@@ -166,6 +166,12 @@ Error silence(const SourceOptions& source, const PingStream& stream, bool receiv
               " sonard's banner names the address of each sonar"};
 }
 
+Result<void> check_output(const SourceOptions& source, const std::filesystem::path& output) {
+  std::error_code ec;
+  if (source.recording.empty() || output.empty() || !std::filesystem::equivalent(source.recording, output, ec)) return {};
+  return failure(ErrorKind::usage, output.string() + " is the recording that is read: name another file");
+}
+
 Result<Endpoint> find_device(const SourceOptions& source, bool say) {
   if (!source.discover) return source.device;
   constexpr std::chrono::seconds patience{5};

@@ -13,6 +13,9 @@ namespace sonar::clients {
 
 std::chrono::milliseconds milliseconds_from(double s);
 
+/// Refuses an output file that is the recording which is read.
+Result<void> check_output(const SourceOptions& source, const std::filesystem::path& output);
+
 /// Returns the given address, or that of a status broadcast; `say` prints the result.
 Result<Endpoint> find_device(const SourceOptions& source, bool say);
 

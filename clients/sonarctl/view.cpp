@@ -18,7 +18,7 @@ Result<void> check(const ViewOptions& o) {
   if (o.live && !o.source.recording.empty())
     return failure(ErrorKind::usage, "--live is for devices; of a recording, choose a ping with --ping");
   if (o.pings > 0 && !o.live) return failure(ErrorKind::usage, "--pings goes with --live");
-  return {};
+  return check_output(o.source, o.png);
 }
 
 Result<Raster> write_picture(const ViewOptions& options, PicturePainter& painter, const SonarPicture& picture) {

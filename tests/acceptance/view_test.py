@@ -77,6 +77,23 @@ class View(unittest.TestCase):
             self.assertEqual(png.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
             self.assertEqual([p.name for p in pathlib.Path(folder).iterdir()], ["ping.png"])  # nothing unfinished lies about
 
+    def test_the_recording_that_is_read_is_not_replaced(self):
+        with tempfile.TemporaryDirectory() as folder:
+            recording = pathlib.Path(folder) / "run.mcap"
+            result = self.daemon.ctl("record", "--mcap", recording, "--pings", "2")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            before = recording.read_bytes()
+            result = run(SONARCTL, "view", "--from", recording, "--png", recording)
+            self.assertEqual(result.returncode, 64)
+            self.assertIn("is the recording that is read", result.stderr)
+            self.assertEqual(recording.read_bytes(), before)
+
+    def test_listen_ends_when_its_reader_has_gone(self):
+        with subprocess.Popen([str(SONARCTL), "listen", self.daemon.address], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as listener:
+            listener.stdout.readline()
+            listener.stdout.close()
+            self.assertEqual(listener.wait(60), 0, listener.stderr.read())
+
     def test_beside_a_driver_it_looks_on(self):
         control = ("--control", f"{self.daemon.address}:14770")
         with tempfile.TemporaryDirectory() as folder, Client(self.daemon.address) as driver:
