@@ -8,6 +8,8 @@ import re
 import subprocess
 import sys
 
+# Folders of protocol/ that are makes of sonar.
+MAKE_FOLDERS = ("aris", "blueview", "dvl", "m3", "micron", "norbit", "oculus", "ping", "waterlinked")
 # Files that a make of sonar may include beside its own folder.
 DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/awaited_ping.hpp", "protocol/dialogue.hpp",
           "protocol/held_settings.hpp", "protocol/host.hpp", "protocol/limits.hpp",
@@ -30,8 +32,7 @@ FLOORS = {
     "protocol/control": ["core/base/", "protocol/control/"],
     "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/", "protocol/host.hpp"],
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
-    **{f"protocol/{make}": [*DEVICE, f"protocol/{make}/"]
-       for make in ("aris", "blueview", "dvl", "m3", "micron", "norbit", "oculus", "ping", "waterlinked")},
+    **{f"protocol/{make}": [*DEVICE, f"protocol/{make}/"] for make in MAKE_FOLDERS},
     "protocol/recorded": ["core/base/", "core/sonar/", "protocol/wire/", "protocol/recorded/"],
     "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/sender.hpp",
                            "protocol/wire/", "protocol/recorded/", "protocol/recording/"],
@@ -117,8 +118,11 @@ FORBIDDEN = [
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]
 # A make of sonar is its folder and a line of makes.cpp; these files still name one. The list only gets shorter.
-MAKE = re.compile(r"oculus|blueview|\baris\b|waterlinked|ping360|ping1d|\bs500|surveyor|omniscan|3d-?15|protocol/ping/|\bping::|dvl-a|protocol/dvl/|\bdvl::|\bmicron|\bnorbit", re.I)
-MAY_NAME_MAKES = r"protocol/(oculus|aris|blueview|waterlinked|ping|dvl|micron|norbit)/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|clients/python/sonard_client/judge/makes/|(.*/)?tests/|docs/"  # the bridge: other people's drivers
+ANY_FOLDER = "|".join(MAKE_FOLDERS)
+MAKE = re.compile(rf"protocol/({ANY_FOLDER})/|\b({ANY_FOLDER})::|oculus|blueview|\baris\b|waterlinked|ping360|ping1d|\bs500|surveyor|omniscan|3d-?15"
+                  r"|dvl-a|(?<!/)\bm3\b|\bmicron|\bnorbit", re.I)  # not kg/m3
+MAY_NAME_MAKES = (rf"protocol/({ANY_FOLDER})/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|clients/python/sonard_client/judge/makes/"
+                  r"|(.*/)?tests/|docs/")  # the bridge: other people's drivers
 NAME_MAKES = {
     "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py",
     "clients/python/sonard_client/judge/cases.py",
@@ -245,7 +249,11 @@ def wording_violations(name, text):
 
 
 def make_violations(name, code):
-    """Of product files; those that NAME_MAKES excepts must name one."""
+    """Of product files; those that NAME_MAKES excepts must name one, and LISTS no folder that is not of MAKE_FOLDERS."""
+    if name in LISTS:
+        for match in re.finditer(r'^#include "protocol/(\w+)/', code, re.M):
+            if match[1] not in MAKE_FOLDERS:
+                yield line_of(code, match.start()), f"make: protocol/{match[1]} is not among the MAKE_FOLDERS of check_floors.py: add it"
     if re.match(MAY_NAME_MAKES, name):
         return
     found = MAKE.search(code)

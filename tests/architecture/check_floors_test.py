@@ -154,10 +154,13 @@ class Planted(unittest.TestCase):
 
     def test_makes_are_named_in_their_folders_only(self):
         for name, line in [("daemon/server/a.cpp", "oculus::Framer framer;"), ("clients/sonarctl/a.cpp", '#include "protocol/ping/messages.hpp"'),
-                           ("clients/python/a.py", "# of an ARIS"), ("protocol/recording/a.cpp", 'if (name == "blueview") return;')]:
+                           ("clients/python/a.py", "# of an ARIS"), ("protocol/recording/a.cpp", 'if (name == "blueview") return;'),
+                           ("daemon/config/a.cpp", 'name = "m3";'), ("daemon/config/a.cpp", '#include "protocol/m3/models.hpp"'),
+                           *((f"daemon/emulator/{make}.cpp", f"{make}::vendor();") for make in check_floors.MAKE_FOLDERS)]:
             with self.subTest(name=name):
                 self.expect(name, line + "\n", 1, "only the make's folder")
         self.expect("daemon/commands/replay/replay_device.cpp", "int x;\n", 1, "take it out of NAME_MAKES")
+        self.expect("protocol/makes.cpp", '#include "protocol/host.hpp"\n#include "protocol/eleventh/host.hpp"\n', 2, "add it")
 
     def test_headers_and_sizes(self):
         found = found_in({"core/base/a.hpp": "int x;\n"})
@@ -175,6 +178,8 @@ class Innocent(unittest.TestCase):
             "protocol/control/control.cpp": '#include "control.pb.h"\n',
             "protocol/oculus/a.cpp": "// reinterpret_cast is not for us\nchar t[9]; int n = std::snprintf(t, 9, \"%d\", 1);\n",
             "protocol/makes.cpp": '#include "protocol/oculus/oculus.hpp"\n',
+            "protocol/m3/m3.cpp": "int m3;\n",
+            "clients/python/b.py": "water = 1025  # kg/m3\n",
             "daemon/server/system/asio.hpp": "#pragma once\n#include <utility>\n#include <boost/asio.hpp>\n",
             "daemon/commands/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
             "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/host.hpp"  // for an Oculus\n',
