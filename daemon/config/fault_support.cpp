@@ -36,37 +36,35 @@ bool has_integer(const protocol::Vendor& vendor, protocol::Part part, protocol::
       part, name, [](auto n) { return n; }, none);
 }
 
-/// How many of the values from first to last a model of the vendor accepts; the largest number over its models.
+/// Whether a model of the vendor accepts `enough` of the values from first to last.
 template <class T>
-std::size_t accepted(const protocol::Vendor& vendor, std::optional<T> protocol::SettingsOverride::*setting, std::uint32_t first,
-                     std::uint32_t last) {
-  std::size_t most = 0;
+bool accepts(const protocol::Vendor& vendor, std::optional<T> protocol::SettingsOverride::*setting, std::uint32_t first,
+             std::uint32_t last, int enough) {
   for (const auto& model : vendor.models()) {
     protocol::DeviceState device;
     device.id = 1;
     device.model = model;
     if (const auto options = check_options(vendor, {})) device.options = *options;
     device.settings = vendor.initial_settings(device).vendor_settings;
-    std::size_t taken = 0;
+    int taken = 0;
     for (std::uint32_t value = first; value <= last; ++value) {
       protocol::SettingsOverride wanted;
       wanted.*setting = static_cast<T>(value);
-      taken += vendor.apply_override(wanted, device).has_value();
+      if (vendor.apply_override(wanted, device) && ++taken == enough) return true;
     }
-    most = std::max(most, taken);
   }
-  return most;
+  return false;
 }
 
 /// `what` is the name of a parameter of the kind. Vendor::apply_override refuses it whatever the value is.
 std::string why_without_setting(std::string_view what, const protocol::Vendor& vendor) {
   using Wanted = protocol::SettingsOverride;
   const auto has_modes = [](const auto& model) { return model->modes.size() > 1; };
-  if ((what == "sample-bits" || what == "row-gains" || what == "largest") && accepted(vendor, &Wanted::sample_bits, 8, 32) < 2)
+  if ((what == "sample-bits" || what == "row-gains" || what == "largest") && !accepts(vendor, &Wanted::sample_bits, 8, 32, 2))
     return "has one type of samples";
-  if (what == "beams" && accepted(vendor, &Wanted::beams, 1, 512) < 2) return "has one number of beams";
+  if (what == "beams" && !accepts(vendor, &Wanted::beams, 1, 512, 2)) return "has one number of beams";
   if (what == "mode" && std::none_of(vendor.models().begin(), vendor.models().end(), has_modes)) return "has one mode";
-  if (what == "rate" && accepted(vendor, &Wanted::rate_hz, 0, 0) == 0) return "has no standby";
+  if (what == "rate" && !accepts(vendor, &Wanted::rate_hz, 0, 0, 1)) return "has no standby";
   return {};
 }
 
