@@ -133,8 +133,15 @@ class Programs(unittest.TestCase):
         done = self.run_programs("short", "long", SONARD_TEST_JOBS="1")
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         ran = [line.partition(" ")[2] for line in (self.build / "ran").read_text().splitlines()]
-        self.assertEqual(ran, [*(f"part {i} of 4" for i in range(4)), "part  of "])
+        self.assertEqual(ran, ["part 0 of 2", "part 1 of 2", "part  of "])
         self.assertFalse(self.failed.exists())
+
+    def test_parts_of_programs_come_in_turns(self):
+        for name in ("waits", "computes"):
+            self.program(name, "GTEST", "")
+        self.assertEqual(self.run_programs("waits", "computes", SONARD_TEST_JOBS="1").returncode, 0)
+        ran = [line.partition(" ")[2] for line in (self.build / "ran").read_text().splitlines()]
+        self.assertEqual(ran, ["part 0 of 2", "part 0 of 2", "part 1 of 2", "part 1 of 2"])
 
     def test_that_fail_are_named_with_their_cases(self):
         self.program("asserts", "GTEST", 'echo "[  FAILED  ] Suite.Asserts (3 ms)"; exit 1')

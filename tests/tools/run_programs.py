@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Runs test programs, as many at once as there are processors, and prints a line for each that passes, all output of one that fails.
+"""Runs test programs, two at once a processor, and prints a line for each that passes, all output of one that fails.
 
 usage: run_programs.py BUILD_FOLDER NAME...        --list KIND... [--without KIND...] prints their names instead
 The names are of BUILD_FOLDER/tests/programs, which CMake writes: its kinds, then the program and its arguments (tests/CMakeLists.txt).
 A GoogleTest program is run in parts, by GTEST_TOTAL_SHARDS, and before the others, which are short: so no processor is idle at the end.
+Parts of all programs come in turns: those that wait for sockets or times to pass run beside those that compute.
 The tests that failed are added to the file that SONARD_FAILED names.
-  SONARD_TEST_JOBS      programs at once (default: the number of processors)
+  SONARD_TEST_JOBS      programs at once (default: two a processor)
   SONARD_TEST_SECONDS   the longest a program may take (1800)
 """
 import argparse
@@ -18,8 +19,8 @@ import sys
 import tempfile
 import time
 
-JOBS = int(os.environ.get("SONARD_TEST_JOBS") or os.cpu_count())
-PARTS_A_JOB = 4  # parts of a program differ: one may take five times another
+JOBS = int(os.environ.get("SONARD_TEST_JOBS") or 2 * os.cpu_count())
+PARTS_A_JOB = 2  # parts of a program differ: one may take five times another
 LONGEST_S = float(os.environ.get("SONARD_TEST_SECONDS") or 1800)
 
 
@@ -60,7 +61,6 @@ def run(command, part, parts):
 def run_all(programs):
     """Runs the parts of all programs; the tests that failed, each after its program."""
     parts_of = {name: PARTS_A_JOB * JOBS if "GTEST" in kinds else 1 for name, (kinds, _) in programs.items()}
-    programs = dict(sorted(programs.items(), key=lambda program: -parts_of[program[0]]))  # stable
     failed, left, seconds = [], dict(parts_of), dict.fromkeys(programs, 0.0)
     broken = set()
 
@@ -69,7 +69,8 @@ def run_all(programs):
         return name, run(programs[name][1], part, parts_of[name]), time.monotonic() - begin
 
     with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
-        waiting = [pool.submit(one, name, part) for name in programs for part in range(parts_of[name])]
+        turns = [(parts == 1, part, name) for name, parts in parts_of.items() for part in range(parts)]
+        waiting = [pool.submit(one, name, part) for _, part, name in sorted(turns)]
         for done in concurrent.futures.as_completed(waiting):
             name, (ended, output), took = done.result()
             seconds[name] += took
