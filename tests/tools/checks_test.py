@@ -9,7 +9,7 @@ import unittest
 
 TOOLS = pathlib.Path(__file__).resolve().parent
 ROOT = TOOLS.parents[1]
-HEAVY = {"package", "page", "cuda", "bench", "levels"}
+HEAVY = {"package", "page", "cuda", "bench", "levels", "sanitizers"}
 # A GoogleTest program as far as run_programs.py knows one.
 PROGRAM = """#!/bin/sh
 echo "$0 part $GTEST_SHARD_INDEX of $GTEST_TOTAL_SHARDS" >>"$RAN"
@@ -28,7 +28,10 @@ class LeftOut(unittest.TestCase):
         self.assertEqual(self.left_out("clients/sonarctl/listen.cpp", "docs/faults.md"), HEAVY)
         self.assertEqual(self.left_out("core/pipeline/cpu/simulate.cpp"), {"package", "page"})
         self.assertEqual(self.left_out("clients/web/main.js"), HEAVY - {"page"})
-        self.assertEqual(self.left_out("daemon/CMakeLists.txt"), HEAVY - {"package"})
+        self.assertEqual(self.left_out("daemon/CMakeLists.txt"), HEAVY - {"package", "sanitizers"})
+        for file in ("tests/protocol/hosts_test.cpp", "tests/is_sanitized.hpp", "clients/bvtsdk/core/link.cpp", "tests/fuzz/corpus/hosts/a.bin"):
+            with self.subTest(file=file):
+                self.assertNotIn("sanitizers", self.left_out(file))
 
     def test_is_nothing_when_the_build_or_the_checks_change(self):
         for file in ("CMakeLists.txt", "CMakePresets.json", ".ci/run", "test.sh", "tests/tools/setup.sh", "tests/CMakeLists.txt", ""):
