@@ -57,7 +57,7 @@ TEST(Everything, IsTheSameBytesForAnyNumberOfThreadsAndWhateverCameBefore) {
 // The counter-check: each part is in those bytes.
 TEST(Everything, LacksSomethingWithoutAnyOneOfItsParts) {
   Engine engine(basin());
-  for (const PingRequest& whole : {high(), low()}) {
+  for (const PingRequest& whole : {with_wide_beams(high()), with_wide_beams(low())}) {
     const std::string with_all = bytes_of(engine.ping(whole));
     for (const NamedSwitch& part : named_switches) {
       if (part.is_on == &Switches::doppler && whole.model->modes[0].waveform.shape != Waveform::Shape::lfm) continue;
@@ -77,7 +77,7 @@ TEST(Everything, SwitchedOffIsAsIfItsDataWereNotThere) {
     auto bare = std::make_shared<Scene>(*whole);
     without(*bare);
     Engine with_data(whole), without_data(bare);
-    for (PingRequest off : {high(), low()}) {
+    for (PingRequest off : {with_wide_beams(high()), with_wide_beams(low())}) {
       off.switches.*part = false;
       PingRequest on = off;
       on.switches.*part = true;
