@@ -325,11 +325,12 @@ TEST(RecordedDaemon, ClientsGetTheSameBytesAndTheFileHasThemToo) {
         EXPECT_EQ(daemon.ask(control::StartRecording{name}).text, "");
       }
     Client client(daemon.address());
+    client.digest.emplace();
     client.fire(fire_at(PingRate::hz40));
     EXPECT_TRUE(client.read_to_end());
     EXPECT_EQ(daemon.wait(), 0);
     digests.push_back(daemon.app().devices().front().digests().at(0).sha256);
-    EXPECT_EQ(digests.back(), client.digest.hex());
+    EXPECT_EQ(digests.back(), client.digest->hex());
     const auto requests = daemon.requests();
     EXPECT_EQ(requests.at(0).switches.keep_truth, recorded);
     if (!recorded) continue;
