@@ -34,7 +34,7 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   const std::optional<Time> next = converses ? due.conversation : due.ping;
   // A dialogue's tick that is due now may run although no time may pass.
   const bool may_come = next && (*next <= bound.last_tick || (converses && *next <= clock_.now()));
-  if (!may_come && bound.then) advance(*bound.then);
+  if (!may_come && bound.then && (*bound.then > clock_.now() || is_overdue())) advance(*bound.then);
   const bool answered = time_.answer(next);
   if (answered) on_change_();  // first the answers, in separate turns of the event loop
   if (enough_served()) return !answered;
@@ -45,6 +45,14 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   else
     due.pings->step();
   return false;
+}
+
+/// Whether a sonar has something to do at the present time but a ping. Each call of advance() is followed by another step().
+bool Stepper::is_overdue() {
+  return std::any_of(fleet_.devices().begin(), fleet_.devices().end(), [this](const Device& d) {
+    const auto next = d.sonar().next_tick_of_conversations();
+    return next && *next <= clock_.now();
+  });
 }
 
 /// The sonars act on the new time at once: dialogues, faults and pings that are held back.

@@ -29,6 +29,7 @@ class Stepper {
     std::optional<Time> ping, request, conversation;
   };
   Due next_due();
+  bool is_overdue();
   void advance(Time to);
   void skip();
 

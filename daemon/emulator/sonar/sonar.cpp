@@ -11,6 +11,8 @@ namespace {
 
 constexpr auto shortest_rhythm = std::chrono::milliseconds(1);  // between two ticks of one conversation
 
+std::optional<Time> earlier(std::optional<Time> a, std::optional<Time> b) { return a && b ? std::min(*a, *b) : a ? a : b; }
+
 }  // namespace
 
 Sonar::Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time now, std::chrono::nanoseconds skipped)
@@ -61,15 +63,12 @@ std::optional<Time> Sonar::next_request() const {
   return next && source_.waits_for_pose(*next) ? std::nullopt : next;
 }
 
-std::optional<Time> Sonar::next_tick() const {
-  std::optional<Time> first = source_.pacer().next_tick();
-  const auto consider = [&first](std::optional<Time> t) {
-    if (t && (!first || *t < *first)) first = t;
-  };
+std::optional<Time> Sonar::next_tick() const { return earlier(source_.pacer().next_tick(), next_tick_of_conversations()); }
+
+std::optional<Time> Sonar::next_tick_of_conversations() const {
+  std::optional<Time> first = earlier(faults_.next_tick(), delivery_.next_release());
   for (const Connection& c : connections().all())
-    if (const auto t = c.next_tick()) consider(data_.clock_time(*t));
-  consider(faults_.next_tick());
-  consider(delivery_.next_release());
+    if (const auto t = c.next_tick()) first = earlier(first, data_.clock_time(*t));
   return first;
 }
 

@@ -88,7 +88,9 @@ class Sonar {
   /// When a conversation will request a ping by itself.
   std::optional<Time> next_request() const;
   Actions tick_pacer(Time now) { return source_.tick(now); }
+  /// The conversations, the faults and the pings that are held back.
   Actions tick_conversations(Time now);
+  std::optional<Time> next_tick_of_conversations() const;
   /// Call it when stepped time jumps ahead.
   void skip(std::chrono::nanoseconds by);
   /// True if no ping is being computed and every client has received all that it was sent.

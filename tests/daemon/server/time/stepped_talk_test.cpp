@@ -2,6 +2,7 @@
 // wall time.
 #include <gmock/gmock.h>
 
+#include <ctime>
 #include <thread>
 
 #include "protocol/control/answers.hpp"
@@ -85,6 +86,18 @@ TEST(SteppedTalk, AHostIsSilentByTheWallsClockOnly) {
   host.reader.join();
   host.reader = std::thread([] {});
   EXPECT_TRUE(host.was_sent_away) << "not reset";
+}
+
+TEST(SteppedTalk, WhileNoTimeMayPassTheDaemonTakesNoProcessor) {
+  Daemon daemon(head("lockstep"));
+  Host host(daemon);
+  EXPECT_EQ(daemon.ask(Step{1}).code, Code::done);
+  EXPECT_TRUE(eventually([] {
+    const std::clock_t before = std::clock();  // of this process alone
+    std::this_thread::sleep_for(milliseconds(500));
+    return std::clock() - before < CLOCKS_PER_SEC / 100;
+  })) << "its event loop runs all the time";
+  daemon.stop();
 }
 
 TEST(SteppedTalk, BeforeTheFirstPoseThereIsNoTimeToPass) {
