@@ -88,6 +88,20 @@ class Recordings(WithFolder):
     def channel(self, maker, schema, topic="/odom", encoding="cdr", steps=30, **how):
         return topic, encoding, schema, [(5000 + made.STEP_S * i, maker(i, **how)) for i in range(steps)]
 
+    def test_names_of_frames_with_ned(self):
+        def in_ned(step, frame):
+            t, north, east, down, *angles = made.moment(step)
+            w, x, y, z = made.quaternion(*angles)
+            return made.Cdr().header(100 + t, frame).put("d", north, east, down, x, y, z, w).done()
+        for frame, axes in (("world_ned", "NED_FRD"), ("odom_NED", "NED_FRD"), ("ned", "NED_FRD"), ("planned_path", "ENU_FLU")):
+            with self.subTest(frame):
+                maker = in_ned if axes == "NED_FRD" else lambda step, frame: made.pose_stamped(step)
+                track = self.convert(made.mcap([self.channel(maker, "geometry_msgs/msg/PoseStamped", frame=frame)]))
+                self.assertEqual(track.frame, axes)
+                self.assert_track(track, range(30), t0=100, metres=1e-9, radians=1e-6)
+                said = [f"its poses are in the frame {frame!r}, so the axes are NED_FRD; --frame ENU_FLU if they are not"]
+                self.assertEqual(self.warned, said if axes == "NED_FRD" else [])
+
     def test_every_ros_message_with_a_pose(self):
         for maker, schema, topic in ((made.odometry, "nav_msgs/msg/Odometry", "/odom"),
                                      (made.pose_stamped, "geometry_msgs/msg/PoseStamped", "/odom"),

@@ -57,30 +57,31 @@ def _pose(reader: Reader) -> Pose:
     return (v[0], v[1], v[2]), (v[3], v[4], v[5], v[6])
 
 
-def decode(kind: str, data: bytes, ros1: bool) -> List[Tuple[str, float, Pose]]:
-    """Returns for each pose of a message: suffix of the topic's name; timestamp [s], 0 if it has none; pose."""
+def decode(kind: str, data: bytes, ros1: bool) -> List[Tuple[str, float, str, Pose]]:
+    """Returns for each pose of a message: suffix of the topic's name; timestamp [s], 0 if it has none; name of the frame that it
+    is in; pose."""
     reader = Reader(data, ros1)
     if kind == "Path":
         _header(reader, ros1)
         (count,) = reader.numbers("I")
-        return [("", _header(reader, ros1)[0], _pose(reader)) for _ in range(int(count))]
+        return [("", *_header(reader, ros1), _pose(reader)) for _ in range(int(count))]
     if kind == "TFMessage":
         (count,) = reader.numbers("I")
         return [_transform(reader, ros1) for _ in range(int(count))]
     if kind == "TransformStamped":
         return [_transform(reader, ros1)]
     if kind == "Pose":
-        return [("", 0.0, _pose(reader))]
-    stamp, _ = _header(reader, ros1)
+        return [("", 0.0, "", _pose(reader))]
+    stamp, frame = _header(reader, ros1)
     if kind == "Odometry":
         reader.text()
-    return [("", stamp, _pose(reader))]
+    return [("", stamp, frame, _pose(reader))]
 
 
-def _transform(reader: Reader, ros1: bool) -> Tuple[str, float, Pose]:
+def _transform(reader: Reader, ros1: bool) -> Tuple[str, float, str, Pose]:
     stamp, parent = _header(reader, ros1)
     child = reader.text()
-    return f" {parent}->{child}", stamp, _pose(reader)
+    return f" {parent}->{child}", stamp, parent, _pose(reader)
 
 
 # Supported types, in order of preference.

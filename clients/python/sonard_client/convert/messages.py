@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import struct
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, Union
 
@@ -13,6 +14,14 @@ from .cdr import KINDS, Broken, decode, kind_of
 FOXGLOVE = ("foxglove.PoseInFrame", "foxglove.FrameTransform")
 
 
+_NED = re.compile(r"(?<![a-z])ned(?![a-z])", re.IGNORECASE)
+
+
+def axes_of(frame_id: str) -> str:
+    """The axes of a named frame: those of ROS, except for names such as world_ned (Stonefish, MAVROS, UUV Simulator)."""
+    return "NED_FRD" if _NED.search(frame_id) else "ENU_FLU"
+
+
 class Found(NamedTuple):
     topic: str         # with suffix " parent->child" for transforms
     rank: int          # smaller is preferred
@@ -20,6 +29,7 @@ class Found(NamedTuple):
     position_m: Vector3
     orientation: Quaternion
     frame: str
+    frame_id: str = ""
 
 
 def may_hold_poses(encoding: str, schema: str) -> bool:
@@ -37,8 +47,8 @@ def poses_in(topic: str, encoding: str, schema: str, data: bytes) -> List[Found]
     if encoding == "protobuf":
         return [_from_protobuf(topic, schema, data)]
     kind = kind_of(schema)
-    return [Found(topic + more, KINDS.index(kind), t or None, *_checked(position, xyzw), "ENU_FLU")
-            for more, t, (position, xyzw) in decode(kind, data, encoding == "ros1")]
+    return [Found(topic + more, KINDS.index(kind), t or None, *_checked(position, xyzw), axes_of(frame_id), frame_id)
+            for more, t, frame_id, (position, xyzw) in decode(kind, data, encoding == "ros1")]
 
 
 def _checked(position: Vector3, xyzw: "Tuple[float, ...]") -> Tuple[Vector3, Quaternion]:
@@ -136,13 +146,15 @@ def _from_protobuf(topic: str, schema: str, data: bytes) -> Found:
     """PoseInFrame: timestamp, frame_id, pose (position, orientation). FrameTransform: timestamp, parent, child, translation,
     rotation. Vectors are x, y, z, quaternions x, y, z, w; zeros are not encoded."""
     fields = _fields(data)
+    frame_id = bytes(fields.get(2, b"")).decode("utf-8", "replace")
     stamp = _fields(fields.get(1, b""))
     t = float(stamp.get(1, 0)) + 1e-9 * float(stamp.get(2, 0))
     if schema == "foxglove.FrameTransform":
-        parent, child = (bytes(fields.get(n, b"")).decode("utf-8", "replace") for n in (2, 3))
-        topic, place, turn = f"{topic} {parent}->{child}", _fields(fields.get(4, b"")), _fields(fields.get(5, b""))
+        child = bytes(fields.get(3, b"")).decode("utf-8", "replace")
+        topic, place, turn = f"{topic} {frame_id}->{child}", _fields(fields.get(4, b"")), _fields(fields.get(5, b""))
     else:
         pose = _fields(fields.get(3, b""))
         place, turn = _fields(pose.get(1, b"")), _fields(pose.get(2, b""))
     x, y, z = (float(place.get(n, 0.0)) for n in (1, 2, 3))
-    return Found(topic, 2, t or None, *_checked((x, y, z), tuple(float(turn.get(n, 0.0)) for n in (1, 2, 3, 4))), "ENU_FLU")
+    xyzw = tuple(float(turn.get(n, 0.0)) for n in (1, 2, 3, 4))
+    return Found(topic, 2, t or None, *_checked((x, y, z), xyzw), axes_of(frame_id), frame_id)

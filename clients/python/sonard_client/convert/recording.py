@@ -112,6 +112,9 @@ def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optio
     chosen = _choice(topics, topic, name, seen)
     selected = topics[chosen]
     rows = rising(selected.rows)
+    frame_id = selected.rows[0][1].frame_id
+    if frame_id and selected.frame == "NED_FRD":
+        warn(f"its poses are in the frame {frame_id!r}, so the axes are NED_FRD; --frame ENU_FLU if they are not")
     if selected.rank == KINDS.index("Path") and len(rows) == 1 and len(selected.rows) > 1:
         raise ConvertError(f"{name}: the poses of {chosen} have no time stamps, so they are not a track")
     if len(rows) < len(selected.rows):
