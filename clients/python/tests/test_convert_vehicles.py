@@ -30,6 +30,22 @@ class Dataflash(WithFolder):
         with self.assertRaisesRegex(ConvertError, r"no poses of 'AHR2'; sources: SIM \(50 poses\), XKF1 "):
             self.convert(log, source="AHR2")
 
+    def test_the_core_that_the_autopilot_used_is_preferred(self):
+        state = {"XKF4": (20, "QBb", "TimeUS,C,PI", "QBb")}
+        with mock.patch.dict(made.DATAFLASH, state):
+            log = made.dataflash_log(("XKF1",)) + made.dataflash_format("XKF4")
+            first, second = (made.dataflash_message("XKF4", 0, 0, core) for core in (0, 1))
+        for states, source, said in ((first, "XKF1", None), (second, "XKF1:1", None),
+                                     (first + 3 * second, "XKF1:1", "XKF1:1 (75 %), XKF1 (25 %); using XKF1:1 throughout")):
+            with self.subTest(source, said=said):
+                track = self.convert(log + states)
+                self.assertEqual(track.source, source)
+                self.assertAlmostEqual(track.rows[0].position_m[2], 102 if source == "XKF1:1" else 2)
+                self.assertEqual(len(self.warned), said is not None)
+                self.assertIn(said or "", "".join(self.warned))
+        self.assertEqual(self.convert(log + second, source="XKF1").source, "XKF1")
+        self.assertIn("XKF1:1 (100 %); using XKF1 throughout", self.warned[0])
+
     def test_another_origin_shifts_local_positions(self):
         other = Geodetic(*made.degrees_at(-30, 20, 0))
         row = self.convert(made.dataflash_log(("XKF1",)), origin=other).rows[0]
@@ -133,6 +149,49 @@ class Telemetry(WithFolder):
                 self.assertEqual(len(self.warned), 1)
                 for name in ("ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY"):
                     self.assertIn(f"{name}: component 1 (omitted: 20 messages of 197)", self.warned[0])
+
+    def test_the_autopilot_is_preferred_to_components_that_send_first(self):
+        for autopilot, other in ((1, 154), (3, 1)):
+            records = sorted(self.sent_by(autopilot, 1, 20, 0) + self.sent_by(other, 0, 20, 50), key=lambda record: record[0])
+            beat = bytes(8) + made.mavlink_frame("HEARTBEAT", (0, 12, 3, 0, 0, 3), component=autopilot)
+            log = beat + b"".join(record for _, record in records)
+            for source in ("ODOMETRY", "ATTITUDE+LOCAL_POSITION_NED"):
+                with self.subTest(source, autopilot=autopilot):
+                    track = self.convert(log, source=source)
+                    self.assertEqual([row.position_m[2] for row in track.rows if row.position_m[2] > 40], [])
+                    self.assertEqual(len(track.rows), 20)
+                    self.assertIn(f"ODOMETRY: component {autopilot} (omitted: 20 messages of {other})", self.warned[0])
+
+    def test_a_submarines_depth_is_below_its_home(self):
+        """A track that begins below the surface must not begin at depth 0."""
+        def log(kind):
+            out = bytes(8) + made.mavlink_frame("HEARTBEAT", (0, kind, 3, 0, 0, 3))
+            for step in range(20):
+                t, north, east, down, *angles = made.moment(step)
+                lat, lon, alt = made.degrees_at(north, east, down)
+                ms, stamp = round(1000 * t), round(1e6 * (1_700_000_000 + t)).to_bytes(8, "big")
+                out += stamp + made.mavlink_frame("ATTITUDE", (ms, *angles, 0, 0, 0))
+                place = round(1e7 * lat), round(1e7 * lon), round(1e3 * alt), round(-1e3 * down)
+                out += stamp + made.mavlink_frame("GLOBAL_POSITION_INT", (ms, *place, 0, 0, 0, 0))
+            return out
+        track = self.convert(log(12))
+        self.assert_track(track, range(20))
+        self.assertEqual(track.comments, ["origin: 47.60000000,-122.33000000,10.000 (the first fix, at the surface)"])
+        self.assert_track(self.convert(log(11)), range(20), origin_down=2)  # a boat's first fix is at its own height
+        other = Geodetic(made.ORIGIN[0], made.ORIGIN[1], 15)
+        self.assert_track(self.convert(log(12), origin=other), range(20), origin_down=-5)
+
+    def test_long_times_without_positions_are_reported(self):
+        begin = len(made.telemetry_log(("ATTITUDE",), 20))
+        log = made.telemetry_log(steps=20) + made.telemetry_log(("ATTITUDE",), 100)[begin:]
+        self.assertEqual(len(self.convert(log).rows), 19)
+        self.assertEqual(self.warned, ["without a position for 8.1 s at the beginning or the end: omitted"])
+        middle = made.telemetry_log(steps=120)[len(made.telemetry_log(steps=100)):]
+        self.assertEqual(len(self.convert(log + middle).rows), 119)
+        self.assertEqual(self.warned, ["no position for 8.2 s after second 1.8, interpolated linearly"])
+        pause = made.telemetry_log(steps=20) + middle  # nothing at all is no lack
+        self.convert(pause)
+        self.assertEqual(self.warned, [])
 
     def test_selected_component(self):
         both = b"".join(record for _, record in
@@ -324,6 +383,17 @@ class Px4(WithFolder):
         track = self.convert(made.ulog(truth=True))
         self.assertEqual(track.source, "vehicle_attitude_groundtruth+vehicle_local_position_groundtruth")
         self.assertAlmostEqual(track.rows[0].position_m[2], 102)
+
+    def test_positions_that_are_not_valid_are_omitted(self):
+        fields = "uint64_t timestamp;double lat;double lon;float alt;bool lat_lon_valid;bool alt_valid"
+        log = made.ulog(has_place=False) + made.ulog_message("F", b"vehicle_global_position:" + fields.encode())
+        log += made.ulog_message("A", bytes([0]) + struct.pack("<H", 20) + b"vehicle_global_position")
+        for step in range(50):
+            t, north, east, down, *_ = made.moment(step)
+            place = made.degrees_at(north, east, down) if step >= 3 else (47.0, -122.0, 0)
+            log += made.ulog_message("D", struct.pack("<HQ2df2?", 20, round(1e6 * t), *place, step not in (0, 2), step > 1))
+        track = self.convert(log, source="vehicle_attitude+vehicle_global_position", origin=HERE)
+        self.assert_track(track, range(3, 50), radians=1e-5)
 
     def of_formats(self, *formats, content=b"\x01" * 32):
         log = b"ULog\x01\x12\x35\x01" + bytes(8) + b"".join(made.ulog_message("F", text.encode("latin-1")) for text in formats)

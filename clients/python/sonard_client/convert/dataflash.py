@@ -27,7 +27,8 @@ FULL = ("SIM", "XKF1", "NKF1", "EKF1", "AHR2")
 LOCAL = ("XKF1", "NKF1", "EKF1")  # metres from the filter's origin
 # Heights above the home, by message and field, of vehicles without a position; BARO:1 is ArduSub's pressure sensor outside.
 HEIGHTS = (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("BARO:1", "Alt"), ("BARO", "Alt"))
-WANTED = FULL + ("ATT", "POS", "GPS", "ORGN", "CTUN", "BARO")
+STATES = {"XKF4": "XKF1", "NKF4": "NKF1"}  # messages with the number of the core in use, PI
+WANTED = FULL + ("ATT", "POS", "GPS", "ORGN", "CTUN", "BARO") + tuple(STATES)
 EKF_ORIGIN = 0  # type of an ORGN message; 1 is the home of the attitude system
 FIX_2D = 2
 
@@ -115,12 +116,16 @@ class _Gathered:
         self.positions: "Dict[str, Stream]" = {}
         self.depths: Dict[str, Stream[float]] = {}
         self.origin: Optional[Geodetic] = None
+        self._in_use: "Dict[str, Dict[int, int]]" = {}  # by filter: its cores, and the number of messages that name each
 
     def add(self, name: str, fields: Dict[str, float]) -> None:
         t = _time_s(fields)
         if name == "ORGN" and fields.get("Type", EKF_ORIGIN) == EKF_ORIGIN:
             self.origin = self.origin or _geodetic(fields)
-        if t is None or name == "ORGN":
+        if name in STATES and "PI" in fields:
+            cores = self._in_use.setdefault(STATES[name], {})
+            cores[int(fields["PI"])] = cores.get(int(fields["PI"]), 0) + 1
+        if t is None or name == "ORGN" or name in STATES:
             return
         instance = int(fields.get("C", fields.get("I", 0)))
         key = f"{name}:{instance}" if instance else name
@@ -139,8 +144,15 @@ class _Gathered:
         if place is not None:
             self.positions.setdefault(key, []).append((t, place))
 
+    def cores(self, key: str) -> "Dict[str, int]":
+        """The cores of a filter that the autopilot used, as sources, most used first; empty if the log does not name them."""
+        used = sorted(self._in_use.get(key.split(":")[0], {}).items(), key=lambda core: -core[1])
+        return {f"{key.split(':')[0]}:{core}" if core else key.split(":")[0]: count for core, count in used}
+
     def sources(self) -> List[Source]:
-        full = sorted((k for k in self.attitudes if k.split(":")[0] in FULL), key=lambda k: (FULL.index(k.split(":")[0]), k))
+        def rank(key: str) -> "Tuple[int, int, str]":
+            return FULL.index(key.split(":")[0]), key != next(iter(self.cores(key)), key), key
+        full = sorted((k for k in self.attitudes if k.split(":")[0] in FULL), key=rank)
         found = [Source(key, self.attitudes[key], self.positions.get(key, [])) for key in full]
         found += [Source(f"ATT+{p}", self.attitudes.get("ATT", []), self.positions.get(p, [])) for p in ("POS", "GPS")]
         depths: Stream[float] = next((self.depths[key] for key, _ in HEIGHTS if key in self.depths), [])
@@ -158,4 +170,9 @@ def read_dataflash(path: pathlib.Path, warn: Warn, source: Optional[str] = None,
         gathered.add(name, fields)
     wanted = chosen(gathered.sources(), source, str(path))
     local = wanted.name.split(":")[0] in LOCAL
+    cores = gathered.cores(wanted.name)
+    if cores and list(cores) != [wanted.name]:
+        total = sum(cores.values())
+        warn(f"cores that the autopilot used: {', '.join(f'{core} ({100 * n / total:.0f} %)' for core, n in cores.items())}; "
+             f"using {wanted.name} throughout")
     return track_of(wanted, str(path), warn, origin, gathered.origin if local else None, at)

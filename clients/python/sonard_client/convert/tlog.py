@@ -20,6 +20,7 @@ FULL = ("ODOMETRY", "SIM_STATE", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE")
 PRESSURES = ("SCALED_PRESSURE2", "SCALED_PRESSURE3", "SCALED_PRESSURE")  # the first is the outer sensor of a BlueROV2
 SURFACE_HPA, HPA_PER_M = 1013.25, 1025 * 9.80665 / 100
 IN_WATER_HPA = 1100.0  # higher than any barometer in air
+NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: cameras, gimbals, companion computers
 ATTITUDES, POSITIONS = ("ATTITUDE_QUATERNION", "ATTITUDE"), ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
 
 
@@ -99,6 +100,8 @@ class _Vehicle:
         self.depths: Dict[str, Stream[float]] = {}  # down [m], of messages without a fix
         self.pressures: Dict[str, Stream[float]] = {}  # [hPa]
         self.is_submarine = False
+        self.autopilot = 1  # its component, usual or by heartbeat
+        self.home_m: Optional[float] = None  # altitude of the home, of submarines the surface
         self.origin: Optional[Geodetic] = None
         self.unsupported: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id
         self.heading_is_local = False
@@ -114,6 +117,8 @@ class _Vehicle:
         name = MESSAGES[logged.frame.message_id].name if fields is not None else "HEARTBEAT"
         if fields is not None and name == "HEARTBEAT":
             self.is_submarine |= fields["type"] == SUBMARINE
+            if fields["autopilot"] != NO_AUTOPILOT:
+                self.autopilot = logged.frame.component
         if fields is None or name == "HEARTBEAT" or not self._is_used(name, logged):
             return
         if name == "GPS_GLOBAL_ORIGIN":
@@ -150,6 +155,8 @@ class _Vehicle:
             place = _simulated_place(fields) if name == "SIM_STATE" else \
                 Geodetic(1e-7 * fields["lat"], 1e-7 * fields["lon"], 1e-3 * fields["alt"])
             position = place if place.is_fix else None
+            if position is not None and name == "GLOBAL_POSITION_INT" and self.home_m is None:
+                self.home_m = 1e-3 * (fields["alt"] - fields["relative_alt"])
             if position is None and name == "GLOBAL_POSITION_INT":
                 self.depths.setdefault(name, []).append((t, -1e-3 * fields["relative_alt"]))
         if name in FULL and (attitude is None or position is None):
@@ -161,12 +168,16 @@ class _Vehicle:
             self.positions.setdefault(name, []).append((t, position))
 
     def _is_used(self, name: str, logged: Logged) -> bool:
-        """Uses one of several components that send the same message, so that their tracks are not mixed."""
+        """Uses one of several components that send the same message, so that their tracks are not mixed: the autopilot, else
+        the first."""
         component = logged.frame.component
         self.senders.add(component)
         if self.component is not None and component != self.component:
             return name == "GPS_GLOBAL_ORIGIN"  # valid for the whole system
         known = self._current.get(name)
+        if known is not None and known[0] != component and component == self.autopilot:
+            self._forget(name, known[0])
+            known = None
         if known is not None and known[0] != component and logged.received_s - known[1] <= SILENCE_S:
             counts = self.omitted.setdefault(name, {})
             counts[component] = counts.get(component, 0) + 1
@@ -175,6 +186,13 @@ class _Vehicle:
         if known is None or known[0] != component:
             self.components.setdefault(name, []).append(component)
         return True
+
+    def _forget(self, name: str, component: int) -> None:
+        """Drops what another component than the autopilot sent in this message."""
+        streams = [s.pop(name, []) for s in (self.attitudes, self.positions, self.depths, self.pressures)]
+        counts = self.omitted.setdefault(name, {})
+        counts[component] = counts.get(component, 0) + max(map(len, streams))
+        self.components[name] = []
 
     def choices(self) -> List[str]:
         """Describes which components were used, for messages that several components sent."""
@@ -258,5 +276,6 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
     if vehicle.restarts:
         warn(f"the vehicle restarted ({vehicle.restarts} x); its clock was continued by the times of receipt")
     local = not isinstance(wanted.positions[0][1], Geodetic)
+    surface_m = vehicle.home_m if vehicle.is_submarine and wanted.name.endswith("GLOBAL_POSITION_INT") else None
     of_local = vehicle.origin if local and wanted.name.endswith("LOCAL_POSITION_NED") else None
-    return track_of(wanted, str(path), warn, origin, of_local, at)
+    return track_of(wanted, str(path), warn, origin, of_local, at, surface_m)

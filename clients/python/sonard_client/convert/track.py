@@ -14,6 +14,7 @@ Value = TypeVar("Value")
 Stream = List[Tuple[float, Value]]  # times in s
 Place2 = Tuple[float, float]  # north, east [m]
 LONG_GAP_S = 1.0
+LONG_LACK_S = 3.0  # of positions or attitudes, while the other ones come
 
 
 class ConvertError(Exception):
@@ -93,9 +94,10 @@ def paired(attitudes: Stream[Quaternion], positions: Stream[Vector3]) -> List[Ro
 
 
 def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] = None,
-             own_origin: Optional[Geodetic] = None, at: Optional[Place2] = None) -> Track:
+             own_origin: Optional[Geodetic] = None, at: Optional[Place2] = None, surface_m: Optional[float] = None) -> Track:
     """Makes a track in NED_FRD. origin: as requested. own_origin: origin of the file's metres, if it contains one. at: north and
-    east of a vehicle that has no horizontal position."""
+    east of a vehicle that has no horizontal position. surface_m: altitude of z = 0 if no origin is requested (default: that of
+    the first fix)."""
     attitudes, positions = rising(source.attitudes), rising(source.positions)
     late = len(source.attitudes) + len(source.positions) - len(attitudes) - len(positions)
     if late:
@@ -106,7 +108,10 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
     if geodetic:
         from_here = origin or next((p for _, p in positions if isinstance(p, Geodetic)), None)
         assert from_here is not None
-        comments.append(f"origin: {from_here}" + ("" if origin else " (the first fix)"))
+        if not origin and surface_m is not None:
+            from_here = from_here._replace(altitude_m=surface_m)
+        comments.append(f"origin: {from_here}" + ("" if origin else " (the first fix" + ("" if surface_m is None else
+                                                                                       ", at the surface") + ")"))
         plane = LocalPlane(from_here)
         local = [(t, plane.ned(p)) for t, p in positions if isinstance(p, Geodetic)]
     else:
@@ -136,7 +141,21 @@ def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] =
     rows = paired(attitudes, local)
     if not rows:
         raise ConvertError(f"{name}: attitudes and positions of {source.name} do not overlap in time")
+    if local[0][0] != attitudes[0][0] or len(local) != len(attitudes):
+        _warn_of_lack(rows, [t for t, _ in attitudes], [t for t, _ in local], warn)
     return Track("NED_FRD", source.name, rows, comments, is_held)
+
+
+def _warn_of_lack(rows: Sequence[Row], attitudes_s: Sequence[float], positions_s: Sequence[float], warn: Warn) -> None:
+    """Describes long times with attitudes only, or with positions only."""
+    for what, times_s, others_s in (("position", positions_s, attitudes_s), ("attitude", attitudes_s, positions_s)):
+        lacking_s = [s for s in (times_s[0] - others_s[0], others_s[-1] - times_s[-1]) if s > LONG_LACK_S]
+        if lacking_s:
+            warn(f"without a {what} for {' and '.join(f'{s:.1f} s' for s in lacking_s)} at the beginning or the end: omitted")
+        gap_s, after_s = max(((b - a, a) for a, b in zip(times_s, times_s[1:])), default=(0.0, 0.0))
+        meanwhile_s = [t for t in others_s if after_s < t < after_s + gap_s]
+        if meanwhile_s and meanwhile_s[-1] - meanwhile_s[0] > LONG_LACK_S:
+            warn(f"no {what} for {gap_s:.1f} s after second {after_s - rows[0].t_s:.1f}, interpolated linearly")
 
 
 def dead_reckon(track: Track, speed_m_s: float) -> None:

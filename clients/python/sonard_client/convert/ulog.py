@@ -29,7 +29,7 @@ _REAL, _FLAG = ("float", "double"), ("bool", "uint8_t")
 _READ: Dict[str, Tuple[Tuple[str, ...], int]] = {
     **dict.fromkeys(("timestamp", "timestamp_sample"), (("uint64_t",), 1)), "q": (_REAL, 4),
     **dict.fromkeys(("x", "y", "z", "lat", "lon", "alt", "ref_lat", "ref_lon", "ref_alt"), (_REAL, 1)),
-    **dict.fromkeys(("xy_valid", "z_valid", "xy_global", "z_global"), (_FLAG, 1))}
+    **dict.fromkeys(("xy_valid", "z_valid", "xy_global", "z_global", "lat_lon_valid", "alt_valid"), (_FLAG, 1))}
 
 
 class Layout(NamedTuple):
@@ -125,7 +125,7 @@ class _Log:
                 self.origin = there if there.is_fix else None
         else:
             there = Geodetic(fields.get("lat", 0.0), fields.get("lon", 0.0), fields.get("alt", 0.0))
-            if there.is_fix:
+            if there.is_fix and fields.get("lat_lon_valid", True) and fields.get("alt_valid", True):
                 self.positions.setdefault(name, []).append((t, there))
 
     def sources(self) -> List[Source]:
