@@ -21,9 +21,11 @@ void append(std::string& out, double v) {
   out.append(text.data(), std::to_chars(text.data(), text.data() + text.size(), v).ptr);
 }
 
+/// Gazebo and RViz take the coordinates of every mesh as they are: z is up even if the file says otherwise.
 MeshFile mesh_at(const fs::path& file) {
   MeshFile request;
   request.file = file;
+  request.up = UpAxis::z;
   return request;
 }
 
@@ -124,6 +126,10 @@ bool FileResolver::resolve_heightmap(PlacedShape& placed, const fs::path& file) 
     const Vec3d size = placed.shape.size_m;
     const auto heights = read_png_heights(file, size.x, size.y, 0, size.z);
     if (!heights) return findings_.leave_out(placed.at, what + plain(heights.error().text, 300)), false;
+    // In Gazebo the brightest pixel of the picture has the full height, in a scene white has it.
+    float highest_m = 0;
+    for (const float z : heights->z_m) highest_m = std::max(highest_m, std::isnan(z) ? 0 : z);
+    if (highest_m > 0) placed.shape.size_m.z *= size.z / static_cast<double>(highest_m);
   }
   placed.shape.uri = path_to_write(file);
   return true;

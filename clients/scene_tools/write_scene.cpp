@@ -7,6 +7,8 @@
 #include <map>
 #include <set>
 
+#include "core/scene/files/mesh_steps.hpp"
+
 namespace sonar::scene_tools {
 namespace {
 
@@ -23,6 +25,12 @@ std::string precise(double v) {
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), v).ptr};
 }
 std::string triple(Vec3d v) { return std::string("[") + number(v.x) + ", " + number(v.y) + ", " + number(v.z) + "]"; }
+
+/// Whether a scene would turn the mesh by what its file or its format says; Gazebo and RViz do not.
+bool says_up(const std::string& file) {
+  const std::string extension = mesh_extension(file);
+  return extension == ".dae" || extension == ".gltf" || extension == ".glb";
+}
 
 /// A YAML scalar that parses to this text: without quotes where that is safe, else in double quotes.
 std::string yaml_text(std::string_view text) {
@@ -211,7 +219,7 @@ class SceneWriter {
       case Shape::Kind::mesh: {
         const double scale = s.scale.x;
         return ", type: mesh, file: " + yaml_text(s.uri) + material +
-               (scale == 1 ? "" : std::string(", scale: ") + precise(scale));
+               (scale == 1 ? "" : std::string(", scale: ") + precise(scale)) + (says_up(s.uri) ? ", up: z" : "");
       }
       case Shape::Kind::heightmap:
         return ", type: heightmap, file: " + yaml_text(s.uri) + material + ", size_m: [" + number(s.size_m.x) + ", " +

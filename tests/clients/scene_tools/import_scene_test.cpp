@@ -1,6 +1,7 @@
 #include "clients/scene_tools/import_scene.hpp"
 
 #include <gmock/gmock.h>
+#include <png.h>
 
 #include <cstdlib>
 #include <optional>
@@ -260,12 +261,45 @@ TEST_F(ImportScene, ColladaFilesBringTheirUnit) {
 <triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry></library_geometries>
 <library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
 <scene><instance_visual_scene url="#s"/></scene></COLLADA>)");
-  const auto done = run(sdf(model("m", mesh("cm.dae"))));
+  const auto size = [&](const std::string& file, const std::string& scale = "1 1 1") {
+    const auto done = run(sdf(model("m", mesh(file, scale))));
+    EXPECT_TRUE(done) << done.error().text;
+    const auto described = describe_scene(options.out);
+    EXPECT_TRUE(described) << described.error().text;
+    return described && described->objects.size() == 1 ? described->objects[0].in_world.size_m() : Vec3d{};
+  };
+  const auto expect_flat = [&](Vec3d is, Vec3d wanted) {
+    EXPECT_NEAR(length(is - wanted), 0, 1e-5) << is.x << ' ' << is.y << ' ' << is.z << '\n' << text();
+  };
+  expect_flat(size("cm.dae"), {2, 1, 0});
+  // Gazebo and RViz do not turn meshes whose files say that another axis is up.
+  std::string other = sonar::tests::TemporaryFiles::read(files.path("cm.dae"));
+  other.replace(other.find("Z_UP"), 4, "Y_UP");
+  write("y.dae", other);
+  expect_flat(size("y.dae"), {2, 1, 0});
+  expect_flat(size("y.dae", "1 3 1"), {2, 3, 0});
+  write("y.gltf",
+        R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[)"
+        R"({"attributes":{"POSITION":0}}]}],"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3",)"
+        R"("min":[0,0,0],"max":[2,1,0]}],"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,"uri":)"
+        R"("data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAAAAQAAAAAAAAAAAAAAAAAAAgD8AAAAA"}]})");
+  expect_flat(size("y.gltf"), {2, 1, 0});
+}
+
+TEST_F(ImportScene, TheBrightestPixelOfAHeightmapHasItsHeight) {
+  const std::vector<std::byte> grey{std::byte{0}, std::byte{50}, std::byte{100}, std::byte{0}};
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = image.height = 2;
+  image.format = PNG_FORMAT_GRAY;
+  ASSERT_TRUE(png_image_write_to_file(&image, files.path("h.png").c_str(), 0, grey.data(), 0, nullptr));
+  const auto done = run(sdf(model("m",
+                                  "<link name='l'><visual name='v'><geometry><heightmap><uri>h.png</uri><size>10 10 4</size>"
+                                  "</heightmap></geometry></visual></link>")));
   ASSERT_TRUE(done) << done.error().text;
   const auto described = describe_scene(options.out);
-  ASSERT_TRUE(described) << described.error().text;
-  ASSERT_EQ(described->objects.size(), 1u) << text();
-  EXPECT_NEAR(described->objects[0].in_world.size_m().x, 2, 1e-5) << text();
+  ASSERT_TRUE(described && described->objects.size() == 1) << text();
+  EXPECT_NEAR(described->objects[0].in_world.size_m().z, 4, 1e-4) << text();
 }
 
 TEST_F(ImportScene, MaterialsByArgumentByNameAndByGuess) {
