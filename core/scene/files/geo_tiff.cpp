@@ -1,4 +1,4 @@
-// GeoTIFF: heights with coordinates (OGC 19-008r4), through libtiff; the only file that includes it.
+// GeoTIFF: heights with coordinates (OGC 19-008r4), through libtiff.
 #include <tiffio.h>
 
 #include <algorithm>
@@ -6,9 +6,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <map>
-#include <memory>
-#include <set>
 #include <span>
 #include <sstream>
 
@@ -17,12 +14,13 @@
 #include "core/scene/files/gdal_metadata.hpp"
 #include "core/scene/files/geo_keys.hpp"
 #include "core/scene/files/height_values.hpp"
+#include "core/scene/files/tiff_file.hpp"
 #include "core/text/format.hpp"
 
 namespace sonar {
 namespace {
 
-constexpr std::uint64_t most_file_bytes = std::uint64_t{2} << 30, most_block_bytes = 64 << 20;
+constexpr std::uint64_t most_file_bytes = std::uint64_t{2} << 30;
 constexpr std::uint64_t memory_of_a_cell = 4;
 constexpr std::uint16_t most_bands = 16;
 
@@ -37,31 +35,6 @@ enum : std::uint32_t {
   gdal_metadata = 42112,
   gdal_no_data = 42113,
 };
-struct CloseTiff {
-  void operator()(TIFF* tiff) const { TIFFClose(tiff); }
-};
-using Tiff = std::unique_ptr<TIFF, CloseTiff>;
-
-// The library's error text for the file that this thread reads.
-thread_local std::string last_error;
-void on_error(const char*, const char* pattern, va_list arguments) {
-  std::array<char, 200> text{};
-  std::vsnprintf(text.data(), text.size(), pattern, arguments);
-  last_error = text.data();
-}
-
-Tiff open(const std::filesystem::path& file) {
-  TIFFSetErrorHandler(on_error);
-  TIFFSetWarningHandler(nullptr);  // libtiff would warn of every unknown tag
-  last_error.clear();
-#if TIFFLIB_VERSION >= 20221213
-  const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(), TIFFOpenOptionsFree);
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), static_cast<tmsize_t>(4 * most_block_bytes));
-  return Tiff(TIFFOpenExt(file.c_str(), "rm", options.get()));
-#else
-  return Tiff(TIFFOpen(file.c_str(), "rm"));  // m: do not map the file, which could shrink
-#endif
-}
 
 /// The values of a tag that is unknown to the library; empty if the tag is missing or has another type.
 template <class T>
@@ -80,26 +53,18 @@ std::vector<T> values_of(TIFF* tiff, std::uint32_t tag, TIFFDataType type) {
   return values == nullptr ? std::vector<T>() : std::vector<T>(values, values + std::min<std::uint32_t>(count, 65536));
 }
 
-struct Picture {
-  std::uint32_t columns = 0, rows = 0;
-  std::uint16_t bits = 1, format = SAMPLEFORMAT_UINT, samples = 1;
-  std::uint16_t bands = 1;             // values of a cell that lie side by side; the first is the height
-  std::optional<std::uint16_t> alpha;  // the one of them that is 0 where there is no data
-  std::size_t value_bytes() const { return bits / 8u; }
-};
-
 /// Place of the middle of the first cell, and steps; y usually falls.
 struct Georeference {
   double x = 0, y = 0, step_x = 0, step_y = 0;
 };
 
-/// The name of a compression that is not read; its code if the name is unknown.
-std::string name_of_compression(std::uint16_t code) {
-  static const std::map<std::uint16_t, const char*> names{
-      {6, "JPEG"},        {7, "JPEG"},        {34712, "JPEG 2000"},           {34887, "LERC"}, {34925, "LZMA"}, {50001, "WebP"},
-      {50002, "JPEG XL"}, {52546, "JPEG XL"}, {COMPRESSION_ZSTD, "Zstandard"}};
-  const auto name = names.find(code);
-  return name != names.end() ? name->second : "code " + std::to_string(code);
+/// A floating-point number of 16 bits.
+double half_number(std::uint16_t bits) {
+  const int exponent = bits >> 10 & 31, fraction = bits & 1023;
+  const double size = exponent == 31  ? (fraction == 0 ? std::numeric_limits<double>::infinity() : NAN)
+                      : exponent == 0 ? std::ldexp(fraction, -24)
+                                      : std::ldexp(fraction + 1024, exponent - 25);
+  return (bits & 0x8000) != 0 ? -size : size;
 }
 
 class GeoTiffReader {
@@ -108,9 +73,16 @@ class GeoTiffReader {
       : tiff_(tiff), file_(file), options_(options) {}
 
   Result<HeightGrid> read() {
-    if (has_mask())
+    const auto mask = mask_of(tiff_);
+    if (std::error_code error; std::filesystem::exists(file_.string() + ".msk", error))
       return bad(
-          "marks cells without data in a mask of its own, which is not read; write them as a value: gdalwarp -dstnodata -9999");
+          "marks cells without data in a file beside it (.msk), which is not read; write them as a value: gdalwarp -dstnodata "
+          "-9999");
+    if (const auto more = read_regular(file_.string() + ".aux.xml", 65536);
+        more && (more->find("<Scale>") != more->npos || more->find("<Offset>") != more->npos))
+      return bad(
+          "has its scale or offset in a file beside it (.aux.xml), which is not read; apply them: gdal_translate -unscale -ot "
+          "Float32 IN OUT.tif");
     if (auto r = read_description(); !r) return tl::make_unexpected(r.error());
     const auto place = read_georeference();
     if (!place) return tl::make_unexpected(place.error());
@@ -122,7 +94,11 @@ class GeoTiffReader {
     declared.erase(0, declared.find_first_not_of(' '));
     declared.erase(declared.find_last_not_of(' ') + 1);
     values_ = declared.empty() ? HeightValues(std::nullopt) : HeightValues(declared);
-    if (auto r = TIFFIsTiled(tiff_) ? read_tiles() : read_strips(); !r) return tl::make_unexpected(r.error());
+    const auto take_heights = [this](std::span<const std::byte> bytes, std::uint32_t column, std::uint32_t row,
+                                     std::uint32_t width) { return take(bytes, column, row, width); };
+    if (auto r = each_row_of_blocks(tiff_, picture_, take_heights); !r) return tl::make_unexpected(r.error());
+    if (mask)
+      if (auto r = apply_mask(*mask); !r) return tl::make_unexpected(r.error());
     const bool north_first = place->step_y < 0;
     for (std::uint32_t i = 0; i < picture_.columns; ++i) raw_.x.push_back(place->x + i * place->step_x);
     for (std::uint32_t j = 0; j < picture_.rows; ++j)
@@ -135,18 +111,25 @@ class GeoTiffReader {
  private:
   static tl::unexpected<Error> bad(const std::string& what) { return failure(ErrorKind::bad_data, what); }
 
-  /// A mask is a further picture of the file.
-  bool has_mask() {
-    constexpr std::uint16_t most_pictures = 64;
-    bool mask = false;
-    for (std::uint16_t n = 1; n < most_pictures && !mask && TIFFReadDirectory(tiff_) == 1; ++n) {
-      std::uint32_t kind = 0;
-      TIFFGetField(tiff_, TIFFTAG_SUBFILETYPE, &kind);
-      mask = (kind & FILETYPE_MASK) != 0;
-    }
-    TIFFSetDirectory(tiff_, 0);
-    last_error.clear();
-    return mask;
+  /// Takes out the heights of the cells that are 0 in the mask, a picture of 1 or 8 bits.
+  Result<void> apply_mask(std::uint16_t number) {
+    TIFFSetDirectory(tiff_, number);
+    const Picture mask = picture_at(tiff_);
+    if (mask.columns != picture_.columns || mask.rows != picture_.rows || mask.samples != 1 || (mask.bits != 1 && mask.bits != 8))
+      return bad(
+          "marks cells without data in a mask that is not like its heights; write them as a value: gdalwarp -dstnodata -9999");
+    if (auto r = check_blocks(tiff_); !r) return r;
+    return each_row_of_blocks(
+        tiff_, mask,
+        [&](std::span<const std::byte> bytes, std::uint32_t column, std::uint32_t row, std::uint32_t width) -> Result<void> {
+          if (!bytes.empty() && bytes.size() < mask.bytes_of(width)) return bad("has a mask with blocks that are too short");
+          for (std::uint32_t i = 0; i < width; ++i) {
+            const bool shown = !bytes.empty() && (mask.bits == 8 ? bytes[i] != std::byte{0}
+                                                                 : (bytes[i / 8] >> (7 - i % 8) & std::byte{1}) != std::byte{0});
+            if (!shown) raw_.z[std::size_t{row} * picture_.columns + column + i] = std::numeric_limits<float>::quiet_NaN();
+          }
+          return {};
+        });
   }
 
   /// The six numbers of a world file beside the grid, relative to the middle of the first cell.
@@ -165,13 +148,8 @@ class GeoTiffReader {
   }
 
   Result<void> read_description() {
-    std::uint16_t compression = COMPRESSION_NONE, photometric = PHOTOMETRIC_MINISBLACK, planes = PLANARCONFIG_CONTIG;
-    TIFFGetField(tiff_, TIFFTAG_IMAGEWIDTH, &picture_.columns);
-    TIFFGetField(tiff_, TIFFTAG_IMAGELENGTH, &picture_.rows);
-    TIFFGetFieldDefaulted(tiff_, TIFFTAG_BITSPERSAMPLE, &picture_.bits);
-    TIFFGetFieldDefaulted(tiff_, TIFFTAG_SAMPLEFORMAT, &picture_.format);
-    TIFFGetFieldDefaulted(tiff_, TIFFTAG_SAMPLESPERPIXEL, &picture_.samples);
-    TIFFGetFieldDefaulted(tiff_, TIFFTAG_COMPRESSION, &compression);
+    std::uint16_t photometric = PHOTOMETRIC_MINISBLACK, planes = PLANARCONFIG_CONTIG;
+    picture_ = picture_at(tiff_);
     TIFFGetFieldDefaulted(tiff_, TIFFTAG_PLANARCONFIG, &planes);
     TIFFGetField(tiff_, TIFFTAG_PHOTOMETRIC, &photometric);
     if (picture_.columns < 2 || picture_.rows < 2) return bad("smaller than 2 x 2 heights");
@@ -181,8 +159,9 @@ class GeoTiffReader {
                        "(-outsize)",
                        picture_.columns, picture_.rows));
     const bool whole = picture_.format == SAMPLEFORMAT_UINT || picture_.format == SAMPLEFORMAT_INT;
-    const bool known = whole ? picture_.bits == 8 || picture_.bits == 16 || picture_.bits == 32
-                             : picture_.format == SAMPLEFORMAT_IEEEFP && (picture_.bits == 32 || picture_.bits == 64);
+    const bool known =
+        whole ? picture_.bits == 8 || picture_.bits == 16 || picture_.bits == 32
+              : picture_.format == SAMPLEFORMAT_IEEEFP && (picture_.bits == 16 || picture_.bits == 32 || picture_.bits == 64);
     const bool grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
     if (grey && picture_.samples == 1 && !known)
       return bad(std::string("has ") + (whole ? "whole" : "floating-point") + " numbers of " + std::to_string(picture_.bits) +
@@ -192,15 +171,7 @@ class GeoTiffReader {
       return bad("not one band of heights but a picture; choose a band of numbers: gdal_translate -b 1 -ot Float32");
     if (planes == PLANARCONFIG_CONTIG) picture_.bands = picture_.samples;
     if (auto r = find_alpha(); !r) return r;
-    static const std::set<std::uint16_t> codecs{COMPRESSION_NONE,    COMPRESSION_LZW,      COMPRESSION_ADOBE_DEFLATE,
-                                                COMPRESSION_DEFLATE, COMPRESSION_PACKBITS, COMPRESSION_ZSTD};
-    if (!codecs.contains(compression) || !TIFFIsCODECConfigured(compression))
-      return bad("compressed in a way that is not read here (" + name_of_compression(compression) +
-                 "); write it otherwise: gdal_translate -co COMPRESS=DEFLATE IN OUT.tif");
-    const std::uint64_t block = TIFFIsTiled(tiff_) ? TIFFTileSize64(tiff_) : TIFFScanlineSize64(tiff_);
-    if (block == 0 || block > most_block_bytes || (!TIFFIsTiled(tiff_) && TIFFStripSize64(tiff_) > 4 * most_block_bytes))
-      return bad("its blocks have more than 64 MiB; write it in tiles: gdal_translate -co TILED=YES");
-    return {};
+    return check_blocks(tiff_);
   }
 
   /// Further bands are uncertainties and the like, except the one that says where there are heights.
@@ -272,6 +243,11 @@ class GeoTiffReader {
   }
   double value_at(const std::byte* at) const {
     const bool sign = picture_.format == SAMPLEFORMAT_INT;
+    if (picture_.format == SAMPLEFORMAT_IEEEFP && picture_.bits == 16) {
+      std::uint16_t half = 0;
+      std::memcpy(&half, at, sizeof half);
+      return half_number(half);
+    }
     if (picture_.format == SAMPLEFORMAT_IEEEFP) return picture_.bits == 64 ? number_at<double>(at) : number_at<float>(at);
     if (picture_.bits == 8) return sign ? number_at<std::int8_t>(at) : number_at<std::uint8_t>(at);
     if (picture_.bits == 16) return sign ? number_at<std::int16_t>(at) : number_at<std::uint16_t>(at);
@@ -281,7 +257,7 @@ class GeoTiffReader {
   /// `width` heights of one row, from a block's bytes, to column and row of the grid.
   Result<void> take(std::span<const std::byte> bytes, std::uint32_t column, std::uint32_t row, std::uint32_t width) {
     const std::size_t size = picture_.value_bytes() * picture_.bands;
-    width = std::min(width, picture_.columns - column);
+    if (bytes.empty()) return {};
     if (bytes.size() < size * width) return bad("has blocks that are shorter than its cells");
     for (std::uint32_t i = 0; i < width; ++i) {
       const std::byte* const cell = bytes.data() + size * i;
@@ -291,55 +267,6 @@ class GeoTiffReader {
       if (!height) return bad(text::format("the height %g in row %u, column %u is beyond 1e7 m", value, row + 1, column + i + 1));
       raw_.z[std::size_t{row} * picture_.columns + column + i] = *height;
     }
-    return {};
-  }
-
-  tl::unexpected<Error> unreadable() const { return bad("cannot be read: " + (last_error.empty() ? "damaged" : last_error)); }
-
-  /// Sparse files do not contain blocks without data.
-  bool is_left_out(std::uint32_t block) { return TIFFGetStrileByteCount(tiff_, block) == 0; }
-
-  /// Unpacks whole strips: some writers pack a run of equal bytes across the end of a row.
-  Result<void> read_strips() {
-    std::uint32_t height = 0;
-    TIFFGetFieldDefaulted(tiff_, TIFFTAG_ROWSPERSTRIP, &height);
-    const auto row_bytes = static_cast<std::size_t>(TIFFScanlineSize64(tiff_));
-    std::vector<std::byte> strip(static_cast<std::size_t>(TIFFStripSize64(tiff_)));
-    if (height == 0) return unreadable();
-    for (std::uint32_t row = 0, rows = 0; row < picture_.rows; row += rows) {
-      rows = std::min(height, picture_.rows - row);
-      const std::uint32_t number = TIFFComputeStrip(tiff_, row, 0);
-      if (is_left_out(number)) continue;
-      const std::size_t size = rows * row_bytes;
-      if (size > strip.size() ||
-          TIFFReadEncodedStrip(tiff_, number, strip.data(), static_cast<tmsize_t>(size)) != static_cast<tmsize_t>(size))
-        return unreadable();
-      for (std::uint32_t j = 0; j < rows; ++j)
-        if (auto r = take(std::span<const std::byte>(strip).subspan(j * row_bytes), 0, row + j, picture_.columns); !r) return r;
-    }
-    return {};
-  }
-
-  Result<void> read_tiles() {
-    std::uint32_t width = 0, height = 0;
-    TIFFGetField(tiff_, TIFFTAG_TILEWIDTH, &width);
-    TIFFGetField(tiff_, TIFFTAG_TILELENGTH, &height);
-    const std::uint64_t row_bytes = TIFFTileRowSize64(tiff_);
-    std::vector<std::byte> tile(static_cast<std::size_t>(TIFFTileSize64(tiff_)));
-    if (width == 0 || height == 0 || row_bytes == 0 || row_bytes * height > tile.size()) return unreadable();
-    // Every tile is unpacked as a whole, even if few of its cells lie in the picture.
-    if (TIFFNumberOfTiles(tiff_) * std::uint64_t{tile.size()} >
-        most_block_bytes + 4 * std::uint64_t{raw_.z.size()} * picture_.value_bytes() * picture_.bands)
-      return bad("its tiles are much larger than the picture; write it without: gdal_translate -co TILED=NO");
-    for (std::uint32_t row = 0; row < picture_.rows; row += std::min(height, picture_.rows - row))
-      for (std::uint32_t column = 0; column < picture_.columns; column += std::min(width, picture_.columns - column)) {
-        if (is_left_out(TIFFComputeTile(tiff_, column, row, 0, 0))) continue;
-        if (TIFFReadTile(tiff_, tile.data(), column, row, 0, 0) < 0) return unreadable();
-        for (std::uint32_t j = 0; j < std::min(height, picture_.rows - row); ++j) {
-          const auto bytes = std::span<const std::byte>(tile).subspan(static_cast<std::size_t>(j * row_bytes));
-          if (auto r = take(bytes, column, row + j, width); !r) return r;
-        }
-      }
     return {};
   }
 
@@ -359,8 +286,8 @@ Result<HeightGrid> read_geo_tiff_heights(const std::filesystem::path& file, cons
   std::error_code error;
   if (std::filesystem::file_size(file, error) > most_file_bytes || error)
     return bad("larger than 2 GiB; cut a part out (gdal_translate)");
-  const Tiff tiff = open(file);
-  if (!tiff) return bad("no TIFF, or damaged: " + last_error);
+  const Tiff tiff = open_tiff(file);
+  if (!tiff) return bad("no TIFF, or damaged: " + last_tiff_error());
   auto grid = GeoTiffReader(tiff.get(), file, options).read();
   if (!grid) return failure(grid.error().kind, file.string() + ": " + grid.error().text);
   return grid;

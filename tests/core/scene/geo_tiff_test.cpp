@@ -291,7 +291,7 @@ TEST_F(GeoTiff, WebMercatorHasItsLengthsOnTheGround) {
   EXPECT_NEAR(as_metres->x[1] - as_metres->x[0], 100, 1e-9);
 }
 
-TEST_F(GeoTiff, BlocksThatAreLeftOutAreHolesAndAMaskIsRefused) {
+TEST_F(GeoTiff, BlocksThatAreLeftOutAreHoles) {
   TiffFile sparse = TiffFile::of(3, 2, six).at(0, 100, 10, 10).without(273).without(278).without(279);
   sparse.shorts(278, {1}), sparse.longs(273, {8, 0}), sparse.longs(279, {12, 0});  // a strip a row, the second without bytes
   sparse.fields[1].value = TiffFile::bytes_of(std::vector<std::uint16_t>{2});
@@ -300,11 +300,41 @@ TEST_F(GeoTiff, BlocksThatAreLeftOutAreHolesAndAMaskIsRefused) {
   ASSERT_TRUE(grid) << grid.error().text;
   EXPECT_FLOAT_EQ(grid->z_m[3], -1);
   EXPECT_TRUE(std::isnan(grid->z_m[0]));
+}
 
-  TiffFile mask = TiffFile::of(3, 2, std::vector<std::uint8_t>(6)).without(262);
-  mask.longs(254, {4}), mask.shorts(262, {4});
-  std::string both = TiffFile::of(3, 2, six).at(0, 100, 10, 10).bytes_before(mask);
-  EXPECT_THAT(read_geo_tiff_heights(files.write("g.tif", both), {}).error().text, HasSubstr("gdalwarp -dstnodata"));
+TEST_F(GeoTiff, CellsThatAMaskHidesAreHoles) {
+  const auto masked = [&](std::uint16_t bits, const std::vector<std::uint8_t>& cells, std::uint16_t columns = 3,
+                          std::uint32_t kind = 4) {
+    TiffFile mask = TiffFile::of(columns, 2, cells).without(262).without(258);
+    mask.longs(254, {kind}), mask.shorts(262, {4}), mask.shorts(258, {bits});
+    return read_geo_tiff_heights(files.write("g.tif", TiffFile::of(3, 2, six).at(0, 100, 10, 10).bytes_before(mask)), {});
+  };
+  const auto holes = [](const Result<HeightGrid>& grid) {
+    std::string all;
+    for (std::size_t k = 0; grid && k < 6; ++k) all += std::isnan(grid->z_m[k]) ? 'o' : 'x';
+    return grid ? all : grid.error().text;
+  };
+  // The file begins in the north, the grid in the south.
+  EXPECT_EQ(holes(masked(1, {0b10100000, 0b10000000})), "xooxox");
+  EXPECT_EQ(holes(masked(8, {255, 255, 255, 255, 0, 255})), "xoxxxx");
+  EXPECT_FLOAT_EQ(masked(8, {255, 255, 255, 255, 0, 255})->z_m[3], -1);
+  EXPECT_EQ(holes(masked(8, {0, 0, 0, 0, 0, 0}, 3, 5)), "xoxxxx") << "of a reduced picture; -9999 is far from all heights";
+  EXPECT_THAT(masked(8, {255, 255, 255, 255}, 2).error().text, HasSubstr("a mask that is not like its heights"));
+  EXPECT_THAT(masked(4, {255, 255, 255, 255, 255, 255}).error().text, HasSubstr("gdalwarp -dstnodata"));
+  files.write("g.tif.msk", "?");
+  EXPECT_THAT(read(TiffFile::of(3, 2, six).at(0, 100, 10, 10)).error().text, HasSubstr("in a file beside it (.msk)"));
+}
+
+TEST_F(GeoTiff, FloatingPointNumbersOf16Bits) {
+  const std::vector<std::uint16_t> halves{0x0000, 0xBC00, 0xD640, 0x3555, 0x8001, 0x7E00};
+  const auto grid = read(TiffFile::of(3, 2, halves).at(0, 100, 10, 10).without(339).shorts(339, {3}));
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_EQ(grid->z_m[3], 0);
+  EXPECT_EQ(grid->z_m[4], -1);
+  EXPECT_EQ(grid->z_m[5], -100);
+  EXPECT_NEAR(grid->z_m[0], 0.33325195, 1e-8);
+  EXPECT_NEAR(grid->z_m[1], -5.9604645e-8, 1e-14);
+  EXPECT_TRUE(std::isnan(grid->z_m[2]));
 }
 
 TEST_F(GeoTiff, TheFirstOfSeveralBandsIsTheHeightAndAnAlphaBandMarksHoles) {

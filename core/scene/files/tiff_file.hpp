@@ -1,0 +1,53 @@
+// TIFF files: the pictures in a file, and their cells by strips or tiles. Internal to geo_tiff.cpp.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "core/base/result.hpp"
+
+struct tiff;  // libtiff's TIFF
+
+namespace sonar {
+
+constexpr std::uint64_t most_block_bytes = 64 << 20;
+
+struct CloseTiff {
+  void operator()(tiff* file) const;
+};
+using Tiff = std::unique_ptr<tiff, CloseTiff>;
+
+/// Null if the file is no TIFF or damaged; last_tiff_error() then tells why.
+Tiff open_tiff(const std::filesystem::path& file);
+/// libtiff's last error of this thread; "damaged" if it gave none.
+std::string last_tiff_error();
+
+/// The number of the picture that says where the first one has data; the file must be at the first one, and is afterwards.
+std::optional<std::uint16_t> mask_of(tiff* file);
+
+struct Picture {
+  std::uint32_t columns = 0, rows = 0;
+  std::uint16_t bits = 1, format = 1, samples = 1;  // format: unsigned integers
+  std::uint16_t bands = 1;                          // values of a cell that lie side by side; the first is the height
+  std::optional<std::uint16_t> alpha;               // the one of them that is 0 where there is no data
+  std::size_t value_bytes() const { return bits / 8u; }
+  std::size_t bytes_of(std::uint32_t cells) const { return (std::size_t{bits} * bands * cells + 7) / 8; }
+};
+
+/// The description of the picture at which the file is.
+Picture picture_at(tiff* file);
+/// Fails if the picture is compressed in a way that is not read, or in blocks that are too large.
+Result<void> check_blocks(tiff* file);
+
+/// Cells of a row, from the given column on: their bytes, which are empty for a block that a sparse file does not contain.
+using TakeCells =
+    std::function<Result<void>(std::span<const std::byte> bytes, std::uint32_t column, std::uint32_t row, std::uint32_t width)>;
+/// Unpacks the first plane of the picture, strip by strip or tile by tile.
+Result<void> each_row_of_blocks(tiff* file, const Picture& picture, const TakeCells& take);
+
+}  // namespace sonar
