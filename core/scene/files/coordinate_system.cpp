@@ -76,6 +76,7 @@ CoordinateSystem system_of_lines(const std::string& text) {
     if (key == "DATUM") datum = value;
     if (key == "ZONE") zone = value;
     if (key == "UNITS") system.unit_m = unit_of(value);
+    if (key == "UNITS" && (value == "DS" || value == "DM")) system.unit_deg = value == "DS" ? 1.0 / 3600 : 1.0 / 60;
     if (key == "ZUNITS") system.height_unit_m = unit_of(value);
   }
   if (is_utm)  // zones of the south have a sign
@@ -161,10 +162,14 @@ class WktReader {
     if (of_vertical && downwards) system_.depths = open_.back().name;
     if (unit.word == "PARAMETER" && first) take_parameter(unit.name, *first);
     if ((unit.word == "SPHEROID" || unit.word == "ELLIPSOID") && first && second) modern_ = is_modern_ellipsoid(*first, *second);
-    if (unit.word != "UNIT" && unit.word != "LENGTHUNIT") return;
+    if (unit.word == "PRIMEM" && first && std::abs(*first) <= 400) meridian_deg_ = *first * meridian_unit_deg_;
+    if (unit.word != "UNIT" && unit.word != "LENGTHUNIT" && unit.word != "ANGLEUNIT") return;
     std::size_t owner = open_.size();
     while (owner > 0 && open_[owner - 1].word == "AXIS") --owner;
     if (owner == 0 || !first || !is_unit(*first)) return;
+    const double deg = deg_from_rad(*first), unit_deg = std::abs(deg - 1) < 1e-6 || unit.name == "DEGREE" ? 1 : deg;
+    if (is_one_of(open_[owner - 1].word, in_degrees)) system_.unit_deg = unit_deg;
+    if (open_[owner - 1].word == "PRIMEM") meridian_unit_deg_ = unit_deg;
     if (is_one_of(open_[owner - 1].word, in_lengths)) system_.unit_m = *first;
     if (is_one_of(open_[owner - 1].word, of_heights)) system_.height_unit_m = *first;
   }
@@ -179,7 +184,11 @@ class WktReader {
   }
 
   CoordinateSystem finished() {
-    if (!system_.utm && is_projected_ && transverse_ && modern_.value_or(false) && system_.unit_m == 1)
+    if (system_.geographic.value_or(false))
+      system_.prime_meridian_deg = meridian_deg_;
+    else if (meridian_deg_ != 0)
+      system_.utm.reset();
+    if (!system_.utm && is_projected_ && transverse_ && meridian_deg_ == 0 && modern_.value_or(false) && system_.unit_m == 1)
       system_.utm = utm_of_parameters(by_);
     if (is_projected_ && !system_.utm && !system_.web_mercator) system_.name = name_;
     system_.other_datum = system_.geographic.value_or(false) && !modern_.value_or(true);
@@ -194,6 +203,7 @@ class WktReader {
   std::string name_;
   bool is_projected_ = false, transverse_ = false;
   std::optional<bool> modern_;
+  double meridian_deg_ = 0, meridian_unit_deg_ = 1;
   TransverseMercator by_;
 };
 

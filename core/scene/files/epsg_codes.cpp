@@ -63,6 +63,38 @@ constexpr auto modern_codes = std::to_array<Codes>(
      {7900, 7931}, {8085, 8086}, {8231, 8255}, {8399, 8403}, {8426, 8427}, {8542, 8545}, {8684, 8685}, {8817, 8818}, {8988, 9019},
      {9053, 9075}, {9754, 9755}, {9989, 9990}});
 
+struct Meridian {
+  std::uint16_t code;
+  double degrees;
+};
+
+/// Prime meridians other than Greenwich, in degrees east of it.
+constexpr auto meridians = std::to_array<Meridian>({
+    {8901, 0},                 // Greenwich
+    {8902, -9.131906111111},   // Lisbon
+    {8903, 2.337229166667},    // Paris
+    {8904, -74.080916666667},  // Bogota
+    {8905, -3.687375},         // Madrid
+    {8906, 12.452333333333},   // Rome
+    {8907, 7.439583333333},    // Bern
+    {8908, 106.807719444444},  // Jakarta
+    {8909, -17.666666666667},  // Ferro
+    {8910, 4.367975},          // Brussels
+    {8911, 18.058277777778},   // Stockholm
+    {8912, 23.7163375},        // Athens
+    {8913, 10.722916666667},   // Oslo
+    {8914, 2.337208333333},    // Paris, by the Royal Greenwich Observatory
+});
+struct OfSystem {
+  std::uint16_t system, meridian;
+};
+/// Geographic systems whose longitudes do not begin at Greenwich.
+constexpr auto systems_of_meridians =
+    std::to_array<OfSystem>({{4801, 8907}, {4802, 8904}, {4803, 8902}, {4804, 8908}, {4805, 8909}, {4806, 8906}, {4807, 8903},
+                             {4808, 8908}, {4809, 8910}, {4810, 8903}, {4811, 8903}, {4813, 8908}, {4814, 8911}, {4815, 8912},
+                             {4816, 8903}, {4817, 8913}, {4818, 8909}, {4819, 8903}, {4820, 8908}, {4821, 8903}, {4901, 8914},
+                             {4902, 8914}, {4903, 8905}, {4904, 8902}, {5229, 8909}, {8042, 8909}, {8043, 8909}});
+
 template <class Rows>
 const auto* row_of(const Rows& rows, std::uint32_t code) {
   const auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& r) { return code >= r.first && code <= r.last; });
@@ -74,6 +106,17 @@ const auto* row_of(const Rows& rows, std::uint32_t code) {
 std::optional<UtmZone> utm_of_epsg(std::uint32_t code) {
   const Zones* const row = row_of(utm_codes, code);
   return row == nullptr ? std::nullopt : std::optional(UtmZone{row->zone + static_cast<int>(code - row->first), row->south});
+}
+
+std::optional<double> degrees_of_prime_meridian(std::uint32_t code) {
+  const auto row = std::find_if(meridians.begin(), meridians.end(), [&](const Meridian& m) { return m.code == code; });
+  return row == meridians.end() ? std::nullopt : std::optional(row->degrees);
+}
+
+double prime_meridian_of_epsg(std::uint32_t code) {
+  const auto row =
+      std::find_if(systems_of_meridians.begin(), systems_of_meridians.end(), [&](const OfSystem& s) { return s.system == code; });
+  return row == systems_of_meridians.end() ? 0 : degrees_of_prime_meridian(row->meridian).value_or(0);
 }
 
 bool agrees_with_wgs84(std::uint32_t code) { return row_of(modern_codes, code) != nullptr; }

@@ -20,7 +20,10 @@ class Words {
   explicit Words(std::string text)
       : text_(std::move(text)), at_(text_.starts_with(byte_order_mark) ? byte_order_mark.size() : 0) {}
   std::string_view next() {
-    while (at_ < text_.size() && is_between(text_[at_])) line_ += text_[at_++] == '\n';
+    while (at_ < text_.size() && (is_between(text_[at_]) || text_[at_] == '#')) {
+      if (text_[at_] == '#') at_ = std::min(text_.find('\n', at_), text_.size() - 1);  // a comment
+      line_ += text_[at_++] == '\n';
+    }
     const std::size_t from = at_;
     while (at_ < text_.size() && !is_between(text_[at_])) ++at_;
     return std::string_view(text_).substr(from, at_ - from);

@@ -1,6 +1,7 @@
 #include "core/scene/files/geo_keys.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "core/base/letters.hpp"
@@ -13,10 +14,13 @@ enum Key : std::uint16_t {
   citation = 1026,
   geographic_system = 2048,
   geographic_citation = 2049,
+  prime_meridian = 2051,
   angular_units = 2054,
+  angular_unit_size = 2055,
   ellipsoid = 2056,
   semi_major_axis = 2057,
   inverse_flattening = 2059,
+  prime_meridian_longitude = 2061,
   projected_system = 3072,
   projected_citation = 3073,
   projection = 3074,
@@ -31,7 +35,7 @@ enum Key : std::uint16_t {
   vertical_citation = 4097,
   vertical_units = 4099,
 };
-constexpr std::uint16_t projected = 1, geographic = 2, geocentric = 3, degree = 9102, other_degree = 9122, user_defined = 32767;
+constexpr std::uint16_t projected = 1, geographic = 2, geocentric = 3, user_defined = 32767;
 constexpr std::uint16_t web_mercator = 3857, old_web_mercator = 3785, transverse_mercator = 1;
 constexpr std::uint16_t numbers_tag = 34736, texts_tag = 34737;
 
@@ -53,6 +57,30 @@ Result<double> length_unit(std::optional<std::uint16_t> key) {
   }
 }
 
+std::optional<std::uint16_t> code_of(const GeoKeys& keys, std::uint16_t key) {
+  const auto code = keys.value_of(key);
+  return code == user_defined || code == 0 ? std::nullopt : code;
+}
+
+/// Degrees per unit of angle. nullopt for minutes with seconds and the like, which are no numbers to calculate with.
+std::optional<double> degrees_per_unit(const GeoKeys& keys) {
+  constexpr std::uint16_t radian = 9101, degree = 9102, grad = 9105, gon = 9106, other_degree = 9122;
+  const std::uint16_t unit = keys.value_of(angular_units).value_or(degree);
+  if (unit == degree || unit == other_degree) return 1;
+  if (unit == grad || unit == gon) return 0.9;
+  if (unit == radian) return deg_from_rad(1);
+  const auto size_rad = unit == user_defined ? keys.number_of(angular_unit_size) : std::nullopt;
+  return size_rad && *size_rad > 1e-6 && *size_rad < 10 ? std::optional(deg_from_rad(*size_rad)) : std::nullopt;
+}
+
+/// Where longitudes begin, in degrees east of Greenwich. nullopt if the file names an unknown meridian.
+std::optional<double> prime_meridian_of_keys(const GeoKeys& keys, double unit_deg) {
+  if (const auto longitude = keys.number_of(prime_meridian_longitude); longitude && std::abs(*longitude * unit_deg) <= 360)
+    return *longitude * unit_deg;
+  if (const auto code = code_of(keys, prime_meridian)) return degrees_of_prime_meridian(*code);
+  return prime_meridian_of_epsg(code_of(keys, geographic_system).value_or(0));
+}
+
 /// The code of the unit of height systems that are not in metres, from the EPSG data set 10.0.
 std::optional<std::uint16_t> unit_of_height_system(std::uint16_t system) {
   static const std::set<std::uint16_t> in_feet{5614, 6130, 6131, 6132, 8050, 8051, 8228},
@@ -67,11 +95,6 @@ bool counts_downwards(std::uint16_t system) {
   static const std::set<std::uint16_t> depths{5336, 5612, 5614, 5706, 5715, 5734, 5739, 5789, 5831, 5861, 5862, 5863, 5864, 5865,
                                               5866, 5867, 5873, 6357, 6358, 6359, 7976, 8051, 8053, 8358, 9287, 9288, 9672};
   return depths.contains(system);
-}
-
-std::optional<std::uint16_t> code_of(const GeoKeys& keys, std::uint16_t key) {
-  const auto code = keys.value_of(key);
-  return code == user_defined || code == 0 ? std::nullopt : code;
 }
 
 /// "EPSG:27700", or the name in the file.
@@ -149,8 +172,13 @@ Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::
     system = *cited;
   } else if (model == geographic) {
     system.geographic = true;
-    if (const auto unit = keys.value_of(angular_units).value_or(degree); unit != degree && unit != other_degree)
-      return failure(ErrorKind::bad_data, "has angles that are not in degrees; convert it to degrees: gdalwarp -t_srs EPSG:4326");
+    const auto unit_deg = degrees_per_unit(keys);
+    const auto meridian_deg = prime_meridian_of_keys(keys, unit_deg.value_or(1));
+    if (!unit_deg || !meridian_deg)
+      return failure(ErrorKind::bad_data,
+                     std::string(unit_deg ? "has longitudes from an unknown meridian" : "has angles in an unknown unit") +
+                         "; convert it: gdalwarp -t_srs EPSG:4326 IN OUT.tif");
+    system.unit_deg = *unit_deg, system.prime_meridian_deg = *meridian_deg;
     system.other_datum = !has_modern_datum(keys).value_or(true);
     if (system.other_datum) system.name = name_by(code_of(keys, geographic_system), keys, geographic_citation);
   } else if (model == projected) {

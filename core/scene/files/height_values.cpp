@@ -99,6 +99,20 @@ void convert_web_mercator(RawHeights& raw, std::vector<std::string>& notes) {
                    1 / std::cos(rad_from_deg(0.5 * (raw.y.front() + raw.y.back())))));
 }
 
+/// Longitudes and latitudes in other units, or from another meridian than Greenwich.
+void convert_to_degrees(RawHeights& raw, std::vector<std::string>& notes) {
+  const double unit_deg = raw.system.unit_deg, meridian_deg = raw.system.prime_meridian_deg;
+  if (unit_deg != 1) {
+    for (auto* axis : {&raw.x, &raw.y})
+      for (double& v : *axis) v *= unit_deg;
+    notes.push_back(text::format("its coordinates, in units of %.9g degrees, become degrees", unit_deg));
+  }
+  if (meridian_deg == 0) return;
+  for (double& x : raw.x) x += meridian_deg;
+  notes.push_back(text::format("its longitudes begin %.6f degrees %s of Greenwich, and become those from Greenwich",
+                               std::abs(meridian_deg), meridian_deg > 0 ? "east" : "west"));
+}
+
 void convert_to_metres(RawHeights& raw, double z_scale, std::vector<std::string>& notes) {
   const double unit_m = raw.system.unit_m;
   if (unit_m == 1) return;
@@ -177,6 +191,22 @@ void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodeti
   grid.origin = middle;
   grid.notes.push_back("x and y are relative to its middle, " + place_text(middle) +
                        "; set origin: {lat, lon} to place it otherwise");
+}
+
+/// Large cells with coordinates of a place on Earth may be degrees, even if the ground is flat. A local grid usually begins or
+/// has its middle at 0, 0.
+void hint_at_degrees(HeightGrid& grid) {
+  constexpr double least_cell = 0.05, all_around = 300;
+  const double cell = grid.x[1] - grid.x[0], near = cell;
+  const auto is_local = [&](const std::vector<double>& axis) {
+    return std::abs(axis.front()) <= near || std::abs(axis.back()) <= near || std::abs(axis.front() + axis.back()) <= near;
+  };
+  if (cell < least_cell || grid.x.front() < -180 || grid.x.back() > 360 || grid.y.front() < -90 || grid.y.back() > 90) return;
+  if (is_local(grid.x) && is_local(grid.y) && grid.x.back() - grid.x.front() + cell < all_around) return;
+  grid.notes.push_back(
+      text::format("its coordinates (%.6g, %.6g, cells of %.6g) are taken as metres; write geographic: true if they "
+                   "are degrees, or false",
+                   grid.x.front(), grid.y.front(), cell));
 }
 
 Result<void> set_origin_of_degrees(HeightGrid& grid, const HeightOptions& options, bool guessed) {
@@ -305,6 +335,7 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   const bool said = options.geographic.has_value() || raw.system.geographic.has_value();
   const bool geographic = options.geographic.value_or(raw.system.geographic.value_or(!said && shows_degrees(raw)));
   if (!geographic) convert_to_metres(raw, options.z_scale, grid.notes);
+  if (geographic && !raw.system.web_mercator) convert_to_degrees(raw, grid.notes);
   if (raw.system.height_unit_m != 1)
     grid.notes.push_back(text::format("its heights, in units of %.6g m, become metres", raw.system.height_unit_m));
   if (geographic && !could_be_degrees(raw))
@@ -339,8 +370,9 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   } else if (zone && !options.centred) {
     grid.notes.push_back("its coordinates are metres of UTM zone " + text_of(*zone) +
                          "; set origin: {lat, lon}, or world.origin in the configuration, to place it by latitude and longitude");
-  } else if (options.world_origin && !options.geographic) {
-    hint_at_zone(grid, *options.world_origin);
+  } else {
+    if (options.world_origin && !options.geographic) hint_at_zone(grid, *options.world_origin);
+    if (!said && !zone && !options.centred) hint_at_degrees(grid);
   }
   return grid;
 }

@@ -37,6 +37,8 @@ class HeightValues {
 /// Coordinates and heights as a file describes them.
 struct CoordinateSystem {
   std::optional<bool> geographic = {};  // coordinates in degrees
+  double unit_deg = 1;                  // unit of coordinates that are angles
+  double prime_meridian_deg = 0;        // where longitudes begin, east of Greenwich
   double unit_m = 1;                    // unit of coordinates that are not degrees
   double height_unit_m = 1;
   bool web_mercator = false;  // its metres are longer than metres on the ground
@@ -73,6 +75,10 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 CoordinateSystem system_by_prj(const std::filesystem::path& heights);
 /// Parses WKT; units that it does not name are metres.
 CoordinateSystem system_of_wkt(std::string_view text);
+/// The meridian at which the longitudes of a geographic system of the EPSG data set begin, in degrees east of Greenwich.
+double prime_meridian_of_epsg(std::uint32_t code);
+/// The same of a prime meridian of the EPSG data set; nothing for an unknown one.
+std::optional<double> degrees_of_prime_meridian(std::uint32_t code);
 /// The zone of a projected system of the EPSG data set; empty for other projections, and for older datums.
 std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
 /// True for the codes, in the EPSG data set, of latitudes and longitudes within 2 m of WGS 84.

@@ -66,6 +66,26 @@ TEST(CoordinateSystems, WktIsUtmByItsParametersWhateverItsName) {
   EXPECT_FALSE(system_of_wkt("GEOGCS[\"WGS 84\"]").other_datum) << "without an ellipsoid";
 }
 
+TEST(CoordinateSystems, LongitudesOfWktMayBeginElsewhereAndAnglesBeGrads) {
+  const std::string begin = "GEOGCS[\"g\",DATUM[\"d\",SPHEROID[" + grs80 + "]],";
+  const auto paris = system_of_wkt(begin + "PRIMEM[\"Paris\",2.337229166666667],UNIT[\"Grad\",0.01570796326794897]]");
+  EXPECT_NEAR(paris.prime_meridian_deg, 2.337229, 1e-6);
+  EXPECT_NEAR(paris.unit_deg, 0.9, 1e-9);
+  const auto newer = system_of_wkt(
+      "GEOGCRS[\"NTF (Paris)\",DATUM[\"d\",ELLIPSOID[\"c\",6378249.2,293.4660212936269,LENGTHUNIT[\"metre\",1]]],"
+      "PRIMEM[\"Paris\",2.5969213,ANGLEUNIT[\"grad\",0.015707963267949]],CS[ellipsoidal,2],"
+      "AXIS[\"latitude\",north,ORDER[1],ANGLEUNIT[\"grad\",0.015707963267949]],"
+      "AXIS[\"longitude\",east,ORDER[2],ANGLEUNIT[\"grad\",0.015707963267949]]]");
+  EXPECT_NEAR(newer.prime_meridian_deg, 2.337229, 1e-6);
+  EXPECT_NEAR(newer.unit_deg, 0.9, 1e-9);
+  const auto usual = system_of_wkt(begin + "PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]]");
+  EXPECT_EQ(usual.prime_meridian_deg, 0);
+  EXPECT_EQ(usual.unit_deg, 1);
+  std::string with = wkt("mine", grs80, transverse);
+  with.insert(with.find(",UNIT"), ",PRIMEM[\"Paris\",2.337229166666667]");
+  EXPECT_EQ(zone_text(system_of_wkt(with).utm), "none");
+}
+
 /// Keys with values of their own, numbers, and one text.
 GeoKeys keys(const std::vector<std::array<std::uint16_t, 2>>& values,
              const std::vector<std::pair<std::uint16_t, double>>& numbers = {}, const std::string& citation = "") {
@@ -102,6 +122,33 @@ TEST(CoordinateSystems, GeoKeysOfOnesOwnAreUtmByProjectionOrParameters) {
     (void)of(GeoKeys({1, 1, 0, 1, 3073, 34737, 60000, at, 2057, 34736, 1, at}, {}, "x"));
 }
 
+TEST(CoordinateSystems, LongitudesOfGeoKeysMayBeginElsewhere) {
+  const auto of = [](const GeoKeys& k) { return system_of_keys(k, std::nullopt); };
+  EXPECT_NEAR(of(keys({{{1024, 2}, {2048, 4806}}}))->prime_meridian_deg, 12.452333, 1e-6) << "Monte Mario (Rome)";
+  EXPECT_NEAR(of(keys({{{1024, 2}, {2048, 32767}, {2051, 8903}}}))->prime_meridian_deg, 2.337229, 1e-6);
+  const auto grads = of(keys({{{1024, 2}, {2048, 32767}, {2054, 9105}}}, {{2061, 2.5969213}}));
+  EXPECT_NEAR(grads->prime_meridian_deg, 2.337229, 1e-6);
+  EXPECT_NEAR(grads->unit_deg, 0.9, 1e-12);
+  EXPECT_EQ(of(keys({{{1024, 2}, {2048, 4326}, {2051, 8901}}}))->prime_meridian_deg, 0);
+  EXPECT_THAT(of(keys({{{1024, 2}, {2048, 32767}, {2051, 8999}}})).error().text,
+              HasSubstr("from an unknown meridian; convert it: gdalwarp"));
+  EXPECT_THAT(of(keys({{{1024, 2}, {2054, 9110}}})).error().text, HasSubstr("angles in an unknown unit"));
+}
+
+TEST(CoordinateSystems, DegreesOfAGridBecomeThoseFromGreenwich) {
+  TemporaryFiles files;
+  files.write("g.prj",
+              "GEOGCS[\"GCS_NTF_Paris\",DATUM[\"D_NTF\",SPHEROID[\"Clarke_1880_IGN\",6378249.2,293.46602]],"
+              "PRIMEM[\"Paris\",2.337229166666667],UNIT[\"Grad\",0.01570796326794897]]");
+  const auto grid =
+      read_esri_heights(files.write("g.asc", "ncols 2\nnrows 2\nxllcenter -8\nyllcenter 53\ncellsize 0.001\n-1 -2 -3 -4\n"), {});
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_NEAR(grid->x[0], -8 * 0.9 + 2.337229, 1e-6);
+  EXPECT_NEAR(grid->y[0], 53 * 0.9, 1e-9);
+  EXPECT_THAT(grid->notes[0], HasSubstr("in units of 0.9 degrees, become degrees"));
+  EXPECT_THAT(grid->notes[1], HasSubstr("begin 2.337229 degrees east of Greenwich"));
+}
+
 struct UnknownSystem : ::testing::Test {
   TemporaryFiles files;
   std::string said(const std::string& prj, const HeightOptions& options, const std::string& x = "400000") {
@@ -129,6 +176,27 @@ TEST_F(UnknownSystem, EastingsMayBeginWithTheirZone) {
   EXPECT_THAT(said("", options, "32400000"), HasSubstr("begin with 32, the number of their zone"));
   EXPECT_EQ(said("", options), "");
   EXPECT_THAT(said("", options, "33400000"), HasSubstr("not eastings and northings of UTM"));
+}
+
+TEST(UnnamedSystem, ANoteTellsOfMetresThatCouldBeDegrees) {
+  TemporaryFiles files;
+  const auto notes = [&](const std::string& corner, const std::string& cell, const HeightOptions& options = {}) {
+    const auto grid =
+        read_esri_heights(files.write("g.asc", "# made by hand\nncols 4\nnrows 2\n" + corner + "\ncellsize " + cell +
+                                                   "\n# heights\n-30 -30.1 -30.2 -30.1\n-30 -30.1 -30 -30\n"),
+                          options);
+    if (!grid) return grid.error().text;
+    return grid->notes.empty() ? std::string() : grid->notes.back();
+  };
+  EXPECT_THAT(notes("xllcorner 4\nyllcorner 52", "0.25"),
+              HasSubstr("are taken as metres; write geographic: true if they are degrees"));
+  EXPECT_THAT(notes("xllcorner -180\nyllcorner -60", "90"), HasSubstr("are taken as metres"));
+  EXPECT_EQ(notes("xllcorner 4\nyllcorner 52", "0.25", {.geographic = false}), "");
+  EXPECT_EQ(notes("xllcorner 0\nyllcorner 0", "0.25"), "") << "a pool";
+  EXPECT_EQ(notes("xllcorner -0.5\nyllcorner -0.25", "0.25"), "") << "about its middle";
+  EXPECT_EQ(notes("xllcorner 400\nyllcorner 52", "0.25"), "");
+  files.write("g.prj", "PROJCS[\"mine\"]");
+  EXPECT_EQ(notes("xllcorner 4\nyllcorner 52", "0.25").find("taken as metres;"), std::string::npos);
 }
 
 TEST(UnnamedSystem, CoarseCellsAreDegreesIfMostStepsAreSteep) {
