@@ -1,6 +1,8 @@
 // Grey PNG images, also stored as colours, as heights; the only file of the scene that includes libpng.
 #include <png.h>
 
+#include <algorithm>
+#include <cmath>
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
@@ -8,6 +10,7 @@
 
 #include "core/base/regular_file.hpp"
 #include "core/scene/shapes/terrain.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar {
 namespace {
@@ -15,6 +18,7 @@ namespace {
 struct Picture {
   std::size_t columns = 0, rows = 0;
   std::vector<std::uint16_t> grey;
+  std::vector<bool> transparent;
   std::string error;
 };
 
@@ -32,11 +36,12 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
   if (columns * rows > max_mesh_triangles / 2) png_error(png, "more than 10 million pixels; use a coarser image");
   if (grey && png_get_bit_depth(png, info) < 8) png_set_expand_gray_1_2_4_to_8(png);
   if (!grey) png_set_palette_to_rgb(png);  // only palettes need this
-  png_set_strip_alpha(png);
+  if (png_get_valid(png, info, PNG_INFO_tRNS)) png_set_tRNS_to_alpha(png);
   const int passes = png_set_interlace_handling(png);
   png_read_update_info(png, info);
   const bool wide = png_get_bit_depth(png, info) == 16;
-  const std::size_t sample = wide ? 2 : 1, pixel = grey ? sample : 3 * sample;
+  const std::size_t sample = wide ? 2 : 1, channels = png_get_channels(png, info), pixel = channels * sample;
+  const bool has_alpha = channels % 2 == 0;
   // If the image is interlaced, rows are complete only after the last pass, which adds to the values of earlier passes.
   const std::size_t row_bytes = png_get_rowbytes(png, info);
   rows_read.resize(passes > 1 ? row_bytes * rows : row_bytes);
@@ -45,12 +50,16 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
   picture.columns = columns;
   picture.rows = rows;
   picture.grey.resize(columns * rows);
+  picture.transparent.resize(has_alpha ? columns * rows : 0);
   for (std::size_t j = 0; j < rows; ++j) {
     png_byte* const row = rows_read.data() + (passes > 1 ? row_bytes * j : 0);
     png_read_row(png, row, nullptr);
     for (std::size_t i = 0; i < columns; ++i) {
       const png_byte* at = row + pixel * i;
-      if (!grey && (std::memcmp(at, at + sample, sample) != 0 || std::memcmp(at, at + 2 * sample, sample) != 0))
+      const png_byte* const alpha = at + pixel - sample;
+      const bool hidden = has_alpha && alpha[0] == 0 && (!wide || alpha[1] == 0);
+      if (has_alpha) picture.transparent[j * columns + i] = hidden;
+      if (!grey && !hidden && (std::memcmp(at, at + sample, sample) != 0 || std::memcmp(at, at + 2 * sample, sample) != 0))
         png_error(png, "not a grey image: it has colours, where red, green and blue differ; heights need one channel");
       const unsigned v = wide ? (unsigned{at[0]} << 8 | at[1]) : at[0] * 257u;
       picture.grey[j * columns + i] = static_cast<std::uint16_t>(v);
@@ -101,10 +110,15 @@ Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double si
   grid.z_m.resize(picture.grey.size());
   for (std::size_t j = 0; j < picture.rows; ++j) {
     for (std::size_t i = 0; i < picture.columns; ++i) {
-      const double v = picture.grey[(picture.rows - 1 - j) * picture.columns + i] / 65535.0;
-      grid.z_m[j * picture.columns + i] = static_cast<float>(low_m + v * (high_m - low_m));
+      const std::size_t at = (picture.rows - 1 - j) * picture.columns + i;
+      const bool hidden = !picture.transparent.empty() && picture.transparent[at];
+      const double v = picture.grey[at] / 65535.0;
+      grid.z_m[j * picture.columns + i] = hidden ? NAN : static_cast<float>(low_m + v * (high_m - low_m));
     }
   }
+  if (const auto holes = std::count(picture.transparent.begin(), picture.transparent.end(), true); holes > 0)
+    grid.notes.push_back(text::format("%zu of its %zu pixels are transparent: holes in the ground",
+                                      static_cast<std::size_t>(holes), picture.grey.size()));
   return grid;
 }
 

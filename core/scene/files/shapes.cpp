@@ -222,11 +222,17 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
     if (!kind.empty()) file.fail(path.filename().string() + ": " + std::string(kind));
     return kind.empty();
   };
+  const auto add_notes = [&](const Result<HeightGrid>& grid) {
+    if (grid)
+      for (const std::string& note : grid->notes) scene.notes.push_back(path.filename().string() + ": " + note);
+  };
   if (extension == ".png") {
     const auto size = keys.required("size_m").numbers<2>(a_size);
     const auto height = keys.required("height_m").numbers<2>(Range::between(-1e5, 1e5));
     if (size[0] <= 0 || size[1] <= 0 || !is_usable()) return {};
-    return from_grid(read_png_heights(path, size[0], size[1], height[0], height[1]), material, file, false);
+    const auto grid = read_png_heights(path, size[0], size[1], height[0], height[1]);
+    add_notes(grid);
+    return from_grid(grid, material, file, false);
   }
   using Read = Result<HeightGrid> (*)(const std::filesystem::path&, const HeightOptions&);
   static const std::map<std::string, Read> readers{
@@ -249,9 +255,8 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
       if (!options.utm) utm.fail("is not a zone of UTM; write its number and hemisphere: 33N, 56S");
     }
     if (!centred) options.world_origin = world_origin;
-    auto grid = reader->second(path, options);
-    if (grid)
-      for (const std::string& note : grid->notes) scene.notes.push_back(path.filename().string() + ": " + note);
+    const auto grid = reader->second(path, options);
+    add_notes(grid);
     return from_grid(grid, material, file, centred);
   }
   static constexpr std::array<std::string_view, 8> pictures{".pgm", ".ppm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif", ".webp"};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <utility>
 
 #include "core/base/letters.hpp"
 #include "core/base/regular_file.hpp"
@@ -90,16 +91,17 @@ struct Order {
 /// By names of columns, such as "lat lon depth" and "id,x,y,z"; the first three if they are other names.
 Order order_by(const Line& names, std::size_t count) {
   using Begins = std::initializer_list<std::string_view>;
-  const auto column = [&](Begins begins, std::size_t otherwise) {
+  const auto column = [&](Begins begins, std::size_t otherwise, std::string_view whole = "z") {
     const auto is_it = [&](std::string_view name) {
-      return std::any_of(begins.begin(), begins.end(),
-                         [&](std::string_view begin) { return same_letters(name.substr(0, begin.size()), begin); });
+      return same_letters(name, whole) || std::any_of(begins.begin(), begins.end(), [&](std::string_view begin) {
+               return same_letters(name.substr(0, begin.size()), begin);
+             });
     };
     const auto found = std::find_if(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(count), is_it);
     return found == names.begin() + static_cast<std::ptrdiff_t>(count) ? otherwise
                                                                        : static_cast<std::size_t>(found - names.begin());
   };
-  Order order{column({"lon", "lng", "x", "east"}, count), column({"lat", "y", "north"}, count),
+  Order order{column({"lon", "lng", "x", "east"}, count, "e"), column({"lat", "y", "north"}, count, "n"),
               column({"z", "dep", "elev", "height", "alt", "bathy", "topo"}, count), false};
   if (order.x == count || order.y == count) return {};
   if (order.z == count) order.z = count == 3 ? 3 - order.x - order.y : 2;
@@ -129,6 +131,8 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
   std::vector<Point> points;
   Line words;
   std::size_t line = 0, first_count = 0;
+  bool has_names = false;
+  std::pair<std::size_t, Order> comment;  // order by the names in a comment, and their number
   const char line_end = text.find('\n') == text.npos ? '\r' : '\n';
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   for (std::size_t at = 0; at < text.size();) {
@@ -136,15 +140,26 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
     const std::string_view this_line = text.substr(at, end - at);
     const std::size_t count = split(this_line, words);
     at = end + 1, ++line;
-    if (count == 0 || words[0].front() == '#' || words[0].starts_with("//")) continue;
+    if (count == 0) continue;
+    if (words[0].front() == '#' || words[0].starts_with("//")) {
+      if (!points.empty()) continue;
+      const std::size_t begin = this_line.find_first_not_of("#/ \t\"");
+      Line names;
+      const std::size_t number = begin == this_line.npos ? 0 : split_names(this_line.substr(begin), names);
+      if (const Order found = order_by(names, number); found.x != 0 || found.y != 1)
+        comment = {number, found};  // names of columns, if as many values follow
+      continue;
+    }
     const auto bad = [&](const std::string& what) {
       return failure(ErrorKind::bad_data, "line " + std::to_string(line) + ": " + what);
     };
     if (points.empty() && count >= 3 && !height_number(words[0]) && !height_number(words[1])) {
       const std::size_t names = split_names(this_line, words);
       order = order_by(words, names);
+      has_names = true;
       continue;
     }
+    if (points.empty() && !has_names && comment.first == count) order = comment.second;
     if (points.empty()) first_count = count;  // another number of words can come of decimal commas
     if ((points.empty() || count != first_count) && has_decimal_commas(this_line))
       return bad("numbers have a decimal comma; write points");

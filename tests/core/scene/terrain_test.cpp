@@ -386,6 +386,25 @@ TEST(PngHeights, GreyStoredAsColoursIsRead) {
               HasSubstr("not a grey image: it has colours"));
 }
 
+// gdal_translate marks cells without data so.
+TEST(PngHeights, TransparentPixelsAreHoles) {
+  TemporaryFiles files;
+  const std::vector<std::uint8_t> grey_alpha{10, 255, 20, 0, 30, 255, 40, 255, 50, 1, 60, 255};
+  std::vector<std::uint8_t> rgba;
+  for (std::size_t k = 0; k < 6; ++k)
+    for (const std::size_t at : {2 * k, 2 * k, 2 * k, 2 * k + 1}) rgba.push_back(grey_alpha[at]);
+  rgba[4] = 99;  // the colour of a transparent pixel is not seen
+  for (const auto& file :
+       {write_png(files, 3, 2, PNG_FORMAT_GA, grey_alpha.data()), write_png(files, 3, 2, PNG_FORMAT_RGBA, rgba.data())}) {
+    const auto grid = read_png_heights(file, 20, 10, 0, 255);
+    ASSERT_TRUE(grid) << grid.error().text;
+    EXPECT_TRUE(std::isnan(grid->z_m[4]));
+    EXPECT_NEAR(grid->z_m[3], 10, 1e-3);
+    EXPECT_NEAR(grid->z_m[1], 50, 1e-3) << "not wholly transparent";
+    EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 of its 6 pixels are transparent: holes")));
+  }
+}
+
 TEST(PngHeights, InterlacedRowsAreWhole) {
   TemporaryFiles files;
   const auto file = files.path("interlaced.png");
@@ -458,6 +477,22 @@ TEST(XyzGrid, NamesOfColumnsMayPutNorthFirst) {
   const auto usual = read_xyz_heights(files.write("g.xyz", "lon lat depth\n100 1 -1\n100 2 -2\n110 1 -4\n"), {});
   ASSERT_TRUE(usual) << usual.error().text;
   EXPECT_EQ(usual->x, (std::vector<double>{100, 110}));
+}
+
+TEST(XyzGrid, NamesOfColumnsMayStandInAComment) {
+  TemporaryFiles files;
+  const auto first_x = [&](const std::string& head, const std::string& more = "") {
+    std::string text = head;
+    for (const char* line : {"1 100 -1", "2 100 -2", "3 100 -3", "1 110 -4"}) text += line + more + "\n";
+    const auto grid = read_xyz_heights(files.write("g.xyz", text), {});
+    return grid ? grid->x.front() : -1;
+  };
+  for (const char* head :
+       {"# lat lon depth\n", "#Latitude,Longitude,Elevation\n", "// y x z\n", "# lat lon z\n# by hand\n", "N,E,Z\n"})
+    EXPECT_EQ(first_x(head), 100) << head;
+  EXPECT_EQ(first_x("# made by x from y, north first\n"), 1) << "no names of three columns";
+  EXPECT_EQ(first_x("# lat lon z\n", " 7"), 1) << "more columns than names";
+  EXPECT_EQ(first_x("# lat lon z\nx y z\n"), 1) << "a line of names counts more";
 }
 
 TEST(XyzGrid, ColumnsAreFoundByTheirNames) {
