@@ -106,12 +106,14 @@ bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
   return identifies_vehicle;
 }
 
-/// Accepts each message from one component only, because two components may send different estimates of the same pose. Heartbeats
-/// are accepted from all.
+/// Accepts each message from one component only, because two components may send different estimates of the same pose: from the
+/// autopilot, or else from the first one. Heartbeats are accepted from all.
 bool MavlinkPoses::is_selected_component(const Frame& frame, Time now) {
   const auto known = received_.find(frame.id);
-  const bool other = known != received_.end() && known->second.component != frame.component;
-  if (other && frame.id != Heartbeat::id && now - known->second.at <= system_silence) return false;
+  const bool other = known != received_.end() && known->second.component != frame.component && frame.id != Heartbeat::id;
+  const bool takes_over = other && has_autopilot_ && frame.component == autopilot_component_;
+  if (other && !takes_over && now - known->second.at <= system_silence) return false;
+  if (takes_over) clear_histories();
   received_[frame.id] = {frame.component, now};
   return true;
 }
@@ -233,10 +235,10 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
 
 void MavlinkPoses::handle(const Heartbeat& m, const Frame& frame) {
   if (m.autopilot == Heartbeat::no_autopilot) return;
+  if (!has_autopilot_) autopilot_component_ = frame.component;
   has_autopilot_ = true;
   is_submarine_ = m.type == Heartbeat::submarine;
   autopilot_ = m.autopilot;
-  autopilot_component_ = frame.component;
 }
 
 void MavlinkPoses::handle(const AttitudeReading& reading, Moment at) {

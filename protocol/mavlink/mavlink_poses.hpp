@@ -25,7 +25,7 @@ std::string_view name_of(Source source);
 
 struct Settings {
   std::string vehicle;                           // a vehicle of the configuration; empty = the only one
-  std::uint8_t system_id = 0, component_id = 0;  // 0 = the first that sends
+  std::uint8_t system_id = 0, component_id = 0;  // 0 = the first that sends; of components the autopilot
   bool request_rates = false;                    // ask the autopilot for its messages
   double rate_hz = 50;
   std::optional<Geodetic> origin;  // origin of the world; needed for latitudes and longitudes

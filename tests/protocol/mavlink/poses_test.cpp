@@ -313,6 +313,25 @@ TEST(MavlinkPoses, OfTwoComponentsThatSendTheSameOneCounts) {
   EXPECT_EQ(link(companion(odometry(78'000'000, 5)), 7).poses.size(), 1u);
 }
 
+TEST(MavlinkPoses, TheAutopilotTakesOverFromAComponentThatSendsFirst) {
+  Sender autopilot{{1, 1, 0}}, gimbal{{1, 154, 0}};
+  Link link;
+  const auto beat = autopilot(autopilot_heartbeat());
+  link(gimbal(attitude(900, 2)) + beat + gimbal(attitude(1000, 2)), 1);
+  for (const std::uint32_t ms : {1100u, 1200u}) {
+    const Reaction r = link(
+        gimbal(attitude(ms, 2)) + autopilot(attitude(ms, 0.5f)) + autopilot(local(ms, 1, 0, 2)) + gimbal(attitude(ms + 1, 2)),
+        1e-3 * ms);
+    ASSERT_EQ(r.poses.size(), 1u) << ms;
+    EXPECT_NEAR(heading_rad(r.poses[0].sample.pose.orientation), 0.5, 1e-6) << ms;
+  }
+  // A second autopilot does not take turns with the first.
+  const Reaction r = link(
+      Sender{{1, 3, 0}}(autopilot_heartbeat()) + Sender{{1, 3, 0}}(attitude(1300, 2)) + autopilot(local(1200, 1, 0, 2)), 1.3);
+  ASSERT_EQ(r.poses.size(), 1u);
+  EXPECT_NEAR(heading_rad(r.poses[0].sample.pose.orientation), 0.5, 1e-6);
+}
+
 TEST(MavlinkPoses, OurOwnWordsComeBackUnheard) {
   Sender us{{1, MavlinkPoses::own_component, 0}};
   Link link;

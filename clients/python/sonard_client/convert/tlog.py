@@ -100,7 +100,7 @@ class _Vehicle:
         self.depths: Dict[str, Stream[float]] = {}  # down [m], of messages without a fix
         self.pressures: Dict[str, Stream[float]] = {}  # [hPa]
         self.is_submarine = False
-        self.autopilot = 1  # its component, usual or by heartbeat
+        self.autopilot, self._has_autopilot = 1, False  # its component: the usual one until its first heartbeat
         self.home_m: Optional[float] = None  # altitude of the home, of submarines the surface
         self.origin: Optional[Geodetic] = None
         self.unsupported: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id
@@ -117,8 +117,8 @@ class _Vehicle:
         name = MESSAGES[logged.frame.message_id].name if fields is not None else "HEARTBEAT"
         if fields is not None and name == "HEARTBEAT":
             self.is_submarine |= fields["type"] == SUBMARINE
-            if fields["autopilot"] != NO_AUTOPILOT:
-                self.autopilot = logged.frame.component
+            if fields["autopilot"] != NO_AUTOPILOT and not self._has_autopilot:
+                self.autopilot, self._has_autopilot = logged.frame.component, True
         if fields is None or name == "HEARTBEAT" or not self._is_used(name, logged):
             return
         if name == "GPS_GLOBAL_ORIGIN":
