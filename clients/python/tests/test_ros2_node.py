@@ -24,9 +24,9 @@ HALF = math.sqrt(0.5)
 STATUS = {"now_ns": "7500000000", "vehicles": [{"name": "rov", "position": {"x": 1, "z": -3}, "orientation": {"w": 1}}]}
 
 
-def pose(sec=3, nanosec=500000000, x=1.0, w=HALF):
+def pose(sec=3, nanosec=500000000, x=1.0, w=HALF, frame="map"):
     of = Message
-    return of(header=of(stamp=of(sec=sec, nanosec=nanosec)),
+    return of(header=of(stamp=of(sec=sec, nanosec=nanosec), frame_id=frame),
               pose=of(position=of(x=x, y=2.0, z=-3.0), orientation=of(x=0.0, y=0.0, z=HALF, w=w)))
 
 
@@ -105,6 +105,16 @@ class WithNode(unittest.TestCase):
 
 
 class Poses(WithNode):
+    def test_frames_named_ned(self):
+        ros = self.bridge(odometry="/odom")
+        (_, call), = ros.subscribed.items()
+        for frame, axes in (("world_ned", "NED_FRD"), ("odom/NED", "NED_FRD"), ("planned", "ENU_FLU"), ("", "ENU_FLU")):
+            call(odometry(frame=frame))
+            line = self.line()
+            self.assertEqual((line["frame"], line["position"]), (axes, [1.0, 2.0, -3.0]), frame)
+            for got, wanted in zip(line["velocity"], (0, 1, 0)):  # turned by 90 degrees about z
+                self.assertAlmostEqual(got, wanted)
+
     def test_odometry_becomes_a_datagram(self):
         ros = self.bridge(odometry="/odom", vehicle="rov")
         (topic, call), = ros.subscribed.items()

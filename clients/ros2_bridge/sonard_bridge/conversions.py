@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 Vector3 = Tuple[float, float, float]
@@ -73,12 +74,20 @@ def image_from_flu(v: Sequence[float]) -> Vector3:
 IMAGE_IN_FLU_XYZW = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 
 
+_NED = re.compile(r"(?<![a-z])ned(?![a-z])", re.IGNORECASE)
+
+
+def axes_of(frame_id: str) -> str:
+    """The axes of a named frame: those of ROS, except for names such as world_ned (Stonefish, MAVROS, UUV Simulator)."""
+    return "NED_FRD" if _NED.search(frame_id) else "ENU_FLU"
+
+
 def json_line(position: Sequence[float], orientation: Quaternion, stamp_s: Optional[float] = None, vehicle: str = "",
-              velocity_in_body: Optional[Sequence[float]] = None) -> bytes:
+              velocity_in_body: Optional[Sequence[float]] = None, frame: str = "ENU_FLU") -> bytes:
     """Makes the line that sonard receives by UDP. The velocity is in body axes, as in ROS; the line has it in world axes."""
     if len(position) != 3 or not all(map(math.isfinite, position)):
         raise Unusable(f"position {tuple(position)} is not three finite numbers")
-    line: Dict[str, Any] = {"frame": "ENU_FLU", "position": list(position), "quaternion": list(orientation)}
+    line: Dict[str, Any] = {"frame": frame, "position": list(position), "quaternion": list(orientation)}
     if stamp_s is not None:
         if not 0 <= stamp_s <= LATEST_STAMP_S:
             raise Unusable(f"stamp {stamp_s:g} s is not between 0 and 4.5e9")

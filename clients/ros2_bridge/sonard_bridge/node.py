@@ -24,7 +24,7 @@ from tf2_msgs.msg import TFMessage
 from tf2_ros import Buffer, TransformException, TransformListener
 
 from . import live_view
-from .conversions import Unusable, json_line, name_in_topic, scan_of, stamp_ns, stamp_s, vehicle_in, wxyz, xyzw
+from .conversions import Unusable, axes_of, json_line, name_in_topic, scan_of, stamp_ns, stamp_s, vehicle_in, wxyz, xyzw
 from .parameters import PARAMETERS, BadParameter, checked
 from .polling import StatusPoll
 
@@ -115,7 +115,7 @@ class Bridge(Node):
         try:
             self.socket.send(json_line((position.x, position.y, position.z),
                                        wxyz((orientation.x, orientation.y, orientation.z, orientation.w)), stamp, self.vehicle,
-                                       None if velocity is None else (velocity.x, velocity.y, velocity.z)))
+                                       None if velocity is None else (velocity.x, velocity.y, velocity.z), axes_of(header.frame_id)))
         except Unusable as error:
             self.warn(f"left out: {error}")
         except BlockingIOError:
