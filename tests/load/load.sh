@@ -11,5 +11,5 @@ failed=0
 alone() { "$SONARD_BUILD/tests/own_network/in_own_network" "$@" || failed=1; }
 alone "$SONARD_BUILD/tests/load/load_test" --gtest_brief=1
 for test in descriptors real_pings beside_driver; do alone python3 -B tests/load/${test}_test.py; done
-alone python3 -B tests/load/strangers_test.py --measure 5
+alone python3 -B tests/load/strangers_test.py --measure 10
 exit $failed

@@ -34,7 +34,7 @@ ITEMS = {
         ("junk-rate", "junk at full speed into one sonar and the pose ports: pings lost by another sonar", "0"),
         ("junk-gap", "the same: its longest gap", "at most 250 ms at 40 Hz"),
         ("descriptors", "all file descriptors used up: pings lost by a running stream", "0"),
-        ("strangers", "one connection that works without end, the worst of 12 kinds: pings of a driver that asks for 40 Hz", "at least 38 Hz"),
+        ("strangers", "one stranger that works without end, the worst of 14 kinds: pings of a driver that asks for 40 Hz", "at least 38 Hz"),
         ("closed-floods", "32 floods of poses have closed: an honest sender steers", "within 1 s"),
         ("viewers", "8 viewers of every channel beside a driver at 10 Hz, 60 s: pings it lost", "0"),
         ("faults-beside", "a fault every second at another client, 60 s: pings lost by the driver", "0"),
