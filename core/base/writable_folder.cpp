@@ -1,6 +1,7 @@
 #include "core/base/writable_folder.hpp"
 
 #include <linux/magic.h>
+#include <sys/stat.h>
 #include <sys/vfs.h>
 #include <unistd.h>
 
@@ -8,14 +9,29 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <optional>
 
 namespace sonar {
 namespace {
 
-/// File systems whose files the kernel makes. Even the superuser cannot make a file there.
-constexpr std::array<unsigned long, 10> kernels_own{PROC_SUPER_MAGIC, SYSFS_MAGIC,   CGROUP_SUPER_MAGIC, CGROUP2_SUPER_MAGIC,
-                                                    DEBUGFS_MAGIC,    TRACEFS_MAGIC, SECURITYFS_MAGIC,   DEVPTS_SUPER_MAGIC,
-                                                    BPF_FS_MAGIC,     PSTOREFS_MAGIC};
+/// File systems whose files the kernel makes or interprets. Even the superuser cannot write a file of his own there.
+constexpr unsigned long mqueue_magic = 0x19800202, configfs_magic = 0x62656570, fusectl_magic = 0x65735543;  // of kernel sources
+constexpr std::array<unsigned long, 19> kernels_own{PROC_SUPER_MAGIC, SYSFS_MAGIC,    CGROUP_SUPER_MAGIC, CGROUP2_SUPER_MAGIC,
+                                                    DEBUGFS_MAGIC,    TRACEFS_MAGIC,  SECURITYFS_MAGIC,   DEVPTS_SUPER_MAGIC,
+                                                    BPF_FS_MAGIC,     PSTOREFS_MAGIC, HUGETLBFS_MAGIC,    BINFMTFS_MAGIC,
+                                                    EFIVARFS_MAGIC,   SELINUX_MAGIC,  SMACK_MAGIC,        RDTGROUP_SUPER_MAGIC,
+                                                    mqueue_magic,     configfs_magic, fusectl_magic};
+
+std::optional<dev_t> file_system_of(const char* file) {
+  struct stat status {};
+  return ::stat(file, &status) == 0 ? std::optional(status.st_dev) : std::nullopt;
+}
+
+/// True for /dev and folders in it that have no file system of their own, as /dev/shm has.
+bool is_of_devices(const std::filesystem::path& folder) {
+  const auto devices = file_system_of("/dev");
+  return devices && devices != file_system_of("/") && devices == file_system_of(folder.c_str());
+}
 
 }  // namespace
 
@@ -26,6 +42,7 @@ std::string why_no_files_in(const std::filesystem::path& folder) {
   if (::statfs(folder.c_str(), &about) == 0 &&
       std::find(kernels_own.begin(), kernels_own.end(), static_cast<unsigned long>(about.f_type)) != kernels_own.end())
     return "holds the kernel's own files; no others can be written there";
+  if (is_of_devices(folder)) return "is for devices; files there take memory and are lost when the computer stops";
   if (::access(folder.c_str(), W_OK | X_OK) == 0) return {};
   return std::string("cannot be written: ") + std::strerror(errno);
 }

@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// The reason why not, to follow the folder's name in an error: "is read-only"; empty = files can be made.
+/// The reason why not, to follow the folder's name in an error: "is not a folder"; empty = files can be made.
 std::string why_no_files_in(const std::filesystem::path& folder);
 
 }  // namespace sonar

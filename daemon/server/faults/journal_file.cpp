@@ -9,18 +9,42 @@
 #include <cstring>
 #include <utility>
 
+#include "core/base/writable_folder.hpp"
+
 namespace sonar {
 namespace {
 
+Error refusal(const std::filesystem::path& file, const std::string& why) {
+  return {ErrorKind::io, "the journal of faults cannot be written: " + file.string() + ": " + why +
+                             "; faults.journal or --fault-journal names another file"};
+}
+
+bool is_missing(const std::filesystem::path& file) {
+  std::error_code ec;
+  return std::filesystem::status(file, ec).type() == std::filesystem::file_type::not_found;
+}
+
+/// The reason if the name cannot be that of a journal, whether its file is there or is to be made; else an empty text.
+std::string why_no_journal(const std::filesystem::path& file) {
+  std::error_code ec;
+  if (std::filesystem::is_block_file(file, ec)) return "is a disk, not a file";
+  if (!is_missing(file)) return {};
+  std::filesystem::path made = std::filesystem::absolute(file, ec);
+  while (std::filesystem::is_symlink(made, ec)) made = made.parent_path() / std::filesystem::read_symlink(made, ec);
+  const std::filesystem::path folder = made.parent_path();
+  const std::string why = why_no_files_in(folder);
+  return why.empty() ? why : folder.string() + " " + why;
+}
+
 Result<int> open_for_appending(const std::filesystem::path& file, int more_flags) {
+  if (const std::string why = why_no_journal(file); !why.empty()) return tl::make_unexpected(refusal(file, why));
   const int descriptor = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | O_NONBLOCK | O_NOCTTY | more_flags, 0666);
   if (descriptor >= 0) return descriptor;
   const int error = errno;
   std::error_code ec;
   const bool is_unread = error == ENXIO && std::filesystem::is_fifo(file, ec);
-  const std::string why = is_unread ? "no program reads this FIFO: start its reader first" : std::strerror(error);
-  return failure(ErrorKind::io, "the journal of faults cannot be written: " + file.string() + ": " + why +
-                                    "; faults.journal or --fault-journal names another file");
+  return tl::make_unexpected(
+      refusal(file, is_unread ? "no program reads this FIFO: start its reader first" : std::strerror(error)));
 }
 
 }  // namespace
@@ -31,18 +55,12 @@ Result<std::shared_ptr<JournalFile>> JournalFile::open(const std::filesystem::pa
   return std::shared_ptr<JournalFile>(new JournalFile(*descriptor));
 }
 
-/// Opens without O_CREAT. If the file is missing, it checks whether it could be created.
+/// Opens as open() does, without making a file.
 Result<void> JournalFile::check(const std::filesystem::path& file) {
   const auto descriptor = open_for_appending(file, 0);
-  if (descriptor) {
-    ::close(*descriptor);
-    return {};
-  }
-  std::error_code ec;
-  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  const bool can_be_made = std::filesystem::symlink_status(file, ec).type() == std::filesystem::file_type::not_found &&
-                           ::access(folder.c_str(), W_OK | X_OK) == 0;
-  return can_be_made ? Result<void>{} : tl::make_unexpected(descriptor.error());
+  if (descriptor) ::close(*descriptor);
+  if (descriptor || (is_missing(file) && why_no_journal(file).empty())) return {};
+  return tl::make_unexpected(descriptor.error());
 }
 
 JournalFile::~JournalFile() { ::close(descriptor_); }

@@ -99,7 +99,17 @@ TEST(JournalFile, CheckSaysWhatOpenWouldAndMakesNothing) {
   const Folder folder;
   EXPECT_TRUE(JournalFile::check(folder.path + "/new"));
   EXPECT_FALSE(std::filesystem::exists(folder.path + "/new"));
-  for (const std::string& wrong : {folder.path + "/missing/new", folder.path}) {
+  std::filesystem::create_symlink("linked", folder.path + "/link");
+  EXPECT_TRUE(JournalFile::check(folder.path + "/link")) << "the file that a link names is made, too";
+  EXPECT_FALSE(std::filesystem::exists(folder.path + "/linked"));
+  EXPECT_TRUE(JournalFile::open(folder.path + "/link"));
+  EXPECT_TRUE(std::filesystem::exists(folder.path + "/linked"));
+  std::filesystem::create_symlink("missing/new", folder.path + "/nowhere");
+  std::vector<std::string> refused = {folder.path + "/missing/new", folder.path,      folder.path + "/nowhere",
+                                      "/proc/journal.jsonl",        "/sys/new.jsonl", folder.path + "/" + std::string(300, 'n')};
+  for (const auto& device : std::filesystem::directory_iterator("/dev"))
+    if (device.is_block_file()) refused.push_back(device.path());
+  for (const std::string& wrong : refused) {
     const auto checked = JournalFile::check(wrong);
     const auto opened = JournalFile::open(wrong);
     ASSERT_FALSE(checked) << wrong;
