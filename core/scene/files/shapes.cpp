@@ -129,7 +129,13 @@ Shape ShapeReader::read_primitive(std::string_view type, Map& keys) {
   const auto segments = [&](double radius_m) {
     return static_cast<int>(std::max<std::int64_t>(keys.optional("segments").integer_or(segments_for(radius_m), 8, 2048), 8));
   };
-  const auto patch = [&] { return std::max(keys.optional("patch_m").number_or(1, Range::between(0.01, 1e5)), 0.01); };
+  const auto patch = [&](double longest_m) {
+    const Node given = keys.optional("patch_m");
+    const double patch_m = std::max(given.number_or(1, Range::between(0.01, 1e5)), 0.01), least_m = longest_m / most_patches;
+    if (given.present() && patch_m < least_m)
+      given.fail(text::format("must be at least %.10g: an edge has at most %d patches", least_m, most_patches));
+    return patch_m;
+  };
   const auto three = [&](const char* key) {
     const auto v = keys.required(key).numbers<3>(a_size);
     return Vec3d{std::max(v[0], a_size.min), std::max(v[1], a_size.min), std::max(v[2], a_size.min)};
@@ -141,13 +147,13 @@ Shape ShapeReader::read_primitive(std::string_view type, Map& keys) {
   if (type == "plane") {
     const auto size = keys.required("size_m").numbers<2>(a_size);
     const Vec3d sheet{std::max(size[0], a_size.min), std::max(size[1], a_size.min), 0};
-    const double patch_m = patch();
+    const double patch_m = patch(std::max(sheet.x, sheet.y));
     return done({sheet.x, sheet.y, patch_m}, [&] { return make_plane(sheet.x, sheet.y, patch_m); },
                 {.kind = Primitive::Kind::plane, .size_m = sheet});
   }
   if (type == "box") {
     const Vec3d edges = three("size_m");
-    const double patch_m = patch();
+    const double patch_m = patch(std::max({edges.x, edges.y, edges.z}));
     return done({edges.x, edges.y, edges.z, patch_m}, [&] { return make_box(edges, patch_m); },
                 {.kind = Primitive::Kind::box, .size_m = edges});
   }

@@ -26,7 +26,9 @@ void add_quad(Mesh& mesh, Index a, Index b, Index c, Index d) {  // counter-cloc
   add_triangle(mesh, a, c, d);
 }
 
-int patches(double length_m, double patch_m) { return static_cast<int>(std::clamp(std::ceil(length_m / patch_m), 1.0, 400.0)); }
+int patches(double length_m, double patch_m) {
+  return static_cast<int>(std::clamp(std::ceil(length_m / patch_m), 1.0, double{most_patches}));
+}
 
 struct ProfilePoint {
   double radius, z;

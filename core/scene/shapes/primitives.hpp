@@ -11,6 +11,8 @@ namespace sonar {
 /// Number of segments of a circle with this radius [m] for which no chord is farther than a millimetre from it; 16..512.
 int segments_for(double radius_m);
 
+/// Patches along an edge of a plane or box. Longer edges have larger patches.
+inline constexpr int most_patches = 400;
 /// A rectangle in the x-y plane, normals up, in patches of at most `patch_m`.
 Mesh make_plane(double length_x_m, double length_y_m, double patch_m = 1);
 Mesh make_box(Vec3d size_m, double patch_m = 1);

@@ -8,6 +8,7 @@
 #include "core/pipeline/arithmetic/waveform.hpp"
 #include "core/pipeline/shared_noise.hpp"
 #include "core/text/decimal.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::render {
 namespace {
@@ -15,6 +16,7 @@ namespace {
 using text::Map;
 using text::Node;
 using text::Range;
+constexpr int most_rows = 65535;
 
 void set(const Node& node, Range range, float& value) {
   value = static_cast<float>(node.number_or(static_cast<double>(value), range));
@@ -187,14 +189,21 @@ void read_ping(Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& 
   if (spacing.present())
     s.range_bin_m = spacing.number(a_length);
   else if (rows.present() || range_image)
-    s.range_bin_m = shown_m / static_cast<double>(std::max<std::int64_t>(rows.integer_or(before.range_bin_count, 1, 65535), 1));
+    s.range_bin_m =
+        shown_m / static_cast<double>(std::max<std::int64_t>(rows.integer_or(before.range_bin_count, 1, most_rows), 1));
   else if (own_grid)
     s.range_bin_m = c / (2 * native_sample_rate_hz(envelope_parameter_hz(c, static_cast<double>(s.pulse_width_m))));
   else
     s.range_bin_m = before.range_bin_m * s.range_m / before.range_m;
   if (!(s.range_bin_m > 0)) return;  // reported already
-  s.range_bin_count = static_cast<int>(
-      rows.integer_or(std::clamp<std::int64_t>(std::llround(std::ceil(shown_m / s.range_bin_m - 1e-9)), 1, 65535), 1, 65535));
+  const double needed = std::max(std::ceil(shown_m / s.range_bin_m - 1e-9), 1.0);
+  if (!rows.present() && needed > most_rows) {
+    const Node& cause = spacing.present() || !pulse.present() ? spacing : pulse;
+    cause.fail(text::format("the picture would have %.0f rows of %g m, and may have %d: make rows longer or the range shorter",
+                            needed, s.range_bin_m, most_rows));
+  }
+  s.range_bin_count =
+      static_cast<int>(rows.integer_or(static_cast<std::int64_t>(std::min<double>(needed, most_rows)), 1, most_rows));
   if (!pulse.present() && rows_of == RowsOf::device)
     s.pulse_width_m = static_cast<float>(static_cast<double>(before.pulse_width_m) * s.range_bin_m / before.range_bin_m);
 

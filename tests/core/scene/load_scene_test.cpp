@@ -271,6 +271,9 @@ TEST(LoadScene, ErrorsNameTheirPlaceAndTheNearestName) {
             "s.yaml:2:46: objects[0].radius_m: must be between 0.0001 and 100000, found -1");
   EXPECT_EQ(refusal(object("type: sphere, radius_m: 1")), "s.yaml:2:5: objects[0].material: required key is missing");
   EXPECT_EQ(refusal(object("typ: sphere, radius_m: 1")), "s.yaml:2:6: objects[0].typ: unknown key; did you mean \"type\"?");
+  EXPECT_THAT(refusal(object("type: box, material: sand, size_m: [2, 1000, 1], patch_m: 2.49")),
+              HasSubstr("patch_m: must be at least 2.5: an edge has at most 400 patches"));
+  EXPECT_THAT(refusal(object("type: plane, material: sand, size_m: [1000, 2], patch_m: 2.49")), HasSubstr("patch_m: must be"));
   EXPECT_THAT(refusal(object("type: box, material: sand, size_m: [1, 1]")), HasSubstr("size_m: must be a list of 3 numbers"));
   EXPECT_THAT(refusal(object("type: torus, material: sand, radius_m: 1, tube_radius_m: 1")),
               HasSubstr("must be smaller than radius_m"));

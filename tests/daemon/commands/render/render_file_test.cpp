@@ -206,6 +206,9 @@ TEST(RenderFile, RefusesWithAPlace) {
   EXPECT_THAT(refusal(point + "sonar: {options: {pulse: native}}\n"), HasSubstr("which is not given"));
   for (const char* mode : {"0", "3", "-1"})
     EXPECT_THAT(refusal(point + "sonar: {profile: oculus-m1200d, ping: {mode: " + mode + "}}\n"), HasSubstr("ping.mode")) << mode;
+  EXPECT_THAT(refusal(point + "sonar: {ping: {range_m: 1000, row_spacing_m: 0.001}}\n"),
+              HasSubstr("ping.row_spacing_m: the picture would have 1000000 rows of 0.001 m, and may have 65535: "));
+  EXPECT_THAT(refusal(point + "sonar: {ping: {range_m: 1000, pulse_width_m: 0.0001}}\n"), HasSubstr("ping.pulse_width_m: the "));
   EXPECT_THAT(refusal("scene: no-such-scene.yaml\n"), HasSubstr("no such file"));
   EXPECT_THAT(refusal("sonar: {}\n"), HasSubstr("scene"));
   EXPECT_THAT(refusal(point + "sweep: {a: [1, 2], b: [1]}\n"), HasSubstr("equally long"));
@@ -239,7 +242,7 @@ TEST(RenderFile, ARangeThatTheProductDoesNotHaveGetsANote) {
   EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: HF, range_m: 25}"),
             "range 25 m: Oculus M1200d in mode HF takes 0.1 to 10 m; rendered all the same, where the device would use 10 m");
   EXPECT_THAT(note("profile: oculus-m370s, ping: {range_m: 0.15}"), HasSubstr("takes 0.2 to 200 m"));
-  EXPECT_EQ(note("ping: {range_m: 1e4}"), "") << "a plain sonar is no product";
+  EXPECT_EQ(note("ping: {range_m: 600}"), "") << "a plain sonar is no product";
   EXPECT_EQ(note("ping: {range_m: 0.01}"), "");
 }
 
