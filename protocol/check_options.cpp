@@ -21,7 +21,7 @@ bool is_number_of(const Option& option, std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return false;
   if (option.whole && std::trunc(value) != value) return false;
-  return option.highest > 0 ? value >= option.lowest && value <= option.highest : value > 0;
+  return value >= option.lowest && value <= option.highest;
 }
 
 /// The reason if the option or its value is refused, else an empty text.

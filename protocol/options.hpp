@@ -15,17 +15,16 @@ namespace sonar::protocol {
 /// One named choice of a protocol's unknowns, settable under `options:` of a sonar in the configuration.
 struct Option {
   std::string_view name;
-  std::vector<std::string_view> allowed;  // first = default; empty = a number above 0, or the word of default_value
+  std::vector<std::string_view> allowed;  // first = default; empty = a number, or the word of default_value
   std::string_view default_value;
   std::string_view meaning;
-  double lowest = 0, highest = 0;  // limits of a number, inclusive; 0, 0 = any number above 0
+  double lowest = 0, highest = 0;  // limits of a number, inclusive
   std::string_view word = {};      // word that may stand for a number, beside the default
   bool whole = false;              // the number has no fraction
 };
-/// A text such as "number above 0", "number from 5 to 170" or "whole number from 0 to 255".
+/// A text such as "number from 5 to 170" or "whole number from 0 to 255".
 inline std::string numbers_of(const Option& option) {
   const std::string kind = option.whole ? "whole number" : "number";
-  if (option.highest <= 0) return kind + " above 0";
   char text[64];
   std::snprintf(text, sizeof text, " from %.9g to %.9g", option.lowest, option.highest);
   return kind + text + (option.word.empty() ? "" : ", or " + std::string(option.word));

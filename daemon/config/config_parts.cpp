@@ -17,13 +17,12 @@ constexpr Range finite_place{.min = -1e7, .max = 1e7};
 /// An option's value, checked where it stands in the file.
 std::string read_option(const Node& value, const protocol::Option& option) {
   if (option.allowed.empty()) {
-    const Range range = option.highest > 0 ? Range::between(option.lowest, option.highest) : Range::above(0);
     const std::string text = value.text(64);
     if (text == option.default_value || (!option.word.empty() && text == option.word)) return text;
     if (option.whole)
       value.integer(static_cast<std::int64_t>(option.lowest), static_cast<std::int64_t>(option.highest));
     else
-      value.number(range);
+      value.number(Range::between(option.lowest, option.highest));
   } else {
     value.choice_index(option.allowed);
   }

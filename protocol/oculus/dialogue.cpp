@@ -167,7 +167,7 @@ class OculusDialogue final : public protocol::Dialogue {
   }
 
   void postpone_dummy(Time now) {
-    const double period_ms = std::clamp(number_option(device_.options, option_name::dummy_period_ms), 10.0, 60000.0);
+    const double period_ms = number_option(device_.options, option_name::dummy_period_ms);
     dummy_at_ = now + nanoseconds_from(period_ms * 1e-3);
   }
 

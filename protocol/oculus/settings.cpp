@@ -168,7 +168,7 @@ ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& d
   const double range = metres ? asked.range : asked.range / 100 * static_cast<double>(mode.max_range_m);
   const double used_range = clamped(range, mode.min_range_m, mode.max_range_m, "range", "m", out.clamped);
   settings.range_m = used_range;
-  const RowGrid rows = row_grid(used_range, speed, std::clamp(number_option(device.options, option_name::row_rate_hz), 1e4, 1e7));
+  const RowGrid rows = row_grid(used_range, speed, number_option(device.options, option_name::row_rate_hz));
   settings.range_bin_count = rows.count;
   settings.range_bin_m = rows.spacing_m;
   settings.row_centre = row_centre(device.options);

