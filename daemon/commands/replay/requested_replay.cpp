@@ -100,24 +100,31 @@ void RequestedReplay::on_client(const Device& of, const std::string&, bool conne
   if (!connected) return;
   ++clients_;
   if (of.sonar().connections().clients() > 1 || pings_.is_scan()) return;
-  pings_.rewind();
-  pace_.begin_again();
+  from_the_front_ = true;
   was_last_ = false;
 }
 
-PlayedPing RequestedReplay::next_ping(const PingRequest& request) {
-  if (pings_.is_scan()) return pings_.nearest(rpy_from_quat(request.sonar_in_world.orientation).yaw_rad);
-  if (pings_.at_end() && options_.loop) {
-    pings_.rewind();
-    pace_.begin_again();
-  }
-  auto ping = pings_.next();
-  was_last_ = pings_.at_end() && !options_.loop;
-  return ping ? *std::move(ping) : PlayedPing{};
+/// Runs in `disk_`, for one ping at a time.
+asio::awaitable<RequestedReplay::Read> RequestedReplay::read(bool from_the_front) {
+  Read found;
+  found.begins_again = from_the_front || (pings_.at_end() && options_.loop);
+  if (found.begins_again) pings_.rewind();
+  if (auto ping = pings_.next()) found.ping = *std::move(ping);
+  found.is_last = pings_.at_end() && !options_.loop;
+  co_return found;
 }
 
-void RequestedReplay::compute(const Device&, PingRequest request, Simulator::Done done) {
-  PlayedPing ping = next_ping(request);
+/// The lines of a scan are in memory.
+asio::awaitable<PlayedPing> RequestedReplay::ping_for(const PingRequest& request) {
+  if (pings_.is_scan()) co_return pings_.nearest(rpy_from_quat(request.sonar_in_world.orientation).yaw_rad);
+  Read found = co_await asio::co_spawn(disk_, read(std::exchange(from_the_front_, false)), asio::use_awaitable);
+  if (found.begins_again) pace_.begin_again();
+  was_last_ = found.is_last && !from_the_front_;  // the first client may have come meanwhile
+  co_return std::move(found.ping);
+}
+
+asio::awaitable<Simulator::Outcome> RequestedReplay::outcome_for(PingRequest request) {
+  PlayedPing ping = co_await ping_for(request);
   auto recorded = std::make_shared<PartsByPort>(std::move(ping.parts));
   if (codec_.answer != nullptr)
     for (auto& part : *recorded) part.second = codec_.answer(part.second, request.vendor_settings.get());
@@ -127,9 +134,23 @@ void RequestedReplay::compute(const Device&, PingRequest request, Simulator::Don
   made->request = std::move(request);
   outcome.ping = std::move(made);
   const auto now = ReplayPace::Steady::now();
-  due_.expires_at(pings_.is_scan() || outcome.recorded->empty() ? now : pace_.due(ping.at, now));
-  due_.async_wait(
-      [outcome = std::move(outcome), done = std::move(done)](const error_code&) mutable { done(std::move(outcome)); });
+  due_.expires_at(pings_.is_scan() || outcome.recorded->empty() || stopping_ ? now : pace_.due(ping.at, now));
+  error_code ec;
+  co_await due_.async_wait(into(ec));
+  co_return outcome;
+}
+
+void RequestedReplay::compute(const Device&, PingRequest request, Simulator::Done done) {
+  asio::co_spawn(io_, outcome_for(std::move(request)),
+                 [done = std::move(done)](const std::exception_ptr& fault, Simulator::Outcome outcome) {
+                   if (fault) outcome.failure = text_of(fault);  // and there is no ping
+                   done(std::move(outcome));
+                 });
+}
+
+void RequestedReplay::on_engine_failure(const Error& why) {
+  outcome_ = tl::make_unexpected(why);
+  asio::post(io_, [this] { stop("the recording cannot be read"); });
 }
 
 ReplayServer::Figures RequestedReplay::figures() const {

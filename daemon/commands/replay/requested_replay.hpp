@@ -1,6 +1,7 @@
 // Serves a recording of a sonar whose hosts decide which pings they get: the device with all its ports and conversations, whose
 // pings are those of the recording. A request of a mechanical scan gets the line nearest to the direction in which its head
-// looks; other requests get one ping after another, not faster than they were recorded.
+// looks; other requests get one ping after another, not faster than they were recorded. These are read in a thread of their own,
+// so that a slow disk delays no conversation.
 #pragma once
 
 #include <memory>
@@ -11,6 +12,7 @@
 #include "daemon/commands/replay/replay_pace.hpp"
 #include "daemon/commands/replay/replay_server.hpp"
 #include "daemon/server/sonars/device.hpp"
+#include "daemon/server/system/asio.hpp"
 
 namespace sonar {
 
@@ -37,16 +39,22 @@ class RequestedReplay final : public DeviceParent {
   void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) override;
   void on_stop(const Device&, const std::string&) override {}
   void on_change() override;
-  void on_engine_failure(const Error& why) override { outcome_ = tl::make_unexpected(why); }
+  void on_engine_failure(const Error& why) override;
 
  private:
-  PlayedPing next_ping(const PingRequest& request);
+  struct Read {
+    PlayedPing ping;
+    bool begins_again = false, is_last = false;
+  };
+  asio::awaitable<Read> read(bool from_the_front);
+  asio::awaitable<PlayedPing> ping_for(const PingRequest& request);
+  asio::awaitable<Simulator::Outcome> outcome_for(PingRequest request);
   void end_when_gone();
 
   asio::io_context& io_;
   recording::RecordingReader& reader_;
   const recording::Codec& codec_;
-  PlayedPings pings_;
+  PlayedPings pings_;  // after open() used by `disk_`, but for the lines of a scan
   ReplayOptions options_;
   Log& log_;
   Config config_;
@@ -59,8 +67,9 @@ class RequestedReplay final : public DeviceParent {
   asio::signal_set signals_;
   Result<void> outcome_;
   std::uint64_t clients_ = 0;
-  bool was_last_ = false, stopping_ = false, over_ = false;
+  bool from_the_front_ = false, was_last_ = false, stopping_ = false, over_ = false;
   std::unique_ptr<Device> device_;
+  asio::thread_pool disk_{1};  // destroyed first: waits for what is read
 };
 
 }  // namespace sonar

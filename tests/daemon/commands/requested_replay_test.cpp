@@ -5,6 +5,7 @@
 #include <poll.h>
 
 #include <array>
+#include <atomic>
 #include <future>
 
 #include "daemon/commands/replay/requested_replay.hpp"
@@ -114,10 +115,29 @@ Bytes file_of(MakeWriter make, const std::vector<Bytes>& messages) {
   return file;
 }
 
-/// A replay in a thread of its own.
+/// A recording on a disk that stands still until `goes_on`.
+class SlowDisk final : public recording::RecordingReader {
+ public:
+  SlowDisk(std::unique_ptr<recording::RecordingReader> of, std::shared_future<void> goes_on)
+      : of_(std::move(of)), goes_on_(std::move(goes_on)) {}
+  std::optional<RecordedMessage> next() override {
+    if (stands_still) goes_on_.wait();
+    return of_->next();
+  }
+  std::optional<Error> damage() const override { return of_->damage(); }
+  void rewind() override { of_->rewind(); }
+  bool knows_times() const override { return of_->knows_times(); }
+  std::atomic<bool> stands_still = false;
+
+ private:
+  std::unique_ptr<recording::RecordingReader> of_;
+  std::shared_future<void> goes_on_;
+};
+
+/// A replay in a thread of its own. Once it is open, its disk stands still until `goes_on`, if given.
 class Replay {
  public:
-  explicit Replay(Bytes file, double rate_hz = 1000)
+  explicit Replay(Bytes file, double rate_hz = 1000, std::shared_future<void> goes_on = {})
       : log_([] {
           LogOptions quiet;
           quiet.sink = [](LogLevel, const std::string&) {};
@@ -126,6 +146,12 @@ class Replay {
     auto opened = recording::open_recording(recording::source_from("recording", std::move(file)));
     if (!opened) throw std::runtime_error(opened.error().text);
     recording_ = std::move(*opened);
+    SlowDisk* disk = nullptr;
+    if (goes_on.valid()) {
+      auto slow = std::make_unique<SlowDisk>(std::move(recording_.reader), std::move(goes_on));
+      disk = slow.get();
+      recording_.reader = std::move(slow);
+    }
     auto device = find_replay_device(*recording_.reader, "recording", 1042);
     if (!device || !device->by_requests()) throw std::runtime_error("not by requests");
     ReplayOptions options;
@@ -133,6 +159,7 @@ class Replay {
     options.rate_hz = rate_hz;
     server_ = std::make_unique<RequestedReplay>(io_, *recording_.reader, *device, options, log_);
     if (const auto listening = server_->open("recording"); !listening) throw std::runtime_error(listening.error().text);
+    if (disk != nullptr) disk->stands_still = true;
     server_->start();
     done_ = std::async(std::launch::async, [this] { io_.run(); });
   }
@@ -320,6 +347,24 @@ TEST_F(NorbitReplay, EachPortSendsItsPacketsOnceTheDriverTurnsItOn) {
   EXPECT_TRUE(replay.ends()) << "the driver has received everything";
   EXPECT_EQ(replay.figures().messages, 5u);
   EXPECT_EQ(replay.figures().clients, 3u);
+}
+
+/// Pings wait for the disk; what the driver says meanwhile is answered, and no ping is cut or lost.
+TEST_F(NorbitReplay, ADiskThatStandsStillDelaysNoConversation) {
+  std::promise<void> goes_on;
+  Replay replay(file_of(raw_dump, messages), 1000, goes_on.get_future().share());
+  Tcp points(norbit::bathymetry_port), pictures(norbit::column_port), commands(norbit::command_port);
+  EXPECT_THAT(commands.read(), ::testing::Not(IsEmpty())) << "it greets";
+  for (int asked = 0; asked < 3; ++asked) {
+    commands.send(std::string_view("set_power 1\r\n"));
+    EXPECT_THAT(commands.read(), ::testing::Not(IsEmpty())) << "the event loop waits for the disk";
+  }
+  goes_on.set_value();
+  auto received = std::async(std::launch::async, [&] { return pictures.read_to_end(); });
+  EXPECT_EQ(points.read_to_end(), bathymetry);
+  EXPECT_EQ(received.get(), column);
+  EXPECT_TRUE(replay.ends());
+  EXPECT_EQ(replay.figures().messages, 5u);
 }
 
 }  // namespace
