@@ -203,6 +203,7 @@ class Farm(unittest.TestCase):
             self.assertIn(f"shard {number} is not one of the 6 of", self.logs())
         self.assertEqual(sorted(f.name for f in made.glob("shard-*.tar")), [f"shard-{n:06}.tar" for n in range(6)])
         self.assertIn("6 done, 0 running, 0 queued, 0 dead", self.status())
+        record("farm-strays", "3 of 3 refused, 6 shards", "refused by name, no file made", True, "python3 tests/acceptance/farm_test.py")
 
     def test_what_is_wrong_is_said(self):
         job = self.small_job()

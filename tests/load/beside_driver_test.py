@@ -13,12 +13,15 @@ import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests/acceptance"), str(ROOT / "tests/reliability")]
+from aris_controller import Controller  # noqa: E402
 from foxglove_viewer import Closed, Viewer  # noqa: E402
 from oculus_reader import Client, fire_message  # noqa: E402
-from ping_link_test import DOWN, OMNISCAN, PING360, SIDE, SURVEYOR, Host, scan, settings, side_scan  # noqa: E402
+from ping_link_test import (DOWN, OMNISCAN, PING1D, PING360, S500, SIDE, SURVEYOR, Host, frame, scan, settings, side_scan,  # noqa: E402
+                            sound)
 from real_pings_test import next_ping  # noqa: E402
 from record import record  # noqa: E402
 from running_sonard import Sonard  # noqa: E402
+from waterlinked_link_test import START, receiver, why_not  # noqa: E402
 
 QUICK = "--quick" in sys.argv
 LASTS_S = 3 if QUICK else 60
@@ -109,16 +112,36 @@ class BesideADriver(unittest.TestCase):
         self.assertTrue(whole, (len(written), entries[-1]["seq"], lost_entries))
 
     def test_hosts_of_datagrams(self):
-        counted, good = [], True
-        for profile, port, begin, message, mount in (("ping360", PING360, scan(0, 399), 2301, None),
-                                                     ("surveyor-240", SURVEYOR, settings(1), 3011, DOWN),
-                                                     ("omniscan-450", OMNISCAN, side_scan(1), 2198, SIDE)):
-            with Sonard(profile=profile, trajectory="orbit", **({"mount": mount} if mount else {})) as daemon:
+        def asks(port, begin, message):
+            def host_of(daemon):
                 host = Host(daemon.address, port)
                 host.send(begin)
-                received, until = 0, time.monotonic() + LASTS_S / 3
+                return lambda: host.next(message, patience_s=60)
+            return host_of
+
+        def controls(daemon):
+            link = Controller(daemon.address)
+            link.set(1)
+            return link.frame
+
+        def listens(_):
+            udp = receiver()
+            return lambda: [udp.recv(65507) for _ in ("ranges", "strengths")]
+
+        counted, good = [], True
+        starts = ", ".join(f'{k}: "{v}"' for k, v in START.items())
+        families = [("ping360", asks(PING360, scan(0, 399), 2301), SIDE, ""), ("surveyor-240", asks(SURVEYOR, settings(1), 3011), DOWN, ""),
+                    ("omniscan-450", asks(OMNISCAN, side_scan(1), 2198), SIDE, ""),
+                    ("ping1d", asks(PING1D, frame(1400, (1300).to_bytes(2, "little")), 1300), DOWN, ""),
+                    ("s500", asks(S500, sound(100, 1308), 1308), DOWN, ""), ("aris-3000", controls, SIDE, "")]
+        if not why_not():
+            families.append(("waterlinked-3d15", listens, SIDE, f"\n    options: {{{starts}}}"))
+        for profile, host_of, mount, options in families:
+            with Sonard(profile=profile + options, trajectory="orbit", mount=mount) as daemon:
+                next_of_host = host_of(daemon)
+                received, until = 0, time.monotonic() + LASTS_S / 6
                 while time.monotonic() < until or received < 3:
-                    host.next(message, patience_s=60)
+                    next_of_host()
                     received += 1
                 self.assertEqual(daemon.stop()[0], 0, daemon.log())
                 said = re.search(r"(\d+) pings, (\d+) served, (\d+) dropped", daemon.log())

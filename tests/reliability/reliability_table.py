@@ -39,8 +39,9 @@ ITEMS = {
         ("viewers", "8 viewers of every channel beside a driver at 10 Hz, 60 s: pings it lost", "0"),
         ("faults-beside", "a fault every second at another client, 60 s: pings lost by the driver", "0"),
         ("faults-journal", "the same: entries of the journal in its file", "every one"),
-        ("datagrams", "Ping360, Surveyor and Omniscan by UDP, 20 s each: pings", "served + dropped, one under way at the end"),
+        ("datagrams", "hosts of the Ping family, ARIS and Sonar 3D-15 by UDP, 10 s each: pings", "served + dropped, one under way at the end"),
         ("farm-kill", "farm: a worker and the queue's server killed: shards", "all, byte for byte those of one process"),
+        ("farm-strays", "the same: numbers in its queue that are no shards of the job", "refused by name, no file made"),
     ],
     "Life cycle": [
         ("stop-reading", "SIGTERM: reading clients get their message whole, then a FIN", "all"),
