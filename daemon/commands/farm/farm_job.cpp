@@ -43,10 +43,11 @@ Result<void> read_counts(const json& words, FarmJob& record) {
   const std::uint64_t needed = (*pings + *shard_pings - 1) / *shard_pings;
   const auto shards = count_in(words, "shards", needed, needed);
   if (!shards) return tl::make_unexpected(shards.error());
-  const auto patience = count_in(words, "patience_ms", 0, static_cast<std::uint64_t>(most_patience.count()));
+  const auto patience = count_in(words, "patience_ms", static_cast<std::uint64_t>(least_patience.count()),
+                                 static_cast<std::uint64_t>(most_patience.count()));
   if (!patience) return tl::make_unexpected(patience.error());
   record.pings = *pings, record.shard_pings = *shard_pings, record.shards = *shards;
-  record.patience = std::max(std::chrono::milliseconds(*patience), least_patience);
+  record.patience = std::chrono::milliseconds(*patience);
   return {};
 }
 

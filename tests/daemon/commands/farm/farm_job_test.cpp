@@ -148,9 +148,10 @@ TEST_F(FarmJobTest, CountsThatNoJobHasAreRefused) {
   const FarmJob is = record();
   using nlohmann::json;
   const std::vector<std::pair<const char*, json>> wrong{
-      {"shards", -1},      {"shards", 1e18},  {"shards", 0},         {"shards", 4},       {"shards", "3"},
-      {"shards", 3.0},     {"pings", 0},      {"pings", 1e300},      {"pings", -5},       {"shard_pings", 0},
-      {"shard_pings", -2}, {"shards", false}, {"patience_ms", 1e18}, {"patience_ms", -1}, {"shards", 18446744073709551615u}};
+      {"shards", -1},        {"shards", 1e18},    {"shards", 0},       {"shards", 4},
+      {"shards", "3"},       {"shards", 3.0},     {"pings", 0},        {"pings", 1e300},
+      {"pings", -5},         {"shard_pings", 0},  {"shard_pings", -2}, {"shards", false},
+      {"patience_ms", 1e18}, {"patience_ms", -1}, {"patience_ms", 99}, {"shards", 18446744073709551615u}};
   for (const auto& [key, value] : wrong) {
     json words = json::parse(is.to_json());
     words[key] = value;
