@@ -115,13 +115,13 @@ Bytes file_of(MakeWriter make, const std::vector<Bytes>& messages) {
   return file;
 }
 
-/// A recording on a disk that stands still until `goes_on`.
+/// A recording on a disk that stands still until `goes_on`, which may hold an exception.
 class SlowDisk final : public recording::RecordingReader {
  public:
   SlowDisk(std::unique_ptr<recording::RecordingReader> of, std::shared_future<void> goes_on)
       : of_(std::move(of)), goes_on_(std::move(goes_on)) {}
   std::optional<RecordedMessage> next() override {
-    if (stands_still) goes_on_.wait();
+    if (stands_still) goes_on_.get();
     return of_->next();
   }
   std::optional<Error> damage() const override { return of_->damage(); }
@@ -170,6 +170,7 @@ class Replay {
   bool ends() { return done_.wait_for(patience) == std::future_status::ready; }
   /// After the end.
   ReplayServer::Figures figures() const { return server_->figures(); }
+  const Result<void>& outcome() const { return server_->outcome(); }
 
  private:
   Log log_;
@@ -365,6 +366,19 @@ TEST_F(NorbitReplay, ADiskThatStandsStillDelaysNoConversation) {
   EXPECT_EQ(received.get(), column);
   EXPECT_TRUE(replay.ends());
   EXPECT_EQ(replay.figures().messages, 5u);
+}
+
+TEST_F(NorbitReplay, AFaultOfTheDiskEndsItWithItsText) {
+  std::promise<void> goes_on;
+  goes_on.set_exception(std::make_exception_ptr(std::runtime_error("the disk is gone")));
+  Replay replay(file_of(raw_dump, messages), 1000, goes_on.get_future().share());
+  Tcp commands(norbit::command_port), points(norbit::bathymetry_port);
+  commands.send(std::string_view("set_power 1\r\n"));
+  commands.read_to_end();
+  points.read_to_end();
+  ASSERT_TRUE(replay.ends());
+  ASSERT_FALSE(replay.outcome());
+  EXPECT_THAT(replay.outcome().error().text, ::testing::HasSubstr("the disk is gone"));
 }
 
 }  // namespace
