@@ -1,6 +1,9 @@
 // Holds the settings of a make in the device, and in a ping request until the ping is framed.
 #pragma once
 
+#include <memory>
+#include <utility>
+
 #include "core/sonar/ping.hpp"
 #include "protocol/dialogue.hpp"
 
@@ -13,9 +16,33 @@ bool same_settings(const Settings& a, const Settings& b) {
   return a == b;
 }
 
+/// The device's findings in a ping; null: none. A make whose device has findings defines this function in its own namespace.
+template <class Settings>
+std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping&) {
+  return nullptr;
+}
+
+/// Findings of type T.
+template <class T>
+struct Found final : PingFindings {
+  explicit Found(T v) : value(std::move(v)) {}
+  T value;
+};
+template <class T>
+std::shared_ptr<const PingFindings> found(T value) {
+  return std::make_shared<const Found<T>>(std::move(value));
+}
+/// The findings of type T in the ping; if it has none, those that `look` makes now.
+template <class T>
+T found_in(const Ping& ping, T (*look)(const Ping&)) {
+  const auto* const made = dynamic_cast<const Found<T>*>(ping.findings.get());
+  return made != nullptr ? made->value : look(ping);
+}
+
 template <class Settings, class Base = VendorSettings>
 struct Held final : Base {
   explicit Held(const Settings& s) : settings(s) {}
+  std::shared_ptr<const PingFindings> look_at(const Ping& ping) const override { return findings_of(settings, ping); }
   bool equals(const VendorSettings& other) const override {
     const auto* of = dynamic_cast<const Held*>(&other);
     return of != nullptr && same_settings(of->settings, settings);

@@ -97,6 +97,13 @@ struct Twist {
   Vec3d angular_rate_radps;  // sonar axes
 };
 
+struct Ping;
+
+/// Base class of a device's findings in a ping, such as the points of a bottom. core does not read them.
+struct PingFindings {
+  virtual ~PingFindings() = default;
+};
+
 /// Base class of settings that a vendor's protocol needs beside PingSettings, such as the client's request: the message of a ping
 /// states the settings with which the ping was made. core does not read them. Exceptions: RangeImageSettings
 /// (core/sonar/range_image.hpp) makes the ping a range image, PhasedSettings (core/sonar/phases.hpp) keeps signals of beams.
@@ -104,6 +111,8 @@ struct VendorSettings {
   virtual ~VendorSettings() = default;
   /// Whether a client would see no difference between the two. `other` is of the same vendor.
   virtual bool equals(const VendorSettings& other) const = 0;
+  /// The device's findings in a ping that was made with these settings; null: it looks for none.
+  virtual std::shared_ptr<const PingFindings> look_at(const Ping&) const { return nullptr; }
 };
 
 /// Meaning of the reported angles if the sonar assumes another sound speed than that of the water (docs/acoustics.md, section 6).
@@ -148,11 +157,17 @@ struct Ping {
   std::vector<std::uint32_t> row_gain;  // [rows] when format.row_gains: power gain applied to the row, at least 1
   std::vector<float> pressure_upa;      // [rows][beams] before TVG, when switches.keep_pressure
   std::vector<std::complex<float>>
-      beam_signal_upa;                       // [samples][beams] before TVG, when switches.keep_beams; not in expected power
-  std::vector<BeamTruth> truth;              // [beams], when switches.keep_truth
-  std::shared_ptr<const PingLabels> labels;  // when switches.keep_labels
+      beam_signal_upa;                           // [samples][beams] before TVG, when switches.keep_beams; not in expected power
+  std::vector<BeamTruth> truth;                  // [beams], when switches.keep_truth
+  std::shared_ptr<const PingLabels> labels;      // when switches.keep_labels
+  std::shared_ptr<const PingFindings> findings;  // set by look_at()
 
   const FrequencyMode& mode() const { return request.model->modes[static_cast<std::size_t>(request.settings.mode)]; }
 };
+
+/// Sets the findings of a ping. Call it again after a change of its request or samples.
+inline void look_at(Ping& ping) {
+  ping.findings = ping.request.vendor_settings != nullptr ? ping.request.vendor_settings->look_at(ping) : nullptr;
+}
 
 }  // namespace sonar

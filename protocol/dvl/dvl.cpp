@@ -27,7 +27,7 @@ class DvlVendor final : public protocol::PushingVendor {
   }
   double gain_percent(const protocol::DeviceState&) const override { return 0; }  // the device sets its gain itself
   std::optional<protocol::ChangeSettings> after_ping(const Ping& ping, const protocol::DeviceState& device) const override {
-    const Measurement measured = measure(ping);
+    const Measurement measured = measured_in(ping);
     Settings s = settings_from(device.settings.get());
     s.reckoning = reckoned(s.reckoning, measured, ping.request, s);
     // The search among range modes continues only after a ping of the present mode. A ping that was fired before a client changed
@@ -41,13 +41,13 @@ class DvlVendor final : public protocol::PushingVendor {
     return port.number == serial_port ? converse_in_sentences(device, now) : converse_in_json(device, now);
   }
   std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
-    const Measurement measured = measure(ping);
+    const Measurement measured = measured_in(ping);
     return std::make_shared<const protocol::Bytes>(velocity_line(measured, since_last(ping, device), sent_at(measured)));
   }
   std::vector<protocol::Bytes> datagrams(const protocol::Port& port, const Ping& ping,
                                          const protocol::DeviceState& device) const override {
     if (port.number != serial_port) return {};  // frame() is what it sends
-    const Measurement measured = measure(ping);
+    const Measurement measured = measured_in(ping);
     const SerialOutput output = settings_from(device.settings.get()).serial_output;
     Bytes lines = velocity_sentences(measured, since_last(ping, device), sent_at(measured), output);
     if (lines.empty()) return {};

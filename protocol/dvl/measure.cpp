@@ -172,6 +172,8 @@ Measurement measure(const Ping& ping) {
   return m;
 }
 
+std::shared_ptr<const PingFindings> HeldSettings::look_at(const Ping& ping) const { return protocol::found(measure(ping)); }
+
 // The search of the device is unknown. Here it tries the next higher mode if it has no velocity, and after the highest the
 // lowest. With a velocity it keeps its mode while the altitude belongs to that (docs/protocols/dvl.md, "Range modes").
 int next_mode(const Measurement& measured, const Settings& settings, const Product& product) {

@@ -29,6 +29,8 @@ struct Measurement {
 /// The velocity of the ground along the beams comes from PingRequest::sonar_moves, which World derives from the poses of the
 /// vehicle: senders give poses, not velocities.
 Measurement measure(const Ping& ping);
+/// The same, from the findings of the ping if it has them.
+inline Measurement measured_in(const Ping& ping) { return protocol::found_in(ping, measure); }
 
 /// The range mode of the next ping.
 int next_mode(const Measurement& measured, const Settings& settings, const Product& product);

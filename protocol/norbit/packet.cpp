@@ -86,12 +86,18 @@ Front front_of(const Ping& ping, const protocol::DeviceState& device) {
   return front;
 }
 
+std::vector<Detection> bottom_of(const Ping& ping) {
+  return detect_points(ping, bottom_beams, above_db, rad_from_deg(beam_width_deg));
+}
+
 Grid grid_in(const Ping& ping) {
   return grid_of(settings_from(ping.request.vendor_settings.get()),
                  static_cast<double>(ping.request.settings.device_sound_speed_mps));
 }
 
 }  // namespace
+
+std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) { return protocol::found(bottom_of(ping)); }
 
 const recording::Framing framing{{preamble & 0xFF, preamble >> 8 & 0xFF}, header_size, length_of};
 
@@ -114,7 +120,7 @@ Bytes encode_bathymetry(const Ping& ping, const protocol::DeviceState& device) {
   }
   const double gain = std::pow(10, static_cast<double>(s.gain_db) / 20);
   const auto& azimuths = ping.beam_azimuth_rad;
-  for (const Detection& found : detect_points(ping, bottom_beams, above_db, rad_from_deg(beam_width_deg))) {
+  for (const Detection& found : protocol::found_in(ping, bottom_of)) {
     const auto part = static_cast<int>((port_rad - found.azimuth_rad) / part_rad);
     Beam& beam = beams[static_cast<std::size_t>(std::clamp(part, 0, bottom_beams - 1))];
     beam.sample = static_cast<std::uint32_t>(std::lround(found.range_m / grid.sample_m));

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/sonar/ping.hpp"
+#include "protocol/held_settings.hpp"
 
 namespace sonar::ping {
 
@@ -24,6 +25,8 @@ struct Echo {
 };
 /// Finds the strongest echo of a profile, and the range at which it begins.
 Echo find_echo(const Ping& ping);
+/// The same, from the findings of the ping if it has them.
+inline Echo echo_in(const Ping& ping) { return protocol::found_in(ping, find_echo); }
 
 /// The range of a ping, counted from the sonar, and its gain.
 struct Reach {

@@ -35,14 +35,14 @@ class Ping1DVendor final : public StreamingVendor {
     if (before.range.start_mm != s.parameters.range.start_mm || before.range.length_mm != s.parameters.range.length_mm ||
         before.gain != s.parameters.gain)
       return std::nullopt;  // a host has changed range or gain since: the ping does not show whether the new ones fit
-    const Parameters next = adjusted(s.parameters, find_echo(ping));
+    const Parameters next = adjusted(s.parameters, echo_in(ping));
     if (next == s.parameters) return std::nullopt;
     s.parameters = next;
     return change_to(s);
   }
   bool measures_distance() const override { return true; }
   std::optional<protocol::Distance> distance_in(const Ping& ping) const override {
-    const Echo echo = find_echo(ping);
+    const Echo echo = echo_in(ping);
     return protocol::Distance{echo.range_m, echo.confidence};
   }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,

@@ -138,7 +138,7 @@ std::vector<Bytes> frames_of(const Ping& ping) {
   const Settings s = settings_from(ping.request.vendor_settings.get());
   const PingSettings& made = ping.request.settings;
   const Results results = s.results != no_result ? s.results : profile_result;
-  const Echo echo = find_echo(ping);
+  const Echo echo = echo_in(ping);
   Profile profile;
   profile.distance_mm = static_cast<std::uint32_t>(std::lround(1000 * echo.range_m));
   profile.confidence = static_cast<std::uint16_t>(echo.confidence);

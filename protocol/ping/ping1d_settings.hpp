@@ -43,6 +43,10 @@ struct Settings {
 };
 /// Compares settings without the results, which differ from ping to ping.
 bool same_settings(const Settings& a, const Settings& b);
+/// The echo.
+inline std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) {
+  return protocol::found(find_echo(ping));
+}
 using HeldSettings = protocol::Held<Settings>;
 /// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }

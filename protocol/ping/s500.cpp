@@ -106,7 +106,7 @@ class S500Vendor final : public StreamingVendor {
   }
   bool measures_distance() const override { return true; }
   std::optional<protocol::Distance> distance_in(const Ping& ping) const override {
-    const Echo echo = find_echo(ping);
+    const Echo echo = echo_in(ping);
     return protocol::Distance{echo.range_m, echo.confidence};
   }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,

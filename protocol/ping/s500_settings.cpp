@@ -173,7 +173,7 @@ double gain_percent(const Parameters& p) { return 100.0 / most_gain() * p.reach.
 
 // The echo is kept for the mean of the distances in any case; range and gain follow it only where they are automatic.
 Settings after(const Ping& ping, const Settings& now) {
-  const Echo echo = find_echo(ping);
+  const Echo echo = echo_in(ping);
   Settings next = now;
   next.earlier = with(now.earlier, echo);
   Parameters& p = next.parameters;
@@ -191,7 +191,7 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
   const Settings s = settings_from(ping.request.vendor_settings.get());
   const PingSettings& made = ping.request.settings;
   const Results results = s.results != no_result ? s.results : profile_result;
-  const Echo echo = find_echo(ping), averaged = average(with(s.earlier, echo));
+  const Echo echo = echo_in(ping), averaged = average(with(s.earlier, echo));
   const auto power_up_ms = static_cast<std::uint32_t>(
       std::chrono::duration_cast<std::chrono::milliseconds>(ping.request.fired_at - device.powered_up_at).count());
   const auto confidence = static_cast<std::uint8_t>(echo.confidence);

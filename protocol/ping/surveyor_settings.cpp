@@ -67,6 +67,10 @@ Bytes payload_of(const M& message, const std::vector<Bytes>& points) {
   return payload;
 }
 
+std::vector<Detection> points_of(const Ping& ping) {
+  return detect_points(ping, directions, above_db, rad_from_deg(beam_width_deg));
+}
+
 }  // namespace
 
 std::span<const std::shared_ptr<const SonarModel>> models() {
@@ -149,6 +153,8 @@ WaterStats water_stats(const protocol::DeviceState& device) {
           static_cast<float>(absolute_pressure_bar(device.water, device.depth_m))};
 }
 
+std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) { return protocol::found(points_of(ping)); }
+
 // Both messages have the same points: 3012 as angle and time, 3011 as y and z.
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) {
   const Settings s = settings_from(ping.request.vendor_settings.get());
@@ -163,7 +169,7 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
   const WaterStats water = water_stats(device);
 
   std::vector<Bytes> atof, yz;
-  for (const Detection& found : detect_points(ping, directions, above_db, rad_from_deg(beam_width_deg))) {
+  for (const Detection& found : protocol::found_in(ping, points_of)) {
     atof.push_back(
         wire::bytes_of(AtofPoint{static_cast<float>(found.azimuth_rad), static_cast<float>(2 * found.range_m / speed), {}}));
     Bytes& pair = yz.emplace_back();

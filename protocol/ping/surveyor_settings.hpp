@@ -21,6 +21,8 @@ struct Settings {
 };
 /// Clocks that differ by less than a millisecond are the same.
 bool same_settings(const Settings& a, const Settings& b);
+/// The points: a std::vector<Detection>.
+std::shared_ptr<const PingFindings> findings_of(const Settings& settings, const Ping& ping);
 using HeldSettings = protocol::Held<Settings>;
 /// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }

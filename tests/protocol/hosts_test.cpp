@@ -178,8 +178,12 @@ class Talk {
                   std::byte{100});
     const Port* const stream = device.port(Port::Kind::udp_stream);
     bool by_stream = false;
+    Ping looked_at = made;
+    look_at(looked_at);
     for (Line& line : lines_) {
       const auto framed = test::bytes_at(make, *line.port, made, state);
+      const auto framed_later = test::bytes_at(make, *line.port, looked_at, state);
+      EXPECT_EQ(framed_later ? *framed_later : Bytes{}, framed ? *framed : Bytes{}) << "whoever looks at it finds the same";
       by_stream = by_stream || (framed && line.port->kind == Port::Kind::tcp_stream);
       const auto delivery = line.dialogue->on_ping(request.vendor_settings.get(), framed ? framed->size() : 0, now);
       for (const Bytes& prefix : delivery.prefixes) {

@@ -64,7 +64,9 @@ std::shared_ptr<const Ping> Faults::altered(const std::shared_ptr<const Ping>& p
     more.ping = number;
     note(e, FaultEntry::What::injected, now, std::move(more));
   }
-  return changed ? changed : ping;
+  if (!changed) return ping;
+  look_at(*changed);
+  return changed;
 }
 
 bool Faults::withholds(std::uint32_t ping, Time now) const {

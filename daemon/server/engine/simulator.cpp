@@ -5,6 +5,7 @@
 #include <exception>
 #include <new>
 #include <stdexcept>
+#include <utility>
 
 namespace sonar {
 namespace {
@@ -12,6 +13,12 @@ namespace {
 using Steady = std::chrono::steady_clock;
 
 double seconds_since(Steady::time_point begin) { return std::chrono::duration<double>(Steady::now() - begin).count(); }
+
+/// The ping with its findings. They are made here to keep this work off the I/O thread.
+std::shared_ptr<const Ping> looked_at(Ping ping) {
+  look_at(ping);
+  return std::make_shared<const Ping>(std::move(ping));
+}
 
 }  // namespace
 
@@ -148,7 +155,7 @@ std::vector<Simulator::Outcome> Simulator::run(const std::vector<Job>& jobs) {
   for (const Job& job : jobs) requests.push_back(job.request);
   try {
     std::vector<Ping> pings = engine_->run(requests);
-    for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i].ping = std::make_shared<const Ping>(std::move(pings.at(i)));
+    for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i].ping = looked_at(std::move(pings.at(i)));
     return outcomes;
   } catch (const std::exception&) {  // one of them failed: computed alone, the others succeed and that one gets its reason
   }
@@ -161,7 +168,7 @@ Simulator::Outcome Simulator::run(const PingRequest& request) {
   Outcome outcome;
   try {
     auto pings = engine_->run({&request, 1});
-    outcome.ping = std::make_shared<const Ping>(std::move(pings.at(0)));
+    outcome.ping = looked_at(std::move(pings.at(0)));
   } catch (const std::invalid_argument& e) {
     outcome.failure = e.what();
     outcome.refused = true;

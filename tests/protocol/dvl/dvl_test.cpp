@@ -80,6 +80,28 @@ TEST(DvlVelocity, MountingRotationTurnsIntoTheVehiclesFrame) {
   EXPECT_NEAR(m.velocity_mps.z, 0.2, 1e-9);
 }
 
+/// Without samples nothing can be measured: what the device says of the ping was found before.
+TEST(DvlVelocity, IsMeasuredOnceForAllItsLines) {
+  const protocol::DeviceState state = device();
+  Settings s;
+  s.mode = 1;
+  Ping ping = ping_of(level, s, state);
+  ping.request.sonar_moves.velocity_mps = {1, 0, 0};
+  const auto said = [&] {
+    std::string all = text_of(*vendor().frame(ping, state));
+    for (const protocol::Port& port : vendor().ports())
+      for (const Bytes& part : vendor().datagrams(port, ping, state)) all += text_of(part);
+    return all + std::to_string(settings_from(vendor().after_ping(ping, state)->vendor_settings.get()).reckoning.velocity_mps.x);
+  };
+  const std::string looked_for_now = said();
+  look_at(ping);
+  EXPECT_EQ(said(), looked_for_now);
+  std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
+  EXPECT_EQ(said(), looked_for_now);
+  look_at(ping);
+  EXPECT_NE(said(), looked_for_now);
+}
+
 TEST(DvlVelocity, AWrongSpeedOfSoundScalesIt) {
   const protocol::DeviceState state = device();
   Settings s;

@@ -220,6 +220,23 @@ TEST(Norbit, EachPortHasItsOwnPackets) {
   EXPECT_EQ(Talk(bathymetry_port).dialogue->on_ping(nullptr, 1, at_s(0)).prefixes.size(), 1u);
 }
 
+TEST(Norbit, TheBottomIsLookedForOnce) {
+  const protocol::DeviceState state = device();
+  Ping ping = ping_with({.power = true, .stop_m = 5}, state, 50, 10);
+  const auto port = std::ranges::find(vendor().ports(), bathymetry_port, &protocol::Port::number);
+  const auto bottom = [&] {
+    std::vector<std::uint32_t> samples;
+    for (const Beam& beam : read_bathymetry(vendor().datagrams(*port, ping, state).at(0))->beams) samples.push_back(beam.sample);
+    return samples;
+  };
+  const auto looked_for_now = bottom();
+  look_at(ping);
+  std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
+  EXPECT_EQ(bottom(), looked_for_now) << "the device has found it before the samples were lost";
+  look_at(ping);
+  EXPECT_NE(bottom(), looked_for_now);
+}
+
 TEST(Norbit, GridsFitTheirRange) {
   for (const double stop_m : {1.0, 2.0, 5.0, 50.0, 150.0, 600.0})
     for (const double start_m : {0.0, 0.5, stop_m - 1})

@@ -251,6 +251,23 @@ TEST(Ping1DAutomatic, SettingsFollowAPingUnlessAHostHasChangedThem) {
   EXPECT_FALSE(talk.vendor.after_ping(profile_with(manual, 20, 150), talk.state));
 }
 
+TEST(Ping1D, TheEchoIsLookedForOnce) {
+  Talk talk("ping1d");
+  Ping ping = profile_with(settings_from(talk.state.settings.get()).parameters, 20, 150);
+  const auto said = [&] {
+    const auto frame = frames_in(talk.vendor.datagrams(talk.vendor.ports()[1], ping, talk.state)).front();
+    const auto next = talk.vendor.after_ping(ping, talk.state);
+    return std::tuple(message_in<Profile>(frame).distance_mm, talk.vendor.distance_in(ping)->range_m,
+                      next ? next->settings.range_m : 0);
+  };
+  const auto looked_for_now = said();
+  look_at(ping);
+  std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
+  EXPECT_EQ(said(), looked_for_now) << "the device has found it before the samples were lost";
+  look_at(ping);
+  EXPECT_NE(said(), looked_for_now);
+}
+
 TEST(Ping1D, AProfileSaysHowItWasMade) {
   Talk talk("ping1d");
   Parameters p;

@@ -116,6 +116,24 @@ TEST(S500, RefusesWhatItCannotDo) {
   EXPECT_THAT(ids_in(talk.take()), ElementsAre(Id::nack, Id::nack));
 }
 
+TEST(S500, TheEchoIsLookedForOnce) {
+  Talk talk("s500");
+  Settings s;
+  s.parameters = requested(s.parameters, {.length_mm = 10240, .gain = 3, .report = Id::s500_profile6});
+  Ping ping = profile_with(s, 400, -20);
+  const auto said = [&] {
+    const auto frame = frames_in(talk.vendor.datagrams(talk.vendor.ports()[1], ping, talk.state)).front();
+    const auto next = settings_from(talk.vendor.after_ping(ping, talk.state)->vendor_settings.get());
+    return std::tuple(message_in<Profile6>(frame).depth_m, talk.vendor.distance_in(ping)->range_m, next.earlier.back().range_m);
+  };
+  const auto looked_for_now = said();
+  look_at(ping);
+  std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
+  EXPECT_EQ(said(), looked_for_now) << "the device has found it before the samples were lost";
+  look_at(ping);
+  EXPECT_NE(said(), looked_for_now);
+}
+
 TEST(S500, AProfileSaysHowItWasMade) {
   Talk talk("s500");
   talk.state.powered_up_at = at_s(0);

@@ -92,6 +92,23 @@ TEST(Surveyor, OneFrameADatagramAndTheSameFramesOverTcp) {
   EXPECT_EQ(talk.vendor.datagrams(talk.vendor.ports()[1], ping_of(talk, 6.05), talk.state).size(), 4u) << "118 once a second";
 }
 
+TEST(Surveyor, PointsAreLookedForOnce) {
+  Talk talk("surveyor-240");
+  talk.say(pings({.end_mm = 5000, .enable = 1, .yz = 1, .atof = 1}));
+  Ping ping = ping_of(talk, 5.5);
+  const std::size_t beams = ping.beam_azimuth_rad.size();
+  for (std::size_t i = 0; i < beams; ++i)
+    ping.beam_azimuth_rad[i] = 0.7f - 1.4f * static_cast<float>(i) / static_cast<float>(beams - 1);
+  ping.samples[2 * (100 * beams + beams / 2) + 1] = std::byte{0xF0};
+  const auto said = [&] { return *talk.vendor.frame(ping, talk.state); };
+  const Bytes looked_for_now = said();
+  look_at(ping);
+  std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
+  EXPECT_EQ(said(), looked_for_now) << "the device has found it before the samples were lost";
+  look_at(ping);
+  EXPECT_LT(said().size(), looked_for_now.size()) << "it has no points";
+}
+
 /// An AtofPointData of a ping that ends at 15 m, with one point 10 m away and 0.1 rad to port; or the same as YzPointData.
 Bytes one_point(Id id, std::uint32_t ping) {
   Bytes payload, point;

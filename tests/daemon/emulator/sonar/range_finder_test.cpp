@@ -18,9 +18,10 @@ struct RangeFinder : ::testing::Test {
     time.run(length);
     return time.pings - before;
   }
-  void add_fault(const std::string& what) {
+  void add_fault(const std::string& what, std::map<std::string, std::string> with = {}) {
     FaultRecord record;
     record.what = what;
+    record.with = std::move(with);
     time.add_fault("front", record);
   }
   std::size_t distances() const {
@@ -65,6 +66,18 @@ TEST_F(RangeFinder, AWithheldPingHasNoDistance) {
   time.end_faults("front");
   time.run(seconds(1));
   EXPECT_GT(distances(), before);
+}
+
+TEST_F(RangeFinder, FindsItsDistanceInTheSamplesThatAFaultHasChanged) {
+  sonar().run_itself(true, time.now);
+  time.run(seconds(1));
+  ASSERT_EQ(time.distances.back()->confidence_percent, 0) << "zeros have no echo";
+  add_fault("saturated", {{"share", "0.1"}});
+  time.run(seconds(1));
+  EXPECT_EQ(time.distances.back()->confidence_percent, 100);
+  time.end_faults("front");
+  time.run(seconds(1));
+  EXPECT_EQ(time.distances.back()->confidence_percent, 0);
 }
 
 }  // namespace

@@ -185,6 +185,7 @@ class VirtualTime {
       ping->beam_azimuth_rad.push_back(0.5f - static_cast<float>(b) / static_cast<float>(beams));
     if (s.format.row_gains) ping->row_gain.assign(rows, 1);
     ping->request = std::move(request);
+    look_at(*ping);
     return ping;
   }
 

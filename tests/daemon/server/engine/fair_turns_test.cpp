@@ -152,5 +152,42 @@ TEST(Simulator, GivesAnEngineThatTakesThemTheRequestsOfSeveralSonars) {
   EXPECT_EQ(calls, expected) << "two that one of them spoils are tried alone; a large one keeps none waiting";
 }
 
+struct SeenOn final : PingFindings {
+  std::thread::id thread = std::this_thread::get_id();
+};
+struct Looking final : VendorSettings {
+  bool equals(const VendorSettings&) const override { return true; }
+  std::shared_ptr<const PingFindings> look_at(const Ping& ping) const override {
+    if (ping.request.sonar_id == wrong) throw std::bad_alloc();
+    ++looks;
+    return std::make_shared<const SeenOn>();
+  }
+  mutable std::atomic<int> looks = 0;
+};
+
+TEST(Simulator, LooksAtAPingOnceOnTheThreadThatComputesIt) {
+  asio::io_context io;
+  std::vector<std::vector<std::uint32_t>> calls;
+  std::promise<void> all_asked;
+  Simulator simulator(io, std::make_unique<Together>(calls, all_asked.get_future().share()), 0);
+  const auto settings = std::make_shared<Looking>();
+  for (const std::uint32_t sonar : {0u, 1u, 2u, wrong}) {
+    PingRequest request;
+    request.sonar_id = sonar;
+    request.vendor_settings = settings;
+    if (sonar == wrong) request.settings.beam_count *= 4;
+    simulator.submit(request, [&, sonar](Simulator::Outcome outcome) {
+      EXPECT_EQ(outcome.refused, sonar == wrong);
+      if (sonar == wrong) return;
+      const auto* const seen = dynamic_cast<const SeenOn*>(outcome.ping->findings.get());
+      ASSERT_NE(seen, nullptr);
+      EXPECT_NE(seen->thread, std::this_thread::get_id());
+    });
+  }
+  all_asked.set_value();
+  io.run();
+  EXPECT_EQ(settings->looks, 3);
+}
+
 }  // namespace
 }  // namespace sonar
