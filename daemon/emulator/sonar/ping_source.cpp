@@ -195,7 +195,8 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
   ++figures.pings;
   figures.simulation_s += outcome.seconds;
   figures.simulation.add(outcome.seconds);
-  if (!settings_.triggered && pacer_.period().count() > 0)
+  // The recording sets the pace of its pings; fewer beams or more threads would not raise it.
+  if (!settings_.triggered && pacer_.period().count() > 0 && outcome.recorded == nullptr)
     if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period()),
                                            sonar_.around.config.sonars.size() > 1))
       sonar_.report(Report::Topic::state, LogLevel::warning, *slow, {}, actions);

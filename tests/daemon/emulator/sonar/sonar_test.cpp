@@ -285,6 +285,38 @@ TEST_F(FramedPings, AreSharedAgainAfterAFault) {
 }
 
 /// Latency is a matter of this computer: it does not follow the clock of the device.
+/// The warnings of a sonar each of whose pings takes three of its periods.
+std::vector<std::string> warnings_of_slow_pings(bool recorded) {
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
+  Sonar& sonar = time.sonar("front");
+  std::vector<std::string> warnings;
+  std::optional<Time> done;  // of the ping that is under way
+  const auto carry_out = [&](const Actions& actions) {
+    for (const Action& action : actions) {
+      const auto* const report = std::get_if<Report>(&action);
+      if (report != nullptr && report->line.level == LogLevel::warning) warnings.push_back(report->line.phrase);
+      if (std::holds_alternative<ComputePing>(action)) done = time.now + milliseconds(300);
+    }
+  };
+  const ConnectionId client = time.connect("front");
+  carry_out(sonar.on_bytes(client, fire(oculus::PingRate::hz10), time.now));
+  for (const Time end = time.now + std::chrono::seconds(30); time.now < end;) {
+    time.now = std::max(time.now, sonar.next_tick().value_or(end));
+    carry_out(sonar.on_tick(time.now));
+    if (!done || time.now < *done) continue;
+    done.reset();
+    PingOutcome outcome{.failure = "not needed here", .refused = true, .seconds = 0.3};
+    if (recorded) outcome.recorded = std::make_shared<const PartsByPort>();
+    carry_out(sonar.on_ping(outcome, time.now));
+  }
+  return warnings;
+}
+
+TEST(SonarInVirtualTime, PingsOfARecordingAreNotTooSlow) {
+  EXPECT_THAT(warnings_of_slow_pings(false), ::testing::Contains(HasSubstr("computing takes 300 ms a ping")));
+  EXPECT_THAT(warnings_of_slow_pings(true), ::testing::Not(::testing::Contains(HasSubstr("computing takes"))));
+}
+
 TEST(SonarInVirtualTime, LatencyIsMeasuredFromTheTrueTimeOfAPing) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   const ConnectionId client = time.connect("front");
