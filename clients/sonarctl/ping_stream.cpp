@@ -276,6 +276,7 @@ void PingStream::take(std::size_t port, std::span<const std::byte> bytes) {
   const auto splitter = splitters_.find(port);
   if (splitter == splitters_.end()) return give(bytes);
   splitter->second.append({}, bytes);
+  carry_out(host_->on_bytes(port, {}, now()));  // the port is not silent, though no message may be whole yet
   while (const auto message = splitter->second.next()) give(message->bytes);
 }
 

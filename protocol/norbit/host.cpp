@@ -1,10 +1,14 @@
 #include "protocol/norbit/host.hpp"
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
-#include <map>
+#include <deque>
+#include <set>
 #include <utility>
 
+#include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
 #include "protocol/norbit/packet.hpp"
 #include "protocol/norbit/settings.hpp"
@@ -16,8 +20,10 @@ using protocol::HostActions;
 using protocol::HostPing;
 using text::format;
 
+constexpr std::size_t empty_rows = 500;
 constexpr double usual_range_m = 10, usual_rate_hz = 10;
-constexpr std::size_t most_parts = 2;
+constexpr auto patience = std::chrono::seconds(2);  // with a silent port, when the other has sent its packet
+constexpr std::size_t most_waiting = 1024, most_waiting_bytes = 64u << 20;
 
 Bytes request_of(const protocol::SettingsOverride& wanted) {
   std::string text = format("set_range 0 %g\r\n", wanted.range_m.value_or(usual_range_m));
@@ -64,61 +70,123 @@ std::optional<PolarImage> image_of(const Column& column) {
   return image;
 }
 
+/// On which points are drawn when there is no water column.
+PolarImage empty_fan(double range_m) {
+  const double half_rad = rad_from_deg(swath_deg / 2);
+  return {empty_rows, 2, range_m / empty_rows, {half_rad, -half_rad}, std::vector<float>(2 * empty_rows)};
+}
+
+/// The two packets of a ping come by two ports, each in the order of the pings. A slow connection may bring its packets long
+/// after the other.
 class NorbitHost final : public protocol::Host {
  public:
   explicit NorbitHost(std::optional<Bytes> request) : request_(std::move(request)) {}
 
-  HostActions on_open(std::span<const std::uint16_t>, Time) override {
+  HostActions on_open(std::span<const std::uint16_t>, Time now) override {
+    begun_ = now;
     if (!request_) return {};
     return {protocol::HostSend{std::size(host_ports) - 1, *request_}};
   }
   HostActions on_bytes(std::size_t port, BytesView received, Time now) override {
     HostActions actions;
+    if (!begun_) begun_ = now;
+    if (port < kinds) heard_at_[port] = now;
     auto& splitter = splitters_[std::min(port, splitters_.size() - 1)];  // a recording has the packets of all ports in one stream
     splitter.append(now, received);
     while (auto whole = splitter.next()) {
       if (auto bathymetry = read_bathymetry(whole->bytes)) {
-        const std::uint32_t number = bathymetry->front.ping;
-        Parts& parts = parts_[number];
-        parts.bathymetry = std::move(bathymetry);
-        parts.bathymetry_size = whole->bytes.size();
-        on_part(number, actions);
+        if (Parts* const parts = place_for(bathymetry->front.ping, of_bottom, whole->bytes.size(), now, actions))
+          parts->bathymetry = std::move(bathymetry);
       } else if (auto column = read_column(whole->bytes)) {
-        const std::uint32_t number = column->front.ping;
-        Parts& parts = parts_[number];
-        parts.column_bytes = std::move(whole->bytes);  // a move keeps the bytes in their place
-        parts.column = std::move(column);
-        on_part(number, actions);
+        if (Parts* const parts = place_for(column->front.ping, of_column, whole->bytes.size(), now, actions)) {
+          parts->column_bytes = std::move(whole->bytes);  // a move keeps the bytes in their place
+          parts->column = std::move(column);
+        }
       } else if (port == 1) {  // others may hold replies to commands: a recording is one stream
         counts_.junk_bytes += whole->bytes.size();
       }
+      show(now, actions);
     }
     return actions;
+  }
+  HostActions on_tick(Time now) override {
+    HostActions actions;
+    show(now, actions);
+    return actions;
+  }
+  std::optional<Time> next_tick() const override {
+    if (waiting_.empty()) return std::nullopt;
+    return given_up_at(waiting_.front());
   }
   std::string about() const override { return "a Norbit"; }
   std::optional<Counts> counts() const override { return counts_; }
 
  private:
-  /// The packets of a ping come by two ports.
+  enum Kind : std::size_t { of_bottom, of_column, kinds };  // packets, by their port
   struct Parts {
+    std::uint32_t number = 0;
+    Time since{};
     std::optional<Bathymetry> bathymetry;
-    std::size_t bathymetry_size = 0;
     Bytes column_bytes;
     std::optional<Column> column;  // reads column_bytes
+    std::size_t bytes = 0;
+    bool has(Kind kind) const { return kind == of_column ? column.has_value() : bathymetry.has_value(); }
+    bool is_whole() const { return bathymetry && column; }
+    Kind missing() const { return bathymetry ? of_column : of_bottom; }
   };
-  /// A ping is whole with both; one whose other packet does not come is shown as it is.
-  void on_part(std::uint32_t number, HostActions& actions) {
+
+  /// The ping to which a packet belongs. Null if it was shown without the packet.
+  Parts* place_for(std::uint32_t number, Kind kind, std::size_t bytes, Time now, HostActions& actions) {
     ++counts_.messages;
-    const bool is_whole = parts_[number].bathymetry && parts_[number].column;
-    while (parts_.size() > most_parts || (is_whole && !parts_.empty() && parts_.begin()->first <= number)) {
-      emit(parts_.begin()->second, actions);
-      parts_.erase(parts_.begin());
+    heard_at_[kind] = now;
+    if (shown_without_[kind].erase(number) > 0) {
+      const char* const what = kind == of_column ? "water column" : "bathymetry";
+      actions.emplace_back(protocol::Notice{format("the %s of ping %u came after the ping was shown", what, number)});
+      return nullptr;
+    }
+    waiting_bytes_ += bytes;
+    auto ping =
+        std::find_if(waiting_.begin(), waiting_.end(), [&](const Parts& p) { return p.number == number && !p.has(kind); });
+    if (ping == waiting_.end()) {
+      const auto newest = std::find_if(waiting_.rbegin(), waiting_.rend(), [&](const Parts& p) { return p.has(kind); });
+      ping = std::find_if(newest.base(), waiting_.end(), [&](const Parts& p) { return p.number > number; });
+      ping = waiting_.emplace(ping);
+      ping->number = number;
+      ping->since = now;
+    }
+    ping->bytes += bytes;
+    return &*ping;
+  }
+
+  /// A port that has sent nothing at all may be closed on purpose; then pings wait only at the beginning.
+  Time given_up_at(const Parts& ping) const {
+    const std::optional<Time>& heard = heard_at_[ping.missing()];
+    return (heard ? std::max(*heard, ping.since) : begun_.value_or(ping.since)) + patience;
+  }
+
+  /// Shows the pings that are whole, and those whose other packet will not come: the port has sent that of a later ping, or is
+  /// silent.
+  void show(Time now, HostActions& actions) {
+    while (!waiting_.empty()) {
+      const Parts& ping = waiting_.front();
+      const bool is_left_out = !ping.is_whole() && std::any_of(waiting_.begin() + 1, waiting_.end(),
+                                                               [&](const Parts& p) { return p.has(ping.missing()); });
+      if (!ping.is_whole() && !is_left_out) {
+        if (now < given_up_at(ping) && waiting_.size() <= most_waiting && waiting_bytes_ <= most_waiting_bytes) return;
+        auto& shown = shown_without_[ping.missing()];
+        shown.insert(ping.number);
+        if (shown.size() > most_waiting) shown.erase(shown.begin());
+      }
+      waiting_bytes_ -= ping.bytes;
+      emit(ping, actions);
+      waiting_.pop_front();
     }
   }
   void emit(const Parts& parts, HostActions& actions) {
     HostPing ping;
     SonarPicture seen{.kind = PictureKind::points, .image = {}};
     ping.facts.bits = 16;
+    ping.facts.message_size = parts.bytes;
     if (parts.bathymetry) {
       const BathymetryFront& front = parts.bathymetry->front;
       seen.points = points_of(*parts.bathymetry);
@@ -126,7 +194,6 @@ class NorbitHost final : public protocol::Host {
       ping.facts.beams = front.beams;
       ping.facts.rows = 1;
       ping.facts.frequency_hz = static_cast<double>(front.frequency_hz);
-      ping.facts.message_size = parts.bathymetry_size;
       ping.fired_s = front.time_s;
       double nearest_m = 0, farthest_m = 0;
       for (const auto& [azimuth, range_m] : seen.points) {
@@ -147,7 +214,6 @@ class NorbitHost final : public protocol::Host {
       ping.facts.row_m = column.sample_m();
       ping.facts.range_m = (front.first_sample - 0.5 + static_cast<double>(front.samples)) * column.sample_m();
       ping.facts.frequency_hz = 1e3 * static_cast<double>(front.frequency_khz);
-      ping.facts.message_size += parts.column_bytes.size();
       ping.fired_s = front.time_s;
       image = image_of(column);
       if (!image) ping.errors.emplace_back("the directions of the beams do not rise, or its samples have no range");
@@ -156,19 +222,25 @@ class NorbitHost final : public protocol::Host {
     if (last_ && ping.facts.number <= *last_)
       ping.errors.push_back("number " + std::to_string(ping.facts.number) + " after " + std::to_string(*last_));
     last_ = ping.facts.number;
-    if (image) seen.image = *image;
+    if (image) shown_m_ = ping.facts.range_m;
+    seen.image = image ? *image : empty_fan(std::max(ping.facts.range_m, shown_m_));
     ping.picture = [image]() -> Result<PolarImage> {
       if (image) return *image;
       return failure(ErrorKind::usage, "a picture needs the water column, port 2211: sonarctl listen prints the points");
     };
-    if (image) ping.drawing = [seen = std::move(seen)] { return seen; };
+    ping.drawing = [seen = std::move(seen)] { return seen; };
     actions.emplace_back(std::move(ping));
   }
 
   std::optional<Bytes> request_;
   static recording::MessageSplitter splitter() { return {recording::Origin::device, framing}; }
   std::array<recording::MessageSplitter, 3> splitters_{splitter(), splitter(), splitter()};
-  std::map<std::uint32_t, Parts> parts_;  // pings of which one packet has not arrived
+  std::deque<Parts> waiting_;  // the first lacks a packet
+  std::size_t waiting_bytes_ = 0;
+  std::optional<Time> begun_;
+  std::array<std::optional<Time>, kinds> heard_at_;
+  std::array<std::set<std::uint32_t>, kinds> shown_without_;  // numbers of pings; the packet may still come
+  double shown_m_ = usual_range_m;                            // far end of the last water column
   std::optional<std::uint32_t> last_;
   Counts counts_;
 };

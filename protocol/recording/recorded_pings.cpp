@@ -25,13 +25,19 @@ Result<void> RecordedPings::make_host() {
 }
 
 std::optional<RecordedPing> RecordedPings::next() {
+  const auto take = [&](protocol::HostActions actions, Time at) {
+    for (protocol::HostAction& action : actions)
+      if (auto* const ping = std::get_if<protocol::HostPing>(&action)) decoded_.push_back({at, std::move(*ping)});
+  };
   while (decoded_.empty()) {
     const auto message = reader_->next();
-    if (!message) return std::nullopt;
+    if (!message) {  // a ping may still wait for a message that the recording does not have
+      if (const auto tick = host_->next_tick()) take(host_->on_tick(*tick), *tick);
+      if (decoded_.empty()) return std::nullopt;
+      break;
+    }
     const auto port = host_port(*by_.make, message->by);
-    if (!port || message->from != Origin::device) continue;
-    for (protocol::HostAction& action : host_->on_bytes(*port, message->bytes, message->at))
-      if (auto* const ping = std::get_if<protocol::HostPing>(&action)) decoded_.push_back({message->at, std::move(*ping)});
+    if (port && message->from == Origin::device) take(host_->on_bytes(*port, message->bytes, message->at), message->at);
   }
   RecordedPing first = std::move(decoded_.front());
   decoded_.pop_front();

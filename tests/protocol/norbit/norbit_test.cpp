@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/image/draw_picture.hpp"
 #include "protocol/norbit/host.hpp"
 #include "protocol/recorded/zlib.hpp"
 #include "tests/protocol/norbit/norbit_testing.hpp"
@@ -13,6 +14,7 @@ namespace {
 
 using namespace tests;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::StartsWith;
 
 template <class T>
@@ -123,20 +125,104 @@ TEST_F(Packets, FaultsFindTheirFields) {
   EXPECT_TRUE(read_column(BytesView(changed).subspan(bathymetry.size())));
 }
 
-TEST_F(Packets, OfOneTypeAreAPingOfTheHostToo) {
-  protocol::Wanted wanted;
-  wanted.as_it_is = true;
-  const auto host = *make_host(wanted);
-  int pings = 0;
-  for (std::uint32_t number = 1; number <= 6; ++number) {
-    ping.request.number = PingNumber{number};
-    for (const auto& action : host->on_bytes(2, encode_column(ping, state), at_s(number)))
-      if (const auto* seen = std::get_if<protocol::HostPing>(&action)) {
-        EXPECT_EQ(seen->facts.number, static_cast<std::uint32_t>(++pings));
-        EXPECT_TRUE(seen->picture());
-      }
+/// The driver's end, which gets packets by its ports: 0 the bathymetry, 1 the water column.
+struct Hosts : Packets {
+  void hear(std::size_t port, std::uint32_t number, double at) {
+    const Bytes& like = port == 0 ? bathymetry : column;
+    Bytes packet = like;
+    const auto field = locate(means::ping_id, packet);
+    for (unsigned b = 0; b < 4; ++b) packet[field->offset + b] = static_cast<std::byte>(number >> (8 * b));
+    reseal(like, packet);
+    note(host->on_bytes(port, packet, at_s(at)));
   }
-  EXPECT_EQ(pings, 4) << "two wait for their bathymetry";
+  void note(const protocol::HostActions& actions) {
+    for (const auto& action : actions) {
+      if (const auto* notice = std::get_if<protocol::Notice>(&action)) said += notice->text;
+      const auto* const seen = std::get_if<protocol::HostPing>(&action);
+      if (seen == nullptr) continue;
+      EXPECT_THAT(seen->errors, IsEmpty());
+      const SonarPicture drawn = seen->drawing();
+      shown += std::to_string(seen->facts.number) + (drawn.points.empty() ? "" : "p") + (seen->picture() ? "c" : "") + " ";
+      EXPECT_TRUE(PicturePainter({100, *find_colour_map("gray"), false}).draw(drawn));
+    }
+  }
+  std::string take() { return std::exchange(shown, {}); }
+
+  std::unique_ptr<protocol::Host> host = *make_host({.as_it_is = true, .settings = {}});
+  std::string shown, said;  // shown: pings with "p" for points, "c" for a water column
+};
+
+TEST_F(Hosts, ShowAPingWhenItIsWhole) {
+  for (std::uint32_t number = 1; number <= 9; ++number) hear(0, number, 0.1 * number);
+  EXPECT_EQ(take(), "") << "the other connection is slower";
+  hear(1, 1, 1);
+  EXPECT_EQ(take(), "1pc ");
+  hear(1, 2, 1.8);
+  hear(1, 3, 2.6);
+  EXPECT_EQ(take(), "2pc 3pc ");
+  hear(1, 10, 2.7);
+  EXPECT_EQ(take(), "4p 5p 6p 7p 8p 9p ") << "the water column of 10 tells that those of 4 to 9 were dropped";
+  hear(0, 10, 2.8);
+  EXPECT_EQ(take(), "10pc ");
+}
+
+TEST_F(Hosts, KeepTheOrderOfPings) {
+  for (const std::uint32_t number : {1, 2, 3, 4}) hear(1, number, 0.1);
+  hear(0, 1, 0.2);
+  hear(0, 4, 0.2);
+  EXPECT_EQ(take(), "1pc 2c 3c 4pc ");
+  hear(0, 5, 0.3);
+  hear(0, 7, 0.3);
+  hear(1, 5, 0.4);
+  hear(1, 6, 0.4);
+  hear(1, 7, 0.4);
+  EXPECT_EQ(take(), "5pc 6c 7pc ");
+}
+
+TEST_F(Hosts, WaitWhileBytesOfAPacketCome) {
+  hear(0, 7, 0);
+  const std::size_t part = column.size() / 8;
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(take(), "");
+    const std::size_t size = i < 7 ? part : column.size() - 7 * part;
+    note(host->on_bytes(1, BytesView(column).subspan(i * part, size), at_s(1.5 * static_cast<double>(i))));
+    note(host->on_tick(at_s(1.5 * static_cast<double>(i))));
+  }
+  EXPECT_EQ(take(), "7pc ");
+}
+
+TEST_F(Hosts, ShowWhatThereIsWhenAPortIsSilent) {
+  hear(0, 1, 0);
+  hear(1, 1, 0);
+  take();
+  hear(0, 2, 10);
+  ASSERT_EQ(host->next_tick(), at_s(12));
+  note(host->on_tick(at_s(11.99)));
+  EXPECT_EQ(take(), "");
+  note(host->on_tick(at_s(12)));
+  EXPECT_EQ(take(), "2p ");
+  EXPECT_EQ(host->next_tick(), std::nullopt);
+  hear(1, 2, 13);
+  EXPECT_EQ(take(), "") << "not twice";
+  EXPECT_EQ(said, "the water column of ping 2 came after the ping was shown");
+  hear(0, 3, 14);
+  hear(1, 3, 14);
+  EXPECT_EQ(take(), "3pc ");
+}
+
+TEST_F(Hosts, ShowPingsOfOnePortAtOnceWhenTheOtherHasSentNothing) {
+  hear(2, 1, 1);  // a recording has the packets of all ports in one stream
+  hear(2, 2, 2);
+  EXPECT_EQ(take(), "");
+  hear(2, 3, 3);
+  EXPECT_EQ(take(), "1c 2c 3c ");
+  hear(2, 4, 4);
+  EXPECT_EQ(take(), "4c ");
+}
+
+TEST_F(Hosts, BoundWhatWaits) {
+  for (std::uint32_t number = 1; number <= 1100; ++number) hear(0, number, 0.001 * number);
+  EXPECT_THAT(take(), StartsWith("1p 2p ")) << "the oldest";
 }
 
 TEST(NorbitCommands, AreAnsweredWithTheValuesInUse) {
