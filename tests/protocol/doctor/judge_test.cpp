@@ -194,6 +194,26 @@ TEST(Judge, OneThatWasDisconnectedBeforeItsFirstPing) {
   }
 }
 
+TEST(Judge, OneThatWasDisconnectedAndIsBack) {
+  const std::string gone =
+      R"(gone { address: "127.0.0.1:1" why: "is no link" utc_ns: 3723000000000 without_ping: true ago_s: 5 })";
+  EXPECT_TRUE(any_fails(with(pinging + silent + "}" + gone))) << "connected, without a ping";
+  const Finding f = trouble(with(pinging + silent + "pings_written: 3 }" + gone), "driver");
+  EXPECT_EQ(f.level, Level::warn);
+  EXPECT_EQ(f.cure, "");
+  EXPECT_TRUE(
+      any_fails(with(pinging + silent + R"(pings_written: 3 } gone { address: "127.0.0.9:1" without_ping: true ago_s: 5 })")))
+      << "another driver";
+}
+
+/// The driver has done what it must; the fault itself is reported as long as it acts.
+TEST(Judge, OneThatAFaultDisconnected) {
+  const Finding f =
+      trouble(with(pinging + driver + R"(gone { address: "10.0.0.7:1" why: "a fault" without_ping: true ago_s: 5 })"), "driver");
+  EXPECT_EQ(f.level, Level::warn);
+  EXPECT_EQ(f.cure, "");
+}
+
 TEST(Judge, PosesThatStopOrComeTooLate) {
   const v1::DaemonStatus now =
       with(pinging + driver, R"(vehicles { name: "rov" source: "json 10.0.0.9" stale: true } poses { late: 12 })");
