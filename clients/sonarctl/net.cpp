@@ -169,10 +169,12 @@ Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chro
   return {Wait::closed, 0, 0, std::strerror(errno)};
 }
 
-bool ends_without_a_byte(const Socket& socket, std::chrono::milliseconds patience) {
-  pollfd ready{socket.fd(), POLLIN, 0};
+bool ends_without_a_byte(const Socket& socket, std::span<const int> others, std::chrono::milliseconds patience) {
+  std::vector<pollfd> ready{{socket.fd(), POLLIN, 0}};
+  for (const int other : others) ready.push_back({other, POLLIN, 0});
   std::byte first{};
-  return ::poll(&ready, 1, static_cast<int>(patience.count())) == 1 && ::recv(socket.fd(), &first, 1, MSG_PEEK) <= 0;
+  return ::poll(ready.data(), ready.size(), static_cast<int>(patience.count())) > 0 && ready.front().revents != 0 &&
+         ::recv(socket.fd(), &first, 1, MSG_PEEK) <= 0;
 }
 
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes) {

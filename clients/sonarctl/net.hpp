@@ -67,8 +67,9 @@ struct Datagram {
   std::string error;
 };
 Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience);
-/// Waits for the end of a connection without reading. Returns false if a byte is available, or nothing happens within `patience`.
-bool ends_without_a_byte(const Socket& socket, std::chrono::milliseconds patience);
+/// Waits for the end of a connection without reading. Returns false if a byte is available, there or at one of the `others`, or
+/// nothing happens within `patience`.
+bool ends_without_a_byte(const Socket& socket, std::span<const int> others, std::chrono::milliseconds patience);
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);
 
 }  // namespace sonar::clients

@@ -328,7 +328,11 @@ PingStream::Item PingStream::next(milliseconds patience) {
 }
 
 bool PingStream::is_rejected(milliseconds patience) const {
-  return make_->ports.front().kind == Kind::tcp && !has_answered_ && ends_without_a_byte(*sockets_.front(), patience);
+  if (make_->ports.front().kind != Kind::tcp || has_answered_) return false;
+  std::vector<int> others;  // some sonars send their pings there, and nothing at the first port
+  for (std::size_t port = 1; port < sockets_.size(); ++port)
+    if (sockets_[port]) others.push_back(sockets_[port]->fd());
+  return ends_without_a_byte(*sockets_.front(), others, patience);
 }
 
 std::string PingStream::own() const {

@@ -176,6 +176,24 @@ TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
   EXPECT_THAT(named.error().text, HasSubstr("is not a Sonar 3D-15"));
 }
 
+/// The patience is longer than the test may last.
+TEST(PingStream, AByteAtAnotherPortShowsThatTheSonarDoesNotReject) {
+  std::array<int, 2> first{}, other{};
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, first.data()), 0);
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_DGRAM, 0, other.data()), 0);
+  std::optional<Socket> first_far(first[1]);
+  const Socket first_near(first[0]), other_far(other[1]), other_near(other[0]);
+  const std::array<int, 1> others{other_near.fd()};
+  EXPECT_FALSE(ends_without_a_byte(first_near, others, 1ms)) << "silence";
+  first_far.reset();
+  EXPECT_TRUE(ends_without_a_byte(first_near, others, 1h));
+  std::array<int, 2> silent{};
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, silent.data()), 0);
+  const Socket silent_near(silent[0]), silent_far(silent[1]);
+  ASSERT_EQ(::send(other_far.fd(), "x", 1, 0), 1);
+  EXPECT_FALSE(ends_without_a_byte(silent_near, others, 1h));
+}
+
 TEST(WatchPings, KeepsWhatTheSonarRefuses) {
   const Server surveyor(62312, [](const Socket& client) {
     std::array<std::byte, 1024> request;
