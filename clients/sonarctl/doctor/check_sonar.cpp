@@ -82,8 +82,9 @@ class SonarChecks {
                  std::string(sonar_.make->remedy) + ", of " + sonar_.at.host);
     }
     const double asked_hz = sonar_.reported->rate_hz();
-    const std::string text = at + ": images by UDP, " + format("%g", asked_hz) + " Hz requested, " +
-                             std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped";
+    const v1::SonarFigures& figures = sonar_.reported->figures();
+    const std::string text = at + ": images by UDP, " + format("%.1f Hz (%g requested), ", figures.made_hz(), asked_hz) +
+                             std::to_string(figures.skipped_ticks()) + " ticks skipped";
     if (too_slow_for(asked_hz))
       add(Level::warn, "ping", text + ", " + computing_text(computing_ms()), less_to_compute);
     else
