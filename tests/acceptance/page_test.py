@@ -190,6 +190,14 @@ class Page(PageChecks, unittest.TestCase):
         self.mock.state("fine")
         page.wait("document.body.dataset.situation === 'fine'")
 
+    def test_log_lines_that_a_new_connection_brings_again_are_shown_once(self):
+        page = self.open(1100, 760, query="?test=300")
+        shown(page)
+        page.wait("document.querySelectorAll('.log-line').length > 3")
+        count = "[...document.querySelectorAll('.log-line')].filter((e) => e.innerText.includes('%s')).length"
+        page.run("[0, 0, 1].forEach((ns) => sonardTest.facts.message('/log', { level: 2, message: 'a new line', name: 'sonard' }, ns))")
+        page.wait(count % "a new line" + " === 2")
+
     def test_token(self):
         self.mock.token = "secret"
         page = self.open(1100, 760)

@@ -146,6 +146,7 @@ export class Facts {
         this.troubles = new Map(value.troubles.map((t) => [t.name, t]));
         return;
       case '/log':
+        if (this.log.some((line) => line.ns === ns && line.message === value.message)) return;  // a new connection brings the last lines again
         this.log.push({ ...value, ns });
         this.logCount++;
         if (this.log.length > log_lines) this.log.shift();
