@@ -200,12 +200,16 @@ class Pages(PageChecks, unittest.TestCase):
         cls.browser = cls.enterClassContext(Browser())
 
     def test_only_the_settings_that_a_sonar_has(self):
-        for maker, choices in {"oculus": ["mode", "beams", "transmit"], "ping360": ["transmit"]}.items():
+        all_of = {"oculus": (["mode", "beams", "transmit"], {"low frequency", "high frequency"}), "ping360": (["transmit"], set()),
+                  "aris": (["mode", "transmit"], {"64 LF", "64 HF", "128 LF", "128 HF"}),
+                  "3d15": (["mode", "transmit"], {"low-frequency", "high-frequency"})}
+        for maker, (choices, modes) in all_of.items():
             with self.subTest(demo=maker), demo(maker):
                 page = self.opened(self.browser.open(f"http://{HTTP}:8088/", 1600, 1000))
                 shown(page)
                 page.wait("!!document.querySelector('#setting-rows select')")
                 self.assertEqual(page.run("[...document.querySelectorAll('#setting-rows select')].map((s) => s.name.split('/').pop())"), choices)
+                self.assertEqual(set(page.run("[...document.querySelectorAll('#setting-rows [name$=mode] option')].map((o) => o.text)")), modes)
                 if maker == "ping360":  # whose host asks for each ping: no engine is as fast as its rate
                     with subprocess.Popen([SONARCTL, "listen", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
                         page.wait("document.querySelector('#rate-word').textContent === 'pinging'")

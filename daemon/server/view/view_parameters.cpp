@@ -36,7 +36,8 @@ double seconds_left(const Device& device, const std::string& fault, Time now) {
 }
 
 /// Whether the product takes a value of this setting. Products that set their rate or gain themselves refuse every value.
-bool takes(const Device& device, std::optional<double> protocol::SettingsOverride::*setting, double value) {
+template <class Value>
+bool takes(const Device& device, std::optional<Value> protocol::SettingsOverride::*setting, Value value) {
   protocol::SettingsOverride wanted;
   wanted.*setting = value;
   return device.config().profile.vendor->apply_override(wanted, device.sonar().state()).has_value();
@@ -51,12 +52,13 @@ void add_sonar(std::vector<Parameter>& all, const Device& device, bool has_previ
   all.push_back({at + "range_m", step ? step->settings.range_m : s.range_m});
   const auto rate_hz = static_cast<double>(s.rate_hz);
   using Setting = protocol::SettingsOverride;
-  if (takes(device, &Setting::rate_hz, rate_hz > 0 ? rate_hz : 1) || takes(device, &Setting::rate_hz, 0))
+  if (takes(device, &Setting::rate_hz, rate_hz > 0 ? rate_hz : 1.0) || takes(device, &Setting::rate_hz, 0.0))
     all.push_back({at + "rate_hz", rate_hz});
   const double gain_percent = vendor.gain_percent(device.sonar().state());
   if (takes(device, &Setting::gain_percent, gain_percent)) all.push_back({at + "gain_percent", gain_percent});
   if (device.config().profile.model->modes.size() > 1) all.push_back({at + "mode", std::int64_t{s.mode}});
-  all.push_back({at + "beams", std::int64_t{s.beam_count}});
+  if (takes(device, &Setting::beams, 256u) && takes(device, &Setting::beams, 512u))
+    all.push_back({at + "beams", std::int64_t{s.beam_count}});
   all.push_back({at + "transmit", device.sonar().transmits()});
   if (has_preview) all.push_back({at + "preview", device.preview().on()});
 }

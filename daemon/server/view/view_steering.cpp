@@ -50,8 +50,12 @@ std::string ViewFeed::server_info(const Viewer& viewer) const {
                    {"sonard.clock", std::string(name_of(of_.config.clock))},
                    {"sonard.previews", of_.config.previews ? "true" : "false"},
                    {"sonard.may_steer", viewer.may_steer() ? "true" : "false"}};
-  for (const Device& device : of_.fleet.devices())
-    info.metadata["sonard.product." + device.config().profile.model->profile] = device.config().profile.model->name;
+  for (const Device& device : of_.fleet.devices()) {
+    const SonarModel& model = *device.config().profile.model;
+    info.metadata["sonard.product." + model.profile] = model.name;
+    std::string& modes = info.metadata["sonard.modes." + device.config().name];
+    for (const FrequencyMode& mode : model.modes) modes += (modes.empty() ? "" : "\n") + mode.name;
+  }
   info.session = session_;
   return foxglove::text_of(info);
 }

@@ -37,15 +37,19 @@ function choiceRow(label, name, choices, steering) {
   return make('div', { class: 'setting' }, make('label', { htmlFor: id }, label), select);
 }
 
+/// Older daemons do not name the modes.
+function modesOf(facts) {
+  const names = facts.info?.metadata?.[`sonard.modes.${facts.sonar}`]?.split('\n') ?? ['LF', 'HF'];
+  return names.map((name, value) => ({ value, text: { LF: 'low frequency', HF: 'high frequency' }[name] ?? name }));
+}
+
 function rowsOf(facts, steering) {
   const of = (name) => `/${facts.sonar}/${name}`;
   const atMost = facts.sonarStatus?.on_request;
   const rows = numbers.filter((s) => facts.parameters.has(of(s.name))).map((s) => numberRow(s.name === 'rate_hz' && atMost ? { ...s, label: 'rate, at most' } : s, of(s.name), steering));
   rows.splice(facts.parameters.has(of('rate_hz')) ? 2 : 1, 0, plainRow('rate, measured', make('b', { id: 'measured' })));
   const yesNo = [{ value: true, text: 'on' }, { value: false, text: 'off' }];
-  const modes = [{ value: 0, text: 'low frequency' }, { value: 1, text: 'high frequency' }];
-  const mode = facts.of('mode');
-  if (mode !== undefined) rows.push(mode <= 1 ? choiceRow('mode', of('mode'), modes, steering) : numberRow({ label: 'mode', unit: '', step: 1 }, of('mode'), steering));
+  if (facts.of('mode') !== undefined) rows.push(choiceRow('mode', of('mode'), modesOf(facts), steering));
   if ([256, 512].includes(facts.of('beams'))) rows.push(choiceRow('beams', of('beams'), [256, 512].map((n) => ({ value: n, text: String(n) })), steering));
   if (facts.parameters.has(of('transmit'))) rows.push(choiceRow('transmit', of('transmit'), yesNo, steering));
   rows.push(...water.filter((s) => facts.parameters.has(s.name)).map((s) => numberRow(s, s.name, steering)));
@@ -64,7 +68,7 @@ export function drawSettings(facts, steering) {
   const box = $('setting-rows');
   const names = [...facts.parameters.keys()].filter((n) => n.startsWith(`/${facts.sonar}/`) || n.startsWith('/water/'));
   const able = facts.maySteer && facts.connection === 'open';
-  showList(box, [facts.sonar, names, Boolean(facts.sonarStatus?.on_request), names.length ? facts.of('mode') > 1 : facts.sonarStatus?.range_m], () => {
+  showList(box, [facts.sonar, names, Boolean(facts.sonarStatus?.on_request), names.length ? '' : facts.sonarStatus?.range_m], () => {
     return names.length ? rowsOf(facts, steering) : plainRows(facts.sonarStatus);
   });
   if ($('measured')) setText($('measured'), facts.recording ? dash : `${fixed(facts.madeRate, 1)} ${facts.rateUnit}`);
