@@ -236,8 +236,12 @@ Result<void> convert(const RecordOptions& options) {
     written = files->write(*message);
     const auto port = recording::host_port(*by->make, message->by);
     if (!port || message->from != Origin::device) continue;
-    for (const protocol::HostAction& action : (*host)->on_bytes(*port, message->bytes, last))
-      if (const auto* ping = std::get_if<HostPing>(&action); ping && written) written = files->write_ping(last, *ping);
+    const auto keep_pings = [&](const protocol::HostActions& actions) {
+      for (const protocol::HostAction& action : actions)
+        if (const auto* ping = std::get_if<HostPing>(&action); ping && written) written = files->write_ping(last, *ping);
+    };
+    if (const auto tick = (*host)->next_tick(); tick && *tick <= last) keep_pings((*host)->on_tick(last));
+    keep_pings((*host)->on_bytes(*port, message->bytes, last));
   }
   const Result<void> closed = files->close();
   report(*files, seconds(last - first.value_or(last)));

@@ -105,10 +105,11 @@ class NorbitHost final : public protocol::Host {
       } else if (port == 1) {  // others may hold replies to commands: a recording is one stream
         counts_.junk_bytes += whole->bytes.size();
       }
-      show(now, actions);
+      show(std::nullopt, actions);
     }
     return actions;
   }
+  /// All ports have been read by then, also after a pause of the reader.
   HostActions on_tick(Time now) override {
     HostActions actions;
     show(now, actions);
@@ -164,21 +165,22 @@ class NorbitHost final : public protocol::Host {
     return (heard ? std::max(*heard, ping.since) : begun_.value_or(ping.since)) + patience;
   }
 
-  /// Shows the pings that are whole, and those whose other packet will not come: the port has sent that of a later ping, or is
-  /// silent.
-  void show(Time now, HostActions& actions) {
+  /// Shows the pings that are whole. One whose other packet was left out, because the port has sent that of a later ping, counts
+  /// as missing: a reader who is slow loses other pings at each port. If the port is silent at `now`, the ping is shown as it is.
+  void show(std::optional<Time> now, HostActions& actions) {
     while (!waiting_.empty()) {
       const Parts& ping = waiting_.front();
       const bool is_left_out = !ping.is_whole() && std::any_of(waiting_.begin() + 1, waiting_.end(),
                                                                [&](const Parts& p) { return p.has(ping.missing()); });
       if (!ping.is_whole() && !is_left_out) {
-        if (now < given_up_at(ping) && waiting_.size() <= most_waiting && waiting_bytes_ <= most_waiting_bytes) return;
+        const bool is_silent = now && *now >= given_up_at(ping);
+        if (!is_silent && waiting_.size() <= most_waiting && waiting_bytes_ <= most_waiting_bytes) return;
         auto& shown = shown_without_[ping.missing()];
         shown.insert(ping.number);
         if (shown.size() > most_waiting) shown.erase(shown.begin());
       }
       waiting_bytes_ -= ping.bytes;
-      emit(ping, actions);
+      if (!is_left_out) emit(ping, actions);
       waiting_.pop_front();
     }
   }

@@ -36,6 +36,7 @@ std::optional<RecordedPing> RecordedPings::next() {
       if (decoded_.empty()) return std::nullopt;
       break;
     }
+    if (const auto tick = host_->next_tick(); tick && *tick <= message->at) take(host_->on_tick(message->at), message->at);
     const auto port = host_port(*by_.make, message->by);
     if (port && message->from == Origin::device) take(host_->on_bytes(*port, message->bytes, message->at), message->at);
   }
