@@ -48,7 +48,8 @@ std::vector<Make> product_makes() {
        .search = &blueview::search,
        .driver_call = "BVTSonar_Open(sonar, \"NET\", \"{at}\") with sonard's libbvtsdk",
        .own_faults = 'B',
-       .each_ping_requested = true},
+       .each_ping_requested = true,
+       .shades = blueview::shades},
       {.device = &aris::vendor(),
        .title = "an ARIS",
        .request = "command",
@@ -141,7 +142,8 @@ std::vector<Make> product_makes() {
        .remedy = "send nothing: pings come to each driver that connects",
        .ports = m3::host_ports,
        .host = m3::make_host,
-       .codec = m3::codec()},
+       .codec = m3::codec(),
+       .shades = m3::shades},
       {.device = &micron::vendor(),
        .title = "a Micron",
        .request = "message",
@@ -160,7 +162,8 @@ std::vector<Make> product_makes() {
        .host = norbit::make_host,
        .codec = norbit::codec(),
        .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
-       .picture = PictureKind::points},
+       .picture = PictureKind::points,
+       .shades = norbit::shades},
   };
 }
 

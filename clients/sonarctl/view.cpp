@@ -4,6 +4,7 @@
 #include "clients/sonarctl/terminal.hpp"
 #include "clients/sonarctl/view_caption.hpp"
 #include "clients/sonarctl/waiting.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -40,6 +41,13 @@ Result<std::vector<std::string>> lines_of(const ViewOptions& options, const Sona
   return draw_terminal_picture(picture, style);
 }
 
+std::string size_of(const SonarPicture& picture) {
+  const std::string cells = text::format("%zu rows x %zu beams", picture.image.rows, picture.image.beams);
+  if (picture.kind != PictureKind::points) return cells;
+  const std::string points = text::format("%zu points", picture.points.size());
+  return picture.column == SonarPicture::Column::none ? points : points + ", " + cells;
+}
+
 Result<void> view_one(const ViewOptions& options) {
   const Result<HostPing> ping = fetch_ping(options.source, options.ping);
   if (!ping) return tl::unexpected(ping.error());
@@ -49,8 +57,8 @@ Result<void> view_one(const ViewOptions& options) {
     PicturePainter painter(options.style);
     const Result<Raster> raster = write_picture(options, painter, *picture);
     if (!raster) return tl::unexpected(raster.error());
-    std::printf("%s: %d x %d pixels, %zu rows x %zu beams, %.2f m%s\n", options.png.c_str(), raster->width, raster->height,
-                picture->image.rows, picture->image.beams, picture->range_m(),
+    std::printf("%s: %d x %d pixels, %s, %.2f m%s\n", options.png.c_str(), raster->width, raster->height,
+                size_of(*picture).c_str(), picture->range_m(),
                 picture->kind == PictureKind::fan ? "" : (", " + std::string(name_of(picture->kind))).c_str());
   }
   if (!options.terminal) return {};

@@ -163,7 +163,7 @@ Result<Raster> FanPainter::draw(const PolarImage& image, Opens opens) {
   Raster raster(layout_.width, layout_.height);
   for (std::size_t i = 0; i < footprints_.size(); ++i)
     raster.pixels[i] =
-        footprints_[i].is_outside() ? outside_colour : style_.colours.colour(mean(image, footprints_[i]) / image.full_scale);
+        footprints_[i].is_outside() ? outside_colour : style_.colours.colour(image.brightness(mean(image, footprints_[i])));
   if (style_.rings) draw_rings(raster, image, layout_);
   return raster;
 }

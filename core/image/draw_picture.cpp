@@ -31,10 +31,10 @@ Raster draw_cells(const PolarImage& image, std::size_t rows, const FanStyle& sty
   for (int y = 0; y < height; ++y) {
     const auto [first, last] = cells_under(y, height, rows);
     for (int x = 0; x < style.width_px; ++x)
-      raster.at(x, y) = first >= image.rows ? outside_colour
-                                            : style.colours.colour(mean_of(image, {first, std::min(last, image.rows)},
-                                                                           cells_under(x, style.width_px, image.beams)) /
-                                                                   image.full_scale);
+      raster.at(x, y) = first >= image.rows
+                            ? outside_colour
+                            : style.colours.colour(image.brightness(mean_of(image, {first, std::min(last, image.rows)},
+                                                                            cells_under(x, style.width_px, image.beams))));
   }
   return raster;
 }

@@ -3,10 +3,17 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
 namespace sonar {
+
+/// The brightness of wide linear samples. A make has its own, after the maker's viewer.
+struct Shades {
+  std::size_t per_mille = 999;  // of a thousand samples, so many are not brighter than the map's end
+  float gamma = 1;              // brightness is (code / full scale)^gamma
+};
 
 struct PolarImage {
   std::size_t rows = 0, beams = 0;
@@ -15,6 +22,7 @@ struct PolarImage {
   std::vector<float> samples;       // [rows][beams], codes as sent
   float full_scale = 255;           // the code drawn brightest
   double start_m = 0;               // there are no samples nearer than this
+  Shades shades = {};
 
   float at(std::size_t row, std::size_t beam) const { return samples[row * beams + beam]; }
   /// The code that `per_mille` of a thousand samples do not exceed, at least 1.
@@ -23,6 +31,15 @@ struct PolarImage {
     const auto place = codes.begin() + static_cast<std::ptrdiff_t>((codes.size() - 1) * per_mille / 1000);
     std::nth_element(codes.begin(), place, codes.end());
     return std::max(1.0f, *place);
+  }
+  void shade(const Shades& of_make) {
+    full_scale = brightest(of_make.per_mille);
+    shades = of_make;
+  }
+  /// 1: the end of the colour map.
+  float brightness(float code) const {
+    const float part = code / full_scale;
+    return shades.gamma == 1 ? part : std::pow(std::max(0.0f, part), shades.gamma);
   }
   double range_m() const { return start_m + static_cast<double>(rows) * row_spacing_m; }
 };

@@ -30,7 +30,8 @@ struct SonarPicture {
   PolarImage image;
   double head_rad = 0;       // sweep: direction of the head, positive to port
   double elevation_rad = 0;  // range image: elevation of the highest row; that of the lowest is its negative
-  std::vector<std::pair<double, double>> points = {};  // points: azimuth, range
+  std::vector<std::pair<double, double>> points = {};             // points: azimuth, range
+  enum class Column { none, sent, model } column = Column::none;  // points: what `image` holds; none: it is empty
 
   bool is_polar() const { return kind == PictureKind::fan || kind == PictureKind::points || kind == PictureKind::sweep; }
   /// Far end of the shown ranges [m].

@@ -141,8 +141,7 @@ Result<PolarImage> picture_of(const DecodedPing& ping) {
       image.samples.push_back(
           static_cast<float>(std::to_integer<int>(ping.samples[at]) + 256 * std::to_integer<int>(ping.samples[at + 1])));
     }
-  // Samples are linear, so the weak ones would be black at full scale. The brightest 1 % may saturate in the picture.
-  image.full_scale = image.brightest(990);
+  image.shade(shades);
   return image;
 }
 

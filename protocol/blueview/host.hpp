@@ -11,6 +11,9 @@ namespace sonar::blueview {
 
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
 
+/// Samples are linear: the brightest 1 % may saturate in a picture, or the weak ones would be black.
+inline constexpr Shades shades{.per_mille = 990};
+
 extern const protocol::Search search;
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);

@@ -4,6 +4,7 @@
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/message.h>
 
+#include <array>
 #include <set>
 
 #include "control.pb.h"
@@ -301,6 +302,10 @@ Bytes picture(const SonarPicture& picture) {
   }
   message.set_head_rad(picture.head_rad);
   message.set_elevation_rad(picture.elevation_rad);
+  constexpr std::array<const char*, 3> columns = {"none", "sent", "model"};
+  if (picture.kind == PictureKind::points) message.set_column(columns[static_cast<std::size_t>(picture.column)]);
+  message.set_gamma(static_cast<double>(picture.image.shades.gamma));
+  message.set_per_mille(static_cast<std::uint32_t>(picture.image.shades.per_mille));
   return bytes_of(message);
 }
 

@@ -33,7 +33,7 @@ PolarImage picture_of(const Packet& packet) {
       const float size = std::hypot(i, q);
       image.samples[row * image.beams + beam - 1] = std::isfinite(size) ? size : 0;
     }
-  image.full_scale = image.brightest(999);  // samples of 32 bits seldom come near their maximum
+  image.shade(shades);
   return image;
 }
 

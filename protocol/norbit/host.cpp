@@ -66,7 +66,7 @@ std::optional<PolarImage> image_of(const Column& column) {
     pixels("pixel", pixel);
     sample = pixel;
   }
-  image.full_scale = image.brightest(999);  // wide samples rarely come near their maximum
+  image.shade(shades);
   return image;
 }
 
@@ -225,6 +225,7 @@ class NorbitHost final : public protocol::Host {
       ping.errors.push_back("number " + std::to_string(ping.facts.number) + " after " + std::to_string(*last_));
     last_ = ping.facts.number;
     if (image) shown_m_ = ping.facts.range_m;
+    seen.column = image ? SonarPicture::Column::sent : SonarPicture::Column::none;
     seen.image = image ? *image : empty_fan(std::max(ping.facts.range_m, shown_m_));
     ping.picture = [image]() -> Result<PolarImage> {
       if (image) return *image;

@@ -15,7 +15,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
 from browser import Browser  # noqa: E402
 from foxglove_viewer import Viewer  # noqa: E402
-from page_checks import LACKING_PX, WHY_NOT, PageChecks, shown  # noqa: E402
+from page_checks import LACKING_PX, WHY_NOT, WITHOUT_WEBGL, PageChecks, shown  # noqa: E402
 from running_sonard import ROOT, SONARCTL, SONARD, Daemon, eventually, run  # noqa: E402
 
 HTTP, SONAR = "127.0.0.1", "127.0.0.2"
@@ -216,6 +216,31 @@ class Pages(PageChecks, unittest.TestCase):
                         page.wait("parseFloat(document.querySelector('#rate').textContent) > 0")
                         self.assertNotIn("of 1000 Hz", page.text("#badges"))
                         driver.terminate()
+
+    def test_wide_samples_are_as_bright_as_sonard_draws_them(self):
+        """Of makes that have shades of their own; on the graphics processor, and without."""
+        for maker, script in (("m3", ""), ("blueview", ""), ("m3", WITHOUT_WEBGL)):
+            with self.subTest(demo=maker, webgl=not script), demo(maker), Viewer(HTTP) as viewer:
+                viewer.greeted().subscribe("/front/fan")
+                page = self.opened(self.browser.open(f"http://{HTTP}:8088/?test=720", 1100, 700, script=script))
+                shown(page)
+                page.wait("sonardTest.facts.pictures.has('front')")
+                page.run("sonardTest.fan.useMap('gray')")
+                fans = {}
+
+                def of_one_ping():
+                    """Until the page holds a ping of which the viewer got the picture too."""
+                    page.run("sonardTest.fan.frozen = false")
+                    _, ns, data = viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/fan")
+                    fans[float(ns)] = data
+                    return fans.get(page.run("(sonardTest.fan.frozen = true, sonardTest.fan.ping.ns)"))
+
+                image = viewer.decode("/front/fan", eventually(of_one_ping))
+                drawn = self.drawn(page, "gray")
+                # 0 is outside of the fan; the page has a colour there.
+                theirs = b"".join(bytes((v, v, v)) if v else drawn[2][3 * i:3 * i + 3] for i, v in enumerate(image["data"]))
+                limits = {"most_mean": 4, "most_p99": 45, "most_above": 0.2} if script else {"most_mean": 1, "most_p99": 4, "most_above": 0.01}
+                self.compare(drawn, (image["width"], image["height"], theirs), **limits)
 
     def test_a_setting_by_keys_and_a_refusal_beside_it(self):
         for width, height in ((1600, 1000), (390, 844)):

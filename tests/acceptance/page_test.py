@@ -14,15 +14,12 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
 from browser import Browser  # noqa: E402
-from page_checks import FAINT_WORDS, LACKING_PX, NAMELESS_CONTROLS, PAGE, SMALL_TARGETS, WHY_NOT, PageChecks, shown  # noqa: E402
+from page_checks import FAINT_WORDS, LACKING_PX, NAMELESS_CONTROLS, PAGE, SMALL_TARGETS, WHY_NOT, WITHOUT_WEBGL, PageChecks, shown  # noqa: E402
 from running_sonard import ROOT, Sonard  # noqa: E402
 
 from sonard_client import OculusClient  # noqa: E402  pylint: disable=wrong-import-order
 
 BUDGET_BYTES = 190_000
-WITHOUT_WEBGL = """window.Worker = class { constructor() { setTimeout(() => this.onmessage({ data: null })); } terminate() {} };
-HTMLCanvasElement.prototype.getContext = ((old) => function (kind, ...rest) {
-  return kind === 'webgl2' ? null : old.call(this, kind, ...rest); })(HTMLCanvasElement.prototype.getContext)"""
 MOUNT = "{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}"
 STATES = {  # of the mock -> the page's name of it, what the user reads, the button
     "no client": ("no-client", "No driver is connected. Nothing is simulated without one. Point a driver at 127.0.0.2.", "Preview"),

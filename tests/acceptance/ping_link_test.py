@@ -380,6 +380,7 @@ class Tools(unittest.TestCase):
                 picture = pathlib.Path(folder) / "fan.png"
                 viewed = run(SONARCTL, "view", at, "--png", picture, "--range", 4)
                 self.assertEqual((viewed.returncode, picture.exists()), (0, True), viewed.stderr)
+                self.assertEqual(profile == "surveyor-240", bool(re.search(r"pixels, \d+ points, 4\.00 m, points$", viewed.stdout.strip())), viewed.stdout)
                 of_many = profile != "surveyor-240"
                 self.assertEqual(bool(re.search(r"the picture has \d+ of \d\d\d scan lines", viewed.stderr)), of_many, viewed.stderr)
 

@@ -39,8 +39,9 @@ SonarPicture picture_of_one(const protocol::Make& make, const Ping& ping, const 
   const auto host = host_of(make);
   const auto drawing = host ? read_by(*host, make, ping, state) : nullptr;
   SonarPicture picture = drawing ? drawing() : SonarPicture{.kind = make.picture, .image = {}};
-  if (make.picture != PictureKind::points) return picture;
-  picture.image = polar_image_of(ping);  // the water column is the model's own
+  if (make.picture != PictureKind::points || picture.column == SonarPicture::Column::sent) return picture;
+  picture.column = SonarPicture::Column::model;
+  picture.image = polar_image_of(ping, make.shades);
   picture.image.full_scale /= dimmed;
   return picture;
 }
@@ -53,7 +54,8 @@ DriverPicture::DriverPicture(const protocol::Make& make) : make_(make) {
 
 /// Pictures that add up many pings need every ping, so a host reads it now. Others are decoded when the drawing is called.
 DriverPicture::Drawing DriverPicture::after(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state) {
-  if (make_.picture == PictureKind::fan) return [ping] { return SonarPicture{.image = polar_image_of(*ping)}; };
+  if (make_.picture == PictureKind::fan)
+    return [ping, shades = make_.shades] { return SonarPicture{.image = polar_image_of(*ping, shades)}; };
   if (host_) return read_by(*host_, make_, *ping, state);
   return [&make = make_, ping, state = std::make_shared<const protocol::DeviceState>(state)] {
     return picture_of_one(make, *ping, *state);

@@ -68,7 +68,7 @@ std::vector<foxglove::CloudPoint> points_of(const Ping& ping, const RangeImageSe
 
 }  // namespace
 
-PolarImage polar_image_of(const Ping& ping) {
+PolarImage polar_image_of(const Ping& ping, const Shades& shades) {
   const PingSettings& s = ping.request.settings;
   if (const RangeImageSettings* const range_image = range_image_of(ping.request)) return plan_of(ping, range_image->range_unit_m);
   PolarImage image;
@@ -82,12 +82,7 @@ PolarImage polar_image_of(const Ping& ping) {
   for (std::size_t i = 0; i < image.rows * image.beams; ++i)
     image.samples.push_back(static_cast<float>(sample_code(ping.samples, i, bytes)));
   image.full_scale = static_cast<float>(s.format.max_code);
-  if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear) {  // wide samples rarely come near their maximum
-    std::vector<float> sorted = image.samples;
-    const auto place = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) * 999 / 1000);
-    std::nth_element(sorted.begin(), place, sorted.end());
-    image.full_scale = std::max(1.0f, *place);
-  }
+  if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear) image.shade(shades);  // they rarely come near their maximum
   return image;
 }
 

@@ -11,8 +11,8 @@
 
 namespace sonar {
 
-/// The picture of a ping. The full scale of wide samples is the level that one sample in a thousand exceeds.
-PolarImage polar_image_of(const Ping& ping);
+/// The picture of a ping. `shades`: of its make, for wide linear samples.
+PolarImage polar_image_of(const Ping& ping, const Shades& shades = {});
 
 using PingPointer = std::shared_ptr<const Ping>;
 // The stamp is the time at which the ping was fired; `sonar` is the frame.

@@ -47,6 +47,10 @@ CUT_WORDS = """[...document.querySelectorAll('button, .chip, h2')].filter((e) =>
 WIDER_THAN = """[...document.querySelectorAll('main *, header *, nav *')].filter((e) => e.offsetWidth && !e.closest('#fan-glass, .unseen')
   && e.getBoundingClientRect().right > WIDTH + 1).map((e) => e.id || e.className || e.tagName)"""
 
+WITHOUT_WEBGL = """window.Worker = class { constructor() { setTimeout(() => this.onmessage({ data: null })); } terminate() {} };
+HTMLCanvasElement.prototype.getContext = ((old) => function (kind, ...rest) {
+  return kind === 'webgl2' ? null : old.call(this, kind, ...rest); })(HTMLCanvasElement.prototype.getContext)"""
+
 # The width that the names of the sonars need, beyond what they have.
 LACKING_PX = """((e) => {
   const whole = e.cloneNode(true);

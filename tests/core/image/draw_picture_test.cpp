@@ -88,6 +88,21 @@ TEST(SonarPicture, PointsLieOverAFanThatOpensDownwards) {
   EXPECT_LT(x, raster.width / 2) << "port is on the left";
 }
 
+TEST(SonarPicture, GammaBrightensWhatIsDark) {
+  for (const PictureKind kind : {PictureKind::fan, PictureKind::waterfall}) {
+    SonarPicture picture{.kind = kind, .image = cells(100, 2)};
+    picture.image.azimuth_rad = {0.7, -0.7};
+    picture.image.samples.assign(200, 4);
+    picture.image.samples[199] = 100;
+    picture.image.shade({.per_mille = 1000, .gamma = 0.5f});
+    ASSERT_EQ(picture.image.full_scale, 100);
+    const Raster raster = *PicturePainter(style()).draw(picture);
+    EXPECT_NEAR(raster.at(raster.width / 2, raster.height / 3).r, 255 * 0.2, 1);
+    picture.image.shade({.per_mille = 990});
+    EXPECT_EQ(picture.image.full_scale, 4) << "the brightest may saturate";
+  }
+}
+
 TEST(SonarPicture, AFanThatOpensDownwardsIsTheOtherUpsideDown) {
   SonarPicture picture{.kind = PictureKind::fan, .image = cells(100, 2)};
   picture.image.azimuth_rad = {0.7, -0.7};

@@ -13,12 +13,13 @@ const background = [13, 17, 23];
 const slow_ms = 40;
 const very_slow_ms = 80;
 const kinds = {  // names of the pictures that sonard draws
-  points: "points as sent, over the model's own water column",
+  points: 'points as sent',
   sweep: 'sweep',
   'range image': 'range image: near is bright',
   waterfall: 'waterfall: the newest ping on top',
   fan: 'fan',
 };
+const columns = { sent: ', over the water column', model: ", over the model's own water column" };
 const empty_grid = { rows: 500, beams: 2, spacing_m: 0.02, start_m: 0, range_m: 10, azimuth_rad: [Math.PI / 6, -Math.PI / 6] };
 
 export class Fan {
@@ -31,7 +32,6 @@ export class Fan {
     this.painter = (exact && makeFanPainter(this.canvas)) || new LookupPainter(this.canvas);
     this.remembered = makeRemembered('fan', { map: 'copper', rings: true });
     this.gain = 1;
-    this.gamma = 1;
     this.rings = !exact && this.remembered.rings;
     this.cost_ms = 0;
     this.quality = 2;  // 2: footprint mean; 1: one sample a pixel; 0: also half resolution
@@ -56,6 +56,12 @@ export class Fan {
   /// True if sonard draws the picture, because it is not a fan of one ping.
   get drawn() {
     return Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
+  }
+
+  /// How samples become shades; daemons before it sent linear ones.
+  get shades() {
+    const { gamma, per_mille } = this.facts.pictures.get(this.facts.sonar) ?? {};
+    return { gamma: gamma || 1, per_mille: per_mille || 999 };
   }
 
   useMap(name) {
@@ -105,7 +111,7 @@ export class Fan {
     const before = this.polar;
     this.polar = polarOf(ping.image, geometry);
     if (!this.samples || before?.range_m !== this.polar.range_m || before?.azimuth_rad.length !== this.polar.azimuth_rad.length) this.layout = null;
-    const { samples, full_scale } = samplesOf(ping.image);
+    const { samples, full_scale } = samplesOf(ping.image, this.shades.per_mille);
     [this.samples, this.full_scale] = [samples, full_scale];
     this.painter.load(ping.image, samples, this.table, full_scale);
     this.paint();
@@ -180,7 +186,7 @@ export class Fan {
     };
     const measured = !this.exact && this.painter.finish && ++this.painted % 8 === 0;
     const from = performance.now();
-    this.painter.paint(this.polar, scaled, { map: this.map, gain: this.gain, gamma: this.gamma, single: this.quality < 2, outside: background });
+    this.painter.paint(this.polar, scaled, { map: this.map, gain: this.gain, gamma: this.shades.gamma, single: this.quality < 2, outside: background });
     if (!measured) return;
     this.painter.finish();
     this.adapt(performance.now() - from);
@@ -207,10 +213,11 @@ export class Fan {
     if (!ping || ping.number) setText($('ping-number'), whole(ping?.number));
     const bits = { mono8: 8, mono16: 16 }[ping?.image.encoding] ?? 32;
     setHidden($('ping-size'), !ping);
-    const kind = ping?.about?.kind;
-    setText($('ping-size'), kinds[kind] ?? (ping && !ping.about ? `${ping.image.width} × ${ping.image.height} · ${bits} bit` : '–'));
+    const { kind, column } = ping?.about ?? {};
+    const words = kinds[kind] && kinds[kind] + (columns[column] ?? '');
+    setText($('ping-size'), words ?? (ping && !ping.about ? `${ping.image.width} × ${ping.image.height} · ${bits} bit` : '–'));
     $('fan-glass').dataset.kind = this.facts.pictureKind;
-    const label = kinds[kind] ? `The sonar's picture: ${kinds[kind]}` : "The sonar's picture";
+    const label = words ? `The sonar's picture: ${words}` : "The sonar's picture";
     if (this.drawnCanvas.getAttribute('aria-label') !== label) this.drawnCanvas.setAttribute('aria-label', label);
     const c = this.cursor;
     setHidden($('cursor'), !c);

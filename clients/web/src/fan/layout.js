@@ -90,26 +90,26 @@ export function beamTable(azimuth_rad) {
   return { first, last, beams };
 }
 
-/// Samples of the image as a typed array, and the code that is drawn brightest: as in `sonarctl view`.
-export function samplesOf(image) {
+/// Samples of the image as a typed array, and the code that is drawn brightest: as in `sonarctl view`. Of a thousand wide samples,
+/// `per_mille` do not exceed it.
+export function samplesOf(image, per_mille) {
   const { data, encoding } = image;
   const at = data.byteOffset;
   const count = image.width * image.height;
   if (encoding === 'mono8') return { samples: data, full_scale: 254 };
   if (encoding === 'mono16') {
     const samples = new Uint16Array(data.slice().buffer, 0, count);
-    return { samples, full_scale: Math.max(1, brightest(samples, 65536, (v) => v)) };
+    return { samples, full_scale: Math.max(1, brightest(samples, 65536, per_mille, (v) => v)) };
   }
   const samples = new Float32Array(data.buffer.slice(at, at + 4 * count));
   const scale = 65535;
-  return { samples, full_scale: Math.max(1, brightest(samples, scale + 1, (v) => Math.min(scale, Math.max(0, Math.round(v * scale))))) / scale };
+  return { samples, full_scale: Math.max(1, brightest(samples, scale + 1, per_mille, (v) => Math.min(scale, Math.max(0, Math.round(v * scale))))) / scale };
 }
 
-/// The level that 999 of a thousand samples do not exceed.
-function brightest(samples, bins, binOf) {
+function brightest(samples, bins, per_mille, binOf) {
   const histogram = new Uint32Array(bins);
   for (let i = 0; i < samples.length; i++) histogram[binOf(samples[i])]++;
-  let left = Math.floor(((samples.length - 1) * 999) / 1000);
+  let left = Math.floor(((samples.length - 1) * per_mille) / 1000);
   for (let v = 0; v < bins; v++) {
     left -= histogram[v];
     if (left < 0) return v;

@@ -3,6 +3,7 @@
 import { table_entries } from './layout.js';
 
 const most_beams = 32;  // beams averaged in one pixel; only pixels at the apex cover more
+const fine_shades = 4096;  // with a gamma, dark shades are far apart
 const most_pixels = 2e6;  // limit for screens with more than one pixel in a CSS pixel
 
 export class LookupPainter {
@@ -21,20 +22,22 @@ export class LookupPainter {
   }
 
   /// map: 256 x RGBA bytes.
-  paint(polar, layout, { map, gain, outside }) {
+  paint(polar, layout, { map, gain, gamma, outside }) {
     const shape = JSON.stringify([layout, polar.rows, polar.beams, polar.spacing_m, polar.start_m]);
     if (shape !== this.shape || this.table !== this.arranged) {
       this.arrange(polar, layout, outside);
       [this.shape, this.arranged] = [shape, this.table];
     }
     const { samples, pixels, count, where, first, wide, rows } = this;
-    const colours = new Uint32Array(map.slice().buffer);
-    const scales = Float64Array.from({ length: most_beams + 1 }, (_, n) => (255 * gain) / this.full_scale / (rows * n));
+    const last = gamma === 1 ? 255 : fine_shades - 1;
+    const colourOf = new Uint32Array(map.slice().buffer);
+    const colours = Uint32Array.from({ length: last + 1 }, (_, i) => colourOf[Math.round(255 * (i / last) ** gamma)]);
+    const scales = Float64Array.from({ length: most_beams + 1 }, (_, n) => (last * gain) / this.full_scale / (rows * n));
     for (let i = 0; i < count; i++) {
       const beams = wide[i];
       let sum = 0;
       for (let row = 0, from = first[i]; row < rows; row++, from += polar.beams) for (let at = from; at < from + beams; at++) sum += samples[at];
-      pixels[where[i]] = colours[Math.min(255, Math.max(0, Math.round(sum * scales[beams])))];
+      pixels[where[i]] = colours[Math.min(last, Math.max(0, Math.round(sum * scales[beams])))];
     }
     this.g.putImageData(this.picture, 0, 0);
   }

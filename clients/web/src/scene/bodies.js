@@ -158,7 +158,7 @@ export function makeFanPlane() {
 }
 
 /// Samples as bytes: those of more bits are scaled to the brightest.
-function bytesOf({ samples, full_scale }) {
+function bytesOf({ samples, full_scale, shades }) {
   if (samples instanceof Uint8Array) return samples;
-  return Uint8Array.from(samples, (v) => Math.min(255, (v * 255) / full_scale));
+  return Uint8Array.from(samples, (v) => 255 * Math.min(1, v / full_scale) ** shades.gamma);
 }
