@@ -158,7 +158,7 @@ struct Make {
   std::string_view demo_profile = {};    // product of the demo; empty: the first model
   std::optional<RollPitchYaw> demo_mount = {};  // in the demo; nullopt: it looks ahead
   PictureKind picture = PictureKind::fan;
-  Shades shades = {};  // of its pictures
+  Shades shades = {};  // shades of its pictures
 
   std::string_view name() const { return device->name(); }
   bool has_several_streams() const { return std::ranges::count(ports, HostPort::Kind::tcp, &HostPort::kind) > 1; }

@@ -11,7 +11,7 @@ namespace sonar {
 
 /// The brightness of wide linear samples. A make has its own, after the maker's viewer.
 struct Shades {
-  std::size_t per_mille = 999;  // of a thousand samples, so many are not brighter than the map's end
+  std::size_t per_mille = 999;  // samples in a thousand that are not brighter than the map's end
   float gamma = 1;              // brightness is (code / full scale)^gamma
 };
 

@@ -62,7 +62,7 @@ std::optional<std::uint16_t> code_of(const GeoKeys& keys, std::uint16_t key) {
   return code == user_defined || code == 0 ? std::nullopt : code;
 }
 
-/// Degrees per unit of angle. nullopt for minutes with seconds and the like, which are no numbers to calculate with.
+/// Degrees per unit of angle. nullopt for minutes with seconds and the like, which are not decimal numbers.
 std::optional<double> degrees_per_unit(const GeoKeys& keys) {
   constexpr std::uint16_t radian = 9101, degree = 9102, grad = 9105, gon = 9106, other_degree = 9122;
   const std::uint16_t unit = keys.value_of(angular_units).value_or(degree);

@@ -22,7 +22,7 @@ struct CloseTiff {
 };
 using Tiff = std::unique_ptr<tiff, CloseTiff>;
 
-/// Null if the file is no TIFF or damaged; last_tiff_error() then tells why.
+/// Null if the file is not a TIFF or is damaged; last_tiff_error() then returns the reason.
 Tiff open_tiff(const std::filesystem::path& file);
 /// libtiff's last error of this thread; "damaged" if it gave none.
 std::string last_tiff_error();

@@ -163,7 +163,7 @@ class Client {
   std::uint64_t bytes_read = 0;
   bool ended = false, was_reset = false;
   oculus::Decoder decoder;
-  std::optional<Sha256> digest;  // of what is read, once a test sets one: it takes longer than all else without optimisation
+  std::optional<Sha256> digest;  // digest of what is read, if a test sets one; it is slow without optimisation
 
  private:
   bool read_some(milliseconds timeout, std::vector<std::byte>* raw = nullptr);

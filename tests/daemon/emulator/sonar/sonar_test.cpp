@@ -290,7 +290,7 @@ std::vector<std::string> warnings_of_slow_pings(bool recorded) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   Sonar& sonar = time.sonar("front");
   std::vector<std::string> warnings;
-  std::optional<Time> done;  // of the ping that is under way
+  std::optional<Time> done;  // when the ping that is being computed is done
   const auto carry_out = [&](const Actions& actions) {
     for (const Action& action : actions) {
       const auto* const report = std::get_if<Report>(&action);

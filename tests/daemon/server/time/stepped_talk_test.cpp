@@ -93,7 +93,7 @@ TEST(SteppedTalk, WhileNoTimeMayPassTheDaemonTakesNoProcessor) {
   Host host(daemon);
   EXPECT_EQ(daemon.ask(Step{1}).code, Code::done);
   EXPECT_TRUE(eventually([] {
-    const std::clock_t before = std::clock();  // of this process alone
+    const std::clock_t before = std::clock();  // processor time of this process alone
     std::this_thread::sleep_for(milliseconds(500));
     return std::clock() - before < CLOCKS_PER_SEC / 100;
   })) << "its event loop runs all the time";
