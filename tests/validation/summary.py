@@ -125,7 +125,10 @@ def tell_apart(text):
     by_sector = next(r for r in judged if r[0] == "unseen sector, texture")
     control = next(r for r in judged if r[0].startswith("control"))
     yield ["the same: patches that a classifier tells apart", f"guessing; ours against ours {control[1]} %",
-           f"{by_sector[1]} % ({by_sector[2]}; most by: {features[0][0]})", "60 % at most is the aim"]
+           f"{by_sector[1]} % ({by_sector[2]}; most by: {features[0][0]})", "55 % at most is the aim"]
+    another = next(r for r in judged if r[0] == "another bed, unseen sector, texture")
+    yield ["the same with another bed and the product's pulse", "guessing", f"{another[1]} % ({another[2]})",
+           "60 % at most is the aim"]
 
 
 CASES = {"tank": tank, "pitched-sonar": pitched_sonar, "two-cylinders": two_cylinders, "local-search": local_search, "differences": differences, "coverage": coverage,

@@ -32,6 +32,18 @@ class Skipping(unittest.TestCase):
             self.assertIn("SONARD_CAPTURES", tell_apart.missing())
 
 
+class Scenes(unittest.TestCase):
+    def test_another_bed_has_nothing_of_the_fit(self):
+        fitted, another = tell_apart.scene_like_the_recording(), tell_apart.scene_of_another_bed()
+        for mark in tell_apart.FITTED:
+            self.assertIn(mark, fitted)
+            self.assertNotIn(mark, another)
+        self.assertIn("      seed: 4\n", fitted)
+        self.assertIn("      seed: 9\n", another)
+        self.assertIn("name: bed", another)
+        self.assertIn("profile: oculus-m1200d", another)
+
+
 @unittest.skipIf(numpy is None, "no python3-sklearn")
 class Classifier(unittest.TestCase):
     def test_local_means(self):
@@ -54,14 +66,19 @@ class Classifier(unittest.TestCase):
 
     def test_tells_what_differs_and_no_more(self):
         with mock.patch.object(tell_apart, "TREES", 20):
-            rows, best, bands = tell_apart.results(pings(1, smooth=True), pings(2), pings(3))
+            rows, best, bands = tell_apart.results(pings(1, smooth=True), pings(2), pings(3), pings(4, smooth=True))
         shares = {name: (low, high) for name, _, low, high in rows}
         self.assertGreater(shares["unseen sector, texture"][0], 0.95)
         low, high = shares["control: sonard against sonard, unseen sector, texture"]
         self.assertTrue(low - 0.05 < 0.5 < high + 0.05, (low, high))
         self.assertGreater(best[0][0], 0.95)
-        self.assertEqual([band[:2] for band in bands], [(0, 95), (96, 223), (224, 447), (448, 671)])
-        self.assertTrue(all(share > 0.9 for *_, share in bands), bands)
+        low, high = shares["another bed, unseen sector, texture"]
+        self.assertTrue(low - 0.05 < 0.5 < high + 0.05, (low, high))
+        told, alike = bands.values()
+        for band in told, alike:
+            self.assertEqual([rows[:2] for rows in band], [(0, 31), (32, 159), (160, 287), (288, 447), (448, 671)])
+        self.assertTrue(all(share > 0.9 for *_, share in told), told)
+        self.assertTrue(all(share < 0.8 for *_, share in alike), alike)
 
 
 if __name__ == "__main__":
