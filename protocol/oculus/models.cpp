@@ -1,5 +1,6 @@
 #include "protocol/oculus/models.hpp"
 
+#include <algorithm>
 #include <array>
 #include <string_view>
 #include <vector>
@@ -39,8 +40,6 @@ constexpr float noise_figure_db = 10, m1200d_high_noise_figure_db = 14.6f;
 /// unknown: fitted to the first two captured M1200d pings; of several fits the one that a comparison with all three judged best
 /// was kept (docs/acoustics.md, section 9). They are used for the mode of these pings only.
 void fit_to_recording(ReceiverModel& receiver) {
-  // Neighbouring rows of the far noise are uncorrelated (0.02).
-  receiver.noise_width = 0.71f / 0.9f;
   // Small echoes within 0.5 m are 3 beams wide at half their amplitude ahead, 5 to 7 at 20 degrees.
   receiver.defocus = 0.4f;
   // Noise across the fan. `noise_db` is that of rows 620 to 702, which have a stripe in the middle, `near_noise_db` that of rows
@@ -64,6 +63,12 @@ void fit_to_recording(ReceiverModel& receiver) {
                            -21,   -22.6f, -25,   -28.2f, -31, -33.5f, -38,    -45,    -60};
   receiver.leak_ring_step_m = 0.001421f;
 }
+
+constexpr double usual_pulse_rows = 0.9;  // chosen: a point between two rows is seen
+// unknown: of the captured M1200d ping, the echoes fit 0.66 rows, the noise fits 0.71 (in neighbouring rows it is uncorrelated).
+// Both pass the same filter, so one width is used. At 0.66 the surface cells, whose width is a power of two, would be half as
+// wide, and a ping at 2 m would take twice as long.
+constexpr double recorded_pulse_rows = 0.71;
 
 struct ModeRow {
   double centre_hz = 0, aperture_deg = 0, azimuth_width_deg = 0, elevation_width_deg = 0, max_range_m = 0;
@@ -189,6 +194,13 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
     return all;
   }();
   return built;
+}
+
+double pulse_rows(const SonarModel& model, int mode) {
+  const auto* const row =
+      std::find_if(std::begin(profiles), std::end(profiles), [&](const ProfileRow& of) { return of.profile == model.profile; });
+  if (row == std::end(profiles)) return usual_pulse_rows;
+  return (mode == 0 ? row->family->low : row->family->high).recorded ? recorded_pulse_rows : usual_pulse_rows;
 }
 
 }  // namespace sonar::oculus

@@ -12,4 +12,7 @@ namespace sonar::oculus {
 /// All profiles, the plain product of each family first. Built once, never changed.
 std::span<const std::shared_ptr<const SonarModel>> models();
 
+/// -3 dB width of the pulse in row spacings, with option `pulse: rows`; `mode` is an index into the model's modes.
+double pulse_rows(const SonarModel& model, int mode);
+
 }  // namespace sonar::oculus

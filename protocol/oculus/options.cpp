@@ -27,7 +27,7 @@ const std::array<protocol::Option, 22> option_rows{{
     {option_name::pulse,
      {"rows", "native"},
      "rows",
-     "pulse width: rows = 0.9 row spacings, native = 2.5 mm at every range and the mean power of a row"},
+     "pulse width: rows = 0.9 row spacings (M1200d, mode 2: 0.71), native = 2.5 mm at every range and the mean power of a row"},
     {option_name::ping_start_time_unit,
      {"nanoseconds", "microseconds"},
      "nanoseconds",

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/sonar/water.hpp"
+#include "protocol/oculus/models.hpp"
 #include "protocol/oculus/options.hpp"
 
 namespace sonar::oculus {
@@ -34,9 +35,10 @@ double row_centre(const protocol::OptionValues& options) {
   return origin == "near_edge" ? 0 : origin == "far_edge" ? 1 : 0.5;
 }
 
-/// Sets the pulse width and the number of samples whose mean power makes a row (option `pulse`).
-void set_pulse(PingSettings& settings, double spacing_m, bool native) {
-  settings.pulse_width_m = static_cast<float>(native ? native_pulse_m : 0.9 * spacing_m);
+/// Sets the pulse width and the number of samples whose mean power makes a row (option `pulse`). Needs the mode.
+void set_pulse(PingSettings& settings, double spacing_m, const protocol::DeviceState& device) {
+  const bool native = text_option(device.options, option_name::pulse) == "native";
+  settings.pulse_width_m = static_cast<float>(native ? native_pulse_m : pulse_rows(*device.model, settings.mode) * spacing_m);
   if (!native) return;
   // Sampling rate 2 b for the bandwidth b = 0.5887 c / pulse. At long ranges the pulse is made longer, so that the number of
   // samples stays bounded.
@@ -172,7 +174,7 @@ ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& d
   settings.range_bin_count = rows.count;
   settings.range_bin_m = rows.spacing_m;
   settings.row_centre = row_centre(device.options);
-  set_pulse(settings, rows.spacing_m, text_option(device.options, option_name::pulse) == "native");
+  set_pulse(settings, rows.spacing_m, device);
 
   settings.beam_count = (asked.flags & flag::beams_512) != 0 ? 512 : 256;
   settings.format = sample_format(fire);

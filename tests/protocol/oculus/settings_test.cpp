@@ -224,11 +224,34 @@ TEST(Settle, NetworkSpeedOnlyWhenHonoured) {
 TEST(Settle, PulseFollowsTheRows) {
   const FireRequest request = fire(0, 2, PingRate::hz10, 0x49, 10, 50);
   const PingSettings rows = settings_of(request, device());
-  EXPECT_FLOAT_EQ(rows.pulse_width_m, static_cast<float>(0.9 * rows.range_bin_m));
+  EXPECT_FLOAT_EQ(rows.pulse_width_m, static_cast<float>(0.71 * rows.range_bin_m));
   EXPECT_EQ(rows.samples_per_row, 1);
   const PingSettings native = settings_of(request, device("oculus-m1200d", {{"pulse", "native"}}));
   EXPECT_FLOAT_EQ(native.pulse_width_m, 0.0025f);
   EXPECT_EQ(native.samples_per_row, 22) << "22.9 mm rows at F_s = 2b, 1.06 mm";
+}
+
+TEST(Settle, OnlyTheRecordedModeHasTheRecordedPulse) {
+  const auto rows_of = [](const char* profile, std::uint8_t mode) {
+    const PingSettings s = settings_of(fire(0, mode, PingRate::hz10, 0x49, 3, 50), device(profile));
+    return static_cast<double>(s.pulse_width_m) / s.range_bin_m;
+  };
+  EXPECT_NEAR(rows_of("oculus-m1200d", 2), 0.71, 1e-6);
+  EXPECT_NEAR(rows_of("oculus-mf1200d", 2), 0.71, 1e-6) << "the same electronics";
+  for (const auto& [profile, mode] :
+       {std::pair("oculus-m1200d", 1), {"oculus-m750d", 2}, {"oculus-m3000d", 2}, {"oculus-n1200s", 1}})
+    EXPECT_NEAR(rows_of(profile, static_cast<std::uint8_t>(mode)), 0.9, 1e-6) << profile;
+}
+
+/// A shorter one would halve the width of the surface cells, and double the time of a ping (`recorded_pulse_rows`).
+TEST(Settle, RecordedPulseHasCellsAsWideAsTheUsualOne) {
+  for (const double sound_speed_mps : {1447.0, 1475.0, 1500.0, 1550.0}) {
+    FireRequest request = fire(0, 2, PingRate::hz10, 0x49, 2, 50);
+    request.settings.sound_speed_mps = sound_speed_mps;
+    const PingSettings s = settings_of(request, device());
+    const auto cell_m = [](double pulse_m) { return std::exp2(std::floor(std::log2(pulse_m))); };
+    EXPECT_EQ(cell_m(static_cast<double>(s.pulse_width_m)), cell_m(0.9 * s.range_bin_m)) << sound_speed_mps;
+  }
 }
 
 TEST(Settle, NativePulseStaysAffordableAtLongRange) {
