@@ -196,7 +196,9 @@ std::vector<RenderJob> shipped_sonars_over_a_bed() {
         job.vehicle().initial_pose.position_m.z = bed_z_m;
         job.settings = device_settings(job);
         const double stored_m = job.settings.range_m;
+        const bool has_another_pulse = job.settings.mode != static_cast<int>(mode) && !range_cell_m(job);
         job.settings.mode = static_cast<int>(mode);
+        if (has_another_pulse) job.settings.pulse_width_m = pulse_of_mode_m(job);
         if (!job.mode().beam_azimuths_rad.empty())
           job.settings.beam_count = static_cast<int>(job.mode().beam_azimuths_rad.size());
         job.settings.range_m = std::min(stored_m, static_cast<double>(job.mode().max_range_m));

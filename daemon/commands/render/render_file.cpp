@@ -96,6 +96,8 @@ void read_sonar(const Node& node, RenderJob& job) {
   if (const auto cell_m = range_cell_m(job)) {
     rows = RowsOf::range_image;
     job.settings.pulse_width_m = *cell_m;
+  } else if (profile.vendor && mode != first_mode) {
+    job.settings.pulse_width_m = pulse_of_mode_m(job);
   }
   read_ping(ping.map(), *profile.model, rows, job.settings);
 }

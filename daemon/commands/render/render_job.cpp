@@ -46,6 +46,11 @@ std::optional<float> range_cell_m(const RenderJob& job) {
   return kept.settings.pulse_width_m;
 }
 
+float pulse_of_mode_m(const RenderJob& job) {
+  const PingSettings kept = as_the_device_keeps(job).settings;
+  return static_cast<float>(static_cast<double>(kept.pulse_width_m) * job.settings.range_bin_m / kept.range_bin_m);
+}
+
 std::string note_of_range(const RenderJob& job) {
   constexpr double rounding = 1 + 1e-6;
   const double least_m = static_cast<double>(job.mode().min_range_m), most_m = static_cast<double>(job.mode().max_range_m);

@@ -62,6 +62,8 @@ Result<RenderInput> parse_render_file(std::string_view text, const std::string& 
 std::string note_of_range(const RenderJob& job);
 /// Returns the width of a range cell in the mode of the job, equal at every range; nullopt for a sonar without range images.
 std::optional<float> range_cell_m(const RenderJob& job);
+/// Returns the pulse width that the device has in the mode of the job, at the job's row spacing. Needs a product with rows.
+float pulse_of_mode_m(const RenderJob& job);
 
 /// The vehicle follows its trajectory in a file, in the file's own time; an empty name: of the only body in it. Errors:
 /// name:line: what.

@@ -235,6 +235,16 @@ TEST(RenderFile, WhatIsWrongWithASceneIsBadDataWhereverItStands) {
   EXPECT_EQ(kind("scene: no-such-scene.yaml\n"), ErrorKind::config) << "as world.scene of a configuration";
 }
 
+TEST(RenderFile, ThePulseIsThatOfTheMode) {
+  const auto rows = [](const std::string& ping) {
+    const PingSettings s = parsed(point + "sonar: {profile: oculus-m1200d, ping: {" + ping + "}}\n").jobs.at(0).settings;
+    return static_cast<double>(s.pulse_width_m) / s.range_bin_m;
+  };
+  EXPECT_NEAR(rows("mode: LF, range_m: 25"), 0.9, 1e-5);
+  EXPECT_NEAR(rows("mode: HF"), 0.71, 1e-5) << "the first mode is LF";
+  EXPECT_NEAR(rows("mode: HF, range_m: 2, rows: 703"), 0.71, 1e-5);
+}
+
 TEST(RenderFile, ARangeThatTheProductDoesNotHaveGetsANote) {
   const auto note = [](const std::string& sonar) { return note_of_range(parsed(point + "sonar: {" + sonar + "}\n").jobs.at(0)); };
   EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: HF, range_m: 10}"), "");
