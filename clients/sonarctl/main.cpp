@@ -12,6 +12,9 @@ int main(int argc, char** argv) {
       SA_RESETHAND);  // a second Ctrl-C ends commands that do not check `interrupted`, such as a check of a scene
   sigaction(SIGINT, &on_interrupt, nullptr);
   sigaction(SIGTERM, &on_interrupt, nullptr);
+  struct sigaction on_hangup {};
+  sigaction(SIGHUP, nullptr, &on_hangup);
+  if (on_hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &on_interrupt, nullptr);  // nohup ignores it
   std::signal(SIGPIPE, SIG_IGN);
   sonar::open_closed_standard_streams();
   return sonar::clients::run(argc, argv);

@@ -25,6 +25,21 @@ Ipv4 read_ip(const Node& node, Ipv4 fallback = {}) {
   return ip.value_or(fallback);
 }
 
+/// The address of one computer, or 0.0.0.0.
+Ipv4 read_host_ip(const Node& node, Ipv4 fallback = {}) {
+  const Ipv4 ip = read_ip(node, fallback);
+  if (ip[0] >= 224) node.fail(text_of(ip) + " is a multicast or broadcast address; give an address of this computer");
+  return ip;
+}
+
+Ipv4 read_netmask(const Node& node) {
+  const Ipv4 mask = read_ip(node);
+  const std::uint32_t zeros = ~text::number_from_ipv4(mask);
+  if (node.present() && (zeros & (zeros + 1)) != 0)  // some zero is left of a one
+    node.fail(text_of(mask) + " is not a netmask: give ones followed by zeros, such as 255.255.255.0");
+  return mask;
+}
+
 AddressRange read_range(const Node& node) {
   const std::string text = node.text(64);
   const std::size_t slash = text.find('/');
@@ -44,10 +59,20 @@ void read_world(Map map, Config& config, const std::filesystem::path& directory)
   config.water = read_water(map.optional("water"), &config.allow_hot);
 }
 
+/// Names stand in lines of text and in paths of HTTP requests.
+std::string read_name_text(const Node& node, std::size_t longest) {
+  std::string name = node.text(longest);
+  const bool fits = name.find('/') == std::string::npos && std::none_of(name.begin(), name.end(), [](char c) {
+                      return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+                    });
+  if (!fits) node.fail("a name has no \"/\" and no control characters such as line ends");
+  return name;
+}
+
 /// Reads the name of one of several entries; `taken` has the names of those before it.
 Node read_name(Map& map, std::size_t longest, std::set<std::string>& taken, std::string& name) {
   const Node node = map.required("name");
-  name = node.text(longest);
+  name = read_name_text(node, longest);
   if (!taken.insert(name).second && node.present()) node.fail("\"" + name + "\" is used twice");
   return node;
 }
@@ -90,13 +115,15 @@ std::size_t read_vehicle_of(Map& map, const Config& config) {
 }
 
 void read_addresses(Map& map, SonarConfig& sonar) {
-  sonar.bind_ip = read_ip(map.required("bind_ip"));
+  sonar.bind_ip = read_host_ip(map.required("bind_ip"));
   const bool any = sonar.bind_ip == Ipv4{};
   const Node advertise = any ? map.required("advertise_ip") : map.optional("advertise_ip");
-  sonar.advertise_ip = read_ip(advertise, sonar.bind_ip);
+  sonar.advertise_ip = read_host_ip(advertise, sonar.bind_ip);
+  if (advertise.present() && sonar.advertise_ip == Ipv4{})
+    advertise.fail("drivers cannot connect to 0.0.0.0; give the address of this computer in their network");
   const Node netmask = map.optional("netmask");
   sonar.has_own_netmask = netmask.present();
-  sonar.netmask = read_ip(netmask);
+  sonar.netmask = read_netmask(netmask);
   for (const Node& to : map.optional("status_to").items(0, 16)) sonar.status_to.push_back(read_endpoint(to, false));
   sonar.has_own_status_to = !sonar.status_to.empty();
   for (const Node& group : map.optional("groups").items(0, 16)) sonar.groups.push_back(read_ip(group));
@@ -107,7 +134,7 @@ void read_addresses(Map& map, SonarConfig& sonar) {
 SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
   SonarConfig sonar;
   const Node name = map.required("name");
-  sonar.name = name.text(64);
+  sonar.name = read_name_text(name, 64);
   const Node profile_node = map.required("profile");
   const auto profile = protocol::find_profile(profile_node.text(64));
   if (!profile) profile_node.fail(profile.error().text);

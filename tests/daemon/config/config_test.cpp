@@ -313,6 +313,26 @@ TEST(Config, AddressesAreReadStrictly) {
     EXPECT_FALSE(parse_ipv4(wrong)) << wrong;
 }
 
+TEST(Config, AddressesAndNamesThatCannotWorkAreRefused) {
+  const auto with = [](const std::string& name, const std::string& addresses) {
+    const auto config = parse("world: {scene: scene.yaml}\nvehicles: [{name: rov}]\nsonars: [{name: " + name +
+                              ", profile: oculus-m1200d, " + addresses + "}]\n");
+    return config ? std::string("accepted") : config.error().text;
+  };
+  EXPECT_EQ(with("front left \u00e9", "bind_ip: 192.168.2.4, netmask: 255.255.240.0"), "accepted");
+  for (const char* mask : {"0.0.0.0", "255.255.255.255", "128.0.0.0"})
+    EXPECT_EQ(with("front", std::string("bind_ip: 192.168.2.4, netmask: ") + mask), "accepted") << mask;
+  for (const char* mask : {"255.0.255.0", "0.0.0.255", "255.255.255.1"})
+    EXPECT_THAT(with("front", std::string("bind_ip: 192.168.2.4, netmask: ") + mask), HasSubstr("is not a netmask")) << mask;
+  for (const char* ip : {"224.0.0.1", "239.1.2.3", "255.255.255.255", "240.0.0.1"}) {
+    EXPECT_THAT(with("front", std::string("bind_ip: ") + ip), HasSubstr("is a multicast or broadcast address")) << ip;
+    EXPECT_THAT(with("front", std::string("bind_ip: 0.0.0.0, advertise_ip: ") + ip), HasSubstr("advertise_ip")) << ip;
+  }
+  EXPECT_THAT(with("front", "bind_ip: 0.0.0.0, advertise_ip: 0.0.0.0"), HasSubstr("drivers cannot connect to 0.0.0.0"));
+  for (const char* name : {"\"a\\nb\"", "a/b", "\"\\x7f\"", "\"tab\\there\""})
+    EXPECT_THAT(with(name, "bind_ip: 192.168.2.4"), HasSubstr("no control characters")) << name;
+}
+
 TEST(Config, TheShippedExampleIsValid) {
   const auto c = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/sonard.yaml");
   ASSERT_TRUE(c) << c.error().text;
