@@ -329,7 +329,8 @@ TEST(Norbit, TheBottomIsLookedForOnce) {
   const auto port = std::ranges::find(vendor().ports(), bathymetry_port, &protocol::Port::number);
   const auto bottom = [&] {
     std::vector<std::uint32_t> samples;
-    for (const Beam& beam : read_bathymetry(vendor().datagrams(*port, ping, state).at(0))->beams) samples.push_back(beam.sample);
+    const auto bathymetry = read_bathymetry(vendor().datagrams(*port, ping, state).at(0));
+    for (const Beam& beam : bathymetry->beams) samples.push_back(beam.sample);
     return samples;
   };
   const auto looked_for_now = bottom();
