@@ -165,13 +165,23 @@ class WktReader {
     if (unit.word == "PRIMEM" && first && std::abs(*first) <= 400) meridian_deg_ = *first * meridian_unit_deg_;
     if (unit.word != "UNIT" && unit.word != "LENGTHUNIT" && unit.word != "ANGLEUNIT") return;
     std::size_t owner = open_.size();
-    while (owner > 0 && open_[owner - 1].word == "AXIS") --owner;
+    bool of_height = false;
+    for (; owner > 0 && open_[owner - 1].word == "AXIS"; --owner) {
+      const std::string direction = upper(open_[owner - 1].values[0]);
+      of_height = direction == "UP" || direction == "DOWN";
+    }
     if (owner == 0 || !first || !is_unit(*first)) return;
     const double deg = deg_from_rad(*first), unit_deg = std::abs(deg - 1) < 1e-6 || unit.name == "DEGREE" ? 1 : deg;
-    if (is_one_of(open_[owner - 1].word, in_degrees)) system_.unit_deg = unit_deg;
-    if (open_[owner - 1].word == "PRIMEM") meridian_unit_deg_ = unit_deg;
-    if (is_one_of(open_[owner - 1].word, in_lengths)) system_.unit_m = *first;
-    if (is_one_of(open_[owner - 1].word, of_heights)) system_.height_unit_m = *first;
+    const std::string& word = open_[owner - 1].word;
+    const bool degrees = is_one_of(word, in_degrees), lengths = is_one_of(word, in_lengths);
+    if (word == "PRIMEM") meridian_unit_deg_ = unit_deg;
+    // A system with three axes has a unit of heights beside that of its coordinates.
+    if (is_one_of(word, of_heights) || (of_height && (degrees || lengths)))
+      system_.height_unit_m = *first;
+    else if (degrees && unit.word != "LENGTHUNIT")
+      system_.unit_deg = unit_deg;
+    else if (lengths && unit.word != "ANGLEUNIT")
+      system_.unit_m = *first;
   }
 
   void take_parameter(const std::string& given, double value) {

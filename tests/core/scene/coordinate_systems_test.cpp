@@ -86,6 +86,58 @@ TEST(CoordinateSystems, LongitudesOfWktMayBeginElsewhereAndAnglesBeGrads) {
   EXPECT_EQ(zone_text(system_of_wkt(with).utm), "none");
 }
 
+TEST(CoordinateSystems, AnAxisOfHeightsChangesNoUnitOfCoordinates) {
+  const std::string ellipsoid = "ELLIPSOID[\"WGS 84\",6378137,298.257223563,LENGTHUNIT[\"metre\",1]]";
+  const auto geographic = [&](const std::string& cs) {
+    return system_of_wkt("GEOGCRS[\"WGS 84\",DATUM[\"World Geodetic System 1984\"," + ellipsoid +
+                         "],PRIMEM[\"Greenwich\",0,ANGLEUNIT[\"degree\",0.0174532925199433]]," + cs + "]");
+  };
+  const auto axes = [](const std::string& unit) {
+    return "AXIS[\"geodetic latitude (Lat)\",north,ORDER[1]," + unit + "],AXIS[\"geodetic longitude (Lon)\",east,ORDER[2]," +
+           unit + "]";
+  };
+  const std::string degree = "ANGLEUNIT[\"degree\",0.0174532925199433]", grad = "ANGLEUNIT[\"grad\",0.015707963267949]";
+  const auto height = [](const std::string& direction, const std::string& unit) {
+    return ",AXIS[\"ellipsoidal height (h)\"," + direction + ",ORDER[3]," + unit + "]";
+  };
+  struct Case {
+    CoordinateSystem is;
+    bool geographic;
+    double unit_deg, unit_m, height_unit_m;
+  };
+  const std::string metre = "LENGTHUNIT[\"metre\",1]", foot = "LENGTHUNIT[\"foot\",0.3048]";
+  const std::string map_axes = "PROJCRS[\"p\",BASEGEOGCRS[\"g\",DATUM[\"d\"," + ellipsoid +
+                               "]],CS[Cartesian,3],AXIS[\"(E)\",east,ORDER[1]," + metre + "],AXIS[\"(N)\",north,ORDER[2]," +
+                               metre + "]";
+  const std::string old =
+      "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],"
+      "UNIT[\"degree\",0.0174532925199433]]";
+  const std::string old_heights =
+      "VERT_CS[\"h\",VERT_DATUM[\"d\",2005],UNIT[\"foot\",0.3048],AXIS[\"Gravity-related height\",UP]]";
+  const std::string esri_heights =
+      "VERTCS[\"h\",VDATUM[\"d\"],PARAMETER[\"Vertical_Shift\",0.0],PARAMETER[\"Direction\",1.0],"
+      "UNIT[\"Foot\",0.3048]]";
+  const std::vector<Case> cases{
+      {geographic("CS[ellipsoidal,3]," + axes(degree) + height("up", metre) + ",ID[\"EPSG\",4979]"), true, 1, 1, 1},
+      {geographic("CS[ellipsoidal,2]," + axes(degree) + ",ID[\"EPSG\",4326]"), true, 1, 1, 1},
+      {geographic("CS[ellipsoidal,3]," + axes(grad) + height("up", foot)), true, 0.9, 1, 0.3048},
+      {geographic("CS[ellipsoidal,3]," + axes(grad) + height("down", "UNIT[\"metre\",1]")), true, 0.9, 1, 1},
+      {geographic("CS[ellipsoidal,2],AXIS[\"latitude\",north],AXIS[\"longitude\",east]," + grad + "," + metre), true, 0.9, 1, 1},
+      {system_of_wkt(map_axes + height("up", foot) + "]"), false, 1, 1, 0.3048},
+      {system_of_wkt("COMPD_CS[\"c\"," + old + "," + old_heights + "]"), true, 1, 1, 0.3048},
+      {system_of_wkt(old + "," + esri_heights), true, 1, 1, 0.3048},
+      {system_of_wkt("COMPOUNDCRS[\"c\"," + map_axes + "],VERTCRS[\"h\",VDATUM[\"d\"],CS[vertical,1],AXIS[\"height (H)\",up," +
+                     foot + "]]]"),
+       false, 1, 1, 0.3048},
+  };
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    EXPECT_EQ(cases[k].is.geographic, cases[k].geographic) << k;
+    EXPECT_NEAR(cases[k].is.unit_deg, cases[k].unit_deg, 1e-9) << k;
+    EXPECT_EQ(cases[k].is.unit_m, cases[k].unit_m) << k;
+    EXPECT_EQ(cases[k].is.height_unit_m, cases[k].height_unit_m) << k;
+  }
+}
+
 /// Keys with values of their own, numbers, and one text.
 GeoKeys keys(const std::vector<std::array<std::uint16_t, 2>>& values,
              const std::vector<std::pair<std::uint16_t, double>>& numbers = {}, const std::string& citation = "") {
