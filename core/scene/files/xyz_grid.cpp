@@ -86,6 +86,7 @@ struct Order {
   std::size_t x = 0, y = 1, z = 2;
   bool depth = false;  // whether the name of the column is depth
   std::size_t last() const { return std::max({x, y, z}); }
+  bool operator==(const Order&) const = default;
 };
 
 /// By names of columns, such as "lat lon depth" and "id,x,y,z"; the first three if they are other names.
@@ -146,7 +147,7 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
       const std::size_t begin = this_line.find_first_not_of("#/ \t\"");
       Line names;
       const std::size_t number = begin == this_line.npos ? 0 : split_names(this_line.substr(begin), names);
-      if (const Order found = order_by(names, number); found.x != 0 || found.y != 1)
+      if (const Order found = order_by(names, number); found != Order())
         comment = {number, found};  // names of columns, if as many values follow
       continue;
     }

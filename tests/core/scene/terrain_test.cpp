@@ -495,6 +495,23 @@ TEST(XyzGrid, NamesOfColumnsMayStandInAComment) {
   EXPECT_EQ(first_x("# lat lon z\nx y z\n"), 1) << "a line of names counts more";
 }
 
+TEST(XyzGrid, NamesInACommentAlsoTellTheHeightAndDepths) {
+  TemporaryFiles files;
+  for (const char* begin : {"", "# "}) {
+    const auto read = [&](const std::string& names, const std::string& points) {
+      return read_xyz_heights(files.write("g.xyz", begin + names + "\n" + points), {});
+    };
+    const auto numbered = read("x y id z", "100 1 7 -1\n100 2 8 -2\n110 1 9 -3\n110 2 10 -4\n");
+    ASSERT_TRUE(numbered) << begin << numbered.error().text;
+    EXPECT_EQ(numbered->z_m, (std::vector<float>{-1, -3, -2, -4})) << begin;
+    const std::string points = "100 1 1\n100 2 2\n110 1 3\n110 2 4\n";
+    const auto depths = read("x y depth", points), heights = read("x y z", points);
+    ASSERT_TRUE(depths && heights);
+    EXPECT_THAT(depths->notes, ::testing::Contains(HasSubstr("set z_scale: -1 if they count down"))) << begin;
+    EXPECT_THAT(heights->notes, ::testing::Not(::testing::Contains(HasSubstr("z_scale")))) << begin;
+  }
+}
+
 TEST(XyzGrid, ColumnsAreFoundByTheirNames) {
   TemporaryFiles files;
   const auto read = [&](const std::string& text) { return read_xyz_heights(files.write("p.csv", text), {}); };
