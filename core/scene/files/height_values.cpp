@@ -204,7 +204,7 @@ void hint_at_degrees(HeightGrid& grid) {
   if (cell < least_cell || grid.x.front() < -180 || grid.x.back() > 360 || grid.y.front() < -90 || grid.y.back() > 90) return;
   if (is_local(grid.x) && is_local(grid.y) && grid.x.back() - grid.x.front() + cell < all_around) return;
   grid.notes.push_back(
-      text::format("its coordinates (%.6g, %.6g, cells of %.6g) are taken as metres; write geographic: true if they "
+      text::format("its coordinates (%.6g, %.6g, cells of %.6g) are read as metres; write geographic: true if they "
                    "are degrees, or false",
                    grid.x.front(), grid.y.front(), cell));
 }

@@ -241,14 +241,14 @@ TEST(UnnamedSystem, ANoteTellsOfMetresThatCouldBeDegrees) {
     return grid->notes.empty() ? std::string() : grid->notes.back();
   };
   EXPECT_THAT(notes("xllcorner 4\nyllcorner 52", "0.25"),
-              HasSubstr("are taken as metres; write geographic: true if they are degrees"));
-  EXPECT_THAT(notes("xllcorner -180\nyllcorner -60", "90"), HasSubstr("are taken as metres"));
+              HasSubstr("are read as metres; write geographic: true if they are degrees"));
+  EXPECT_THAT(notes("xllcorner -180\nyllcorner -60", "90"), HasSubstr("are read as metres"));
   EXPECT_EQ(notes("xllcorner 4\nyllcorner 52", "0.25", {.geographic = false}), "");
   EXPECT_EQ(notes("xllcorner 0\nyllcorner 0", "0.25"), "") << "a pool";
   EXPECT_EQ(notes("xllcorner -0.5\nyllcorner -0.25", "0.25"), "") << "about its middle";
   EXPECT_EQ(notes("xllcorner 400\nyllcorner 52", "0.25"), "");
   files.write("g.prj", "PROJCS[\"mine\"]");
-  EXPECT_EQ(notes("xllcorner 4\nyllcorner 52", "0.25").find("taken as metres;"), std::string::npos);
+  EXPECT_EQ(notes("xllcorner 4\nyllcorner 52", "0.25").find("read as metres;"), std::string::npos);
 }
 
 TEST(UnnamedSystem, CoarseCellsAreDegreesIfMostStepsAreSteep) {
