@@ -66,7 +66,7 @@ void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
   next_request_ = now;
   has_autopilot_ = is_submarine_ = sim_state_is_coarse_ = global_has_fix_ = sim_state_has_fix_ = false;
   reported_.reset();
-  autopilot_component_ = 1;
+  autopilot_component_ = first_autopilot;
   received_.clear();
   local_in_world_.reset();
   newest_ns_ = {};
@@ -233,9 +233,11 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
   }
 }
 
+/// The autopilot is component 1, or else the first one that names an autopilot, as gimbals and cameras may do too.
 void MavlinkPoses::handle(const Heartbeat& m, const Frame& frame) {
   if (m.autopilot == Heartbeat::no_autopilot) return;
-  if (!has_autopilot_) autopilot_component_ = frame.component;
+  if (!has_autopilot_ || frame.component == first_autopilot) autopilot_component_ = frame.component;
+  if (frame.component != autopilot_component_) return;
   has_autopilot_ = true;
   is_submarine_ = m.type == Heartbeat::submarine;
   autopilot_ = m.autopilot;

@@ -160,8 +160,9 @@ class MavlinkPoses {
   DistanceRequests distances_;
   Identity self_;
   FrameCounts counts_;
+  static constexpr std::uint8_t first_autopilot = 1;  // MAV_COMP_ID_AUTOPILOT1
   std::optional<std::uint8_t> system_;
-  std::uint8_t autopilot_ = 0, autopilot_component_ = 1;
+  std::uint8_t autopilot_ = 0, autopilot_component_ = first_autopilot;
   bool has_autopilot_ = false, is_submarine_ = false, sim_state_is_coarse_ = false;
   bool global_has_fix_ = false, sim_state_has_fix_ = false;
   Time found_at_{}, last_received_{}, next_heartbeat_{}, next_request_{}, next_reminder_{};

@@ -112,6 +112,35 @@ TEST(MavlinkPoses, OfASubmarineThePilotsDisplayGivesTheDepth) {
   EXPECT_THAT(broken(v(autopilot_heartbeat()) + v(hud) + v(attitude(1000, 0)), 1).poses, IsEmpty());
 }
 
+TEST(MavlinkPoses, HeartbeatsOfOtherComponentsDoNotChangeTheTypeOfTheVehicle) {
+  VfrHud hud;
+  hud.altitude_m = -7;
+  GlobalPositionInt m = global(1000, 47.6, -122.33, 12);
+  m.height_mm = -4000;
+  Heartbeat other = autopilot_heartbeat();
+  other.type = 26;      // a gimbal
+  other.autopilot = 4;  // another one than the autopilot's
+  for (const std::uint8_t component : {std::uint8_t{100}, std::uint8_t{154}}) {
+    Sender autopilot{{1, 1, 0}}, second{{1, component, 0}};
+    for (const Bytes& order :
+         {autopilot(autopilot_heartbeat()) + second(other), second(other) + autopilot(autopilot_heartbeat())}) {
+      Link by_hud, by_place;
+      EXPECT_EQ(by_hud(order + autopilot(hud) + autopilot(attitude(1000, 0)), 1).poses.size(), 1u) << int{component};
+      EXPECT_EQ(by_place(order + autopilot(m) + autopilot(attitude(1000, 0)), 1).poses.size(), 1u) << int{component};
+    }
+    // Nor does a submarine's type of another component make a boat one.
+    Heartbeat boat = autopilot_heartbeat();
+    boat.type = 11;
+    Link of_boat;
+    EXPECT_THAT(of_boat(autopilot(boat) + second(autopilot_heartbeat()) + autopilot(hud) + autopilot(attitude(1000, 0)), 1).poses,
+                IsEmpty());
+    // Without component 1, the first autopilot counts.
+    Sender sole{{1, 2, 0}};
+    Link of_sole;
+    EXPECT_EQ(of_sole(sole(autopilot_heartbeat()) + second(other) + sole(hud) + sole(attitude(1000, 0)), 1).poses.size(), 1u);
+  }
+}
+
 TEST(MavlinkPoses, APlaceWithoutAnOriginIsADepthOnlyOfASubmarine) {
   for (const bool submarine : {true, false}) {
     Sender v;
