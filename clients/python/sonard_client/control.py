@@ -130,11 +130,15 @@ class Control:
         self._post("sonar", _given(sonar=sonar or None, range_m=range_m, rate_hz=rate_hz, gain_percent=gain_percent, mode=mode,
                                    beams=beams, transmit=transmit))
 
-    def mount_sonar(self, sonar: str = "", position: Sequence[float] = (0, 0, 0), rpy_deg: Sequence[float] = (0, 0, 0),
+    def mount_sonar(self, sonar: str = "", position: Optional[Sequence[float]] = None, rpy_deg: Optional[Sequence[float]] = None,
                     frame: str = "FLU") -> None:
-        """Sets the mount of the sonar on its vehicle, as a tilt unit does. frame: "FLU" or "FRD"; rpy_deg: intrinsic Z-Y-X."""
-        mount = {"frame": frame, "position": _xyz("position", position), "rpy_deg": _xyz("rpy_deg", rpy_deg)}
-        self._post("sonar", _given(sonar=sonar or None, mount=mount))
+        """Sets the mount of the sonar on its vehicle, as a tilt unit does: its position, its angles or both; what is None keeps
+        its values. frame: "FLU" or "FRD"; position: m; rpy_deg: intrinsic Z-Y-X."""
+        if position is None and rpy_deg is None:
+            raise ValueError("a mount needs a position, angles (rpy_deg) or both")
+        given = _given(position=None if position is None else _xyz("position", position),
+                       rpy_deg=None if rpy_deg is None else _xyz("rpy_deg", rpy_deg))
+        self._post("sonar", _given(sonar=sonar or None, mount=dict(given, frame=frame)))
 
     def set_environment(self, temperature_c: Optional[float] = None, salinity_psu: Optional[float] = None,
                         ph: Optional[float] = None, sound_speed_mps: Optional[float] = None) -> None:

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 import unittest
+from unittest import mock
 
 from common import PACKAGE  # and it is on the path
 
@@ -194,6 +195,17 @@ class Requests(unittest.TestCase):
             self.control.place_object("b", (0, 0, 0), frame="up")
         with self.assertRaises(ValueError):
             self.control.set_sonar(range_m=float("nan"))
+
+    def test_a_mount_has_only_what_is_given(self):
+        control, place, angles = self.control, {"x": 0.3, "y": 0, "z": 0}, {"x": 0, "y": 20, "z": 0}
+        for given, sent in (({"position": (0.3, 0, 0)}, {"position": place}),
+                            ({"rpy_deg": (0, 20, 0)}, {"rpy_deg": angles}),
+                            ({"position": (0.3, 0, 0), "rpy_deg": (0, 20, 0)}, {"position": place, "rpy_deg": angles})):
+            with self.subTest(**given), mock.patch.dict(ANSWERS, {"/api/v1/sonar": (200, '{"code":"OK"}')}):
+                control.mount_sonar("front", frame="FRD", **given)
+                self.assertEqual(self.last(), ("POST", "/api/v1/sonar", {"sonar": "front", "mount": dict(sent, frame="FRD")}))
+        with self.assertRaisesRegex(ValueError, "a mount needs a position, angles"):
+            control.mount_sonar("front")
 
     def test_events_until_end_disconnection_and_timeout(self):
         for kinds in ({"pings": True}, {"poses": True}):

@@ -144,6 +144,11 @@ class Mounts(WithSonard):
         self.assertAlmostEqual(mount.transform.translation.y, 0.2)
         ahead = c.rotate(c.wxyz([getattr(mount.transform.rotation, axis) for axis in "xyzw"]), (1, 0, 0))
         self.assertAlmostEqual(ahead[2], -0.5)  # bow down, as FLU has a positive pitch
+        Control(daemon.address).mount_sonar("front", position=(0.5, -0.2, 0))
+        moved = wait_for(lambda: ros.static[2:])[0][0]
+        self.assertAlmostEqual(moved.transform.translation.y, -0.2)
+        self.assertEqual([getattr(moved.transform.rotation, axis) for axis in "xyzw"],
+                         [getattr(mount.transform.rotation, axis) for axis in "xyzw"])
 
 
 class TheClock(WithSonard):

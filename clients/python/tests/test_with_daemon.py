@@ -117,7 +117,7 @@ class Running(unittest.TestCase):
             control.set_sonar("front", range_m=4)
             self.assertEqual(control.status()["sonars"][0]["range_m"], 4)
             control.mount_sonar(rpy_deg=(0, 20, 0))
-            control.mount_sonar()
+            control.mount_sonar(position=(0, 0, 0), rpy_deg=(0, 0, 0))
             control.set_environment(temperature_c=7)
             self.assertEqual(control.status()["environment"]["temperature_c"], 7)
             control.add_object("D", like="A", position=(2, 0, 0), moving=True)
