@@ -196,9 +196,9 @@ def odometry(step, t0=100, **how):
     return cdr.put("d", *[0] * 6).put("d", *[0] * 36).done()
 
 
-def pose_stamped(step, t0=100, **how):
+def pose_stamped(step, t0=100, frame="map", **how):
     t, position, xyzw = enu_moment(step)
-    return Cdr(**how).header(t0 + t if t0 else 0, "map").put("d", *position, *xyzw).done()
+    return Cdr(**how).header(t0 + t if t0 else 0, frame).put("d", *position, *xyzw).done()
 
 
 def path(steps, t0=100, stamped=True, **how):

@@ -204,6 +204,11 @@ class Command(WithFolder):
         log = self.file(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", [(i, made.odometry(i)) for i in range(3)])]))
         self.assertTrue(self.run_main(log, "-o", "-", "--frame", "NED_FRD")[1].startswith("# frame: NED_FRD"))
         self.assertEqual(self.run_main(self.file(made.dataflash_log()), "-o", "-", "--frame", "ENU_FLU")[0], 64)
+        log = self.file(made.mcap([("/pose", "cdr", "geometry_msgs/msg/PoseStamped",
+                                    [(i, made.pose_stamped(i, frame="world_ned")) for i in range(3)])]))
+        self.assertIn("so the axes are NED_FRD", self.run_main(log, "-o", "-")[2])
+        code, text, said = self.run_main(log, "-o", "-", "--frame", "ENU_FLU")
+        self.assertEqual((code, text.splitlines()[0], "axes" in said), (0, "# frame: ENU_FLU", False), said)
 
     def test_gaps_are_reported(self):
         late = made.dataflash_message("SIM", 9000000, 0, 0, 0, 0, 476000000, -1223300000, 1, 0, 0, 0)

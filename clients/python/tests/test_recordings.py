@@ -102,6 +102,20 @@ class Recordings(WithFolder):
                 said = [f"its poses are in the frame {frame!r}, so the axes are NED_FRD; --frame ENU_FLU if they are not"]
                 self.assertEqual(self.warned, said if axes == "NED_FRD" else [])
 
+    def test_axes_that_the_user_names_are_not_guessed(self):
+        poses = [(5000 + i, made.pose_stamped(i, frame="world_ned")) for i in range(3)]
+        ros1 = [(5000 + i, made.pose_stamped(i, frame="world_ned", ros1=True)) for i in range(3)]
+        recordings = {"mcap": made.mcap([("/pose", "cdr", "geometry_msgs/msg/PoseStamped", poses)]),
+                      "rosbag": made.bag([("/pose", "geometry_msgs/PoseStamped", ros1)]),
+                      "db3": made.db3(self.folder / "made", [("/pose", "geometry_msgs/msg/PoseStamped", poses)]).read_bytes()}
+        for kind, recording in recordings.items():
+            with self.subTest(kind):
+                self.assertEqual((self.convert(recording, kind=kind).frame, len(self.warned)), ("NED_FRD", 1))
+                for axes in ("ENU_FLU", "NED_FRD"):
+                    self.assertEqual((self.convert(recording, kind=kind, frame=axes).frame, self.warned), (axes, []))
+                with self.assertRaisesRegex(ValueError, "frame is 'up': it must be one of"):
+                    self.convert(recording, kind=kind, frame="up")
+
     def test_every_ros_message_with_a_pose(self):
         for maker, schema, topic in ((made.odometry, "nav_msgs/msg/Odometry", "/odom"),
                                      (made.pose_stamped, "geometry_msgs/msg/PoseStamped", "/odom"),

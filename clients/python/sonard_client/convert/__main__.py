@@ -14,7 +14,7 @@ from typing import List, Optional
 
 from ..geodesy import parse_origin
 from ..nmea import Assumptions
-from .formats import FORMATS, RECORDINGS, convert, format_of
+from .formats import FORMATS, convert, format_of
 from .track import ConvertError, Place2, Track, dead_reckon, gap_warning, write_csv
 
 
@@ -91,11 +91,7 @@ def _run(options: argparse.Namespace) -> None:
     assumed = Assumptions(heading_deg=options.heading, depth_m=options.depth, depth_is_vehicle=options.depth_is_vehicle,
                           bottom_m=options.bottom)
     track = convert(options.file, kind, options.source, options.topic, origin, options.system, assumed, warn,
-                    options.component, _place(options.at))
-    if options.frame:
-        if kind not in RECORDINGS:
-            raise ValueError(f"--frame is for recordings of ROS and MCAP only: {kind} is always {track.frame}")
-        track.frame = options.frame
+                    options.component, _place(options.at), options.frame)
     if options.dead_reckon is not None:
         if not track.held:
             raise ValueError(f"--dead-reckon is for logs without horizontal position: {track.source} has one")

@@ -6,6 +6,7 @@ from typing import Callable, Optional, Union
 
 from ..geodesy import Geodetic
 from ..nmea import Assumptions
+from ..pose_messages import FRAMES
 from . import dataflash, mcap, rosbag, rosbag2, ulog
 from .dataflash import read_dataflash
 from .mavlink import frame_length
@@ -86,24 +87,29 @@ def format_of(path: pathlib.Path) -> str:
 def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source: Optional[str] = None,
             topic: Optional[str] = None, origin: Optional[Geodetic] = None, system: Optional[int] = None,
             assumed: Assumptions = Assumptions(), warn: Warn = lambda text: None, component: Optional[int] = None,
-            at: Optional[Place2] = None) -> Track:
+            at: Optional[Place2] = None, frame: Optional[str] = None) -> Track:
     """Reads the track of one vehicle. kind: one of FORMATS; default: detected. source: messages of an autopilot's log.
     topic: topic of a recording. system, component: MAVLink system and component of a telemetry log. at: north and east [m]
-    of a vehicle whose log has its depth and no horizontal position. Raises ConvertError and OSError."""
+    of a vehicle whose log has its depth and no horizontal position. frame: axes of a recording, "ENU_FLU" or "NED_FRD"; default:
+    as the recording says. Raises ConvertError and OSError."""
     file = recording_at(pathlib.Path(path))
     chosen = kind or format_of(file)
     readers: "dict[str, Callable[[], Track]]" = {
         "dataflash": lambda: read_dataflash(file, warn, source, origin, at),
         "tlog": lambda: read_tlog(file, warn, source, origin, system, component, at),
-        "mcap": lambda: read_rosbag2(file, warn, topic) if file.is_dir() else read_mcap(file, warn, topic),
-        "rosbag": lambda: read_rosbag(file, warn, topic),
-        "db3": lambda: read_rosbag2(file, warn, topic),
+        "mcap": lambda: read_rosbag2(file, warn, topic, frame) if file.is_dir() else read_mcap(file, warn, topic, frame),
+        "rosbag": lambda: read_rosbag(file, warn, topic, frame),
+        "db3": lambda: read_rosbag2(file, warn, topic, frame),
         "ulog": lambda: read_ulog(file, warn, source, origin, at),
         "nmea": lambda: read_nmea(file, warn, origin, assumed)}
     if chosen not in readers:
         raise ValueError(f"format is {chosen!r}: it must be one of {', '.join(FORMATS)}")
     if origin is not None and chosen in RECORDINGS:
         raise ValueError("an origin needs positions in degrees; poses of recordings are in metres")
+    if frame is not None and frame not in FRAMES:
+        raise ValueError(f'frame is {frame!r}: it must be one of {", ".join(FRAMES)}')
+    if frame is not None and chosen not in RECORDINGS:
+        raise ValueError(f"--frame is for recordings of ROS and MCAP only: {chosen} is always NED_FRD")
     if at is not None and chosen not in ("dataflash", "tlog", "ulog"):
         raise ValueError(f"--at is for logs of autopilots without horizontal position, not for {chosen}")
     return readers[chosen]()

@@ -135,7 +135,7 @@ def mcap_messages(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> List[
     return messages
 
 
-def read_mcap(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
+def read_mcap(path: pathlib.Path, warn: Warn, topic: Optional[str] = None, frame: Optional[str] = None) -> Track:
     """Reads the poses of one topic; ROS and foxglove use ENU_FLU."""
     seen: Dict[str, str] = {}
-    return track_from(mcap_messages(path, warn, seen), str(path), warn, topic, seen)
+    return track_from(mcap_messages(path, warn, seen), str(path), warn, topic, seen, frame)

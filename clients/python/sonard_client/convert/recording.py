@@ -91,8 +91,8 @@ def _unpacked(message: Recorded, name: str) -> bytes:
 
 
 def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optional[str] = None,
-               seen: Mapping[str, str] = {}) -> Track:
-    """seen: the types of all topics of the recording."""
+               seen: Mapping[str, str] = {}, frame: Optional[str] = None) -> Track:
+    """seen: the types of all topics of the recording. frame: the axes that the user named; None = as the recording says."""
     topics: Dict[str, _Topic] = {}
     faults: List[str] = []
     for message in messages:
@@ -113,11 +113,11 @@ def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optio
     selected = topics[chosen]
     rows = rising(selected.rows)
     frame_id = selected.rows[0][1].frame_id
-    if frame_id and selected.frame == "NED_FRD":
+    if frame is None and frame_id and selected.frame == "NED_FRD":
         warn(f"its poses are in the frame {frame_id!r}, so the axes are NED_FRD; --frame ENU_FLU if they are not")
     if selected.rank == KINDS.index("Path") and len(rows) == 1 and len(selected.rows) > 1:
         raise ConvertError(f"{name}: the poses of {chosen} have no time stamps, so they are not a track")
     if len(rows) < len(selected.rows):
         warn(f"poses of {chosen} omitted because their time does not increase: {len(selected.rows) - len(rows)}" +
              _clock_reset(selected.rows))
-    return Track(selected.frame, chosen, [Row(t, f.position_m, f.orientation) for t, f in rows])
+    return Track(frame or selected.frame, chosen, [Row(t, f.position_m, f.orientation) for t, f in rows])

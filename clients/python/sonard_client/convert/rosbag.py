@@ -87,7 +87,7 @@ class _Bag:
             yield from self.messages(inner, 0, at)
 
 
-def read_rosbag(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
+def read_rosbag(path: pathlib.Path, warn: Warn, topic: Optional[str] = None, frame: Optional[str] = None) -> Track:
     data = path.read_bytes()
     if not data.startswith(MAGIC):
         raise ConvertError(f"{path}: at byte 0: not a ROS 1 bag of format 2.0")
@@ -97,4 +97,4 @@ def read_rosbag(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> 
         raise ConvertError(f"{path}: {bag.unreadable}")
     if bag.unreadable:
         warn(bag.unreadable)
-    return track_from(messages, str(path), warn, topic, dict(bag.connections.values()))
+    return track_from(messages, str(path), warn, topic, dict(bag.connections.values()), frame)

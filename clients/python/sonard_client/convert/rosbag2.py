@@ -172,7 +172,7 @@ def recording_at(path: pathlib.Path) -> pathlib.Path:
     return path.parent if path.name == METADATA and path.is_file() else path
 
 
-def read_rosbag2(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) -> Track:
+def read_rosbag2(path: pathlib.Path, warn: Warn, topic: Optional[str] = None, frame: Optional[str] = None) -> Track:
     """Reads the poses of one topic of a file or a folder, ENU_FLU."""
     messages = Kept()
     seen: Dict[str, str] = {}
@@ -180,4 +180,4 @@ def read_rosbag2(path: pathlib.Path, warn: Warn, topic: Optional[str] = None) ->
         with file.open("rb") as opened:
             is_mcap = opened.read(len(MCAP_MAGIC)) == MCAP_MAGIC
         messages.extend(mcap_messages(file, warn, seen) if is_mcap else db3_messages(file, warn, seen))
-    return track_from(messages, str(path), warn, topic, seen)
+    return track_from(messages, str(path), warn, topic, seen, frame)
