@@ -4,6 +4,7 @@ Pictures of the states are kept in the folder that SONARD_SHOTS names; without i
 """
 import gzip
 import http.client
+import json
 import pathlib
 import re
 import sys
@@ -34,6 +35,33 @@ STATES = {  # of the mock -> the page's name of it, what the user reads, the but
     "look only": ("fine", "look only", ""),
 }
 
+
+# Lines, each of one letter and all of the same time, that connections bring -> the log. A daemon brings its last 100 lines again.
+LOGS_OF_CONNECTIONS = (
+    ("1:abab", "abab"),
+    ("1:abc 1:abcd", "abcd"),
+    ("1:aab 1:aabb", "aabb"),
+    ("1:aaa 1:aaaa", "aaaa"),
+    ("1:abcab 1:abcabcab", "abcabcab"),
+    ("1:abca 1:abcad", "abcad"),
+    ("1:abc 1:ab 1:abcd", "abcd"),  # lost before all had come again
+    ("1:abc 1: 1:abcc 1:abccd", "abccd"),
+    ("1:abc 1:dea", "abcdea"),  # more were lost than the daemon keeps
+    ("1:abcx 1:bcde", "abcxbcde"),
+    ("1:abc 2:abcd", "abcabcd"),  # another daemon
+    ("1:" + "a" * 150 + " 1:" + "a" * 100 + "ab", "a" * 151 + "b"),
+)
+LOG_AFTER = """(connections) => {
+  const facts = new sonardTest.facts.constructor();
+  for (const connection of connections.split(' ')) {
+    const [daemon, lines] = connection.split(':');
+    facts.opened({ sessionId: `${daemon}-1` });
+    facts.opened({ sessionId: `${daemon}-2` });  // a new session in the same connection
+    for (const message of lines) facts.message('/log', { level: 2, message, name: 'sonard' }, 0);
+    facts.connection = 'lost';
+  }
+  return facts.log.map((line) => line.message).join('');
+}"""
 
 # Settings whose field something else is painted over.
 COVERED_SETTINGS = """[...document.querySelectorAll('#setting-rows :is(input, select)')].filter((e) => {
@@ -193,7 +221,11 @@ class Page(PageChecks, unittest.TestCase):
         page.wait("document.querySelectorAll('.log-line').length > 3")
         count = "[...document.querySelectorAll('.log-line')].filter((e) => e.innerText.includes('%s')).length"
         page.run("[0, 0, 1].forEach((ns) => sonardTest.facts.message('/log', { level: 2, message: 'a new line', name: 'sonard' }, ns))")
-        page.wait(count % "a new line" + " === 2")
+        page.wait(count % "a new line" + " === 3")  # the daemon's clock may stand still
+        for connections, expected in LOGS_OF_CONNECTIONS:
+            with self.subTest(connections):
+                got = page.run(f"(({LOG_AFTER})({json.dumps(connections)}))")
+                self.assertEqual(got, expected)
 
     def test_token(self):
         self.mock.token = "secret"

@@ -2,16 +2,33 @@
 import { Counter, Counters } from './rates.js';
 
 const log_lines = 500;
+const replayed_lines = 100;  // at most; of a new connection, the daemon's lines_kept
 const recent_pings = 64;
 const history_s = 60;
 
 const now_s = () => performance.now() / 1000;
+const sameLine = (a, b) => a.ns === b.ns && a.message === b.message && a.name === b.name && a.level === b.level;
+const beginsWith = (lines, beginning) => beginning.every((line, i) => sameLine(line, lines[i]));
+
+/// A new connection brings the last lines of the log again, then new ones. Returns those of `came` that follow `known`: all but the
+/// longest beginning that equals an end of `known`. Returns null while that is undecided, because all of `came` equal lines
+/// before the end.
+function linesAfter(known, came) {
+  const last = known.slice(-replayed_lines);
+  for (let at = 0; at < last.length; at++) {
+    const end = last.slice(at);
+    if (end.length > came.length && beginsWith(end, came)) return null;
+    if (end.length <= came.length && beginsWith(came, end)) return came.slice(end.length);
+  }
+  return came;
+}
 
 export class Facts {
   constructor() {
     this.parameters = new Map();
     this.log = [];
     this.logCount = 0;
+    this.replayed = null;  // lines of a new connection until it is known which of them are new
     this.sonar = '';
     this.connection = 'connecting';  // connecting, open, lost, token
     this.clear();
@@ -47,6 +64,8 @@ export class Facts {
 
   opened(info) {
     const same = this.info?.sessionId === info.sessionId;
+    const daemonOf = (one) => one?.sessionId.split('-')[0];  // what follows counts its sessions
+    if (this.connection !== 'open') this.replayed = daemonOf(this.info) === daemonOf(info) ? [] : null;
     this.info = info;
     this.connection = 'open';
     const meta = info.metadata ?? {};
@@ -146,10 +165,7 @@ export class Facts {
         this.troubles = new Map(value.troubles.map((t) => [t.name, t]));
         return;
       case '/log':
-        if (this.log.some((line) => line.ns === ns && line.message === value.message)) return;  // a new connection brings the last lines again
-        this.log.push({ ...value, ns });
-        this.logCount++;
-        if (this.log.length > log_lines) this.log.shift();
+        this.addLine({ ...value, ns });
         return;
       case '/tf':
         for (const t of value.transforms) this.frames.set(t.child_frame_id, { parent: t.parent_frame_id, translation: t.translation, rotation: t.rotation });
@@ -160,6 +176,15 @@ export class Facts {
     if (kind === 'ping' && sonar === this.sonar) this.pingEvent(value, ns);
     if (kind === 'picture') this.pictures.set(sonar, value);
     if ((kind === 'image' || kind === 'fan') && sonar === this.sonar) this.image(value, ns, kind === 'fan');
+  }
+
+  addLine(line) {
+    const lines = this.replayed ? linesAfter(this.log, [...this.replayed, line]) : [line];
+    if (!lines) return this.replayed.push(line);
+    this.replayed = null;
+    this.log.push(...lines);
+    this.logCount += lines.length;
+    this.log.splice(0, this.log.length - log_lines);
   }
 
   pingEvent(event, ns) {
