@@ -162,6 +162,39 @@ class Telemetry(WithFolder):
                     self.assertEqual(len(track.rows), 20)
                     self.assertIn(f"ODOMETRY: component {autopilot} (omitted: 20 messages of {other})", self.warned[0])
 
+    def test_poses_of_the_autopilot_around_gaps_are_kept(self):
+        beat = [(0, bytes(8) + made.mavlink_frame("HEARTBEAT", (0, 12, 3, 0, 0, 3)))]
+        sent = self.sent_by
+        gap = sent(1, 0, 100, 0) + sent(197, 160, 1, 50) + sent(1, 162, 20, 0)
+        for log, steps, omitted in ((beat + gap, [*range(100), *range(162, 182)], 1),
+                                    (beat + gap + sent(197, 240, 3, 50) + sent(1, 244, 1, 0),
+                                     [*range(100), *range(162, 182), 244], 4),
+                                    (sent(197, 0, 10, 50) + sent(1, 70, 10, 0) + beat + sent(1, 80, 5, 0), range(70, 85), 10)):
+            for source in ("ODOMETRY", "ATTITUDE+LOCAL_POSITION_NED"):
+                t0 = 1_700_000_000 if source == "ODOMETRY" else 0
+                with self.subTest(source, omitted=omitted):
+                    track = self.convert(b"".join(record for _, record in log), source=source)
+                    self.assert_track(track, steps, t0=t0, metres=1e-5, radians=1e-5)
+                    for name in source.split("+"):
+                        self.assertIn(f"{name}: component 1 (omitted: {omitted} messages of 197)", self.warned[0])
+                    self.assertIn("using the autopilot's, else the first, and another one after 5 s of silence", self.warned[0])
+
+    def test_the_origin_is_the_autopilots(self):
+        beat = bytes(8) + made.mavlink_frame("HEARTBEAT", (0, 12, 3, 0, 0, 3))
+        others = bytes(8) + made.mavlink_frame("GPS_GLOBAL_ORIGIN", (int(1e8), int(2e8), 3000, 0), component=197)
+        own = bytes(8) + made.mavlink_frame("GPS_GLOBAL_ORIGIN", (476000000, -1223300000, 10000, 0))
+        poses = b"".join(record for _, record in self.sent_by(1, 0, 20, 0))
+        for log in (others + beat + own, beat + own + others):
+            track = self.convert(log + poses, source="ATTITUDE+LOCAL_POSITION_NED")
+            self.assertEqual(track.comments[0], "origin: 47.60000000,-122.33000000,10.000")
+            self.assertIn("GPS_GLOBAL_ORIGIN: component 1 (omitted: 1 messages of 197)", self.warned[0])
+
+    def test_only_a_heartbeat_makes_an_autopilot(self):
+        records = self.sent_by(197, 0, 100, 0) + self.sent_by(1, 100, 1, 50)
+        track = self.convert(b"".join(record for _, record in records), source="ODOMETRY")
+        self.assert_track(track, range(100), t0=1_700_000_000, metres=1e-5, radians=1e-5)
+        self.assertIn("ODOMETRY: component 197 (omitted: 1 messages of 1)", self.warned[0])
+
     def test_a_submarines_depth_is_below_its_home(self):
         """A track that begins below the surface must not begin at depth 0."""
         def log(kind):

@@ -100,16 +100,18 @@ class _Vehicle:
         self.depths: Dict[str, Stream[float]] = {}  # down [m], of messages without a fix
         self.pressures: Dict[str, Stream[float]] = {}  # [hPa]
         self.is_submarine = False
-        self.autopilot, self._has_autopilot = 1, False  # its component: the usual one until its first heartbeat
-        self.home_m: Optional[float] = None  # altitude of the home, of submarines the surface
-        self.origin: Optional[Geodetic] = None
+        self.autopilot: Optional[int] = None  # its component, from its first heartbeat on
+        self._homes_m: Dict[int, float] = {}  # by component: altitude of the home, of submarines the surface
+        self._origins: Dict[int, Geodetic] = {}  # by component
         self.unsupported: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id
-        self.heading_is_local = False
+        self._local_headings: Dict[int, bool] = {}  # by component
         self.restarts = 0
         self._boot: "Optional[Tuple[float, float]]" = None  # the latest time since start, and its time of receipt
         self._before_s = 0.0  # offset of times since start, after restarts
         self._current: "Dict[str, Tuple[int, float]]" = {}  # by message: its component and its last time of receipt
-        self.components: Dict[str, List[int]] = {}  # by message: the components used, in sequence
+        # By message: the components used, in sequence, and the lengths of the message's streams when each began.
+        self._runs: "Dict[str, List[Tuple[int, List[int]]]]" = {}
+        self._used: "Dict[str, Dict[int, int]]" = {}  # by message: the number of messages of each component used
         self.omitted: "Dict[str, Dict[int, int]]" = {}  # by message: the other components and their number of messages
 
     def add(self, logged: Logged) -> None:
@@ -117,13 +119,15 @@ class _Vehicle:
         name = MESSAGES[logged.frame.message_id].name if fields is not None else "HEARTBEAT"
         if fields is not None and name == "HEARTBEAT":
             self.is_submarine |= fields["type"] == SUBMARINE
-            if fields["autopilot"] != NO_AUTOPILOT and not self._has_autopilot:
-                self.autopilot, self._has_autopilot = logged.frame.component, True
+            if fields["autopilot"] != NO_AUTOPILOT and self.autopilot is None:
+                self.autopilot = logged.frame.component
         if fields is None or name == "HEARTBEAT" or not self._is_used(name, logged):
             return
+        component = logged.frame.component
         if name == "GPS_GLOBAL_ORIGIN":
             place = Geodetic(1e-7 * fields["latitude"], 1e-7 * fields["longitude"], 1e-3 * fields["altitude"])
-            self.origin = self.origin or (place if place.is_fix else None)
+            if place.is_fix:
+                self._origins.setdefault(component, place)
             return
         # Attitude and position are paired by the vehicle's clock if both have it, else by time of receipt.
         t = self._since_start(1e-3 * fields["time_boot_ms"], logged.received_s) if "time_boot_ms" in fields else \
@@ -155,13 +159,14 @@ class _Vehicle:
             place = _simulated_place(fields) if name == "SIM_STATE" else \
                 Geodetic(1e-7 * fields["lat"], 1e-7 * fields["lon"], 1e-3 * fields["alt"])
             position = place if place.is_fix else None
-            if position is not None and name == "GLOBAL_POSITION_INT" and self.home_m is None:
-                self.home_m = 1e-3 * (fields["alt"] - fields["relative_alt"])
+            if position is not None and name == "GLOBAL_POSITION_INT":
+                self._homes_m.setdefault(component, 1e-3 * (fields["alt"] - fields["relative_alt"]))
             if position is None and name == "GLOBAL_POSITION_INT":
                 self.depths.setdefault(name, []).append((t, -1e-3 * fields["relative_alt"]))
         if name in FULL and (attitude is None or position is None):
             return
-        self.heading_is_local |= fields.get("frame_id") == LOCAL_FRD
+        if fields.get("frame_id") == LOCAL_FRD:
+            self._local_headings[component] = True
         if attitude is not None:
             self.attitudes.setdefault(name, []).append((t, attitude))
         if position is not None:
@@ -175,30 +180,65 @@ class _Vehicle:
         if self.component is not None and component != self.component:
             return name == "GPS_GLOBAL_ORIGIN"  # valid for the whole system
         known = self._current.get(name)
-        if known is not None and known[0] != component and component == self.autopilot:
-            self._forget(name, known[0])
+        if component == self.autopilot:
+            self._forget_others(name)
             known = None
         if known is not None and known[0] != component and logged.received_s - known[1] <= SILENCE_S:
             counts = self.omitted.setdefault(name, {})
             counts[component] = counts.get(component, 0) + 1
             return False
         self._current[name] = component, logged.received_s
-        if known is None or known[0] != component:
-            self.components.setdefault(name, []).append(component)
+        runs = self._runs.setdefault(name, [])
+        if not runs or runs[-1][0] != component:
+            runs.append((component, self._lengths(name)))
+        used = self._used.setdefault(name, {})
+        used[component] = used.get(component, 0) + 1
         return True
 
-    def _forget(self, name: str, component: int) -> None:
-        """Drops what another component than the autopilot sent in this message."""
-        streams = [s.pop(name, []) for s in (self.attitudes, self.positions, self.depths, self.pressures)]
+    @property
+    def _streams(self) -> "Tuple[Dict[str, Stream], ...]":
+        return self.attitudes, self.positions, self.depths, self.pressures
+
+    def _lengths(self, name: str) -> List[int]:
+        return [len(streams.get(name, ())) for streams in self._streams]
+
+    def _forget_others(self, name: str) -> None:
+        """Drops what other components than the autopilot sent in this message."""
+        runs = self._runs.get(name, [])
+        if all(component == self.autopilot for component, _ in runs):
+            return
+        ends = [begins for _, begins in runs[1:]] + [self._lengths(name)]
+        for i, streams in enumerate(self._streams):
+            if name in streams:
+                streams[name] = [sample for (component, begins), end in zip(runs, ends) if component == self.autopilot
+                                 for sample in streams[name][begins[i]:end[i]]]
         counts = self.omitted.setdefault(name, {})
-        counts[component] = counts.get(component, 0) + max(map(len, streams))
-        self.components[name] = []
+        for component in [c for c in self._used[name] if c != self.autopilot]:
+            counts[component] = counts.get(component, 0) + self._used[name].pop(component)
+        facts: "Dict[str, dict]" = {"GLOBAL_POSITION_INT": self._homes_m, "GPS_GLOBAL_ORIGIN": self._origins,
+                                    "ODOMETRY": self._local_headings}
+        for component in [c for c in facts.get(name, {}) if c != self.autopilot]:
+            del facts[name][component]
+        self._runs[name] = [(component, [0] * len(self._streams)) for component, _ in runs if component == self.autopilot][:1]
 
     def choices(self) -> List[str]:
         """Describes which components were used, for messages that several components sent."""
         return [f"{name}: component {', later '.join(map(str, used))} (omitted: " +
                 (", ".join(f"{n} messages of {c}" for c, n in sorted(self.omitted.get(name, {}).items())) or "none") + ")"
-                for name, used in sorted(self.components.items()) if name in self.omitted or len(used) > 1]
+                for name, used in ((name, [c for c, _ in runs]) for name, runs in sorted(self._runs.items()))
+                if name in self.omitted or len(used) > 1]
+
+    @property
+    def home_m(self) -> Optional[float]:
+        return next(iter(self._homes_m.values()), None)
+
+    @property
+    def origin(self) -> Optional[Geodetic]:
+        return next(iter(self._origins.values()), None)
+
+    @property
+    def heading_is_local(self) -> bool:
+        return bool(self._local_headings)
 
     def _since_start(self, boot_s: float, received_s: float) -> float:
         """Returns the time since the first start. After a restart the time of receipt continues it."""
@@ -265,8 +305,8 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
              " was omitted: supported are local NED and FRD (1, 20) with bodies in FRD (12, 8 or the world frame) or FLU (13)")
     choices = vehicle.choices()
     if choices:
-        warn("several components send the same message; using the first, and another one after "
-             f"{SILENCE_S:.0f} s of silence: {'; '.join(choices)}")
+        warn("several components send the same message; using the autopilot's, else the first, and another one "
+             f"after {SILENCE_S:.0f} s of silence: {'; '.join(choices)}")
     wanted = chosen(vehicle.sources(), source, str(path))
     if wanted.held and vehicle.pressure_of_depth:
         warn(f"no message has the depth; it is that of {vehicle.pressure_of_depth} in sea water (1025 kg/m3) below "
