@@ -197,7 +197,7 @@ Result<void> record_device(const RecordOptions& options) {
   const double took_s = recorder.seconds();
   const Result<void> closed = files->close();
   report(*files, took_s);
-  if (ran && closed && files->messages() == 0)
+  if (ran && closed && files->messages() == 0 && interrupted == 0)
     return failure(ErrorKind::unavailable, "no message came from " + at + ", so the files hold none: is the sonar suspended?");
   return ran ? closed : ran;
 }
@@ -226,6 +226,10 @@ Result<void> convert(const RecordOptions& options) {
   Result<void> written;
   std::optional<Time> first;
   Time last{};
+  const auto keep_pings = [&](const protocol::HostActions& actions) {
+    for (const protocol::HostAction& action : actions)
+      if (const auto* ping = std::get_if<HostPing>(&action); ping && written) written = files->write_ping(last, *ping);
+  };
   while (written && interrupted == 0 && (options.pings == 0 || files->pings() < options.pings)) {
     auto message = reader.next();
     if (!message) break;
@@ -236,13 +240,10 @@ Result<void> convert(const RecordOptions& options) {
     written = files->write(*message);
     const auto port = recording::host_port(*by->make, message->by);
     if (!port || message->from != Origin::device) continue;
-    const auto keep_pings = [&](const protocol::HostActions& actions) {
-      for (const protocol::HostAction& action : actions)
-        if (const auto* ping = std::get_if<HostPing>(&action); ping && written) written = files->write_ping(last, *ping);
-    };
     if (const auto tick = (*host)->next_tick(); tick && *tick <= last) keep_pings((*host)->on_tick(last));
     keep_pings((*host)->on_bytes(*port, message->bytes, last));
   }
+  if (const auto tick = (*host)->next_tick()) keep_pings((*host)->on_tick(*tick));  // pings that wait for another part
   const Result<void> closed = files->close();
   report(*files, seconds(last - first.value_or(last)));
   if (!reader.note().empty()) std::printf("%s\n", reader.note().c_str());
