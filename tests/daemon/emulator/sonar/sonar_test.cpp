@@ -290,7 +290,8 @@ std::vector<std::string> warnings_of_slow_pings(bool recorded) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   Sonar& sonar = time.sonar("front");
   std::vector<std::string> warnings;
-  std::optional<Time> done;  // when the ping that is being computed is done
+  constexpr Time never = Time::max();
+  Time done = never;  // when the ping that is being computed is done
   const auto carry_out = [&](const Actions& actions) {
     for (const Action& action : actions) {
       const auto* const report = std::get_if<Report>(&action);
@@ -303,8 +304,8 @@ std::vector<std::string> warnings_of_slow_pings(bool recorded) {
   for (const Time end = time.now + std::chrono::seconds(30); time.now < end;) {
     time.now = std::max(time.now, sonar.next_tick().value_or(end));
     carry_out(sonar.on_tick(time.now));
-    if (!done || time.now < *done) continue;
-    done.reset();
+    if (time.now < done) continue;
+    done = never;
     PingOutcome outcome{.failure = "not needed here", .refused = true, .seconds = 0.3};
     if (recorded) outcome.recorded = std::make_shared<const PartsByPort>();
     carry_out(sonar.on_ping(outcome, time.now));
