@@ -168,7 +168,7 @@ TEST_F(Hosts, ShowAPingWhenItIsWhole) {
 }
 
 TEST_F(Hosts, KeepTheOrderOfPings) {
-  for (const std::uint32_t number : {1, 2, 3, 4}) hear(1, number, 0.1);
+  for (const std::uint32_t number : {1u, 2u, 3u, 4u}) hear(1, number, 0.1);
   hear(0, 1, 0.2);
   hear(0, 4, 0.2);
   EXPECT_EQ(take(), "1pc 4pc ");
