@@ -9,6 +9,8 @@
 namespace sonar {
 namespace {
 
+constexpr const char* stop_requested = "stop requested";
+
 std::vector<LogField> fields_of(const v1::RecordingStatus& status) {
   return {{"sonar", status.sonar()}, {"file", status.file()}, {"pings", status.pings()}, {"bytes", status.bytes()}};
 }
@@ -157,14 +159,22 @@ void Recordings::remove_oldest() {
   }
 }
 
+/// Names the newest recording that could be meant, and why it has ended already; a full disk for example.
+std::string Recordings::why_none_to_stop(const std::string& file) const {
+  const auto last = std::find_if(recordings_.rbegin(), recordings_.rend(), [&](const Pointer& r) {
+    return (file.empty() || r->name == file) && !r->status.why().empty() && r->status.why() != stop_requested;
+  });
+  const std::string ended = last == recordings_.rend() ? "" : (*last)->name + " has ended: " + (*last)->status.why();
+  if (file.empty()) return "nothing is being recorded" + (ended.empty() ? "" : "; " + ended);
+  return ended.empty() ? "no recording is called \"" + file.substr(0, 128) + "\"" : ended;
+}
+
 /// `done` is called once, when the last of the recordings has been closed, with the first error.
 void Recordings::stop(const control::StopRecording& asked, Done done) {
   std::vector<Pointer> meant;
   for (const Pointer& r : recordings_)
     if (r->state != Recording::State::ended && (asked.file.empty() || asked.file == r->name)) meant.push_back(r);
-  if (meant.empty())
-    return done(failure(ErrorKind::usage, asked.file.empty() ? std::string("nothing is being recorded")
-                                                             : "no recording is called \"" + asked.file.substr(0, 128) + "\""));
+  if (meant.empty()) return done(failure(ErrorKind::usage, why_none_to_stop(asked.file)));
   if (std::any_of(meant.begin(), meant.end(), [](const Pointer& r) { return r->state == Recording::State::opening; }))
     return done(failure(ErrorKind::unavailable, "the recording is just being begun: stop it when its start was answered"));
   struct All {
@@ -178,7 +188,7 @@ void Recordings::stop(const control::StopRecording& asked, Done done) {
       if (!outcome && all->first_error) all->first_error = outcome;
       if (--all->left == 0) done(all->first_error);
     });
-    end(r, "stop requested");
+    end(r, stop_requested);
   }
 }
 

@@ -94,6 +94,7 @@ class Recordings {
   void fail(const Pointer& recording, const std::string& why);
   void ended(const Pointer& recording, const Outcome& outcome);
   void remove_oldest();
+  std::string why_none_to_stop(const std::string& file) const;
 
   WriterThread& writer_;
   const Config& config_;

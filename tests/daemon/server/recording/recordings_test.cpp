@@ -386,7 +386,13 @@ TEST(RecordedDaemon, AFullDiskEndsTheRecordingAndNothingElse) {
     return !daemon.status().recordings().at(0).running();
   }));
   EXPECT_TRUE(client.next_ping());
-  EXPECT_TRUE(eventually([&] { return daemon.ask(control::StopRecording{}).text == "nothing is being recorded"; }));
+  std::string nothing;
+  EXPECT_TRUE(eventually([&] {
+    nothing = daemon.ask(control::StopRecording{}).text;
+    return nothing.find("nothing is being recorded") == 0;
+  }));
+  EXPECT_THAT(nothing, HasSubstr("has ended: ")) << "whoever stops it is told the reason";
+  EXPECT_THAT(nothing, HasSubstr("File too large"));
   const auto told = daemon.status().recordings().at(0);
   EXPECT_THAT(told.why(), HasSubstr("File too large"));
   EXPECT_EQ(daemon.stop(), 0);
