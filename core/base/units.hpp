@@ -1,4 +1,4 @@
-// Types for values that could be mistaken for each other, the type of times, and decibel arithmetic.
+// Decibel arithmetic, the type for points in time, and separate types for numbers that are easily confused.
 #pragma once
 
 #include <chrono>

@@ -28,7 +28,7 @@ void read_link(const Node& node, bool has_ranges, MavlinkConfig& link) {
   if (link.dials && link.at.ip == Ipv4{}) node.fail("udpout needs the address of the other end");
 }
 
-/// A link belongs to one vehicle; its name may be left out if there is only one.
+/// Each link belongs to one vehicle. The vehicle's name may be left out if there is only one vehicle.
 std::string read_vehicle(Map& map, const std::vector<VehicleConfig>& vehicles) {
   if (vehicles.empty()) return {};  // reported elsewhere
   const Node node = vehicles.size() > 1 ? map.required("vehicle") : map.optional("vehicle");
@@ -89,7 +89,7 @@ std::vector<MavlinkConfig> read_mavlink(const Node& node, bool has_ranges, const
     const bool taken = std::any_of(links.begin(), links.end(), [&](const MavlinkConfig& other) {
       return other.at.port != 0 && other.at.port == link.at.port && other.at.ip == link.at.ip;
     });
-    if (taken) endpoint.fail("this endpoint is used twice; a link is for one vehicle");
+    if (taken) endpoint.fail("another link already uses this endpoint; give each link its own endpoint");
     links.push_back(std::move(link));
   }
   return links;

@@ -1,5 +1,4 @@
-// The settings of the heads of one sonar, which all its hosts share: checks them, and converts them to PingSettings. The device
-// keeps them.
+// Checks the head settings of one sonar (shared by its hosts) and converts them to PingSettings. The device keeps them.
 #pragma once
 
 #include <cstdint>
@@ -45,15 +44,15 @@ struct Refusal {
   Code code{};
   std::string text;
 };
-/// Sets one key of a head and returns the applied value, which may be the nearest valid one.
 struct Applied {
   std::optional<Value> value;
   Refusal refusal;  // if there is no value
 };
+/// Sets one key of a head and returns the applied value, which may be the nearest valid one.
 Applied apply(SonarSettings& settings, int head, Key key, const Value& value, const protocol::DeviceState& device);
 std::optional<Value> read_back(const SonarSettings& settings, int head, Key key);
 
-/// The sample grid of a head: rows from the sonar on, of which the first `skipped` lie before the start range.
+/// The sample grid of a head. Rows count from the sonar; the first `skipped` rows lie before the start range.
 struct HeadGrid {
   double bin_m = 0;
   int skipped = 0, bins = 0;

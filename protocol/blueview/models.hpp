@@ -16,11 +16,11 @@ struct HeadPreset {
   int beams = 512;
   double bin_m = 0.0254;  // range resolution
   double start_m = 2, stop_m = 10;
-  bool verified = false;  // numbers from an accessible source; otherwise recalled from data sheets
+  bool verified = false;  // true: checked against an accessible source; false: from memory of data sheets
 };
 
 std::span<const std::shared_ptr<const SonarModel>> models();
-/// Presets of the model's heads, as many as it has modes.
+/// One preset per frequency mode of the model.
 std::span<const HeadPreset> head_presets(std::string_view profile);
 
 /// The ping of benchmark P1 (docs/benchmarks.md): 10 m in 394 rows of 25.4 mm, 512 beams, pulse 25.4 mm.

@@ -1,4 +1,4 @@
-// The Surveyor 240: its product, the checks of its settings, and the frames of a ping. Pure functions; sources:
+// The Surveyor 240: its SonarModel, the checks of its settings, and the frames of a ping. Pure functions; sources:
 // docs/protocols/ping.md.
 #pragma once
 
@@ -21,7 +21,7 @@ struct Settings {
 };
 /// Clocks that differ by less than a millisecond are the same.
 bool same_settings(const Settings& a, const Settings& b);
-/// The points: a std::vector<Detection>.
+/// Returns the detected points of the ping, as a std::vector<Detection>.
 std::shared_ptr<const PingFindings> findings_of(const Settings& settings, const Ping& ping);
 using HeldSettings = protocol::Held<Settings>;
 /// The settings in `held`; if it is null, those of a new device.

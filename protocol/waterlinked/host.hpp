@@ -1,4 +1,4 @@
-// A program that uses a Sonar 3D-15 (docs/protocols/waterlinked.md): settings over HTTP, images by multicast.
+// The client side of a Sonar 3D-15 (docs/protocols/waterlinked.md): settings over HTTP, images by multicast.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ inline constexpr std::array<protocol::HostPort, 2> host_ports{
     {{protocol::HostPort::Kind::http, http_port},
      {protocol::HostPort::Kind::udp_listen, multicast_group.port, multicast_group.ip}}};
 
-/// A ping with a picture from above: each column of pixels becomes a beam with its strengths at their horizontal ranges. Without
+/// Builds a top-view ping: each column of pixels becomes a beam with its strengths at their horizontal ranges. Without
 /// `strengths` all returns are equally bright. nullopt: the messages do not describe one image.
 std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const StrengthMessage* strengths);
 

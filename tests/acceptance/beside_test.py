@@ -1,4 +1,4 @@
-"""Two demos on one computer, side by side by --offset, each reached by sonarctl; more clients by --clients."""
+"""Tests --offset (two demos on one computer, each reached by sonarctl) and --clients."""
 import json
 import signal
 import socket
@@ -59,7 +59,7 @@ class Beside(unittest.TestCase):
                 texts = " ".join(f["text"] for f in found["findings"])
                 self.assertIn(f"tcp {demo.address}:52100 accepts", texts)
                 self.assertIn(f"http://127.0.0.1:{8088 + 10 * demo.offset}/healthz returns ok", texts)
-                # The other demo's broadcast is received too.
+                # doctor receives the other demo's broadcast too, and must not report a duplicate device id.
                 alike = [f["text"] for f in found["findings"] if "same device id" in f["text"] and demo.address in f["text"]]
                 self.assertEqual(alike, [])
             moved = run(SONARCTL, "pose", "once", "--xyz", "1,2,-3", "--to", f"127.0.0.1:{14770 + 10 * second.offset}")

@@ -1,5 +1,5 @@
-// Configuration files by fuzzing: whatever the text, the answer is a configuration the daemon can use or a sentence that starts
-// with the file's name. Short texts.
+// Fuzzes the configuration parser: any text of at most 4096 bytes must yield either a configuration that the daemon can use, or
+// an error that starts with the file's name.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

@@ -1,5 +1,6 @@
-// Conversations of the host and the emulated sonar of any make in virtual time, with faults and foreign bytes both ways. The
-// first byte chooses the make; then commands: a letter, a number, and of bytes as many as the number says.
+// Fuzzes conversations between a host and an emulated sonar of any make, in virtual time, with faults and with arbitrary bytes
+// injected in both directions. The first byte chooses the make. Commands follow: a letter, a number and, for some letters, bytes
+// to inject.
 #include "tests/example_make/host_link.hpp"
 #include "tests/fuzz/byte_script.hpp"
 #include "tests/fuzz/sonar_accounts.hpp"

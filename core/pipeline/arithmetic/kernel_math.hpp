@@ -1,4 +1,5 @@
-// The formulas of the hot loops for one value at a time, and the sizes of their tables. Device code reads it: C++17-clean.
+// The formulas of the hot loops for one value at a time, and the sizes of their tables. Device code includes this file, so it
+// must compile as C++17.
 #pragma once
 
 #include <cmath>
@@ -12,14 +13,15 @@ namespace sonar {
 
 /// Terms of the even polynomial that approximates the elevation pattern, in w = sin^2(elevation angle).
 inline constexpr int elevation_terms = 9;
-/// A place of the depth map states its object: the last bits of 1 / x are the object's number modulo 64. In scenes with more
-/// objects the last bits of the slope, whose precision matters little, are ten more bits of the number.
+/// Each node of the depth map names its object: the last six bits of 1 / x hold the object's number modulo 64. If a scene has
+/// more than 64 objects, the last ten bits of the slope hold further bits of the number; the slope needs little precision.
 inline constexpr int surface_mark_bits = 6;
 inline constexpr std::int32_t surface_marks = (1 << surface_mark_bits) - 1, upper_marks = 1023;
 SONAR_HD constexpr std::int32_t surface_mark(std::uint32_t object) { return static_cast<std::int32_t>(object & 0xFFFFu); }
 SONAR_HD constexpr std::int32_t upper_mark(std::int32_t mark) { return mark >> surface_mark_bits; }
 SONAR_HD constexpr bool has_upper_marks(std::size_t objects) { return objects > static_cast<std::size_t>(surface_marks) + 1; }
-/// Distance behind the surface that was hit at which a cell of another object is hidden [m], and the part added per range.
+/// A cell of another object is hidden if it lies farther behind the surface that was hit than contact_m [m] plus contact_share
+/// times the range.
 inline constexpr float contact_m = 1e-3f, contact_share = 2e-5f;
 /// The axis of the depth map. Bins are uniform in the tangent: narrow between two edges, and wide in the side lobes beyond them.
 struct TangentAxis {
@@ -50,7 +52,7 @@ SONAR_HD inline float tangent_of_bin(const TangentAxis& a, float bin) {
 SONAR_HD inline float with_last_bits(float x, std::int32_t bits, std::int32_t among) {
   return float_of((bits_of(x) & ~static_cast<std::uint32_t>(among)) | static_cast<std::uint32_t>(bits & among));
 }
-/// The value 0, which means nothing, does not change.
+/// 0 means that nothing was hit, and stays 0.
 SONAR_HD inline float with_mark(float inverse_x, std::int32_t mark) {
   return inverse_x > 0 ? with_last_bits(inverse_x, mark, surface_marks) : inverse_x;
 }

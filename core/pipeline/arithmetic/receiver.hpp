@@ -25,7 +25,8 @@ SONAR_HD inline double noise_level_db(const FrequencyMode& mode, double noise_ba
                               static_cast<double>(mode.pattern.elevation_width_rad)) +
          static_cast<double>(mode.receiver.noise_figure_db);
 }
-/// sqrt(E|s|^2) of the noise at a beam's output [uPa]. A column gets this over sqrt(sum_k W_jk^2), before beamforming.
+/// sqrt(E|s|^2) of the noise at a beam's output [uPa]. Before beamforming, the noise of a column is this value divided by
+/// sqrt(sum_k W_jk^2).
 SONAR_HD inline double noise_rms_upa(const FrequencyMode& mode, double noise_bandwidth_hz) {
   return std::pow(10.0, noise_level_db(mode, noise_bandwidth_hz) / 20);
 }
@@ -44,8 +45,8 @@ SONAR_HD inline double full_scale_factor(const ReceiverModel& law, double gain_d
   return std::pow(10.0, gain_db / 20) / static_cast<double>(law.full_scale_upa);
 }
 
-/// Power gain of a row in formats that send it: the integer nearest to the row's TVG over the smallest TVG, at least 1.
-/// Exactly sqrt(row gain) is then applied to the amplitude, so that sample / sqrt(gain) undoes it.
+/// Power gain of a row in formats that send it: the power ratio of the row's TVG to the smallest TVG, rounded to an integer, at
+/// least 1. Exactly sqrt(row gain) is then applied to the amplitude, so that sample / sqrt(gain) undoes it.
 SONAR_HD inline std::uint32_t row_power_gain(double row_tvg_db, double smallest_tvg_db) {
   const double gain = std::floor(std::pow(10.0, 0.1 * (row_tvg_db - smallest_tvg_db)) + 0.5);
   if (!(gain > 1)) return 1;

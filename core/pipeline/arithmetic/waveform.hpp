@@ -1,4 +1,4 @@
-// Pulses p(t) after the receiver's filter that have a formula, and their widths: Gaussian, rectangular tone, linear sweep.
+// Formulas for pulses p(t) after the receiver's filter (Gaussian, rectangular tone, linear sweep), and for their widths.
 // Synthesis, shaped noise and level predictions use them (docs/acoustics.md, section 4). C++17-clean, standard library
 // only.
 #pragma once
@@ -42,7 +42,7 @@ SONAR_HD inline double noise_correlation(double b_hz, double time_s) {
   return std::exp(-0.5 * x * x);
 }
 
-/// Rectangular tone of length T after its matched filter: a triangle, as long as the tone on either side.
+/// Rectangular tone of length T after its matched filter: a triangle that reaches T to either side of its peak.
 SONAR_HD inline double tone_envelope(double length_s, double time_s) {
   const double x = std::fabs(time_s) / length_s;
   return x < 1 ? 1 - x : 0;
@@ -52,11 +52,12 @@ SONAR_HD inline double tone_envelope_spectrum_s(double length_s, double frequenc
   const double d = sinc(frequency_offset_hz * length_s);
   return length_s * d * d;
 }
-/// -3 dB width in delay over the tone's length, 2 - sqrt 2: in range 0.293 c T.
+/// -3 dB width in delay, divided by the tone's length: 2 - sqrt 2. As a range, the width is 0.293 c T.
 inline constexpr double tone_width_per_length = 0.58578643762690485;
 
 /// Linear sweep over B after its matched filter with a Hamming window: the transform of 0.54 + 0.46 cos(2 pi nu / B), side lobes
-/// at -42.6 dB and falling as 1 / t. They fade out from 24 / B to 48 / B, where they are at -60 dB.
+/// at -42.6 dB and falling as 1 / t. They fade out between 24 / B and 48 / B; without the fade they would be at -60 dB at
+/// 48 / B.
 SONAR_HD inline double sweep_envelope(double bandwidth_hz, double time_s) {
   constexpr double fade_from = 24, over_at = 48, neighbour = 0.23 / 0.54;
   const double x = std::fabs(bandwidth_hz * time_s);
@@ -66,7 +67,7 @@ SONAR_HD inline double sweep_envelope(double bandwidth_hz, double time_s) {
   return p * fade * fade;
 }
 inline constexpr double sweep_reach = 48;  // p(t) = 0 from here on, in 1 / B
-/// -3 dB width in delay times B.
+/// -3 dB width in delay, multiplied by B.
 inline constexpr double sweep_width_times_bandwidth = 1.3029820808162345;
 
 }  // namespace sonar

@@ -1,5 +1,6 @@
 // Traces the view via mirrors: the rays of a fan are followed via up to two flat mirrors. Each direction has one
-// sequence of mirrors, so that one map is enough for all paths. multipath_scatter finds in it the places that a path reaches.
+// sequence of mirrors, so that one map is enough for all paths. In this map, multipath_scatter finds the places that each path
+// reaches.
 #pragma once
 
 #include <array>
@@ -29,11 +30,12 @@ struct PathWindow {
   bool empty() const { return last_bin < first_bin; }
 };
 
-/// Per column, over the tangent of elevation.
+/// For each column, nodes spaced evenly in the tangent of elevation.
 struct BounceMap {
   static constexpr std::uint8_t no_mirror = 0xFF;
   struct Node {
-    float inverse_x[3];      // after 0, 1, 2 bounces: 1 / x of the surface hit, x along the unfolded path (DepthMap), 0 = none
+    /// [n]: 1 / x of the surface hit after n bounces (0: none); x runs along the unfolded path, as in DepthMap.
+    float inverse_x[3];
     std::uint8_t mirror[2];  // index of the first and the second mirror, or no_mirror
   };
   BounceFan fan;

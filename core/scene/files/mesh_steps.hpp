@@ -13,10 +13,10 @@ std::string mesh_extension(const std::filesystem::path& file);
 
 tl::unexpected<Error> bad_mesh(const MeshFile& request, const std::string& what);
 
-/// Error if the importer would need more memory for files of so many bytes than is left.
+/// Fails if importing files of `bytes` bytes would need more memory than is free.
 Result<void> check_import_memory(const MeshFile& request, std::uintmax_t bytes);
 
-/// `source` passes at most `triangles` triangles, in units and axes of the file.
+/// `source` yields at most `triangles` triangles, in the file's units and axes.
 Result<LoadedMesh> finish_mesh(const MeshFile& request, bool y_up_by_default, std::uint64_t triangles,
                                std::vector<std::string> names, const TriangleSource& source);
 

@@ -19,7 +19,7 @@ Result<void> Beacon::open(const SonarConfig& sonar, const protocol::Port& port) 
   return {};
 }
 
-/// If an exception ends send(), it begins again after a period, or at once by send_now().
+/// If an exception ends send(), start() is called again after one period, or as soon as send_now() is called.
 void Beacon::start() {
   if (period_.count() == 0) return;
   asio::co_spawn(
@@ -43,7 +43,7 @@ void Beacon::stop() {
 
 asio::awaitable<void> Beacon::send() {
   while (!stopping_) {
-    timer_.expires_after(period_);  // before the bytes are made: send_now() during a write counts
+    timer_.expires_after(period_);  // set before the bytes are made, so that a send_now() during a write is not lost
     sent_at_ = std::chrono::steady_clock::now();
     const std::vector<protocol::Bytes> datagrams = make_();
     for (const protocol::Bytes& status : datagrams)

@@ -75,7 +75,8 @@ TEST(ConfigMavlink, MistakesAreNamed) {
   EXPECT_THAT(why("{mavlink: [{endpoint: 'udpin:127.0.0.1:1', vehicle: ship}]}"), HasSubstr("rov"));
   EXPECT_THAT(why("{mavlink: [{endpoint: 'udpin:127.0.0.1:1', rate_hz: 0}]}"), HasSubstr("poses.mavlink[0].rate_hz"));
   EXPECT_THAT(why("{mavlink: [{endpoint: 'udpin:127.0.0.1:1', system_id: 256}]}"), HasSubstr("poses.mavlink[0].system_id"));
-  EXPECT_THAT(why("{mavlink: [{endpoint: 'udpin:127.0.0.1:1'}, {endpoint: 'udpin:127.0.0.1:1'}]}"), HasSubstr("used twice"));
+  EXPECT_THAT(why("{mavlink: [{endpoint: 'udpin:127.0.0.1:1'}, {endpoint: 'udpin:127.0.0.1:1'}]}"),
+              HasSubstr("another link already uses"));
   EXPECT_THAT(why("{mavlink: [{endpont: 'udpin:127.0.0.1:1'}]}"), HasSubstr("endpoint"));
 }
 

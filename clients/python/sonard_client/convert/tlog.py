@@ -63,7 +63,7 @@ def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
 
 
 def _is_supported(f: Dict[str, float]) -> bool:
-    """Whether the frames of an ODOMETRY are supported. A world frame as child_frame_id is the velocity's; the body is FRD."""
+    """Whether an ODOMETRY's frames are supported. A world frame as child_frame_id concerns only velocity; the body is FRD."""
     return f["frame_id"] in (LOCAL_NED, LOCAL_FRD) and f["child_frame_id"] in (BODY_NED, BODY_FRD, BODY_FLU, f["frame_id"])
 
 
@@ -136,7 +136,7 @@ class _Vehicle:
             if math.isfinite(fields["press_abs"]):
                 self.pressures.setdefault(name, []).append((t, fields["press_abs"]))
             return
-        if name == "VFR_HUD":  # without a time; above the surface of submarines, above sea level or the home of others
+        if name == "VFR_HUD":  # has no time; submarines: altitude above the surface; others: above sea level or home
             if math.isfinite(fields["alt"]) and self._boot is not None:  # else its time since start is not known yet
                 now = self._before_s + self._boot[0] + logged.received_s - self._boot[1]
                 self.depths.setdefault(name, []).append((now, -fields["alt"]))

@@ -145,7 +145,7 @@ class Scene:
         return list(self.status.ping_times)
 
     def moves(self) -> Tuple[int, ...]:
-        """Returns counts of which one grows as long as there is any activity between sonar and driver."""
+        """Returns counts. Any activity between sonar and driver increases at least one of them."""
         wire = self.capture
         return (len(self.status.ping_times), len(self.driver.published), len(self.driver.line_times),
                 len(wire.seen()) if wire else 0, len(wire.connections) if wire else len(self.status.connections),

@@ -1,5 +1,5 @@
-"""The pings that are really in what a sonar sends, whatever faults are in it: what a driver may publish. Each make has a row in
-makes/__init__.py and a file beside it."""
+"""Finds the intact pings in what a sonar sends, whatever faults are in it; a driver may publish only these. Each make has a row
+in makes/__init__.py and a file beside it."""
 from __future__ import annotations
 
 from typing import Callable, FrozenSet, Iterator, List, Mapping, NamedTuple, Optional, Protocol, Tuple
@@ -37,7 +37,7 @@ class Make(NamedTuple):
     datagrams: Callable[[], Reader] = NoPings    # reads a flow of datagrams
     is_request: Callable[[bytes], bool] = bool   # whether bytes of a driver are settings or a request for pings
     needs_request: bool = True                   # False: the sonar pings as soon as a client connects
-    is_pushed: Optional[Callable[[bytes], bool]] = None  # whether a datagram that no driver's datagram preceded is of a ping
+    is_pushed: Optional[Callable[[bytes], bool]] = None  # whether an unrequested datagram belongs to a ping
     numbered: bool = True                        # False: its pings have other numbers than the journal, or none
     sonar: Mapping[str, object] = {}             # keys of the sonar's configuration, beside the usual ones
 
@@ -46,7 +46,7 @@ LOOKS_DOWN = {"mount": {"frame": "FRD", "xyz_m": [0, 0, 0], "rpy_deg": [0, -90, 
 
 
 class WholeMessages:
-    """Finds whole messages at any offset, whatever is between them. A message that is never completed hides none behind it.
+    """Finds whole messages at any offset, whatever is between them. An incomplete message does not hide later ones.
 
     is_stream: False drops what a datagram leaves incomplete."""
     magic = b""

@@ -115,8 +115,8 @@ class DatagramFlow(Connection):
 class Capture(threading.Thread):
     """Captures packets from start() to stop(). Needs CAP_NET_RAW, which a process has in its own network namespace.
 
-    interface: "lo" or the end of the cable. device: the sonar's address. port: where a driver connects first; tcp_ports: further
-    ones. make: None reads no pings."""
+    interface: "lo" or our end of the veth pair. device: the sonar's address. port: where a driver connects first; tcp_ports:
+    further ones. make: None reads no pings."""
 
     def __init__(self, interface: str, device: str, port: int, make: Optional[Make], tcp_ports: Collection[int] = ()) -> None:
         super().__init__(daemon=True)

@@ -32,7 +32,7 @@ def unpacked(block: bytes) -> bytes:
             raise ValueError("a copy of bytes that are not there")
         begin = len(out) - back
         piece = bytes(out[begin:begin + length])
-        out += (piece * (length // len(piece) + 1))[:length]  # a copy may contain what it makes
+        out += (piece * (length // len(piece) + 1))[:length]  # a copy may overlap its output
     if len(out) != size or at != len(block):
         raise ValueError("another size than announced")
     return bytes(out)
