@@ -30,8 +30,9 @@ Result<void> PlayedPings::open(const std::string& file) {
 
 void PlayedPings::rewind() {
   reader_.rewind();
-  splitter_.reset();
-  if (codec_.framing != nullptr) splitter_.emplace(recording::Origin::device, *codec_.framing);
+  splitter_ = nullptr;
+  if (codec_.framing != nullptr)
+    splitter_ = std::make_unique<recording::MessageSplitter>(recording::Origin::device, *codec_.framing);
   ahead_ = read();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -51,8 +52,8 @@ class PlayedPings {
 
   recording::RecordingReader& reader_;
   const recording::Codec& codec_;
-  std::optional<recording::MessageSplitter> splitter_;  // for a make whose stream delimits messages
-  std::optional<Part> ahead_;                           // the first part of the next ping
+  std::unique_ptr<recording::MessageSplitter> splitter_;  // for a make whose stream delimits messages
+  std::optional<Part> ahead_;                             // the first part of the next ping
   std::vector<Line> lines_;
   std::size_t after_ = 0;  // place of the line after the last one that was returned
 };
