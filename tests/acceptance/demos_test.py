@@ -5,6 +5,8 @@ The page's part is skipped without browser or page. SONARD_SHOTS names a folder 
 """
 import pathlib
 import re
+import socket
+import struct
 import subprocess
 import sys
 import time
@@ -117,8 +119,20 @@ class Preview(unittest.TestCase):
             self.assertNotIn("viewer connected", daemon.log())
 
     def test_a_host_that_has_left_is_no_trouble(self):
+        payload = struct.pack("<BBHHHHHBB", 1, 1, 0, 100, 88, 740, 1200, 1, 0)  # a scan line
+        request = b"BR" + struct.pack("<HHBB", len(payload), 2601, 0, 0) + payload
+        request += struct.pack("<H", sum(request) & 0xFFFF)
+
+        def has_left():
+            """Requests a line and leaves before the answer, which shows the sonar that nobody receives it."""
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
+                host.bind((HTTP, 20000))
+                host.sendto(request, (SONAR, 12345))
+            time.sleep(0.5)
+            return re.search("clients 0 now, [1-9]", run(SONARCTL, "status").stdout)
+
         with demo("ping360"):
-            self.assertEqual(run(SONARCTL, "listen", "--pings", 5, "--quiet").returncode, 0)
+            eventually(has_left)
             said = run(SONARCTL, "doctor", "--within", 60).stdout
             self.assertIn("ok    udp 127.0.0.2:12345", said)
             self.assertNotIn("The connection of", said)
