@@ -26,12 +26,6 @@ std::string precise(double v) {
 }
 std::string triple(Vec3d v) { return std::string("[") + number(v.x) + ", " + number(v.y) + ", " + number(v.z) + "]"; }
 
-/// Whether a scene would turn the mesh by what its file or its format says; Gazebo and RViz do not.
-bool says_up(const std::string& file) {
-  const std::string extension = mesh_extension(file);
-  return extension == ".dae" || extension == ".gltf" || extension == ".glb";
-}
-
 /// A YAML scalar that parses to this text: without quotes where that is safe, else in double quotes.
 std::string yaml_text(std::string_view text) {
   const auto is_letter = [](char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; };
@@ -217,9 +211,10 @@ class SceneWriter {
         return ", type: plane" + material + ", size_m: [" + number(s.size_m.x) + ", " + number(s.size_m.y) + "]" +
                patch(std::max(s.size_m.x, s.size_m.y));
       case Shape::Kind::mesh: {
-        const double scale = s.scale.x;
+        const double scale = s.scale.x;  // z is up as in Gazebo and RViz
         return ", type: mesh, file: " + yaml_text(s.uri) + material +
-               (scale == 1 ? "" : std::string(", scale: ") + precise(scale)) + (says_up(s.uri) ? ", up: z" : "");
+               (scale == 1 ? "" : std::string(", scale: ") + precise(scale)) +
+               (is_y_up_by_default(mesh_extension(s.uri)) ? ", up: z" : "");
       }
       case Shape::Kind::heightmap:
         return ", type: heightmap, file: " + yaml_text(s.uri) + material + ", size_m: [" + number(s.size_m.x) + ", " +

@@ -1,6 +1,8 @@
 // The steps that the daemon's own readers of meshes and the importer share.
 #pragma once
 
+#include <string_view>
+
 #include "core/scene/files/clean_mesh.hpp"
 #include "core/scene/files/mesh_file.hpp"
 
@@ -10,6 +12,10 @@ constexpr std::uintmax_t max_mesh_bytes = std::uintmax_t{2} << 30;  // limit for
 
 /// The extension in small letters, such as ".obj".
 std::string mesh_extension(const std::filesystem::path& file);
+/// Returns whether y is up in imported meshes of the format unless MeshFile::up says otherwise. Assimp turns COLLADA to y up.
+inline bool is_y_up_by_default(std::string_view extension) {
+  return extension == ".gltf" || extension == ".glb" || extension == ".dae";
+}
 
 tl::unexpected<Error> bad_mesh(const MeshFile& request, const std::string& what);
 

@@ -148,7 +148,7 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
     return bad_mesh(request, "has " + std::to_string(files->free_form_surfaces()) +
                                  " curved surface(s) (surf), which are not read; export polygons");
   const bool dae = extension == ".dae";
-  const bool y_up_by_default = extension == ".gltf" || extension == ".glb" || dae;  // Assimp turns a tagged DAE to y up
+  const bool y_up_by_default = is_y_up_by_default(extension);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());
   const aiScene* scene =  // without post-processing, whose asserts fail on unusual files
       request.in_memory.empty()
