@@ -284,8 +284,7 @@ TEST_F(FramedPings, AreSharedAgainAfterAFault) {
   EXPECT_EQ(after[0].datagrams, after[1].datagrams) << "the fault has ended";
 }
 
-/// Latency is a matter of this computer: it does not follow the clock of the device.
-/// The warnings of a sonar each of whose pings takes three of its periods.
+/// Returns the warnings of a sonar each of whose pings takes three of its periods.
 std::vector<std::string> warnings_of_slow_pings(bool recorded) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   Sonar& sonar = time.sonar("front");
@@ -318,6 +317,7 @@ TEST(SonarInVirtualTime, PingsOfARecordingAreNotTooSlow) {
   EXPECT_THAT(warnings_of_slow_pings(true), ::testing::Not(::testing::Contains(HasSubstr("computing takes"))));
 }
 
+/// Latency is a matter of this computer: it does not follow the clock of the device.
 TEST(SonarInVirtualTime, LatencyIsMeasuredFromTheTrueTimeOfAPing) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   const ConnectionId client = time.connect("front");
