@@ -1,4 +1,4 @@
-// Whether this program runs under the address or the thread sanitizer, where everything takes about ten times as long.
+// States whether this program runs under the address or the thread sanitizer, where everything takes about ten times as long.
 #pragma once
 
 namespace sonar::test {

@@ -36,7 +36,7 @@ bool has_integer(const protocol::Vendor& vendor, protocol::Part part, protocol::
       part, name, [](auto n) { return n; }, none);
 }
 
-/// Whether a model of the vendor accepts `enough` of the values from first to last.
+/// Returns whether a model of the vendor accepts `enough` of the values from first to last.
 template <class T>
 bool accepts(const protocol::Vendor& vendor, std::optional<T> protocol::SettingsOverride::*setting, std::uint32_t first,
              std::uint32_t last, int enough) {

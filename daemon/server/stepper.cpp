@@ -47,7 +47,8 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   return false;
 }
 
-/// Whether a sonar has something to do at the present time but a ping. Each call of advance() is followed by another step().
+/// Returns whether a sonar has something to do at the present time, pings excepted. Each call of advance() is followed by another
+/// step().
 bool Stepper::is_overdue() {
   return std::any_of(fleet_.devices().begin(), fleet_.devices().end(), [this](const Device& d) {
     const auto next = d.sonar().next_tick_of_conversations();

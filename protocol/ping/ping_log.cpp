@@ -15,7 +15,7 @@ ping::Id first_id(BytesView message) {
   fields(reader, header);
   return header.id;
 }
-/// Whether the message answers a host. Such answers may come before the pings and do not identify the product.
+/// Returns whether the message answers a host. Such answers may come before the pings and do not identify the product.
 bool is_answer(ping::Id id) {
   using enum ping::Id;
   return ping::is_of_device(id) || id == device_information || id == protocol_version;

@@ -93,7 +93,7 @@ class Clocks(unittest.TestCase):
             self.assertEqual(result.stdout, "0.250000000 s  1 ping\n")
             reader.join(20)
             self.assertIn("clock lockstep at 0.250 s", run(SONARCTL, "status", "--control", control).stdout)
-            # Nobody takes the pings of this step: it does not end, but Ctrl-C ends the command.
+            # No client receives the pings of this step, so it does not end. Ctrl-C ends the command.
             with subprocess.Popen([str(SONARCTL), "step", "3000", "--control", control], stderr=subprocess.PIPE) as waiting:
                 eventually(lambda: "clock lockstep at 0.250 s" not in run(SONARCTL, "status", "--control", control).stdout)
                 waiting.send_signal(signal.SIGINT)

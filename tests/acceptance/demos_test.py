@@ -124,7 +124,7 @@ class Preview(unittest.TestCase):
         request += struct.pack("<H", sum(request) & 0xFFFF)
 
         def has_left():
-            """Requests a line and leaves before the answer, which shows the sonar that nobody receives it."""
+            """Requests a line and closes its socket before the answer, so that the sonar notices that the host has left."""
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
                 host.bind((HTTP, 20000))
                 host.sendto(request, (SONAR, 12345))

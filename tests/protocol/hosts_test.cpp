@@ -183,7 +183,7 @@ class Talk {
     for (Line& line : lines_) {
       const auto framed = test::bytes_at(make, *line.port, made, state);
       const auto framed_later = test::bytes_at(make, *line.port, looked_at, state);
-      EXPECT_EQ(framed_later ? *framed_later : Bytes{}, framed ? *framed : Bytes{}) << "whoever looks at it finds the same";
+      EXPECT_EQ(framed_later ? *framed_later : Bytes{}, framed ? *framed : Bytes{}) << "the findings are the same";
       by_stream = by_stream || (framed && line.port->kind == Port::Kind::tcp_stream);
       const auto delivery = line.dialogue->on_ping(request.vendor_settings.get(), framed ? framed->size() : 0, now);
       for (const Bytes& prefix : delivery.prefixes) {

@@ -391,7 +391,7 @@ TEST(RecordedDaemon, AFullDiskEndsTheRecordingAndNothingElse) {
     nothing = daemon.ask(control::StopRecording{}).text;
     return nothing.find("nothing is being recorded") == 0;
   }));
-  EXPECT_THAT(nothing, HasSubstr("has ended: ")) << "whoever stops it is told the reason";
+  EXPECT_THAT(nothing, HasSubstr("has ended: ")) << "the answer to a stop has the reason";
   EXPECT_THAT(nothing, HasSubstr("File too large"));
   const auto told = daemon.status().recordings().at(0);
   EXPECT_THAT(told.why(), HasSubstr("File too large"));
