@@ -283,13 +283,35 @@ class Telemetry(WithFolder):
                 self.assert_track(track, range(50), t0=25, metres=1e-5, radians=1e-5)
                 self.assertEqual(["x is used as north" in text for text in self.warned], [True] * (frames[0] == 20))
 
+    def test_odometry_in_a_world_of_enu_or_flu(self):
+        a = math.sqrt(0.5)
+        of_frame = {4: ((0, a, a, 0), lambda n, e, d: (e, n, -d)), 21: ((0, 1, 0, 0), lambda n, e, d: (n, -e, -d))}
+        for frame, body in ((4, 8), (4, 12), (4, 13), (21, 12), (21, 13)):
+            with self.subTest(frame=frame, body=body):
+                turn, place = of_frame[frame]
+                log = b""
+                for step in range(50):
+                    t, north, east, down, *angles = made.moment(step)
+                    q = made.times(turn, made.times(made.quaternion(*angles), (0, 1, 0, 0) if body == 13 else (1, 0, 0, 0)))
+                    values = round(1e6 * (25 + t)), *place(north, east, down), *q, *[0] * 6, frame, body, 0, 0, 0
+                    log += bytes(8) + made.mavlink_frame("ODOMETRY", values)
+                self.assert_track(self.convert(log, kind="tlog"), range(50), t0=25, metres=1e-5, radians=1e-5)
+                self.assertEqual(["x is used as north" in text for text in self.warned], [True] * (frame == 21))
+
+    def test_a_vehicle_in_enu_that_faces_east_and_climbs(self):
+        values = 1000, 3, 0, -2, 1, 0, 0, 0, *[0] * 6, 4, 13, 0, 0, 0  # ROS's axes, no turn: ahead is east; 3 m east, 2 m deep
+        row, = self.convert(bytes(8) + made.mavlink_frame("ODOMETRY", values), kind="tlog").rows
+        self.assertEqual(row.position_m, (0, 3, 2))
+        for got, wanted in zip(row.orientation, made.quaternion(0, 0, math.pi / 2)):
+            self.assertAlmostEqual(abs(got), wanted, delta=1e-6)
+
     def test_a_level_body_in_flu_is_level(self):
         values = 1000, 1, 2, 3, 0, 1, 0, 0, *[0] * 6, 1, 13, 0, 0, 0  # to NED: half a turn about the forward axis
         row, = self.convert(bytes(8) + made.mavlink_frame("ODOMETRY", values)).rows
         self.assertEqual([abs(part) for part in row.orientation], [1, 0, 0, 0])
 
     def test_odometry_in_unsupported_frames_is_omitted(self):
-        for frames in ((21, 8), (1, 20), (20, 1), (1, 0), (12, 12)):
+        for frames in ((21, 21), (4, 4), (4, 20), (1, 20), (20, 1), (1, 0), (12, 12)):
             with self.subTest(frames):
                 frame_ids = "frame_id %d and child_frame_id %d" % frames
                 self.convert(made.telemetry_log(("ODOMETRY",), 3) + made.telemetry_log(("ODOMETRY",), 2, frames=frames))

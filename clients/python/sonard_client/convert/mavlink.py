@@ -48,7 +48,7 @@ MESSAGES: Dict[int, Message] = {
                         "reset_counter estimator_type quality")),
 }
 # MAV_FRAME, as frame_id and child_frame_id of ODOMETRY.
-LOCAL_NED, LOCAL_FRD = 1, 20
+LOCAL_NED, LOCAL_ENU, LOCAL_FRD, LOCAL_FLU = 1, 4, 20, 21
 SUBMARINE = 12  # MAV_TYPE
 BODY_NED, BODY_FRD, BODY_FLU = 8, 12, 13  # BODY_NED is deprecated and means FRD
 

@@ -8,9 +8,9 @@ import pathlib
 from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 from ..geodesy import Geodetic
-from ..rotations import Quaternion, quaternion_from_rpy, unit
-from .mavlink import (BODY_FLU, BODY_FRD, BODY_NED, LOCAL_FRD, LOCAL_NED, MESSAGES, SUBMARINE, Frame, fields_of, frame_length,
-                      read_frame)
+from ..rotations import Quaternion, Vector3, quaternion_from_rpy, unit
+from .mavlink import (BODY_FLU, BODY_FRD, BODY_NED, LOCAL_ENU, LOCAL_FLU, LOCAL_FRD, LOCAL_NED, MESSAGES, SUBMARINE, Frame,
+                      fields_of, frame_length, read_frame)
 from .track import ConvertError, Place2, Source, Stream, Track, Warn, chosen, depth_source, track_of
 
 STAMP_BYTES = 8
@@ -64,12 +64,27 @@ def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
 
 def _is_supported(f: Dict[str, float]) -> bool:
     """Whether an ODOMETRY's frames are supported. A world frame as child_frame_id concerns only velocity; the body is FRD."""
-    return f["frame_id"] in (LOCAL_NED, LOCAL_FRD) and f["child_frame_id"] in (BODY_NED, BODY_FRD, BODY_FLU, f["frame_id"])
+    bodies = (BODY_NED, BODY_FRD, BODY_FLU)
+    if f["frame_id"] in (LOCAL_NED, LOCAL_FRD):
+        return f["child_frame_id"] in (*bodies, f["frame_id"])
+    return f["frame_id"] in (LOCAL_ENU, LOCAL_FLU) and f["child_frame_id"] in bodies
 
 
 def _of_frd(q: Quaternion) -> Quaternion:
     """Attitude of the FRD body from that of the FLU body: q (0, 1, 0, 0), half a turn about the forward axis."""
     return -q[1], q[0], q[3], -q[2]
+
+
+def _in_ned(frame_id: float, q: Quaternion, p: Vector3) -> Tuple[Quaternion, Vector3]:
+    """Turns an attitude and a position from a local frame to NED: half a turn about the axis (1, 1, 0) from ENU, (1, 0, 0) from
+    FLU."""
+    w, x, y, z = q
+    if frame_id == LOCAL_ENU:
+        a = math.sqrt(0.5)
+        return (-a * (x + y), a * (w + z), a * (w - z), a * (y - x)), (p[1], p[0], -p[2])
+    if frame_id == LOCAL_FLU:
+        return (-x, w, -z, y), (p[0], -p[1], -p[2])
+    return q, p
 
 
 def _angles(f: Dict[str, float]) -> Optional[Quaternion]:
@@ -155,6 +170,8 @@ class _Vehicle:
             attitude = _angles(fields)
         if name in ("ODOMETRY", "ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE", "LOCAL_POSITION_NED"):
             position = _metres(fields)
+            if name == "ODOMETRY" and attitude is not None and position is not None:
+                attitude, position = _in_ned(fields["frame_id"], attitude, position)
         elif name in ("SIM_STATE", "GLOBAL_POSITION_INT"):
             place = _simulated_place(fields) if name == "SIM_STATE" else \
                 Geodetic(1e-7 * fields["lat"], 1e-7 * fields["lon"], 1e-3 * fields["alt"])
@@ -165,7 +182,7 @@ class _Vehicle:
                 self.depths.setdefault(name, []).append((t, -1e-3 * fields["relative_alt"]))
         if name in FULL and (attitude is None or position is None):
             return
-        if fields.get("frame_id") == LOCAL_FRD:
+        if fields.get("frame_id") in (LOCAL_FRD, LOCAL_FLU):
             self._local_headings[component] = True
         if attitude is not None:
             self.attitudes.setdefault(name, []).append((t, attitude))
@@ -302,7 +319,8 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
     if vehicle.unsupported:
         warn("ODOMETRY with " + ", ".join(f"frame_id {world:.0f} and child_frame_id {body:.0f} ({n} messages)"
                                           for (world, body), n in sorted(vehicle.unsupported.items())) +
-             " was omitted: supported are local NED and FRD (1, 20) with bodies in FRD (12, 8 or the world frame) or FLU (13)")
+             " was omitted: supported are local NED, ENU, FRD and FLU (1, 4, 20, 21) with bodies in FRD (12, 8, or the world "
+             "frame of NED and FRD) or FLU (13)")
     choices = vehicle.choices()
     if choices:
         warn("several components send the same message; using the autopilot's, else the first, and another one "
