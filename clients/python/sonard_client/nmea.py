@@ -1,6 +1,6 @@
 """Parses NMEA 0183 sentences and derives poses from them, without sockets or clocks.
 
-HDT: heading. PRDID: pitch, roll, heading. PHTRO: pitch and roll. GGA, RMC, GLL: position. DPT, DBT: depth of water below a
+HDT, THS, HDG: heading. PRDID: pitch, roll, heading. PHTRO: pitch and roll. GGA, RMC, GLL: position. DPT, DBT: depth of water below a
 transducer.
 """
 from __future__ import annotations
@@ -13,7 +13,8 @@ from .rotations import Vector3
 
 DAY_S = 86400.0
 FIX_KINDS = ("GGA", "RMC", "GLL")  # in order of preference; the others repeat the fix
-ATTITUDE_KINDS = ("HDT", "PRDID", "PHTRO")
+TRUE_HEADINGS = {"HDT", "THS"}
+ATTITUDE_KINDS = (*TRUE_HEADINGS, "HDG", "PRDID", "PHTRO")
 DEPTH_KINDS = ("DPT", "DBT")
 
 
@@ -70,6 +71,16 @@ def _angle(text: str, half: str, degrees: int) -> Optional[float]:
         return None
     value = int(text[:degrees]) + minutes / 60
     return -value if half in ("S", "W") else value
+
+
+def _true_heading(fields: Tuple[str, ...]) -> Optional[float]:
+    """The true heading of HDG: magnetic heading, deviation and variation. None without a variation."""
+    if len(fields) < 5:
+        return None
+    magnetic, deviation, variation = _number(fields[0]), _number(fields[1] or "0"), _number(fields[3])
+    if magnetic is None or deviation is None or variation is None or fields[4] not in ("E", "W"):
+        return None
+    return (magnetic + (-deviation if fields[2] == "W" else deviation) + (-variation if fields[4] == "W" else variation)) % 360
 
 
 def time_of_day_s(text: str) -> Optional[float]:
@@ -130,11 +141,14 @@ class Instruments:
 
     def _attitude(self, kind: str, fields: Tuple[str, ...]) -> str:
         numbers: List[Optional[float]] = [_number(f) for f in fields]
-        if kind == "HDT" and numbers and numbers[0] is not None:
+        if kind in TRUE_HEADINGS and numbers and numbers[0] is not None and not (kind == "THS" and fields[1:2] == ("V",)):
             self.heading_deg = numbers[0]
+        elif kind == "HDG" and (true := _true_heading(fields)) is not None:
+            if not self.received & {*TRUE_HEADINGS, "PRDID"}:
+                self.heading_deg = true
         elif kind == "PRDID" and len(numbers) >= 3 and None not in numbers[:3]:
             self.pitch_deg, self.roll_deg = numbers[0], numbers[1]
-            if "HDT" not in self.received:
+            if not self.received & TRUE_HEADINGS:
                 self.heading_deg = numbers[2]
         elif kind == "PHTRO" and len(numbers) >= 4 and numbers[0] is not None and numbers[2] is not None and \
                 fields[1] in ("M", "P") and fields[3] in ("B", "T"):
@@ -208,7 +222,8 @@ class NmeaPoses:
         if now.place is None:
             out.append("no position (a fix of GGA, RMC or GLL)" + (": --at is used" if assumed.north_east_m else ""))
         if now.heading_deg is None:
-            out.append("no heading (HDT or PRDID)" + (": --heading is used" if assumed.heading_deg is not None else ""))
+            out.append("no heading (HDT, THS, PRDID, or HDG with the variation): --heading " +
+                       ("is used" if assumed.heading_deg is not None else "DEG sets one"))
         if now.pitch_deg is None:
             out.append("no pitch and roll (PRDID or PHTRO): 0 is used")
         if now.water_below_m is None:

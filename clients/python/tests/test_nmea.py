@@ -62,6 +62,18 @@ class Signs(unittest.TestCase):
         self.assertEqual(self.after("HEHDT,10.0,T", "PRDID,0,0,50.0").heading_deg, 10)
         self.assertEqual(self.after("PRDID,0,0,50.0", "HEHDT,10.0,T").heading_deg, 10)
 
+    def test_other_headings(self):
+        self.assertEqual(self.after("GPTHS,77.5,A").heading_deg, 77.5)
+        self.assertIsNone(self.after("GPTHS,77.5,V").heading_deg)
+        for fields, heading in (("98.3,1.0,E,12.6,W", 86.7), ("98.3,,,12.6,E", 110.9), ("5.0,1.0,W,10.0,W", 354), ("98.3,,,,", None),
+                                ("98.3", None), (",,,12.6,E", None)):
+            with self.subTest(fields):
+                got = self.after("HCHDG," + fields).heading_deg
+                self.assertIsNone(got) if heading is None else self.assertAlmostEqual(got, heading)
+        for better in ("HEHDT,10.0,T", "HETHS,10.0,A", "PRDID,0,0,10.0"):
+            for bodies in ((better, "HCHDG,98.3,,,1.0,E"), ("HCHDG,98.3,,,1.0,E", better)):
+                self.assertEqual(self.after(*bodies).heading_deg, 10, bodies)
+
     def test_hemispheres(self):
         for halves, latitude, longitude in (("NE", 48.1173, 11.516666667), ("SW", -48.1173, -11.516666667)):
             place = self.after(f"GPGLL,4807.038,{halves[0]},01131.000,{halves[1]},123519,A").place
