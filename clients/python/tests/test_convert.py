@@ -119,7 +119,12 @@ class Corrupted(WithFolder):
                            (b"time,x,y\n1,2,3\n", "name the file in `traj"),
                            (b"# frame: ENU_FLU\n1.5 0 0 0 0 0 0 1\n", "sonard plays TUM"), (b"\x1f\x8b\x08", "gunzip -k .*log"),
                            (b"\x28\xb5\x2f\xfd", "zstd -d"), (b"#ROSBAG V1.2\n", "rosbag migrate .*log NEW.bag"),
-                           (b"FMT, 128, 89, FMT, BBnNZ, Type\n", "as text; give the .bin"), (b"PK\x03\x04..", "unzip")):
+                           (b"FMT, 128, 89, FMT, BBnNZ, Type\n", "as text; give the .bin"), (b"PK\x03\x04..", "unzip"),
+                           (b"\xef\xbb\xbf<?xml version='1.0'?><gpx>", "XML, such as GPX"), (b"\n<kml>", "XML.*in metres"),
+                           (b"lat,lon,time\n60,5,0\n", "latitudes and longitudes; write poses as CSV, in metres"),
+                           (b"t;\"Longitude\";\"Latitude\"\n0;5;60\n", "text with latitudes"), (b'{"type": 1}', "JSON"),
+                           (bytes([14, 16]) + bytes(6) + b".FIT" + bytes(20), "FIT"), (b"LASF" + bytes(200), "cloud of points"),
+                           (b"\x89HDF\r\n\x1a\n", "BAG, S-102")):
             with self.subTest(data[:8]), self.assertRaisesRegex(ConvertError, said):
                 format_of(self.file(data))
 
@@ -132,6 +137,7 @@ class Corrupted(WithFolder):
     def test_results_of_a_download_that_went_wrong(self):
         for name, content, says in (("a.tlog", b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
                                     ("a.db3", b"<!DOCTYPE html><html>", "a web page"),
+                                    ("a.gpx", b" <html><head>", "a web page"),
                                     ("a.gpx", b"<?xml version=\"1.0\"?><gpx/>", "GPX and KML, without attitudes"),
                                     ("a.pcap", b"\xd4\xc3\xb2\xa1", "a capture of packets"),
                                     ("a.bin.xz", b"\xfd7zXZ\x00", "unxz -k")):

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import pathlib
+import re
 from typing import Callable, Optional, Union
 
 from ..geodesy import Geodetic
@@ -21,6 +22,7 @@ from .ulog import read_ulog
 FORMATS = ("dataflash", "tlog", "mcap", "rosbag", "db3", "ulog", "nmea")
 RECORDINGS = ("mcap", "rosbag", "db3")  # their positions are metres in an unknown frame
 _HEAD_BYTES = 4096
+_WRITE = "write poses as CSV, in metres: sonard_client.geodesy converts degrees (docs/poses.md)"
 # Common formats that cannot be read: first bytes, name of the format, advice; {} is the file.
 _OTHERS = (
     (b"\x28\xb5\x2f\xfd", "compressed by zstd; unpack it first: zstd -d {}"),
@@ -31,14 +33,15 @@ _OTHERS = (
     (b"PK\x03\x04", "a ZIP archive; unpack it first: unzip {}"),
     (b"#ROSBAG V1", "a ROS 1 bag of an old format; rewrite it: rosbag migrate {} NEW.bag"),
     (b"FMT, 128, ", "a dataflash log as text; give the .bin file that it was made from"),
-    (b"\x89HDF\r\n", "HDF5, as .mat files of MATLAB 7.3 are; write its poses as CSV (docs/poses.md)"),
+    (b"\x89HDF\r\n", "HDF5, as .mat files of MATLAB 7.3 and grids (BAG, S-102) are; write its poses as CSV (docs/poses.md), or name "
+     "the grid in the scene (docs/scenes.md)"),
+    (b"LASF", "a cloud of points (LAS, LAZ), not a track; give the log of the vehicle"),
     (b"version https://git-lfs", "a pointer of Git LFS, not the file itself; to fetch the file: git lfs pull"),
-    (b"<!DOCTYPE html", "a web page, not the file itself; was the download refused? Fetch it again"),
-    (b"<?xml", "XML, such as GPX and KML, without attitudes; write poses as CSV (docs/poses.md)"),
+    (b"<", "XML, such as GPX and KML, without attitudes; " + _WRITE),
     (b"CDF", "NetCDF; write its poses as CSV (docs/poses.md)"),
     (b"\xd4\xc3\xb2\xa1", "a capture of packets; give the log of the vehicle"),
     (b"\n\r\r\n", "a capture of packets; give the log of the vehicle"),
-    (b"{", "JSON; write its poses as CSV (docs/poses.md)"),
+    (b"{", "JSON; " + _WRITE),
     (b"\xff\xfe", "text in UTF-16; save it as UTF-8"),
     (b"MATLAB 5.0", "a MATLAB file; write its poses as CSV (docs/poses.md)"),
 )
@@ -46,14 +49,21 @@ _OTHERS = (
 
 def _described(path: pathlib.Path, head: bytes) -> str:
     """Names the format of a file that cannot be read, with advice; empty if the format is unknown."""
+    plain = head[3:].lstrip() if head.startswith(b"\xef\xbb\xbf") else head.lstrip()
+    if plain[:15].lower().startswith((b"<!doctype html", b"<html")):
+        return "a web page, not the file itself; was the download refused? Fetch it again"
     for magic, text in _OTHERS:
-        if head.startswith(magic):
+        if head.startswith(magic) or plain.startswith(magic):
             return text.format(path)
+    if head[8:12] == b".FIT":
+        return "a track of a watch or a GPS (FIT), without attitudes; " + _WRITE
     frame = frame_length(head, 0)
     if frame is not None and frame_length(head, frame) is not None:
         return ("MAVLink frames without times; give the telemetry log of a ground station (.tlog) or the autopilot's own log "
                 "(.bin), or send the frames to a running sonard (docs/poses.md)")
     first = next((line for line in head.split(b"\n") if line.strip() and not line.startswith(b"#")), head)
+    if re.search(rb"(?i)(^|[,;\t ])\"?(lat|lon|latitude|longitude|lng)(_deg)?\"?([,;\t ]|$)", first.strip()):
+        return "text with latitudes and longitudes; " + _WRITE
     if all(9 <= byte < 128 for byte in head) and (set(first) <= set(b"0123456789+-.eE, \t\r") or first[:1] in b"tT"):
         return ("text; sonard plays TUM, EuRoC, KITTI and CSV with a header unconverted: name the file in `trajectory:` "
                 "(docs/poses.md)")
