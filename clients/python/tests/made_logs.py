@@ -332,7 +332,8 @@ def ulog_message(kind, content):
     return struct.pack("<HB", len(content), ord(kind)) + content
 
 
-def ulog(truth=False, steps=50, has_place=True):
+def ulog(truth=False, steps=50, has_place=True, local=0):
+    """local: the instance of the local position."""
     formats = ["vehicle_attitude:uint64_t timestamp;uint64_t timestamp_sample;float[4] q;float[4] delta_q_reset;uint8_t n;"
                "uint8_t[7] _padding0",
                "vehicle_local_position:uint64_t timestamp;float x;float y;float z;double ref_lat;double ref_lon;float ref_alt;"
@@ -343,12 +344,12 @@ def ulog(truth=False, steps=50, has_place=True):
     out += b"".join(ulog_message("F", text.encode()) for text in formats)
     out += ulog_message("F", b"other:uint64_t timestamp;nested[2] n")
     names = [text.split(":")[0] for text in formats]
-    out += b"".join(ulog_message("A", bytes([0]) + struct.pack("<H", n) + name.encode()) for n, name in enumerate(names))
+    out += b"".join(ulog_message("A", struct.pack("<BH", local * (n == 1), n) + name.encode()) for n, name in enumerate(names))
     out += ulog_message("A", bytes([1]) + struct.pack("<H", 9) + b"vehicle_attitude")  # a second instance
     for step in range(steps):
         t, north, east, down, *angles = moment(step)
         stamp = round(1e6 * t)
-        out += ulog_message("D", struct.pack("<HQ4f", 9, stamp, *quaternion(1, 1, 1)))
+        out += ulog_message("D", struct.pack("<HQQ4f4fB", 9, stamp, stamp, *quaternion(1, 1, 1), 0, 0, 0, 0, 1))
         out += ulog_message("D", struct.pack("<HQQ4f4fB", 0, stamp + 2000, stamp, *quaternion(*angles), 0, 0, 0, 0, 1))
         out += ulog_message("D", struct.pack("<HQ3f2df4?", 1, stamp, north, east, down, *ORIGIN, has_place, step > 0, True, True))
         if truth:

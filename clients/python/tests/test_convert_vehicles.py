@@ -434,6 +434,18 @@ class Px4(WithFolder):
         self.assert_track(track, range(1, 50), metres=1e-5, radians=1e-5)  # the first position is not valid
         self.assertIn("origin: 47.60000000,-122.33000000,10.000", track.comments)
 
+    def test_the_lowest_instance_with_values_is_used(self):
+        track = self.convert(made.ulog(local=1))  # of two instances of the attitude the first counts
+        self.assert_track(track, range(1, 50), metres=1e-5, radians=1e-5)
+        self.assertIn("origin: 47.60000000,-122.33000000,10.000", track.comments)
+        self.assertEqual(self.warned, ["without values of the first instance; used: vehicle_local_position 1"])
+        self.convert(made.ulog(has_place=False, local=2))
+        self.assertEqual(self.warned[0], "without values of the first instance; used: vehicle_local_position 2")
+        second = made.ulog()[len(made.ulog(steps=0)):]  # messages of an instance 0 that come later
+        for log in (made.ulog(local=3) + made.ulog_message("A", bytes([0, 1, 0]) + b"vehicle_local_position") + second,):
+            self.assertEqual(len(self.convert(log).rows), 49)
+            self.assertFalse([text for text in self.warned if "first instance" in text])
+
     def test_truth_of_the_simulator_is_preferred(self):
         track = self.convert(made.ulog(truth=True))
         self.assertEqual(track.source, "vehicle_attitude_groundtruth+vehicle_local_position_groundtruth")

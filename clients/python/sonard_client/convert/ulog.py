@@ -32,6 +32,9 @@ _READ: Dict[str, Tuple[Tuple[str, ...], int]] = {
     **dict.fromkeys(("xy_valid", "z_valid", "xy_global", "z_global", "lat_lon_valid", "alt_valid"), (_FLAG, 1))}
 
 
+Instance = Tuple[str, int]  # of a message: its name and number
+
+
 class Layout(NamedTuple):
     body: struct.Struct  # up to the last field that is read; the padding at a format's end is not logged
     fields: Dict[str, Tuple[int, int]]  # by name: its first value and how many
@@ -67,13 +70,14 @@ def _layout(text: str) -> Union[Layout, str]:
 
 class _Log:
     def __init__(self, data: bytes, name: str, warn: Warn) -> None:
-        self.attitudes: Dict[str, Stream[Quaternion]] = {}
-        self.positions: "Dict[str, Stream]" = {}
-        self.depths: Stream[float] = []  # down [m], of local positions, whose x and y may be invalid
-        self.origin: Optional[Geodetic] = None
+        # By message and instance; the lowest instance with values is used.
+        self.attitudes: Dict[Instance, Stream[Quaternion]] = {}
+        self.positions: "Dict[Instance, Stream]" = {}
+        self.depths: Dict[Instance, Stream[float]] = {}  # down [m], of local positions, whose x and y may be invalid
+        self._origins: Dict[Instance, Geodetic] = {}
         self._layouts: Dict[str, Layout] = {}
         self._short: Dict[str, int] = {}  # messages that are shorter than their format
-        self._named: Dict[int, str] = {}  # subscriptions of the first instance
+        self._subscribed: Dict[int, Instance] = {}
         at = HEAD_BYTES
         while at + 3 <= len(data):
             size, kind = struct.unpack_from("<HB", data, at)
@@ -95,43 +99,64 @@ class _Log:
                 else:
                     self._layouts.pop(name, None)
                     warn(f"at byte {at}: {name} is omitted: its format cannot be read: {layout}")
-        elif kind == "A" and len(content) > 3 and content[0] == 0:
-            self._named[int.from_bytes(content[1:3], "little")] = content[3:].decode("latin-1")
+        elif kind == "A" and len(content) > 3:
+            self._subscribed[int.from_bytes(content[1:3], "little")] = content[3:].decode("latin-1"), content[0]
         elif kind == "D" and len(content) > 2:
-            name = self._named.get(int.from_bytes(content[:2], "little"), "")
+            instance = name, _ = self._subscribed.get(int.from_bytes(content[:2], "little"), ("", 0))
             known = self._layouts.get(name)
             if known is not None and len(content) < 2 + known.body.size:
                 self._short[name] = self._short.get(name, 0) + 1
             elif known is not None:
                 values = known.body.unpack_from(content, 2)
-                self._add(name, {label: values[first] if number == 1 else values[first:first + number]
-                                 for label, (first, number) in known.fields.items()})
+                self._add(instance, {label: values[first] if number == 1 else values[first:first + number]
+                                     for label, (first, number) in known.fields.items()})
 
-    def _add(self, name: str, fields: Dict) -> None:
+    def _add(self, instance: Instance, fields: Dict) -> None:
+        name = instance[0]
         t = 1e-6 * (fields.get("timestamp_sample") or fields.get("timestamp") or 0)
         if name.startswith(ATTITUDE):
             q = fields.get("q")
             if isinstance(q, tuple) and len(q) == 4 and abs(sum(p * p for p in q) - 1) < 1e-3:
-                self.attitudes.setdefault(name, []).append((t, unit(q)))
+                self.attitudes.setdefault(instance, []).append((t, unit(q)))
         elif name.startswith(LOCAL):
             place = tuple(fields.get(axis, math.nan) for axis in "xyz")
             z_valid = fields.get("z_valid", True) and math.isfinite(place[2])
             if z_valid and name == LOCAL:
-                self.depths.append((t, place[2]))
+                self.depths.setdefault(instance, []).append((t, place[2]))
             if z_valid and fields.get("xy_valid", True) and all(map(math.isfinite, place)):
-                self.positions.setdefault(name, []).append((t, place))
-            if self.origin is None and fields.get("xy_global") and fields.get("z_global"):
+                self.positions.setdefault(instance, []).append((t, place))
+            if instance not in self._origins and fields.get("xy_global") and fields.get("z_global"):
                 there = Geodetic(fields.get("ref_lat", 0.0), fields.get("ref_lon", 0.0), fields.get("ref_alt", 0.0))
-                self.origin = there if there.is_fix else None
+                if there.is_fix:
+                    self._origins[instance] = there
         else:
             there = Geodetic(fields.get("lat", 0.0), fields.get("lon", 0.0), fields.get("alt", 0.0))
             if there.is_fix and fields.get("lat_lon_valid", True) and fields.get("alt_valid", True):
-                self.positions.setdefault(name, []).append((t, there))
+                self.positions.setdefault(instance, []).append((t, there))
+
+    @property
+    def origin(self) -> Optional[Geodetic]:
+        return self._origins.get(_lowest(self.positions, LOCAL))
 
     def sources(self) -> List[Source]:
-        return [Source(f"{ATTITUDE}{more}+{position}{more}", self.attitudes.get(ATTITUDE + more, []),
-                       self.positions.get(position + more, [])) for more in (TRUTH, "") for position in (LOCAL, GLOBAL)] + \
-            [depth_source(ATTITUDE, self.attitudes.get(ATTITUDE, []), self.depths)]
+        def attitudes(name: str) -> Stream[Quaternion]:
+            return self.attitudes.get(_lowest(self.attitudes, name), [])
+
+        return [Source(f"{ATTITUDE}{more}+{position}{more}", attitudes(ATTITUDE + more),
+                       self.positions.get(_lowest(self.positions, position + more), []))
+                for more in (TRUTH, "") for position in (LOCAL, GLOBAL)] + \
+            [depth_source(ATTITUDE, attitudes(ATTITUDE), self.depths.get(_lowest(self.depths, LOCAL), []))]
+
+    def further_instances(self, source: Source) -> List[str]:
+        """The instances that the source uses, where it is not the first."""
+        used = [_lowest(values, name) for values, name in
+                [(self.attitudes, name) for name in source.name.split("+")] +
+                [(self.depths, LOCAL)] * source.held + [(self.positions, name) for name in source.name.split("+")]]
+        return [f"{name} {number}" for name, number in used if number > 0]
+
+
+def _lowest(values: Dict[Instance, Stream], name: str) -> Instance:
+    return min((instance for instance in values if instance[0] == name), default=(name, 0))
 
 
 def read_ulog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, origin: Optional[Geodetic] = None,
@@ -142,4 +167,7 @@ def read_ulog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
         raise ConvertError(f"{path}: at byte 0: not a log of PX4: it does not begin with ULog")
     log = _Log(data, str(path), warn)
     wanted = chosen(log.sources(), source, str(path))
+    further = log.further_instances(wanted)
+    if further:
+        warn(f"without values of the first instance; used: {', '.join(further)}")
     return track_of(wanted, str(path), warn, origin, log.origin if wanted.name == f"{ATTITUDE}+{LOCAL}" else None, at)
