@@ -81,6 +81,12 @@ bool is_rotation(const Rotation& r) {
   return largest({dot(a, b), dot(b, c), dot(c, a)}) <= norm_allowed && dot(cross(a, b), c) > 0;
 }
 
+/// Whether a column has latitudes or longitudes, by its name in small letters.
+bool is_of_degrees(std::string_view name) {
+  if (name.ends_with("_deg")) name.remove_suffix(4);
+  return name == "lat" || name == "lon" || name == "lng" || name == "latitude" || name == "longitude";
+}
+
 }  // namespace
 
 // The names in the order of enum Column. The long names carry the unit, which is the same for the short ones.
@@ -141,6 +147,8 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
     out.says_unit_ = out.says_unit_ || name == "t_s" || name == "t_ns";
     std::size_t c = 0;
     while (c < columns && name != long_names[c] && name != short_names[c]) ++c;
+    if (c == columns && is_of_degrees(name))
+      return "column " + in_quotes(header[i]) + ": positions are metres; sonard_client.geodesy converts degrees (docs/poses.md)";
     if (c == columns) return "unknown column " + in_quotes(header[i]) + text::suggestion(name, long_names, "columns");
     if (out.place_[c] >= 0) return "column " + std::string(header[i]) + " appears twice";
     out.place_[c] = static_cast<int>(i);

@@ -311,7 +311,11 @@ Result<std::string> text_of(const std::filesystem::path& file) {
 /// Logs and recordings have zero bytes near their beginning; lines of numbers have none.
 bool is_log(std::string_view text) {
   constexpr std::size_t beginning = 4096;
-  return text.substr(0, beginning).find('\0') != std::string_view::npos || text.starts_with("$G");  // NMEA of a GPS
+  std::string_view begin = text.substr(0, beginning);
+  begin.remove_prefix(std::min(begin.find_first_not_of("\xef\xbb\xbf \t\r\n"), begin.size()));
+  // NMEA of a GPS, XML such as GPX and KML, and JSON: the converter reads them, or tells how to.
+  const bool other_text = begin.starts_with("$G") || begin.starts_with("<") || begin.starts_with("{");
+  return other_text || begin.find('\0') != std::string_view::npos;
 }
 
 }  // namespace

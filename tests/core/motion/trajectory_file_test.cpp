@@ -242,6 +242,8 @@ TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
       {"t,x,y\n", "p.csv:1: column z_m is missing"},
       {"x,y,z\n", "p.csv:1: column t_s is missing"},
       {"t,t_ns,x,y,z\n", "p.csv:1: give the time once"},
+      {"t,lat,lon,depth\n", "p.csv:1: column \"lat\": positions are metres; sonard_client.geodesy converts degrees"},
+      {"Longitude,Latitude,t\n", "p.csv:1: column \"Longitude\": positions are metres"},
       {"t,x,y,z,yaw_dge\n", "did you mean \"yaw_deg\""},
       {"t,x,y,z,x_m\n", "p.csv:1: column x_m appears twice"},
       {"t,x,y,z,qw\n", "p.csv:1: a quaternion needs"},
@@ -281,7 +283,8 @@ TEST(TrajectoryFile, OneThatIsMissingIsSaidToBe) {
 TEST(TrajectoryFile, LogsAreToldTheConverter) {
   const std::filesystem::path file = testing::TempDir() + "poses-log-" + std::to_string(getpid());
   for (const std::string& bytes :
-       {std::string("\0\5\xfd\x1c", 4), std::string("#ROSBAG V2.0\nE\0\0\0", 17), std::string("$GPGGA,1,2\n")}) {
+       {std::string("\0\5\xfd\x1c", 4), std::string("#ROSBAG V2.0\nE\0\0\0", 17), std::string("$GPGGA,1,2\n"),
+        std::string("\xef\xbb\xbf<?xml version=\"1.0\"?><gpx>\n"), std::string("\n <kml>"), std::string("{\"poses\": []}\n")}) {
     std::ofstream(file, std::ios::binary) << bytes;
     const auto refused = load_trajectories(file, enu);
     ASSERT_FALSE(refused);
