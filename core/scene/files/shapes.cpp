@@ -64,7 +64,7 @@ Shape from_grid(const Result<HeightGrid>& grid, std::uint16_t material, const No
   if (!made) return at.fail(made.error().text), Shape{};
   Shape shape = with_material(std::move(made->mesh), material);
   shape.centre_m = made->centre_m;
-  if (centred) shape.centre_m.x = shape.centre_m.y = 0;
+  if (centred && !grid->origin) shape.centre_m.x = shape.centre_m.y = 0;  // the origin of degrees is the grid's middle
   return shape;
 }
 

@@ -249,6 +249,17 @@ TEST(LoadScene, HeightmapsInDegreesStandAboutAnOrigin) {
   EXPECT_THAT(refusal(object(bed + "geographic: true, origin: {lat: 40, lon: 5}"), files.folder()), HasSubstr("at most 5"));
 }
 
+TEST(LoadScene, TheMiddleOfACentredGridInDegreesIsAtThePose) {
+  TemporaryFiles files;  // the parallel of 60 degrees is 1690 m longer than that of 61
+  files.write("g.asc", "ncols 3\nnrows 3\nxllcenter 5\nyllcenter 60\ncellsize 0.5\n-1 -1 -1\n-1 -1 -1\n-1 -1 -1\n");
+  const std::string bed = "type: heightmap, file: g.asc, material: sand, geographic: true";
+  const auto of_its_own = parsed(object(bed), files.folder()), centred = parsed(object(bed + ", centred: true"), files.folder());
+  const Vec3d own_m = of_its_own->objects[0].in_world.position_m, middle_m = centred->objects[0].in_world.position_m;
+  EXPECT_GT(std::hypot(own_m.x, own_m.y), 100);  // the mesh counts from between its first and its last vertex
+  EXPECT_NEAR(middle_m.x, own_m.x, 1e-6);
+  EXPECT_NEAR(middle_m.y, own_m.y, 1e-6);
+}
+
 TEST(LoadScene, MaterialLibrariesOfOnesOwn) {
   TemporaryFiles files;
   files.write("lib.yaml", "kelp: {lambert_db: -40}\n");
