@@ -12,34 +12,55 @@ namespace {
 using namespace std::string_view_literals;
 
 struct Kind {
-  std::string_view begins, says;
+  std::size_t at;
+  std::string_view bytes, says;
 };
 
-constexpr std::array<Kind, 16> kinds{
-    {{"\x1f\x8b"sv, "is compressed with gzip; unpack it (gunzip)"},
-     {"PK\x03\x04"sv, "is a zip archive; unpack it (unzip)"},
-     {"BZh"sv, "is compressed with bzip2; unpack it (bunzip2)"},
-     {"\xfd"
+constexpr std::string_view points =
+    "is a cloud of points, not a surface; make a grid of it: pdal translate IN OUT.tif --writers.gdal.resolution=1 "
+    "--writers.gdal.output_type=mean";
+constexpr std::string_view soundings = "holds pings of a multibeam sonar, not a grid; make one of them (MB-System: mbgrid)";
+constexpr std::string_view netcdf = "is NetCDF; convert it: gdal_translate -of GTiff IN OUT.tif";
+
+constexpr std::array<Kind, 22> kinds{
+    {{0, "\x1f\x8b"sv, "is compressed with gzip; unpack it (gunzip)"},
+     {0, "PK\x03\x04"sv, "is a zip archive; unpack it (unzip)"},
+     {0, "BZh"sv, "is compressed with bzip2; unpack it (bunzip2)"},
+     {0,
+      "\xfd"
       "7zXZ"sv,
       "is compressed with xz; unpack it (unxz)"},
-     {"(\xb5/\xfd"sv, "is compressed with Zstandard; unpack it (unzstd)"},
-     {"7z\xbc\xaf"sv, "is a 7z archive; unpack it"},
-     {"\x89HDF"sv, "is HDF5 (NetCDF-4 and BAG are, too); convert it: gdal_translate -of GTiff IN OUT.tif"},
-     {"CDF\x01"sv, "is NetCDF; convert it: gdal_translate -of GTiff IN OUT.tif"},
-     {"CDF\x02"sv, "is NetCDF; convert it: gdal_translate -of GTiff IN OUT.tif"},
-     {"CDF\x05"sv, "is NetCDF; convert it: gdal_translate -of GTiff IN OUT.tif"},
-     {"LASF"sv, "is a cloud of points (LAS, LAZ); make a grid or a mesh of it"},
-     {"%PDF"sv, "is a PDF document"},
-     {"\xff\xfe"sv, "is text in UTF-16; save it as UTF-8"},
-     {"\xfe\xff"sv, "is text in UTF-16; save it as UTF-8"},
-     {"version https://git-lfs"sv, "is a pointer of Git LFS, not the file itself; fetch that: git lfs pull"},
-     {"Kaydara FBX"sv, "is FBX; export it as OBJ, STL, PLY, glTF, GLB or DAE"}}};
+     {0, "(\xb5/\xfd"sv, "is compressed with Zstandard; unpack it (unzstd)"},
+     {0, "7z\xbc\xaf"sv, "is a 7z archive; unpack it"},
+     {0, "\x89HDF"sv, "is HDF5 (as BAG, S-102 and NetCDF-4 are); convert it: gdal_translate -of GTiff IN OUT.tif"},
+     {0, "CDF\x01"sv, netcdf},
+     {0, "CDF\x02"sv, netcdf},
+     {0, "CDF\x05"sv, netcdf},
+     {0, "LASF"sv, points},
+     {0, "ASTM-E57"sv, points},
+     {0, "# .PCD"sv, points},
+     {0, "\0\0\x27\x0a"sv, "is a shapefile, of points or outlines; make a grid of it: gdal_grid -zfield NAME IN OUT.tif"},
+     {8, "GSF-v"sv, soundings},
+     {4, "#IIP"sv, soundings},
+     {2, "\0\0\x02I"sv, soundings},
+     {0, "%PDF"sv, "is a PDF document"},
+     {0, "\xff\xfe"sv, "is text in UTF-16; save it as UTF-8"},
+     {0, "\xfe\xff"sv, "is text in UTF-16; save it as UTF-8"},
+     {0, "version https://git-lfs"sv, "is a pointer of Git LFS, not the file itself; fetch that: git lfs pull"},
+     {0, "Kaydara FBX"sv, "is FBX; export it as OBJ, STL, PLY, glTF, GLB or DAE"}}};
+
+/// Charts of IHO S-57 begin with six digits (the length and the level of the first record) and a fixed word.
+bool is_sea_chart(std::string_view begin) {
+  constexpr std::size_t digits = 6;
+  return begin.find_first_not_of("0123456789") == digits && begin.substr(digits).starts_with("LE1");
+}
 
 }  // namespace
 
 std::string_view unusable_kind(std::string_view begin) {
   for (const Kind& kind : kinds)
-    if (begin.starts_with(kind.begins)) return kind.says;
+    if (begin.substr(std::min(kind.at, begin.size())).starts_with(kind.bytes)) return kind.says;
+  if (is_sea_chart(begin)) return "is a sea chart (S-57), without a grid; use a grid of the area (GeoTIFF, BAG, S-102)";
   std::string word = small_letters(begin.substr(0, kind_bytes));
   word.erase(0, std::min(word.find_first_not_of(" \t\r\n"), word.size()));
   if (word.starts_with("<!doctype html") || word.starts_with("<html"))

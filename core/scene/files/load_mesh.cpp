@@ -98,15 +98,14 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
   if (!opened) return tl::make_unexpected(opened.error());
   const std::uintmax_t bytes = on_disk ? std::filesystem::file_size(request.file, error) : request.in_memory.size();
   if (error || bytes > max_mesh_bytes) return bad_mesh(request, "is larger than 2 GiB; simplify it");
+  const std::string begin = on_disk ? read_regular(request.file, text::kind_bytes).value_or("") : std::string();
+  if (const auto kind = text::unusable_kind(begin); !kind.empty()) return bad_mesh(request, std::string(kind));
   const std::string extension = mesh_extension(request.file);
-  static constexpr std::array<const char*, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
-  if (std::find(known.begin(), known.end(), extension) == known.end())
+  if (!is_mesh_extension(extension))
     return bad_mesh(request,
                     "unknown mesh format; use OBJ, STL, PLY, glTF, GLB or DAE; others, such as FBX, X3D and 3DS: assimp export "
                     "IN OUT.glb; STEP "
                     "and IGES: export STL from the CAD program");
-  const std::string begin = on_disk ? read_regular(request.file, text::kind_bytes).value_or("") : std::string();
-  if (const auto kind = text::unusable_kind(begin); !kind.empty()) return bad_mesh(request, std::string(kind));
   if (on_disk && extension == ".stl") {
     if (const auto stl = binary_stl(opened->get())) {
       bool whole = true;

@@ -1,5 +1,6 @@
 #include "core/scene/files/mesh_steps.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include "core/base/letters.hpp"
@@ -18,6 +19,11 @@ Vec3d z_up_from_y_up(Vec3d p) { return {p.x, -p.z, p.y}; }
 }  // namespace
 
 std::string mesh_extension(const std::filesystem::path& file) { return small_letters(file.extension().string()); }
+
+bool is_mesh_extension(std::string_view extension) {
+  static constexpr std::array<std::string_view, 6> known{".obj", ".stl", ".ply", ".gltf", ".glb", ".dae"};
+  return std::find(known.begin(), known.end(), extension) != known.end();
+}
 
 tl::unexpected<Error> bad_mesh(const MeshFile& request, const std::string& what) {
   return failure(ErrorKind::bad_data, request.file.filename().string() + ": " + what);

@@ -12,6 +12,8 @@ constexpr std::uintmax_t max_mesh_bytes = std::uintmax_t{2} << 30;  // limit for
 
 /// The extension in small letters, such as ".obj".
 std::string mesh_extension(const std::filesystem::path& file);
+/// Whether files with this extension are read as meshes.
+bool is_mesh_extension(std::string_view extension);
 /// Returns whether y is up in imported meshes of the format unless MeshFile::up says otherwise. Assimp turns COLLADA to y up.
 inline bool is_y_up_by_default(std::string_view extension) {
   return extension == ".gltf" || extension == ".glb" || extension == ".dae";

@@ -270,6 +270,7 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   if (std::find(pictures.begin(), pictures.end(), own) != pictures.end())
     return file.fail("a picture whose format is not read; convert it: gdal_translate -of PNG " + name + " " + stem + ".png"),
            Shape{};
+  if (is_mesh_extension(own)) return file.fail("a mesh, not a grid of heights; write type: mesh"), Shape{};
   if (file.present() && !path.filename().empty())
     file.fail(
         "unknown height format; use a grey .png, an ESRI ASCII grid (.asc), .xyz or GeoTIFF (.tif); others, such as NetCDF "

@@ -153,7 +153,8 @@ MeshFault unread_extension(const GltfWalk& walk) {
   for (const auto& [name, primitives] : walk.primitives)
     for (const GltfWalk::Primitive& p : primitives)
       if (const auto at = walk.accessors.find(p.positions); at != walk.accessors.end() && at->second.type != floating)
-        return "has vertices that are not floating-point numbers (KHR_mesh_quantization), which are not read; export it without";
+        return "has vertices that are not floating-point numbers (KHR_mesh_quantization), which are not read; export it "
+               "without, or convert it: gltf-transform dequantize IN OUT.glb";
   return std::nullopt;
 }
 

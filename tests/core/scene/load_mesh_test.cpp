@@ -409,7 +409,7 @@ TEST_F(LoadMesh, GltfExtensionsThatMoveSurfacesAreRefusedByName) {
     EXPECT_EQ(good("a.gltf", with("extensionsRequired", harmless)).centred.mesh.triangles.size(), 4u) << harmless;
   std::string whole_numbers = gltf(two, scene);
   whole_numbers.replace(whole_numbers.find("5126"), 4, "5122");
-  EXPECT_THAT(refusal("a.gltf", whole_numbers), HasSubstr("(KHR_mesh_quantization), which are not read"));
+  EXPECT_THAT(refusal("a.gltf", whole_numbers), HasSubstr("(KHR_mesh_quantization), which are not read; export it without, or"));
   EXPECT_THAT(refusal("b.gltf", glb()), HasSubstr("is a GLB file; name it .glb"));
 }
 
@@ -539,6 +539,7 @@ TEST_F(LoadMesh, WrongFilesAreRefusedWithOneSentence) {
               HasSubstr("flat.obj: has only triangles without area"));
   EXPECT_THAT(refusal("x.xyz", "1 2 3"), HasSubstr("x.xyz: unknown mesh format; use OBJ"));
   EXPECT_THAT(refusal("x.fbx", "Kaydara"), HasSubstr("assimp export IN OUT.glb"));
+  EXPECT_THAT(refusal("x.laz", "LASF"), HasSubstr("x.laz: is a cloud of points, not a surface"));
   EXPECT_THAT(
       refusal("c.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\ncstype bezier\ndeg 1 1\nsurf 0 1 0 1 1 2 3 4\nend\n"),
       HasSubstr("c.obj: has 1 curved surface(s) (surf), which are not read; export polygons"));

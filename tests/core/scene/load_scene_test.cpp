@@ -223,6 +223,8 @@ objects:
               HasSubstr("git lfs pull"));
   EXPECT_THAT(refusal(object("type: heightmap, file: g.pgm, material: sand"), files.folder()),
               HasSubstr("gdal_translate -of PNG g.pgm g.png"));
+  files.write("g.ply", "ply\n");
+  EXPECT_THAT(refusal(object("type: heightmap, file: g.ply, material: sand"), files.folder()), HasSubstr("write type: mesh"));
   files.write("g.bin", std::string("II*\0", 4));
   EXPECT_THAT(refusal(object("type: heightmap, file: g.bin, material: sand"), files.folder()),
               ::testing::Not(HasSubstr("unknown height format")));

@@ -18,8 +18,21 @@ TEST(FileKind, NamesWhatADownloadMayBeInstead) {
   EXPECT_THAT(unusable_kind("\x89HDF\r\n\x1a\n"sv), HasSubstr("gdal_translate"));
   EXPECT_THAT(unusable_kind("\xff\xfet\0"sv), HasSubstr("UTF-16"));
   for (const std::string_view usable :
-       {""sv, "ncols 4"sv, "v 0 0 0"sv, "II*\0"sv, "\xEF\xBB\xBFncols 4"sv, "<COLLADA>"sv, "PKD"sv, "solid"sv})
+       {""sv, "12345"sv, "12345 6 7"sv, "123456L"sv, "# .PC"sv, "ncols 4"sv, "v 0 0 0"sv, "II*\0"sv, "II*\0\x02I\0\0"sv,
+        "MM\0*\x02I\0\0"sv, "\xEF\xBB\xBFncols 4"sv, "<COLLADA>"sv, "PKD"sv, "solid"sv})
     EXPECT_EQ(unusable_kind(usable), "") << usable;
+}
+
+TEST(FileKind, NamesDataOfSurveys) {
+  EXPECT_THAT(unusable_kind("LASF\0\0"sv), HasSubstr("cloud of points, not a surface; make a grid of it: pdal translate"));
+  EXPECT_THAT(unusable_kind("ASTM-E57\x01"sv), HasSubstr("cloud of points"));
+  EXPECT_THAT(unusable_kind("# .PCD v0.7 - Point Cloud Data"sv), HasSubstr("cloud of points"));
+  EXPECT_THAT(unusable_kind("\x89HDF\r\n\x1a\n"sv), HasSubstr("BAG, S-102"));
+  EXPECT_THAT(unusable_kind("\0\0\x27\x0a\0\0"sv), HasSubstr("gdal_grid"));
+  EXPECT_THAT(unusable_kind("015763LE1 0900084   "sv), HasSubstr("sea chart (S-57)"));
+  EXPECT_THAT(unusable_kind("\0\0\0\x14\0\0\0\x01GSF-v03.09\0"sv), HasSubstr("mbgrid"));
+  EXPECT_THAT(unusable_kind("\x80\0\0\0#IIP\0"sv), HasSubstr("pings of a multibeam"));
+  EXPECT_THAT(unusable_kind("\x10\x01\0\0\x02I\x5c\x08"sv), HasSubstr("pings of a multibeam"));
 }
 
 }  // namespace
