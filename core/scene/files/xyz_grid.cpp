@@ -85,6 +85,7 @@ std::size_t split_names(std::string_view line, Line& words) {
 struct Order {
   std::size_t x = 0, y = 1, z = 2;
   bool depth = false;  // whether the name of the column is depth
+  bool named = false;  // whether the name of the x column is easting
   std::size_t last() const { return std::max({x, y, z}); }
   bool operator==(const Order&) const = default;
 };
@@ -103,12 +104,13 @@ Order order_by(const Line& names, std::size_t count) {
                                                                        : static_cast<std::size_t>(found - names.begin());
   };
   Order order{column({"lon", "lng", "x", "east"}, count, "e"), column({"lat", "y", "north"}, count, "n"),
-              column({"z", "dep", "elev", "height", "alt", "bathy", "topo"}, count), false};
+              column({"z", "dep", "elev", "height", "alt", "bathy", "topo"}, count)};
   if (order.x == count || order.y == count) return {};
   if (order.z == count) order.z = count == 3 ? 3 - order.x - order.y : 2;
   const bool distinct = order.x != order.y && order.x != order.z && order.y != order.z && order.last() < count;
   if (!distinct) return {};
   order.depth = same_letters(names[order.z].substr(0, 1), "d");
+  order.named = same_letters(names[order.x].substr(0, 1), "e");
   return order;
 }
 
@@ -121,6 +123,12 @@ bool has_decimal_commas(std::string_view line) {
     return comma != word.npos && comma > 0 && comma + 1 < word.size();
   };
   return count >= 3 && std::any_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count), is_decimal);
+}
+
+/// Lists of surveyed points often have the northing first. Eastings of UTM have six digits, most northings have seven.
+bool may_be_northing_first(const std::vector<double>& x, const std::vector<double>& y) {
+  constexpr double least_easting = 1.6e5, most_easting = 8.4e5, least_northing = 1e6, most_northing = 1e7;
+  return x.front() > least_northing && x.back() < most_northing && y.front() > least_easting && y.back() < most_easting;
 }
 
 /// Advice for a file that begins with something else than points.
@@ -213,11 +221,15 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
     raw.z[at] = p.z;
   }
   raw.fill_values = values.fill_values();
+  const bool exchanged = !order.named && (raw.system.name.empty() || raw.system.utm) && may_be_northing_first(raw.x, raw.y);
   const bool positive = std::none_of(raw.z.begin(), raw.z.end(), [](float z) { return z < 0; });
   auto grid = finish_heights(std::move(raw), options);
   if (!grid) return bad(grid.error().text);
   if (order.depth && positive && options.z_scale > 0)
     grid->notes.push_back("its column of depths has no negative value: set z_scale: -1 if they count down from the surface");
+  if (exchanged)
+    grid->notes.push_back(
+        "x and y may be exchanged: its first column looks like northings of UTM; name the columns in a first line: north east z");
   if (again > 0) grid->notes.push_back(text::format("%zu points have the position of an earlier point, and replaced it", again));
   return grid;
 }

@@ -479,6 +479,23 @@ TEST(XyzGrid, NamesOfColumnsMayPutNorthFirst) {
   EXPECT_EQ(usual->x, (std::vector<double>{100, 110}));
 }
 
+TEST(XyzGrid, NorthingsInTheFirstColumnAreANote) {
+  TemporaryFiles files;
+  const auto notes = [&](const std::string& text) {
+    const auto grid = read_xyz_heights(files.write("g.xyz", text), {});
+    return grid ? grid->notes : std::vector<std::string>{grid.error().text};
+  };
+  const std::string north_first = "6650000 556000 -1\n6650001 556000 -2\n6650000 556002 -3\n6650001 556002 -4\n";
+  const auto exchanged = ::testing::Contains(HasSubstr("x and y may be exchanged"));
+  EXPECT_THAT(notes(north_first), exchanged);
+  EXPECT_THAT(notes("north east z\n" + north_first), ::testing::Not(exchanged));
+  EXPECT_THAT(notes("easting northing z\n" + north_first), ::testing::Not(exchanged)) << "such as feet of a state's plane";
+  EXPECT_THAT(notes("# E N z\n" + north_first), ::testing::Not(exchanged));
+  for (const char* other : {"556000 6650000 -1\n556001 6650000 -2\n556000 6650002 -3\n", "0 0 -1\n1 0 -2\n0 1 -3\n1 1 -3\n",
+                            "6650000 5560000 -1\n6650001 5560000 -2\n6650000 5560002 -3\n"})
+    EXPECT_THAT(notes(other), ::testing::Not(exchanged)) << other;
+}
+
 TEST(XyzGrid, NamesOfColumnsMayStandInAComment) {
   TemporaryFiles files;
   const auto first_x = [&](const std::string& head, const std::string& more = "") {
