@@ -33,12 +33,29 @@ class Requirements(unittest.TestCase):
         self.assertIn("CLI11 2.1 or newer (not found) Protobuf 3.12 or newer (not found)", text)
         self.assertIn("apt-get install libcli11-dev libprotobuf-dev protobuf-compiler)", text)
 
+    def test_names_libraries_without_a_description_for_cmake_too(self):
+        # Nothing is found by its files alone.
+        text, status = configure("-DSONAR_FFTW=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_tinyxml2=ON",
+                                 before="macro(find_library)\nendmacro()\nmacro(find_path)\nendmacro()")
+        self.assertNotEqual(status, 0)
+        self.assertRegex(text, r"tinyxml2 \(not found\).* snappy \(not found\) fftw3 \(not found\) Install")
+        self.assertRegex(text, r"apt-get install .*libtinyxml2-dev .*libsnappy-dev libfftw3-dev\)")
+        text, status = configure("-DSONAR_FFTW=OFF", before="macro(find_library)\nendmacro()\nmacro(find_path)\nendmacro()")
+        self.assertNotIn("fftw3", text)
+
     def test_names_what_is_too_old(self):
         text, status = configure("-Dspdlog_DIR=FOLDER/old", folders={
             "old/spdlog-config.cmake": "", "old/spdlog-config-version.cmake": "set(PACKAGE_VERSION 1.8.0)"})
         self.assertNotEqual(status, 0)
         self.assertIn("spdlog 1.9 or newer (1.8.0 was found)", text)
         self.assertIn("libspdlog-dev", text)
+
+    def test_leaves_the_farm_out_where_its_library_is_too_old(self):
+        for version, is_built in (("3.2.0", False), ("3.3.0", True), ("3.10.1", True)):
+            text, status = configure("-DSONAR_FARM=ON", "-DNATS_INCLUDE_DIR=FOLDER", "-DNATS_LIBRARY=FOLDER/libnats.so",
+                                     folders={"nats/version.h": f'#define NATS_VERSION_STRING "{version}"\n'})
+            self.assertEqual(status, 0, text)
+            self.assertEqual("built without the farm (sonard worker, sonarctl farm): install libnats-dev 3.3" not in text, is_built, version)
 
     def test_names_a_protobuf_that_is_too_new(self):
         text, status = configure(before="macro(find_package name)\n  _find_package(${ARGV})\n  if(${name} STREQUAL Protobuf)\n"
