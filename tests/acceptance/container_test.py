@@ -1,11 +1,12 @@
 """Lints the container file by rules of our own, and with hadolint where it is found. The image itself is not built here."""
 import fnmatch
 import json
+import pathlib
 import re
 import shutil
 import unittest
 
-from running_sonard import ROOT, run
+from running_sonard import BUILD, ROOT, run
 
 FILE = ROOT / "Containerfile"
 TEXT = FILE.read_text(encoding="utf-8")
@@ -32,6 +33,18 @@ def setup_packages():
     text = (ROOT / "tests/tools/setup.sh").read_text(encoding="utf-8")
     listed = re.search(r"^product_packages=\(\n(.*?)^\)", text, re.M | re.S).group(1)
     return set((listed + " " + re.search(r"^page_packages=\((.*?)\)", text, re.M).group(1)).split())
+
+
+def ignored(path):
+    """What docker does with a file of the tree: the last line that matches it, or a folder that it is in, decides."""
+    path, decided = pathlib.PurePosixPath(path), False
+    for line in (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines():
+        anywhere, pattern = "**/" in line, line.lstrip("!").removeprefix("**/")
+        if pattern and pattern[0] != "#":
+            tried = path.parts if anywhere else [str(folder) for folder in (path, *path.parents)]
+            if any(fnmatch.fnmatch(name, pattern) for name in tried):
+                decided = line[0] != "!"
+    return decided
 
 
 class Container(unittest.TestCase):
@@ -69,12 +82,18 @@ class Container(unittest.TestCase):
         self.assertEqual(installed - {"dpkg-dev", "file"}, setup_packages())
         self.assertLessEqual({"dpkg-dev", "file"}, installed, "for the dependencies of the package")
 
-    def test_what_the_build_needs_is_not_ignored(self):
-        ignored = [line for line in (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines() if line and line[0] != "#"]
-        for needed in ("CMakeLists.txt", "core", "cuda", "protocol", "daemon", "clients", "scenes", "docs", "README.md", "CHANGELOG.md"):
-            self.assertTrue((ROOT / needed).exists())
-            self.assertFalse([pattern for pattern in ignored if fnmatch.fnmatch(needed, pattern)], needed)
-        self.assertIn("build", ignored)
+    def test_what_the_build_and_the_package_need_is_not_ignored(self):
+        installed = set()
+        for script in BUILD.rglob("cmake_install.cmake"):
+            installed.update(re.findall(rf'"{re.escape(str(ROOT))}/([^"]+)"', script.read_text(encoding="utf-8")))
+        build = f"{BUILD.relative_to(ROOT)}/" if BUILD.is_relative_to(ROOT) else "build/"
+        installed = {path.rstrip("/") for path in installed if not path.startswith(build)}
+        self.assertLessEqual({"scenes", "docs", "tests/judge", "README.md"}, installed)
+        needed = {"CMakeLists.txt", "core", "cuda", "protocol", "daemon", "clients", "CHANGELOG.md"} | installed
+        self.assertEqual([path for path in sorted(needed) if not (ROOT / path).exists()], [])
+        self.assertEqual([path for path in sorted(needed) if ignored(path)], [])
+        for path in ("build/release/x.o", "tests/core/x.cpp", "docs/__pycache__", ".git/HEAD"):
+            self.assertTrue(ignored(path), path)
 
     @unittest.skipIf(shutil.which("hadolint") is None, "hadolint is not here")
     def test_hadolint_finds_nothing(self):
