@@ -39,13 +39,15 @@ packages() {
   local package library
   for library in "${bundled[@]}"; do dpkg-query -S "*/$(basename "$(readlink -f "${library#* }")")"; done | sed 's/:.*//'
   for package in "${build_packages[@]}" libjs-three; do
-    case $package in *-dev | libjs-*) dpkg-query -W -f '${Package} ${Depends}\n' "$package" | sed 's/([^)]*)//g; s/[,|]/ /g' | tr -s ' ' '\n' ;; esac
-  done | grep -E -- '-dev$|^libjs-'
+    case $package in
+      libfftw3-dev | libnats-dev | libtiff-dev | libgtest-dev | libgmock-dev | libeigen3-dev) ;;  # nor what these need is inside
+      *-dev | libjs-*) dpkg-query -W -f '${Package} ${Depends}\n' "$package" | sed 's/([^)]*)//g; s/[,|]/ /g' | tr -s ' ' '\n' ;;
+    esac
+  done | grep -E -- '-dev$|^libjs-' | grep -vE '^libc6?-dev$'
 }
 licences=$stage/share/doc/sonard/licences
 mkdir -p "$licences/common" || exit
 while read -r package; do
-  case $package in libfftw3* | libnats* | libtiff* | libgtest* | libgmock* | libeigen3* | libc6* | libssl*) continue ;; esac
   [ ! -e "/usr/share/doc/$package/copyright" ] || cp "/usr/share/doc/$package/copyright" "$licences/$package"
 done < <(packages | sort -u)
 grep -rhoE '/usr/share/common-licenses/[A-Za-z0-9.-]*[A-Za-z0-9]' "$licences" "$stage/share/doc" | sort -u | while read -r text; do
