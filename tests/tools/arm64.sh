@@ -48,17 +48,17 @@ setup() {
   DEBIAN_FRONTEND=noninteractive apt-get -q -y --no-install-recommends install "${names[@]}" "${page_packages[@]}" </dev/null
 }
 
-# Core, protocol and the emulator, but for programs that repeat one stage over thousands of pings to measure a figure.
+# Core, protocol, the contract of all makes and the emulator, but for programs that repeat a stage many times to measure a figure.
 tested() {
-  grep -E '^tests/(core|protocol)/|^tests/daemon/daemon_(emulator|rules|config|sonar|viewer)_test$' |
-    grep -vE '/(core_)?(everything|statistics|coverage|statistics_oracles|coverage_oracles|specular_statistics|texture)_test$' | sort -u
+  awk -v folder="$PWD/$folder/" 'index($2, folder) == 1 && $1 ~ /^GTEST/ && $1 !~ /FIGURES/ {print substr($2, length(folder) + 1)}' \
+    "$folder/tests/programs" | grep -E '^tests/(core|protocol|example_make)/|^tests/daemon/daemon_emulator_test$'
 }
 
 build_all() {
   local tests
   cmake -S . -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_TOOLCHAIN_FILE=tests/tools/arm64.cmake \
     -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" -DSONAR_WERROR="${SONAR_WERROR:-OFF}" >/dev/null </dev/null || return
-  mapfile -t tests < <(ninja -C "$folder" -t targets all | sed -n 's/^\(tests\/.*_test\): .*/\1/p' | tested)
+  mapfile -t tests < <(tested)
   [ ${#tests[@]} -gt 0 ] || { echo "$folder has no tests to build" >&2; return 66; }
   NINJA_STATUS="[%f/%t] " cmake --build "$folder" --parallel "$(build_jobs)" --target installed "${tests[@]}" </dev/null |
     tests/tools/build_progress.py
@@ -81,8 +81,8 @@ export SONARD_IMPORT_MESH=$PWD/$emulated/importer/sonard-import-mesh
 run_tests() {
   local programs
   make_commands
-  mapfile -t programs < <(cd "$folder" && find tests -name '*_test' -type f | tested)
-  [ ${#programs[@]} -gt 0 ] || { echo "no tests in $folder: first the step build" >&2; return 66; }
+  mapfile -t programs < <(tested)
+  [ -x "$folder/${programs[0]:-none}" ] || { echo "no tests in $folder: first the step build" >&2; return 66; }
   printf '%s\0' "${programs[@]}" | xargs -0 -n 1 -P "${SONARD_TEST_JOBS:-$(nproc)}" bash -c '
     started=$SECONDS
     if output=$(timeout 3600 qemu-aarch64 "'"$folder"'/$0" --gtest_brief=1 2>&1 </dev/null); then
