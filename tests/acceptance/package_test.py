@@ -131,6 +131,35 @@ class Package(Installed, unittest.TestCase):
         for name in ("postinst", "postrm"):
             self.assertNotRegex(scripts[name], r"systemctl (--now )?(enable|start|restart)")
 
+    def test_nothing_stays_behind_after_an_upgrade_and_a_removal(self):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder) / "root"
+            log = pathlib.Path(folder) / "log"
+            (root / "var/lib/dpkg/info").mkdir(parents=True)
+            (root / "var/lib/dpkg/updates").mkdir()
+            (root / "var/lib/dpkg/status").touch()
+            (root / "etc").mkdir()
+
+            def dpkg(*arguments):
+                result = run("dpkg", f"--root={root}", f"--log={log}", "--force-script-chrootless", "--force-not-root",
+                             "--force-depends", "--force-bad-path", *arguments)
+                self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+
+            def installed():
+                return {p.relative_to(root) for p in root.rglob("*")} - {p.relative_to(root) for p in (root / "var/lib/dpkg").rglob("*")}
+
+            before = installed()
+            dpkg("--install", *self.packages.values())
+            of_the_package = installed()
+            run(sys.executable, "-m", "compileall", "-q", root / "usr/share/sonard/python", root / "usr/share/doc/sonard")
+            (root / "etc/sonard").mkdir()  # by systemd, when the service starts
+            self.assertTrue(list(root.rglob("*.pyc")))
+            dpkg("--install", *self.packages.values())
+            self.assertEqual(installed() - of_the_package, {pathlib.Path("etc/sonard")})
+            run(sys.executable, "-m", "compileall", "-q", root / "usr/share/sonard/python", root / "usr/share/doc/sonard")
+            dpkg("--purge", *self.packages)
+            self.assertEqual(installed() - before, set())
+
     def test_the_control_file_says_who_what_and_on_what_it_depends(self):
         for name, package in self.packages.items():
             control = fields(package)
