@@ -169,6 +169,7 @@ class Package(Installed, unittest.TestCase):
             self.assertRegex(control["Depends"], r"\blibc6\b.*\blibstdc\+\+6\b")
             self.assertGreater(len(control["Description"]), 100)
         self.assertRegex(fields(self.packages["sonard"])["Depends"], r"\blibembree")
+        self.assertEqual(fields(self.packages["sonard"])["Recommends"], "python3", "sonarctl judge and lab are Python programs")
         self.assertNotIn("embree", fields(self.packages["sonard-bvtsdk"])["Depends"])
 
     def test_the_licence_of_the_binaries_is_told(self):
