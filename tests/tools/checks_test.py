@@ -1,6 +1,7 @@
-"""The steps that .ci/run leaves out, the compiler that setup.sh chooses, and failures as run_programs.py and test_times.py name them."""
+"""What .ci/run and arm64.sh leave out, the compiler that setup.sh chooses, and failures as run_programs.py and test_times.py name them."""
 import os
 import pathlib
+import re
 import select
 import subprocess
 import sys
@@ -175,6 +176,15 @@ class Programs(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("one FAILED: it did not start: ", done.stdout)
         self.assertEqual(self.failed.read_text(), "one\n")
+
+
+class Arm64(unittest.TestCase):
+    def test_leaves_out_cases_that_there_are(self):
+        left_out = re.search(r"GTEST_FILTER=-(\S+)", (TOOLS / "arm64.sh").read_text())[1].split(":")
+        sources = "".join(path.read_text() for path in (ROOT / "tests/core").rglob("*_test.cpp"))
+        for case in left_out:
+            suite, name = case.split(".")
+            self.assertRegex(sources, rf"TEST(_F)?\({suite}, {name}\)")
 
 
 class Times(unittest.TestCase):
