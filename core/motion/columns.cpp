@@ -136,6 +136,7 @@ Columns Columns::kitti() {
 Complaint Columns::refuse_header(const Words& header, Columns& out) {
   out = Columns();
   out.count_ = header.size();
+  bool has_degrees = false;
   for (std::size_t i = 0; i < header.size(); ++i) {
     // A header may mix both sets of names.
     std::string name = plain_name(header[i]);
@@ -145,6 +146,8 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
     }
     if (name == "t_ns") out.power_ = 0;
     out.says_unit_ = out.says_unit_ || name == "t_s" || name == "t_ns";
+    const bool is_radians = name == "roll_rad" || name == "pitch_rad" || name == "yaw_rad";
+    if (is_radians) name.replace(name.size() - 3, 3, "deg");
     std::size_t c = 0;
     while (c < columns && name != long_names[c] && name != short_names[c]) ++c;
     if (c == columns && is_of_degrees(name))
@@ -152,7 +155,11 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
     if (c == columns) return "unknown column " + in_quotes(header[i]) + text::suggestion(name, long_names, "columns");
     if (out.place_[c] >= 0) return "column " + std::string(header[i]) + " appears twice";
     out.place_[c] = static_cast<int>(i);
+    if (c != roll && c != pitch && c != yaw) continue;
+    out.says_angles_ = out.says_angles_ || name == long_names[c];
+    (is_radians ? out.radians_ : has_degrees) = true;
   }
+  if (out.radians_ && has_degrees) return "give all angles in one unit: roll_rad, pitch_rad and yaw_rad, or all in degrees";
   return out.refuse_set();
 }
 
@@ -230,8 +237,9 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
   if (!has(qw)) {
     if (auto wrong = fill({roll, pitch, yaw})) return wrong;
     if (std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}) > farthest) return "an angle is beyond 1e8";
-    // [rad] from here on.
-    out.pose.orientation = quat_from_rpy({rad_from_deg(v[0]), rad_from_deg(v[1]), rad_from_deg(v[2])});
+    out.angles = {v[0], v[1], v[2]};
+    const auto in_rad = [this](double angle) { return radians_ ? angle : rad_from_deg(angle); };
+    out.pose.orientation = quat_from_rpy({in_rad(v[0]), in_rad(v[1]), in_rad(v[2])});
     return std::nullopt;
   }
   if (auto wrong = fill({qw, qx, qy, qz})) return wrong;

@@ -247,6 +247,8 @@ TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
       {"t,x,y,z,yaw_dge\n", "did you mean \"yaw_deg\""},
       {"t,x,y,z,x_m\n", "p.csv:1: column x_m appears twice"},
       {"t,x,y,z,qw\n", "p.csv:1: a quaternion needs"},
+      {"t,x,y,z,roll_rad,yaw\n", "p.csv:1: give all angles in one unit"},
+      {"t,x,y,z,yaw_deg,yaw_rad\n", "p.csv:1: column yaw_rad appears twice"},
       {"t,x,y,z,qw,qx,qy,qz,yaw\n", "not both"},
       {"t,x,y,z,vx\n", "p.csv:1: a velocity needs"},
       {"t,x,y,z,wx,wy\n", "p.csv:1: an angular velocity needs"},
@@ -270,6 +272,35 @@ TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
   EXPECT_THAT(refusal("2 0 0 0 0 2 0 0 0 0 2 0\n", ten_hz), HasSubstr("not a rotation"));
   EXPECT_THAT(refusal("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 0\n", {.frame = Frame::enu_flu, .rate_hz = 1e-300}),
               "p.csv:2: the time is beyond 146 years");
+}
+
+TEST(TrajectoryFile, AnglesMayBeRadians) {
+  const auto yaw_deg = [](const std::string& text) {
+    const Quatd q = points(parsed(text)).poses.back().orientation;
+    return deg_from_rad(2 * std::atan2(q.z, q.w));
+  };
+  EXPECT_NEAR(yaw_deg("t,x,y,z,roll_rad,pitch_rad,yaw_rad\n0,1,2,3,0,0,1.5707963268\n"), 90, 1e-6);
+  EXPECT_NEAR(yaw_deg("t,x,y,z,YAW_RAD\n0,1,2,3,-0.5235987756\n"), -30, 1e-6);
+  EXPECT_NEAR(yaw_deg("t,x,y,z,yaw\n0,1,2,3,1.5707963268\n"), 1.5707963268, 1e-6);
+}
+
+TEST(TrajectoryFile, AnglesThatLookLikeRadiansAreMarked) {
+  const struct {
+    const char *columns, *first, *last;
+    bool may_be;
+  } files[] = {{"roll,pitch,yaw", "0.1,0,-3.1", "0,0.2,3.1", true},
+               {"yaw", "0", "6.28", true},
+               {"yaw", "0", "7", false},
+               {"roll,pitch,yaw", "0,10,-3", "0,0,3", false},
+               {"yaw", "1.5", "2.5", false},
+               {"yaw_deg", "-3.1", "3.1", false},
+               {"yaw_rad", "-3.1", "3.1", false},
+               {"roll,pitch", "-3,0", "3,0", false},
+               {"roll_deg,pitch,yaw", "0,0,-3.1", "0,0,3.1", false}};
+  for (const auto& f : files)
+    EXPECT_EQ(parsed(std::string("t,x,y,z,") + f.columns + "\n0,1,2,3," + f.first + "\n1,1,2,3," + f.last + "\n").may_be_radians,
+              f.may_be)
+        << f.columns << ' ' << f.last;
 }
 
 TEST(TrajectoryFile, OneThatIsMissingIsSaidToBe) {
