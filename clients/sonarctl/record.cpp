@@ -13,7 +13,7 @@
 #include "core/text/counted.hpp"
 #include "core/text/ipv4.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/recording/recording.hpp"
+#include "protocol/recording/recorded_pings.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -226,9 +226,9 @@ Result<void> convert(const RecordOptions& options) {
   Result<void> written;
   std::optional<Time> first;
   Time last{};
-  const auto keep_pings = [&](const protocol::HostActions& actions) {
-    for (const protocol::HostAction& action : actions)
-      if (const auto* ping = std::get_if<HostPing>(&action); ping && written) written = files->write_ping(last, *ping);
+  const auto keep_pings = [&](const RecordedMessage* message) {
+    for (const recording::RecordedPing& decoded : recording::decode_next(**host, *by->make, message))
+      if (written) written = files->write_ping(last, decoded.ping);
   };
   while (written && interrupted == 0 && (options.pings == 0 || files->pings() < options.pings)) {
     auto message = reader.next();
@@ -238,12 +238,9 @@ Result<void> convert(const RecordOptions& options) {
     last = message->at = std::max(last, message->at);
     if (options.seconds > 0 && seconds(last - *first) > options.seconds) break;
     written = files->write(*message);
-    const auto port = recording::host_port(*by->make, message->by);
-    if (!port || message->from != Origin::device) continue;
-    if (const auto tick = (*host)->next_tick(); tick && *tick <= last) keep_pings((*host)->on_tick(last));
-    keep_pings((*host)->on_bytes(*port, message->bytes, last));
+    keep_pings(&*message);
   }
-  if (const auto tick = (*host)->next_tick()) keep_pings((*host)->on_tick(*tick));  // pings that wait for another part
+  keep_pings(nullptr);
   const Result<void> closed = files->close();
   report(*files, seconds(last - first.value_or(last)));
   if (!reader.note().empty()) std::printf("%s\n", reader.note().c_str());

@@ -5,6 +5,21 @@
 
 namespace sonar::recording {
 
+std::vector<RecordedPing> decode_next(protocol::Host& host, const protocol::Make& make, const RecordedMessage* message) {
+  std::vector<RecordedPing> pings;
+  const auto take = [&](protocol::HostActions actions, Time at) {
+    for (protocol::HostAction& action : actions)
+      if (auto* const ping = std::get_if<protocol::HostPing>(&action)) pings.push_back({at, std::move(*ping)});
+  };
+  if (const auto tick = host.next_tick(); tick && (message == nullptr || *tick <= message->at)) {
+    const Time at = message == nullptr ? *tick : message->at;
+    take(host.on_tick(at), at);
+  }
+  if (message == nullptr || message->from != Origin::device) return pings;
+  if (const auto port = host_port(make, message->by)) take(host.on_bytes(*port, message->bytes, message->at), message->at);
+  return pings;
+}
+
 Result<RecordedPings> RecordedPings::open(std::unique_ptr<RecordingReader> reader) {
   auto by = find_sender(*reader);
   if (!by) return failure(ErrorKind::bad_data, "holds no ping of a known sonar");
@@ -25,20 +40,10 @@ Result<void> RecordedPings::make_host() {
 }
 
 std::optional<RecordedPing> RecordedPings::next() {
-  const auto take = [&](protocol::HostActions actions, Time at) {
-    for (protocol::HostAction& action : actions)
-      if (auto* const ping = std::get_if<protocol::HostPing>(&action)) decoded_.push_back({at, std::move(*ping)});
-  };
   while (decoded_.empty()) {
     const auto message = reader_->next();
-    if (!message) {  // a ping may still wait for a message that the recording does not have
-      if (const auto tick = host_->next_tick()) take(host_->on_tick(*tick), *tick);
-      if (decoded_.empty()) return std::nullopt;
-      break;
-    }
-    if (const auto tick = host_->next_tick(); tick && *tick <= message->at) take(host_->on_tick(message->at), message->at);
-    const auto port = host_port(*by_.make, message->by);
-    if (port && message->from == Origin::device) take(host_->on_bytes(*port, message->bytes, message->at), message->at);
+    for (RecordedPing& ping : decode_next(*host_, *by_.make, message ? &*message : nullptr)) decoded_.push_back(std::move(ping));
+    if (!message && decoded_.empty()) return std::nullopt;
   }
   RecordedPing first = std::move(decoded_.front());
   decoded_.pop_front();

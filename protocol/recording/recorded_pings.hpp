@@ -4,6 +4,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "protocol/recording/recording.hpp"
 
@@ -13,6 +14,10 @@ struct RecordedPing {
   Time at{};  // 0 where the format stores no times
   protocol::HostPing ping;
 };
+
+/// The pings that `host`, of that make, decodes of the next message of a recording. Null: the recording has ended, so pings that
+/// wait for another part are complete. Actions of the host other than pings are left out.
+std::vector<RecordedPing> decode_next(protocol::Host& host, const protocol::Make& make, const RecordedMessage* message);
 
 class RecordedPings {
  public:
