@@ -56,7 +56,7 @@ recording::Codec codec() {
           .answer =
               [](wire::BytesView message, const VendorSettings*) {
                 const auto payload = message.subspan(header_size);  // the dialogue makes the header
-                return wire::Bytes(payload.begin(), payload.end());
+                return std::vector<wire::Bytes>{wire::Bytes(payload.begin(), payload.end())};
               }};
 }
 

@@ -7,10 +7,12 @@
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/omniscan.hpp"
 #include "protocol/ping/ping1d.hpp"
+#include "protocol/ping/ping1d_settings.hpp"
 #include "protocol/ping/ping360.hpp"
 #include "protocol/ping/ping360_settings.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/ping/s500.hpp"
+#include "protocol/ping/s500_settings.hpp"
 #include "protocol/ping/surveyor.hpp"
 #include "protocol/recorded/raw_dump.hpp"
 
@@ -18,8 +20,6 @@ namespace sonar::ping {
 namespace {
 
 using recording::RecordedMessage;
-
-constexpr std::size_t longest_payload = 65535;
 
 /// Whether some device of the family sends or accepts this message.
 bool is_known(Id id) {
@@ -107,6 +107,19 @@ std::optional<recording::Sender> one_of(const protocol::Vendor& vendor) { return
 
 constexpr recording::Framing framing{{'B', 'R'}, header_size, length_of};
 
+/// The number of the message. Id{}: it is not a whole frame, or its sum is wrong.
+Id id_in(BytesView message) {
+  const auto frame = whole_frame(message);
+  return frame ? frame->header.id : Id{};
+}
+std::optional<recording::PingPart> part_if(bool is_part) { return is_part ? std::optional(recording::PingPart{}) : std::nullopt; }
+/// Messages that a Surveyor or an Omniscan sends while pings are enabled. A ping may have several.
+std::optional<recording::PingPart> measured_part(BytesView message) {
+  const Id id = id_in(message);
+  return part_if(id == Id::atof_point_data || id == Id::yz_point_data || id == Id::os_mono_profile || id == Id::attitude_report ||
+                 id == Id::water_stats);
+}
+
 constexpr std::array<recording::FileKind, 1> kinds{{{
     .ending = ".svlog",
     .name = "ping protocol log",
@@ -141,31 +154,49 @@ recording::Codec ping360::codec() {
                 Settings s = settings_from(request);
                 const auto line = line_in(message);
                 s.ping = line->ping;
-                return encode(s, line->samples);
+                return std::vector<Bytes>{encode(s, line->samples)};
               }};
 }
 recording::Codec surveyor::codec() {
-  return {.framing = &framing, .files = kinds, .sender = [](const RecordedMessage& message) {
-            return holds(message, {Id::atof_point_data, Id::yz_point_data}) ? one_of(vendor()) : std::nullopt;
-          }};
+  return {.framing = &framing,
+          .files = kinds,
+          .sender =
+              [](const RecordedMessage& message) {
+                return holds(message, {Id::atof_point_data, Id::yz_point_data}) ? one_of(vendor()) : std::nullopt;
+              },
+          .ping_part = measured_part};
 }
 recording::Codec omniscan::codec() {
-  return {.framing = &framing, .files = kinds, .sender = [](const RecordedMessage& message) {
-            return holds(message, {Id::os_mono_profile}) ? one_of(vendor()) : std::nullopt;
-          }};
+  return {
+      .framing = &framing,
+      .files = kinds,
+      .sender =
+          [](const RecordedMessage& message) { return holds(message, {Id::os_mono_profile}) ? one_of(vendor()) : std::nullopt; },
+      .ping_part = measured_part};
 }
 
 recording::Codec ping1d::codec() {
-  return {.framing = &framing, .sender = [](const RecordedMessage& message) {
+  return {
+      .framing = &framing,
+      .sender =
+          [](const RecordedMessage& message) {
             return holds(message, {Id::ping1d_distance_simple, Id::ping1d_distance, Id::ping1d_profile}) ? one_of(vendor())
                                                                                                          : std::nullopt;
-          }};
+          },
+      .ping_part = [](BytesView message) { return part_if(results_of(id_in(message)) != no_result); },
+      .answer = [](BytesView message, const VendorSettings* request) { return answer(message, settings_from(request).results); }};
 }
 
 recording::Codec s500::codec() {
-  return {.framing = &framing, .files = kinds, .sender = [](const RecordedMessage& message) {
+  return {
+      .framing = &framing,
+      .files = kinds,
+      .sender =
+          [](const RecordedMessage& message) {
             return holds(message, {Id::s500_distance2, Id::s500_profile6}) ? one_of(vendor()) : std::nullopt;
-          }};
+          },
+      .ping_part = [](BytesView message) { return part_if(results_of(id_in(message)) != no_result); },
+      .answer = [](BytesView message, const VendorSettings* request) { return answer(message, settings_from(request).results); }};
 }
 
 }  // namespace sonar::ping

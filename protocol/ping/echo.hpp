@@ -5,9 +5,11 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "core/sonar/ping.hpp"
 #include "protocol/held_settings.hpp"
+#include "protocol/wire/wire.hpp"
 
 namespace sonar::ping {
 
@@ -17,6 +19,16 @@ inline constexpr std::uint32_t shortest_range_mm = 1000;
 /// The messages that are to be made of a ping, as bits.
 using Results = unsigned;
 inline constexpr Results no_result = 0;
+/// The messages for the results `wanted` (no_result: as recorded) of a recorded message of the result `own`, in order. `make`
+/// makes the message of another result.
+template <class Make>
+std::vector<wire::Bytes> messages_for(Results wanted, wire::BytesView recorded, Results own, Make make) {
+  if (wanted == no_result) wanted = own;
+  std::vector<wire::Bytes> messages;
+  for (Results one = 1; one <= wanted; one <<= 1)
+    if ((wanted & one) != 0) messages.push_back(one == own ? wire::Bytes(recorded.begin(), recorded.end()) : make(one));
+  return messages;
+}
 
 struct Echo {
   double range_m = 0;  // in the device's metres

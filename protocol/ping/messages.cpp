@@ -112,6 +112,13 @@ std::optional<Frame> Framer::next() {
 }
 
 // A datagram that only looks like the protocol must not take the dialogue away from the host that has it.
+std::optional<Frame> whole_frame(BytesView message) {
+  Framer framer(longest_payload, true);
+  framer.append(message);
+  auto frame = framer.next();
+  return frame && frame->sum_is_right ? std::move(frame) : std::nullopt;
+}
+
 bool holds_frame(BytesView datagram) {
   Framer framer(longest_request, true);
   framer.append(datagram);

@@ -78,6 +78,7 @@ enum class Id : std::uint16_t {
 };
 
 inline constexpr std::size_t header_size = 8, sum_size = 2;
+inline constexpr std::size_t longest_payload = 65535;
 inline constexpr std::size_t longest_request = 256;  // payload; the longest that a host has to send is 36
 
 struct Header {
@@ -142,6 +143,9 @@ class Framer {
   std::size_t last_size_ = 0;           // size of the frame that ends there
   std::uint64_t erased_ = 0;
 };
+
+/// The first frame of a message that is all there. nullopt: there is none, or its sum is wrong.
+std::optional<Frame> whole_frame(BytesView message);
 
 /// Messages that only devices send. They are not answered: two devices would answer each other without end.
 constexpr bool is_of_device(Id id) { return id == Id::ack || id == Id::nack || id == Id::ascii_text; }

@@ -134,6 +134,20 @@ Parameters adjusted(const Parameters& made_with, const Echo& echo) {
   return p;
 }
 
+namespace {
+
+Bytes frame_of(Results result, const Profile& profile, BytesView samples, std::uint8_t id) {
+  if (result == simple_result)
+    return framed_message(Id::ping1d_distance_simple, id,
+                          DistanceSimple{profile.distance_mm, static_cast<std::uint8_t>(profile.confidence)});
+  if (result == distance_result) return framed_message(Id::ping1d_distance, id, static_cast<const Distance&>(profile));
+  Bytes payload = wire::bytes_of(profile);
+  payload.insert(payload.end(), samples.begin(), samples.end());
+  return framed(Id::ping1d_profile, id, payload);
+}
+
+}  // namespace
+
 std::vector<Bytes> frames_of(const Ping& ping) {
   const Settings s = settings_from(ping.request.vendor_settings.get());
   const PingSettings& made = ping.request.settings;
@@ -152,19 +166,27 @@ std::vector<Bytes> frames_of(const Ping& ping) {
   profile.gain = static_cast<std::uint32_t>(std::lower_bound(gains.begin(), gains.end() - 1, 0.99 * gain) - gains.begin());
   profile.count = static_cast<std::uint16_t>(ping.samples.size());
   std::vector<Bytes> frames;
-  if ((results & simple_result) != 0)
-    frames.push_back(framed_message(Id::ping1d_distance_simple, s.id,
-                                    DistanceSimple{profile.distance_mm, static_cast<std::uint8_t>(profile.confidence)}));
-  if ((results & distance_result) != 0) {
-    const Distance& distance = profile;
-    frames.push_back(framed_message(Id::ping1d_distance, s.id, distance));
-  }
-  if ((results & profile_result) != 0) {
-    Bytes payload = wire::bytes_of(profile);
-    payload.insert(payload.end(), ping.samples.begin(), ping.samples.end());
-    frames.push_back(framed(Id::ping1d_profile, s.id, payload));
-  }
+  for (const Results one : {simple_result, distance_result, profile_result})
+    if ((results & one) != 0) frames.push_back(frame_of(one, profile, ping.samples, s.id));
   return frames;
+}
+
+std::vector<Bytes> answer(BytesView recorded, Results wanted) {
+  const auto frame = whole_frame(recorded);
+  if (!frame) return {};
+  Profile profile;
+  wire::Reader reader(frame->payload);
+  if (frame->header.id == Id::ping1d_distance_simple) {
+    DistanceSimple simple;
+    fields(reader, simple);
+    profile.distance_mm = simple.distance_mm;
+    profile.confidence = simple.confidence;
+  } else {
+    fields(reader, static_cast<Distance&>(profile));
+  }
+  const Results own = results_of(frame->header.id);
+  if (!reader.ok() || own == no_result) return {};
+  return messages_for(wanted, recorded, own, [&](Results one) { return frame_of(one, profile, {}, frame->header.source); });
 }
 
 }  // namespace sonar::ping::ping1d

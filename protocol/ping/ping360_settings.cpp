@@ -18,7 +18,6 @@ constexpr double sample_unit_s = 25e-9;
 constexpr int shortest_period = 80, longest_period = 40000;    // DEF: sample periods, in sample_unit_s
 constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn takes 2.4 s
 constexpr double db_per_gain = 6;                              // unknown: assumed
-constexpr std::size_t longest_line = 65535;                    // bytes of a payload
 constexpr double fastest_hz = 1000;                            // no limit: hosts request each line, or the head limits the scan
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
@@ -195,10 +194,8 @@ std::optional<Line> line_of(const Frame& frame) {
 }  // namespace
 
 std::optional<Line> line_in(BytesView message) {
-  Framer framer(longest_line, true);
-  framer.append(message);
-  const auto frame = framer.next();
-  if (!frame || !frame->sum_is_right) return std::nullopt;
+  const auto frame = whole_frame(message);
+  if (!frame) return std::nullopt;
   if (frame->header.id == Id::auto_device_data) return line_of<AutoDeviceData>(*frame);
   return frame->header.id == Id::device_data ? line_of<DeviceData>(*frame) : std::nullopt;
 }

@@ -48,7 +48,7 @@ std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
   }
 }
 
-constexpr std::size_t longest_payload = 65535, chunk_bytes = std::size_t{64} << 10;
+constexpr std::size_t chunk_bytes = std::size_t{64} << 10;
 
 /// Reads frame by frame. Bytes between frames are noted as damage.
 class PingLogReader final : public RecordingReader {
@@ -73,7 +73,7 @@ class PingLogReader final : public RecordingReader {
   std::optional<Error> damage() const override { return damages_.error(source_->name()); }
   void rewind() override {
     scan_.seek(0);
-    framer_ = ping::Framer(longest_payload);
+    framer_ = ping::Framer(ping::longest_payload);
     whole_to_ = 0;
     at_ = {};
     damages_.clear();
@@ -100,7 +100,7 @@ class PingLogReader final : public RecordingReader {
 
   std::unique_ptr<Source> source_;
   Scan scan_;
-  ping::Framer framer_{longest_payload};
+  ping::Framer framer_{ping::longest_payload};
   std::uint64_t whole_to_ = 0;  // offset of the end of the last frame
   Time at_{};
   Damages damages_;

@@ -187,6 +187,21 @@ Settings after(const Ping& ping, const Settings& now) {
   return next;
 }
 
+namespace {
+
+Bytes frame_of(Results result, const Distance2& distance, const Profile6& profile, BytesView samples, std::uint8_t id) {
+  if (result == altitude_result)
+    return framed_message(Id::ping1d_distance_simple, id, DistanceSimple{distance.ping_mm, distance.ping_confidence});
+  if (result == distance_result) return framed_message(Id::s500_distance2, id, distance);
+  Bytes payload = wire::bytes_of(profile);
+  payload.insert(payload.end(), samples.begin(), samples.end());
+  return framed(Id::s500_profile6, id, payload);
+}
+/// Whether a recorded distance fits into the messages.
+bool is_distance(float m) { return m >= 0 && m < 4e6f; }
+
+}  // namespace
+
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) {
   const Settings s = settings_from(ping.request.vendor_settings.get());
   const PingSettings& made = ping.request.settings;
@@ -195,14 +210,8 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
   const auto power_up_ms = static_cast<std::uint32_t>(
       std::chrono::duration_cast<std::chrono::milliseconds>(ping.request.fired_at - device.powered_up_at).count());
   const auto confidence = static_cast<std::uint8_t>(echo.confidence);
-  std::vector<Bytes> frames;
-  if ((results & altitude_result) != 0)
-    frames.push_back(framed_message(Id::ping1d_distance_simple, s.id, DistanceSimple{mm(echo.range_m), confidence}));
-  if ((results & distance_result) != 0)
-    frames.push_back(framed_message(Id::s500_distance2, s.id,
-                                    Distance2{mm(echo.range_m), mm(averaged.range_m), 0, confidence,
-                                              static_cast<std::uint8_t>(averaged.confidence), power_up_ms}));
-  if ((results & profile_result) == 0) return frames;
+  const Distance2 distance{mm(echo.range_m), mm(averaged.range_m), 0, confidence, static_cast<std::uint8_t>(averaged.confidence),
+                           power_up_ms};
   Profile6 profile;
   profile.ping = static_cast<std::uint32_t>(ping.request.number) - 1;  // ping_number counts from 0
   profile.start_mm = mm(made.range_start_m);
@@ -222,10 +231,46 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
   profile.decimation = s.parameters.ping.decimation;
   profile.smooth_confidence = static_cast<std::uint8_t>(averaged.confidence);
   profile.results = static_cast<std::uint16_t>(ping.samples.size() / 2);
-  Bytes payload = wire::bytes_of(profile);
-  payload.insert(payload.end(), ping.samples.begin(), ping.samples.end());
-  frames.push_back(framed(Id::s500_profile6, s.id, payload));
+  std::vector<Bytes> frames;
+  for (const Results one : {altitude_result, distance_result, profile_result})
+    if ((results & one) != 0) frames.push_back(frame_of(one, distance, profile, ping.samples, s.id));
   return frames;
+}
+
+std::vector<Bytes> answer(BytesView recorded, Results wanted) {
+  const auto frame = whole_frame(recorded);
+  if (!frame) return {};
+  Distance2 distance;
+  Profile6 profile;
+  wire::Reader reader(frame->payload);
+  const Results own = results_of(frame->header.id);
+  if (own == profile_result) {
+    fields(reader, profile);
+    if (!is_distance(profile.depth_m) || !is_distance(profile.smooth_depth_m)) return {};
+    distance = {mm(static_cast<double>(profile.depth_m)),
+                mm(static_cast<double>(profile.smooth_depth_m)),
+                0,
+                profile.confidence,
+                profile.smooth_confidence,
+                profile.power_up_ms};
+  } else {
+    if (own == altitude_result) {
+      DistanceSimple altitude;
+      fields(reader, altitude);
+      distance.ping_mm = distance.averaged_mm = altitude.distance_mm;
+      distance.ping_confidence = distance.averaged_confidence = altitude.confidence;
+    } else {
+      fields(reader, distance);
+    }
+    profile.depth_m = 1e-3f * static_cast<float>(distance.ping_mm);
+    profile.smooth_depth_m = 1e-3f * static_cast<float>(distance.averaged_mm);
+    profile.confidence = distance.ping_confidence;
+    profile.smooth_confidence = distance.averaged_confidence;
+    profile.power_up_ms = distance.power_up_ms;
+  }
+  if (!reader.ok() || own == no_result) return {};
+  return messages_for(wanted, recorded, own,
+                      [&](Results one) { return frame_of(one, distance, profile, {}, frame->header.source); });
 }
 
 }  // namespace sonar::ping::s500

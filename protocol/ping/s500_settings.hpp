@@ -60,5 +60,7 @@ double gain_percent(const Parameters& parameters);
 Settings after(const Ping& ping, const Settings& now);
 /// The frames for Settings::results, in the order of their numbers.
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device);
+/// As ping1d::answer().
+std::vector<Bytes> answer(BytesView recorded, Results wanted);
 
 }  // namespace sonar::ping::s500

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "core/base/result.hpp"
 #include "core/sonar/sonar_model.hpp"
@@ -67,11 +68,11 @@ struct Codec {
   /// A message as a client gets it of what Vendor::frame() makes of a ping. Null: the same bytes.
   Bytes (*message)(BytesView framed) = nullptr;
   /// Set if requests of hosts decide which pings they get, or if pings come by several ports: then a replay is a whole device,
-  /// whose pings these are. nullopt: the message holds no ping.
+  /// whose pings these are. nullopt: the message is not of a ping. A part of a ping may be a message of its own.
   std::optional<PingPart> (*ping_part)(BytesView message) = nullptr;
-  /// A message of ping_part() as what Vendor::frame() or Vendor::datagrams() makes of a ping that was requested with `request`.
-  /// Null: the same bytes.
-  Bytes (*answer)(BytesView message, const VendorSettings* request) = nullptr;
+  /// A message of ping_part() as the messages that Vendor::frame() or Vendor::datagrams() makes of a ping that was requested with
+  /// `request`, in order. Null: the same bytes.
+  std::vector<Bytes> (*answer)(BytesView message, const VendorSettings* request) = nullptr;
 };
 
 }  // namespace sonar::recording

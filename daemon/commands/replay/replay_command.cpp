@@ -101,7 +101,7 @@ Result<void> run_replay(const ReplayCommand& command) {
   auto device = find_replay_device(*opened->reader, command.file, command.part_number);
   if (!device) return tl::make_unexpected(device.error());
   if (device->by_requests() && (command.stepped || command.port != 0))
-    return failure(ErrorKind::usage, std::string(command.stepped ? "--stepped: the requests of a driver set the pace of "
+    return failure(ErrorKind::usage, std::string(command.stepped ? "--stepped: its driver and --speed set the pace of "
                                                                  : "--port: only --ip sets where drivers find ") +
                                          std::string(device->make->title));
   if (device->by_datagrams() && command.stepped)

@@ -125,9 +125,13 @@ asio::awaitable<PlayedPing> RequestedReplay::ping_for(const PingRequest& request
 
 asio::awaitable<Simulator::Outcome> RequestedReplay::outcome_for(PingRequest request) {
   PlayedPing ping = co_await ping_for(request);
-  auto recorded = std::make_shared<PartsByPort>(std::move(ping.parts));
-  if (codec_.answer != nullptr)
-    for (auto& part : *recorded) part.second = codec_.answer(part.second, request.vendor_settings.get());
+  auto recorded = std::make_shared<PartsByPort>();
+  for (auto& [port, message] : ping.parts)
+    if (codec_.answer == nullptr)
+      recorded->emplace_back(port, std::move(message));
+    else
+      for (recording::Bytes& one : codec_.answer(message, request.vendor_settings.get()))
+        recorded->emplace_back(port, std::move(one));
   Simulator::Outcome outcome;
   outcome.recorded = std::move(recorded);
   auto made = std::make_shared<Ping>();
@@ -164,8 +168,10 @@ ReplayServer::Figures RequestedReplay::figures() const {
 }
 
 std::string RequestedReplay::at() const {
-  const protocol::DriverAddress first = device_->addresses().front();
-  return std::string(first.protocol) + " " + text_of(first.at);
+  std::string all;
+  for (const protocol::DriverAddress& address : device_->addresses())
+    all += (all.empty() ? "" : ", ") + std::string(address.protocol) + " " + text_of(address.at);
+  return all;
 }
 
 }  // namespace sonar

@@ -31,7 +31,7 @@ class RequestedReplay final : public DeviceParent {
   /// `messages` counts pings.
   ReplayServer::Figures figures() const;
   const Result<void>& outcome() const { return outcome_; }
-  /// "tcp 127.0.0.2:4001"
+  /// All its ports: "tcp 127.0.0.2:9090, udp 127.0.0.2:9090"
   std::string at() const;
 
   void compute(const Device& of, PingRequest request, Simulator::Done done) override;

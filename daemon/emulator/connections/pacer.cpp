@@ -46,6 +46,12 @@ void Pacer::skip(std::chrono::nanoseconds by) {
   home_at_ += by;
 }
 
+void Pacer::hurry(Time now) {
+  if (!running_ || triggered_) return;
+  start_ = now;
+  index_ = 0;
+}
+
 void Pacer::stop() {
   running_ = false;
   forget_trigger();

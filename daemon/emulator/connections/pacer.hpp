@@ -30,6 +30,8 @@ class Pacer {
   void configure(const PingSettings& settings, Time now);
   /// Call it when the clock jumps ahead: moves all times by `by`.
   void skip(std::chrono::nanoseconds by);
+  /// Free running: the grid restarts at `now`, at once.
+  void hurry(Time now);
   /// No pings until the next configure().
   void stop();
   /// A client requests a ping. One trigger waits while the previous ping is computed. Further ones count as skipped, or join the

@@ -36,8 +36,11 @@ FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceSta
   if (recorded_ == nullptr) {
     bytes_ = vendor.frame(ping, state);
     is_first_ports_ = bytes_ != nullptr;
-  } else if (recorded_->size() == 1 && vendor.pings_by() != protocol::PingsBy::datagrams) {
-    bytes_ = std::make_shared<const Bytes>(recorded_->front().second);
+  } else if ((recorded_->size() == 1 || !vendor.has_several_streams()) && !recorded_->empty() &&
+             vendor.pings_by() != protocol::PingsBy::datagrams) {
+    auto all = std::make_shared<Bytes>();
+    for (const auto& [port, bytes] : *recorded_) all->insert(all->end(), bytes.begin(), bytes.end());
+    bytes_ = std::move(all);
   }
   if (bytes_ != nullptr || !vendor.has_several_streams()) return;
   // The parts of the ports make up the whole, so that the ping is encoded once.
@@ -85,7 +88,7 @@ PingQueued Delivery::queue(const PingOutcome& outcome, Time now, Requests& reque
   const auto reported = faults_.altered(outcome.ping, sonar_.state, now);
   FramedPing framed(sonar_.vendor, sonar_.state, *reported, outcome.recorded.get());
   PingQueued queued{outcome.ping, framed.bytes(), {}, outcome.seconds};
-  if (!faults_.withholds(static_cast<std::uint32_t>(outcome.ping->request.number), now))
+  if (outcome.recorded == nullptr && !faults_.withholds(static_cast<std::uint32_t>(outcome.ping->request.number), now))
     queued.distance = sonar_.vendor.distance_in(*reported);
   for (Connection& c : audience_.all())
     audience_.guarded(c, actions, [&] {

@@ -195,7 +195,9 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
   ++figures.pings;
   figures.simulation_s += outcome.seconds;
   figures.simulation.add(outcome.seconds);
-  // The recording sets the pace of its pings; fewer beams or more threads would not raise it.
+  // The recording sets the pace of its pings: the next one is requested now, and comes when it is due. Fewer beams or more
+  // threads would not raise that pace.
+  if (outcome.recorded != nullptr && !outcome.recorded->empty()) pacer_.hurry(now);
   if (!settings_.triggered && pacer_.period().count() > 0 && outcome.recorded == nullptr)
     if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period()),
                                            sonar_.around.config.sonars.size() > 1))
@@ -203,7 +205,8 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
   // The gain of the next ping follows this one, also if no client gets it.
   if (outcome.ping) gain_assist_.look_at(*outcome.ping);
   // A ping that was made for clients that have left, or that is noise only, must not change the device.
-  if (outcome.ping && !audience_.stopping() && !busy_unwanted_ && !outcome.ping->request.blank)
+  // Nor must a recorded one: the settings of the recording are not known.
+  if (outcome.ping && !audience_.stopping() && !busy_unwanted_ && !outcome.ping->request.blank && outcome.recorded == nullptr)
     if (const auto change = sonar_.vendor.after_ping(*outcome.ping, sonar_.state)) change_settings(*change, {}, now, actions);
   if (outcome.ping) note_water(outcome.ping->request, now, actions);
   if (outcome.refused) {

@@ -11,7 +11,9 @@
 #include "daemon/commands/replay/requested_replay.hpp"
 #include "protocol/norbit/host.hpp"
 #include "protocol/ping/messages.hpp"
+#include "protocol/ping/ping1d_messages.hpp"
 #include "protocol/ping/ping_log.hpp"
+#include "protocol/ping/s500_messages.hpp"
 #include "protocol/recorded/raw_dump.hpp"
 #include "protocol/recording/recording.hpp"
 #include "tests/protocol/micron/micron_testing.hpp"
@@ -138,6 +140,8 @@ class SlowDisk final : public recording::RecordingReader {
 class Replay {
  public:
   explicit Replay(Bytes file, double rate_hz = 1000, std::shared_future<void> goes_on = {})
+      : Replay(std::move(file), false, rate_hz, std::move(goes_on)) {}
+  Replay(Bytes file, bool loop, double rate_hz = 1000, std::shared_future<void> goes_on = {})
       : log_([] {
           LogOptions quiet;
           quiet.sink = [](LogLevel, const std::string&) {};
@@ -157,6 +161,7 @@ class Replay {
     ReplayOptions options;
     options.at = {{127, 0, 0, 2}, 0};
     options.rate_hz = rate_hz;
+    options.loop = loop;
     server_ = std::make_unique<RequestedReplay>(io_, *recording_.reader, *device, options, log_);
     if (const auto listening = server_->open("recording"); !listening) throw std::runtime_error(listening.error().text);
     if (disk != nullptr) disk->stands_still = true;
@@ -252,20 +257,25 @@ TEST(ReplayOfMicron, ASendDataGetsTheRecordedLineOfItsDirection) {
 /// A host by UDP.
 class Udp {
  public:
-  Udp() : socket_(io_, udp::endpoint(asio::ip::address_v4::loopback(), 0)) {}
-  void send(const Bytes& bytes) { socket_.send_to(asio::buffer(bytes), {asio::ip::address_v4({127, 0, 0, 2}), 12345}); }
+  explicit Udp(std::uint16_t port)
+      : at_(asio::ip::address_v4({127, 0, 0, 2}), port), socket_(io_, udp::endpoint(asio::ip::address_v4::loopback(), 0)) {}
+  void send(const Bytes& bytes) { socket_.send_to(asio::buffer(bytes), at_); }
   std::optional<ping::Frame> read() {
     pollfd waited{socket_.native_handle(), POLLIN, 0};
     if (::poll(&waited, 1, static_cast<int>(patience.count())) <= 0) return std::nullopt;
     Bytes datagram(1 << 16);
     datagram.resize(socket_.receive(asio::buffer(datagram)));
-    ping::Framer framer(1 << 16, true);
-    framer.append(datagram);
-    return framer.next();
+    return ping::whole_frame(datagram);
+  }
+  /// The number of the next frame; Id{}: none came.
+  ping::Id next_id() {
+    const auto frame = read();
+    return frame ? frame->header.id : ping::Id{};
   }
 
  private:
   asio::io_context io_;
+  udp::endpoint at_;
   udp::socket socket_;
 };
 
@@ -281,7 +291,7 @@ Bytes ping360_line(std::uint16_t angle, bool of_a_scan) {
 /// The recording is of a scan; the request of a single line is answered by the message that answers it.
 TEST(ReplayOfPing360, ARequestGetsTheLineOfItsAngleInTheMessageThatAnswersIt) {
   Replay replay(file_of(ping_log, {ping360_line(10, true), ping360_line(20, true), ping360_line(30, true)}));
-  Udp host;
+  Udp host(12345);
   for (const std::uint16_t angle : std::array<std::uint16_t, 3>{20, 10, 28}) {
     host.send(ping::framed_message(
         ping::Id::transducer, 0,
@@ -297,6 +307,164 @@ TEST(ReplayOfPing360, ARequestGetsTheLineOfItsAngleInTheMessageThatAnswersIt) {
     EXPECT_EQ(data.samples, 3) << "settings of the recording";
     EXPECT_EQ(frame->payload.back(), static_cast<std::byte>(data.angle));
   }
+}
+
+// ---- range finders: each result is requested, or a stream of them
+
+Bytes ping1d_profile(std::uint32_t number) {
+  ping::Profile profile;
+  profile.distance_mm = 1000 + number;
+  profile.confidence = 90;
+  profile.ping = number;
+  profile.length_mm = 4000;
+  profile.count = 3;
+  Bytes payload = wire::bytes_of(profile);
+  payload.insert(payload.end(), 3, static_cast<std::byte>(number));
+  return ping::framed(ping::Id::ping1d_profile, 1, payload);
+}
+template <class M>
+M message_in(const ping::Frame& frame) {
+  M message;
+  wire::Reader reader(frame.payload);
+  fields(reader, message);
+  EXPECT_TRUE(reader.ok());
+  return message;
+}
+/// A message that names another one.
+Bytes about(ping::Id request, ping::Id id) {
+  const auto number = static_cast<unsigned>(id);
+  return ping::framed(request, 0, Bytes{static_cast<std::byte>(number & 0xFF), static_cast<std::byte>(number >> 8)});
+}
+Bytes wanted(ping::Id id) { return about(ping::Id::general_request, id); }
+
+TEST(ReplayOfPing1D, AHostByUdpGetsTheResultsThatItRequestsOneByOne) {
+  Replay replay(file_of(raw_dump, {ping1d_profile(1), ping1d_profile(2), ping1d_profile(3), ping1d_profile(4)}));
+  Udp host(9090);
+  host.send(wanted(ping::Id::ping1d_general_info));
+  EXPECT_EQ(host.next_id(), ping::Id::ping1d_general_info) << "the device answers by itself";
+  host.send(wanted(ping::Id::ping1d_profile));
+  auto frame = host.read();
+  ASSERT_TRUE(frame && frame->header.id == ping::Id::ping1d_profile);
+  EXPECT_EQ(message_in<ping::Profile>(*frame).ping, 1u);
+  EXPECT_EQ(frame->payload.back(), std::byte{1}) << "with its samples";
+  host.send(wanted(ping::Id::ping1d_distance));
+  frame = host.read();
+  ASSERT_TRUE(frame && frame->header.id == ping::Id::ping1d_distance) << "made of the recorded profile";
+  const auto distance = message_in<ping::Distance>(*frame);
+  EXPECT_EQ(distance.distance_mm, 1002u);
+  EXPECT_EQ(distance.length_mm, 4000u);
+  host.send(wanted(ping::Id::ping1d_distance_simple));
+  frame = host.read();
+  ASSERT_TRUE(frame && frame->header.id == ping::Id::ping1d_distance_simple);
+  EXPECT_EQ(message_in<ping::DistanceSimple>(*frame).distance_mm, 1003u);
+  host.send(wanted(ping::Id::ping1d_profile));
+  ASSERT_EQ(host.next_id(), ping::Id::ping1d_profile);
+  EXPECT_TRUE(replay.ends()) << "that was the last ping";
+  EXPECT_EQ(replay.figures().messages, 4u);
+}
+
+TEST(ReplayOfPing1D, AHostByTcpGetsTheRecordedBytes) {
+  Bytes all;
+  std::vector<Bytes> profiles;
+  for (std::uint32_t i = 1; i <= 3; ++i) profiles.push_back(ping1d_profile(i));
+  for (const Bytes& one : profiles) all.insert(all.end(), one.begin(), one.end());
+  Replay replay(file_of(raw_dump, profiles));
+  Tcp host(9090);
+  host.send(about(ping::Id::ping1d_continuous_start, ping::Id::ping1d_profile));
+  const Bytes acked = ping::ack(ping::Id::ping1d_continuous_start, 1), got = host.read_to_end();
+  ASSERT_EQ(got.size(), acked.size() + all.size());
+  EXPECT_EQ(Bytes(got.begin() + static_cast<std::ptrdiff_t>(acked.size()), got.end()), all);
+}
+
+TEST(ReplayOfS500, AStreamOfAnotherReportIsMadeOfTheRecordedOne) {
+  std::vector<Bytes> reports;
+  for (std::uint32_t i = 1; i <= 3; ++i)
+    reports.push_back(ping::framed_message(ping::Id::s500_distance2, 0, ping::Distance2{2000 + i, 2000, 0, 80, 70, 10 * i}));
+  Replay replay(file_of(ping_log, reports));
+  Udp host(51200);
+  ping::SetPingParams params;
+  params.period_ms = 0;
+  params.report = ping::Id::s500_profile6;
+  host.send(ping::framed_message(ping::Id::s500_set_ping_params, 0, params));
+  EXPECT_EQ(host.next_id(), ping::Id::ack);
+  for (std::uint32_t i = 1; i <= 3; ++i) {
+    const auto frame = host.read();
+    ASSERT_TRUE(frame && frame->header.id == ping::Id::s500_profile6);
+    const auto report = message_in<ping::Profile6>(*frame);
+    EXPECT_NEAR(report.depth_m, 2 + 1e-3f * static_cast<float>(i), 1e-5);
+    EXPECT_EQ(report.confidence, 80);
+    EXPECT_EQ(report.results, 0) << "the recording has no samples";
+  }
+  EXPECT_TRUE(replay.ends());
+}
+
+// ---- sonars that send while their host enables pings: the recording sets the pace
+
+Bytes points(std::uint32_t number) {
+  ping::AtofPointData data;
+  data.power_up_ms = 200 * number;
+  data.ping = number;
+  return ping::framed_message(ping::Id::atof_point_data, 0, data);
+}
+Bytes enabling(bool enable) {
+  ping::PingParameters settings;
+  settings.end_mm = 5000;
+  settings.period_ms = 1000;
+  settings.enable = enable ? 1 : 0;
+  return ping::framed_message(ping::Id::set_ping_parameters, 0, settings);
+}
+/// The next frame that is not of the conversation.
+std::optional<ping::Frame> next_measured(Udp& host) {
+  while (auto frame = host.read())
+    if (frame->header.id != ping::Id::utc_request && frame->header.id != ping::Id::ack) return frame;
+  return std::nullopt;
+}
+
+TEST(ReplayOfSurveyor, AHostByUdpGetsEveryMessageAtTheRecordedPace) {
+  std::vector<Bytes> messages;
+  for (std::uint32_t i = 1; i <= 4; ++i) {
+    messages.push_back(ping::framed_message(ping::Id::attitude_report, 0, ping::AttitudeReport{{}, {}, 0, 200 * i}));
+    messages.push_back(points(i));
+  }
+  Replay replay(file_of(ping_log, messages));
+  Udp host(62312);
+  host.send(wanted(ping::Id::device_information));
+  ASSERT_EQ(next_measured(host)->header.id, ping::Id::device_information) << "and no ping before";
+  const auto begin = std::chrono::steady_clock::now();
+  host.send(enabling(true));  // once a second; the recording has five a second
+  for (std::uint32_t i = 1; i <= 4; ++i)
+    for (const ping::Id id : {ping::Id::attitude_report, ping::Id::atof_point_data}) {
+      const auto frame = next_measured(host);
+      ASSERT_TRUE(frame);
+      EXPECT_EQ(frame->header.id, id) << i;
+      EXPECT_EQ(ping::framed(frame->header.id, 0, frame->payload), messages[2 * (i - 1) + (id == ping::Id::atof_point_data)]);
+    }
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, milliseconds(590));
+  EXPECT_TRUE(replay.ends());
+  EXPECT_EQ(replay.figures().messages, 8u);
+}
+
+TEST(ReplayOfSurveyor, AHostByTcpIsAnsweredAndGetsPingsWhileItEnablesThem) {
+  Replay replay(file_of(ping_log, {points(1), points(2), points(3)}), true);
+  Tcp host(62312);
+  ping::Framer framer(65535);
+  const auto next = [&] {
+    while (true) {
+      const auto frame = framer.next();
+      if (frame && frame->header.id != ping::Id::utc_request) return frame->header.id;
+      if (!frame) framer.append(host.read());
+    }
+  };
+  host.send(enabling(true));
+  for (int i = 0; i < 7; ++i) EXPECT_EQ(next(), ping::Id::atof_point_data) << "again and again";
+  host.send(ping::framed(ping::Id::set_device_id, 0, Bytes{std::byte{9}}));
+  host.send(enabling(false));
+  host.send(wanted(ping::Id::protocol_version));
+  bool acked = false;
+  for (auto id = next(); id != ping::Id::protocol_version; id = next()) acked |= id == ping::Id::ack;
+  EXPECT_TRUE(acked);
+  host.send(enabling(true));
+  EXPECT_EQ(next(), ping::Id::atof_point_data);
 }
 
 struct NorbitReplay : ::testing::Test {

@@ -47,6 +47,22 @@ TEST(Pacer, LateTicksAreSkippedAndCountedNeverQueued) {
   EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(500));
 }
 
+TEST(Pacer, AHurriedGridRestartsAtOnce) {
+  Pacer pacer;
+  pacer.hurry(t0);
+  EXPECT_FALSE(pacer.next_tick()) << "standby";
+  pacer.configure(settings(10), t0);
+  EXPECT_TRUE(pacer.fire(t0, false));
+  pacer.hurry(t0 + milliseconds(7));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(7));
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(7), false));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(107));
+  EXPECT_EQ(pacer.skipped_ticks(), 0u);
+  pacer.configure(settings(10, 5, true), t0 + milliseconds(300));
+  pacer.hurry(t0 + milliseconds(300));
+  EXPECT_FALSE(pacer.next_tick()) << "a triggered sonar waits for its trigger";
+}
+
 TEST(Pacer, ABusySimulationLosesTheTick) {
   Pacer pacer;
   pacer.configure(settings(10), t0);
