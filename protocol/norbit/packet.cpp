@@ -86,18 +86,50 @@ Front front_of(const Ping& ping, const protocol::DeviceState& device) {
   return front;
 }
 
-std::vector<Detection> bottom_of(const Ping& ping) {
-  return detect_points(ping, bottom_beams, above_db, rad_from_deg(beam_width_deg));
-}
-
 Grid grid_in(const Ping& ping) {
   return grid_of(settings_from(ping.request.vendor_settings.get()),
                  static_cast<double>(ping.request.settings.device_sound_speed_mps));
 }
 
+/// The pixels of the water column as its packet has them.
+Bytes column_pixels(const Ping& ping) {
+  const Settings settings = settings_from(ping.request.vendor_settings.get());
+  const Grid grid = grid_in(ping);
+  const int coarse = grid.step * grid.thin, beam_step = ping.request.settings.beam_count / settings.beams;
+  const double coarse_m = coarse * grid.sample_m;
+  Bytes pixels;
+  pixels.reserve(pixel_size * static_cast<std::size_t>(grid.column_rows() * settings.beams));
+  wire::Writer write(pixels);
+  for (int m = 0; m < grid.column_rows(); ++m) {
+    const double range_m = (grid.first / coarse + m) * coarse_m;
+    const double more_db = std::min(2 * range_m * gain_slope_db_per_m, most_gain_db - settings.gain_db);
+    const double scale = most_pixel * std::pow(10, more_db / 20);
+    const int begin = std::max(0, m * grid.thin - grid.thin / 2), end = std::min(grid.rows, m * grid.thin + grid.thin / 2 + 1);
+    for (int n = 0; n < settings.beams; ++n) {
+      double sum = 0;
+      for (int row = begin; row < end; ++row)
+        for (int beam = n * beam_step; beam < (n + 1) * beam_step; ++beam) sum += power_at(ping, row, beam);
+      const double level = scale * std::sqrt(sum / ((end - begin) * beam_step));
+      const auto pixel = static_cast<std::uint16_t>(std::lround(std::min(level, most_pixel)));
+      write("pixel", pixel);
+    }
+  }
+  return pixels;
+}
+
+/// The parts of the packets that take long to make. They are made with the ping, off the I/O thread.
+struct Findings {
+  std::vector<Detection> bottom;
+  Bytes pixels;
+};
+std::shared_ptr<const Findings> find(const Ping& ping) {
+  return std::make_shared<const Findings>(
+      Findings{detect_points(ping, bottom_beams, above_db, rad_from_deg(beam_width_deg)), column_pixels(ping)});
+}
+
 }  // namespace
 
-std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) { return protocol::found(bottom_of(ping)); }
+std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) { return protocol::found(find(ping)); }
 
 const recording::Framing framing{{preamble & 0xFF, preamble >> 8 & 0xFF}, header_size, length_of};
 
@@ -120,7 +152,8 @@ Bytes encode_bathymetry(const Ping& ping, const protocol::DeviceState& device) {
   }
   const double gain = std::pow(10, static_cast<double>(s.gain_db) / 20);
   const auto& azimuths = ping.beam_azimuth_rad;
-  for (const Detection& found : protocol::found_in(ping, bottom_of)) {
+  const auto findings = protocol::found_in(ping, find);
+  for (const Detection& found : findings->bottom) {
     const auto part = static_cast<int>((port_rad - found.azimuth_rad) / part_rad);
     Beam& beam = beams[static_cast<std::size_t>(std::clamp(part, 0, bottom_beams - 1))];
     beam.sample = static_cast<std::uint32_t>(std::lround(found.range_m / grid.sample_m));
@@ -161,23 +194,8 @@ Bytes encode_column(const Ping& ping, const protocol::DeviceState& device) {
   front.gain_end_db = static_cast<float>(most_gain_db);
   front.gain_end = static_cast<std::int32_t>(std::lround((most_gain_db - settings.gain_db) / gain_slope_db_per_m / 2 / coarse_m));
 
-  Bytes rest;
-  rest.reserve(pixel_size * front.samples * front.beams + sizeof(float) * front.beams);
+  Bytes rest = protocol::found_in(ping, find)->pixels;
   wire::Writer write(rest);
-  for (int m = 0; m < grid.column_rows(); ++m) {
-    const double range_m = (front.first_sample + m) * coarse_m;
-    const double more_db = std::min(2 * range_m * gain_slope_db_per_m, most_gain_db - settings.gain_db);
-    const double scale = most_pixel * std::pow(10, more_db / 20);
-    const int begin = std::max(0, m * grid.thin - grid.thin / 2), end = std::min(grid.rows, m * grid.thin + grid.thin / 2 + 1);
-    for (int n = 0; n < settings.beams; ++n) {
-      double sum = 0;
-      for (int row = begin; row < end; ++row)
-        for (int beam = n * beam_step; beam < (n + 1) * beam_step; ++beam) sum += power_at(ping, row, beam);
-      const double level = scale * std::sqrt(sum / ((end - begin) * beam_step));
-      const auto pixel = static_cast<std::uint16_t>(std::lround(std::min(level, most_pixel)));
-      write("pixel", pixel);
-    }
-  }
   for (int n = 0; n < settings.beams; ++n) {
     const auto first = ping.beam_azimuth_rad.begin() + n * beam_step;
     const float angle_rad = -(first[0] + first[beam_step - 1]) / 2;

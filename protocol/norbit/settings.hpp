@@ -25,7 +25,7 @@ struct Settings {
   double sound_mps = -1;           // -1: as measured
   bool operator==(const Settings&) const = default;
 };
-/// The bottom, a std::vector<Detection> (packet.cpp).
+/// The bottom and the pixels of the water column (packet.cpp).
 std::shared_ptr<const PingFindings> findings_of(const Settings& settings, const Ping& ping);
 using HeldSettings = protocol::Held<Settings>;
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
