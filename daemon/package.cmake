@@ -38,11 +38,8 @@ install(FILES ${made}/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-
 install(FILES docs/bvtsdk.md docs/blueview.png DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
 install(FILES clients/bvtsdk/README.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
 install(FILES docs/protocols/blueview-link.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk/protocols COMPONENT bvtsdk)
-install(FILES scenes/sonard.yaml scenes/sonard-blueview.yaml scenes/sonard-aris.yaml scenes/sonard-3d15.yaml scenes/sonard-ping360.yaml
-  scenes/sonard-surveyor.yaml scenes/sonard-omniscan.yaml scenes/sonard-ping1d.yaml
-  scenes/sonard-s500.yaml
-  scenes/sonard-dvl.yaml scenes/sonard-m3.yaml scenes/sonard-micron.yaml scenes/sonard-norbit.yaml scenes/sonard-suite.yaml
-  DESTINATION ${documents}/examples COMPONENT sonard)
+file(GLOB configurations CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/scenes/sonard*.yaml)  # one for each make, and the suite
+install(FILES ${configurations} DESTINATION ${documents}/examples COMPONENT sonard)
 install(FILES README.md CONTRIBUTING.md LICENSE DESTINATION ${documents} COMPONENT sonard)
 install(DIRECTORY tests/judge DESTINATION ${documents}/tests COMPONENT sonard PATTERN "__pycache__" EXCLUDE)  # examples of docs/judge.md
 install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT sonard PATTERN "man" EXCLUDE PATTERN "__pycache__" EXCLUDE)
