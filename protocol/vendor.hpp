@@ -136,6 +136,11 @@ class Vendor {
   /// A new dialogue at a port of kind tcp_stream or udp_dialogue. The state must outlive it.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
   virtual PingsBy pings_by() const { return PingsBy::stream; }
+  /// When the device sends a ping's messages, if it needs time to make them. nullopt: as soon as they are made.
+  virtual std::optional<Time> leaves_at(const Ping& ping, const DeviceState& device) const {
+    static_cast<void>(ping), static_cast<void>(device);
+    return std::nullopt;
+  }
   /// Encodes a ping under its settings (PingRequest::vendor_settings), for all connections, or those of the first of several TCP
   /// ports. Called once per ping. Null: its pings are datagrams, or the parts of several TCP ports together.
   virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const {

@@ -8,7 +8,14 @@
 namespace sonar::dvl {
 namespace {
 
-constexpr auto processing_time = std::chrono::milliseconds(2);  // unknown: assumed; from the last echo to the report
+/// From the last echo to the report. Three public reports have 88 and 147 (USR) and 189 ms (DOC), by software of different years:
+/// too few for a default.
+constexpr std::string_view report_delay = "report_delay_ms";
+constexpr double assumed_delay_ms = 2;
+
+std::optional<double> wanted_delay_ms(const protocol::DeviceState& device) {
+  return protocol::given_number(device.options, report_delay);
+}
 
 using PortKind = protocol::Port::Kind;
 constexpr std::array<protocol::Port, 2> port_table{
@@ -20,6 +27,16 @@ class DvlVendor final : public protocol::PushingVendor {
   std::string_view name() const override { return "dvl"; }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return dvl::models(); }
+  std::span<const protocol::Option> options() const override {
+    static const std::array<protocol::Option, 1> all{
+        {{report_delay,
+          {},
+          "none",
+          "milliseconds from a ping's last echo to its report; none: it is sent once it is made",
+          0,
+          1000}}};
+    return all;
+  }
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
   Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
                                                   const protocol::DeviceState& device) const override {
@@ -42,14 +59,17 @@ class DvlVendor final : public protocol::PushingVendor {
   }
   std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
     const Measurement measured = measured_in(ping);
-    return std::make_shared<const protocol::Bytes>(velocity_line(measured, since_last(ping, device), sent_at(measured)));
+    return std::make_shared<const protocol::Bytes>(velocity_line(measured, since_last(ping, device), sent_at(measured, device)));
+  }
+  std::optional<Time> leaves_at(const Ping& ping, const protocol::DeviceState& device) const override {
+    return wanted_delay_ms(device) ? std::optional(sent_at(measured_in(ping), device)) : std::nullopt;
   }
   std::vector<protocol::Bytes> datagrams(const protocol::Port& port, const Ping& ping,
                                          const protocol::DeviceState& device) const override {
     if (port.number != serial_port) return {};  // frame() is what it sends
     const Measurement measured = measured_in(ping);
     const SerialOutput output = settings_from(device.settings.get()).serial_output;
-    Bytes lines = velocity_sentences(measured, since_last(ping, device), sent_at(measured), output);
+    Bytes lines = velocity_sentences(measured, since_last(ping, device), sent_at(measured, device), output);
     if (lines.empty()) return {};
     return {std::move(lines)};
   }
@@ -60,7 +80,9 @@ class DvlVendor final : public protocol::PushingVendor {
     const Time before = device.framed_at, fired = ping.request.fired_at;
     return before != Time{} && fired > before ? fired - before : std::chrono::nanoseconds(0);
   }
-  static Time sent_at(const Measurement& measured) { return measured.heard_at + processing_time; }
+  static Time sent_at(const Measurement& measured, const protocol::DeviceState& device) {
+    return measured.heard_at + nanoseconds_from(1e-3 * wanted_delay_ms(device).value_or(assumed_delay_ms));
+  }
 };
 
 }  // namespace

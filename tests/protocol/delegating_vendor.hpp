@@ -32,6 +32,9 @@ class DelegatingVendor : public Vendor {
   std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const override {
     return of_.after_ping(ping, device);
   }
+  std::optional<Time> leaves_at(const Ping& ping, const DeviceState& device) const override {
+    return of_.leaves_at(ping, device);
+  }
   Bytes beacon(const DeviceState& device, Time now) const override { return of_.beacon(device, now); }
   Reaction on_datagram(const Port& port, BytesView datagram, const DeviceState& device, Time now) const override {
     return of_.on_datagram(port, datagram, device, now);

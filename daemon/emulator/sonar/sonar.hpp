@@ -7,9 +7,11 @@
 // jumps over.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "daemon/emulator/connections/actions.hpp"
 #include "daemon/emulator/faults/faults.hpp"
@@ -84,7 +86,8 @@ class Sonar {
   std::optional<Time> next_tick() const;
   // The stepped clock advances to the next of these and performs them one by one.
   std::optional<Time> next_ping() const { return source_.next_ping(); }
-  std::optional<Time> next_conversation() const { return audience_.earliest(&Connection::next_tick); }
+  /// A tick of a dialogue, or a ping that a slow device sends.
+  std::optional<Time> next_conversation() const;
   /// When a conversation will request a ping by itself.
   std::optional<Time> next_request() const;
   Actions tick_pacer(Time now) { return source_.tick(now); }
@@ -146,6 +149,9 @@ class Sonar {
     protocol::Ipv4 ip{};
   };
   static Source source_of(Connection& connection) { return {&connection, connection.peer.name, connection.peer.ip}; }
+  void deliver(const PingOutcome& outcome, Time now, Actions& actions);
+  void deliver_unsent(Time now, Actions& actions);
+  std::optional<Time> next_unsent() const;
   void handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions);
   void on_event(const Source& from, const protocol::Event& event, Time now, Actions& actions);
   void serve(Connection& connection, Time now, Actions& actions);
@@ -160,6 +166,7 @@ class Sonar {
   Faults faults_;
   PingSource source_;
   Delivery delivery_;
+  std::deque<std::pair<Time, PingOutcome>> unsent_;  // by the time at which a slow device sends them
   std::size_t reactions_ = 0;
 };
 

@@ -1,0 +1,97 @@
+// A device that needs time between its last echo and its report, in virtual time.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/daemon/emulator/sonar/virtual_time.hpp"
+
+namespace sonar::slow_device_test {
+namespace {
+
+using namespace testing_emulator;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+struct SlowDevice : ::testing::Test {
+  static std::string dvl(const std::string& options) {
+    return yaml_of("  - {name: down, profile: dvl-a50, bind_ip: 127.0.0.2, options: {" + options + "}}\n");
+  }
+  static std::int64_t microseconds_of(Time at) {
+    return std::chrono::duration_cast<std::chrono::microseconds>(at.time_since_epoch()).count();
+  }
+  /// The velocity reports that the client has received since the last call.
+  static std::vector<nlohmann::json> reports(VirtualTime& time, ConnectionId client) {
+    protocol::Bytes& received = time.clients[client].received;
+    std::vector<nlohmann::json> found;
+    std::string line;
+    for (const std::byte b : received) {
+      line += static_cast<char>(b);
+      if (b != std::byte{'\n'}) continue;
+      auto message = nlohmann::json::parse(line);
+      if (message["type"] == "velocity") found.push_back(std::move(message));
+      line.clear();
+    }
+    EXPECT_TRUE(line.empty()) << "a line is cut";
+    received.clear();
+    return found;
+  }
+};
+
+TEST_F(SlowDevice, AReportLeavesAtTheTimeThatItStates) {
+  VirtualTime time(dvl("report_delay_ms: 150"));
+  const ConnectionId client = time.connect("down");
+  std::size_t count = 0;
+  for (int ms = 0; ms < 3000; ++ms) {
+    time.run(milliseconds(1));
+    for (const auto& report : reports(time, client)) {
+      const auto sent = report["time_of_transmission"].get<std::int64_t>(),
+                 valid = report["time_of_validity"].get<std::int64_t>();
+      EXPECT_GE(microseconds_of(time.now), sent);
+      EXPECT_LE(microseconds_of(time.now) - sent, 1001);
+      EXPECT_GE(sent - valid, 150'000) << "the delay, and the way of the echo";
+      EXPECT_LE(sent - valid, 250'000);
+      ++count;
+    }
+  }
+  EXPECT_GE(count, 10u);
+}
+
+TEST_F(SlowDevice, WithoutADelayAReportLeavesWithItsPing) {
+  VirtualTime time(dvl(""));
+  const ConnectionId client = time.connect("down");
+  time.run(milliseconds(1));
+  const auto first = reports(time, client);
+  ASSERT_EQ(first.size(), 1u);
+  EXPECT_GT(first[0]["time_of_transmission"].get<std::int64_t>(), microseconds_of(time.now)) << "it is only stamped";
+}
+
+/// Waiting reports of a slow device do not pile up either.
+TEST_F(SlowDevice, AClientThatDoesNotReadLosesTheOldestReports) {
+  VirtualTime time(dvl("report_delay_ms: 150"));
+  const ConnectionId client = time.connect("down");
+  time.clients[client].reads = false;
+  time.run(seconds(30));
+  time.clients[client].reads = true;
+  time.run(milliseconds(1));
+  EXPECT_LE(reports(time, client).size(), static_cast<std::size_t>(time.sonar("down").config().outbox.depth) + 2);
+}
+
+/// The end of a fault does not release what its device has not sent yet.
+TEST_F(SlowDevice, AFaultDelaysItFurther) {
+  VirtualTime time(dvl("report_delay_ms: 150"));
+  const ConnectionId client = time.connect("down");
+  time.run(seconds(1));
+  reports(time, client);
+  FaultRecord record;
+  record.what = "delayed-delivery";
+  time.add_fault("down", record);
+  for (int ms = 0; ms < 2000; ++ms) {
+    if (ms == 1000) time.end_faults("down");
+    time.run(milliseconds(1));
+    for (const auto& report : reports(time, client))
+      EXPECT_GE(microseconds_of(time.now), report["time_of_transmission"].get<std::int64_t>());
+  }
+}
+
+}  // namespace
+}  // namespace sonar::slow_device_test
