@@ -63,6 +63,25 @@ LOG_AFTER = """(connections) => {
   return facts.log.map((line) => line.message).join('');
 }"""
 
+# Notes the canvases that are drawn on by other tasks than animation frames.
+DRAWN_OUTSIDE = """window.outside = [], window.inside = new Set();
+{
+  let framed = 0;
+  const ask = window.requestAnimationFrame;
+  window.requestAnimationFrame = (call) => ask.call(window, (at) => {
+    framed++;
+    try { call(at); } finally { framed--; }
+  });
+  for (const name of ['putImageData', 'clearRect', 'fillRect', 'stroke', 'fill', 'drawImage']) {
+    const draw = CanvasRenderingContext2D.prototype[name];
+    CanvasRenderingContext2D.prototype[name] = function (...rest) {
+      if (framed) window.inside.add(this.canvas.id);
+      else if (this.canvas.id) window.outside.push(`${this.canvas.id}: ${name}`);
+      return draw.apply(this, rest);
+    };
+  }
+}"""
+
 # Settings whose field something else is painted over.
 COVERED_SETTINGS = """[...document.querySelectorAll('#setting-rows :is(input, select)')].filter((e) => {
   e.scrollIntoView({ block: 'nearest' });
@@ -243,6 +262,18 @@ class Page(PageChecks, unittest.TestCase):
         self.picture(page, "no-webgl")
         page.run("1")
         self.assertEqual(page.errors, [])
+
+    def test_canvases_are_drawn_in_animation_frames_alone(self):
+        """After another task that draws, the browser may wait for the graphics, and clicks wait with it."""
+        page = self.open(script=DRAWN_OUTSIDE)
+        shown(page)
+        for key in "tffc+g":
+            page.press(key)
+        for canvas in ("fan", "fan-marks", "history", "ramp"):
+            page.wait(f"window.inside.has('{canvas}') || window.outside.length > 0")
+        number = page.text("#ping-number")
+        page.wait(f"document.querySelector('#ping-number').textContent !== '{number}'")
+        self.assertEqual(page.run("[...new Set(window.outside)]"), [])
 
     def test_keys(self):
         page = self.open()

@@ -7,7 +7,7 @@ import { LogPane } from './panels/log.js';
 import { Notice } from './panels/notice.js';
 import { Refusals } from './panels/refusals.js';
 import { Timeline } from './panels/timeline.js';
-import { drawConnections } from './panels/connections.js';
+import { drawConnections, drawHistory } from './panels/connections.js';
 import { drawDoctor } from './panels/doctor.js';
 import { drawFaults } from './panels/faults.js';
 import { drawHead } from './panels/head.js';
@@ -117,8 +117,8 @@ function showAllEchoes(threshold) {
   allEchoesOf = wanted;
 }
 
+// Canvases are drawn in frame() alone: after any other task that draws, the browser waits for the graphics, and clicks wait with it.
 function draw() {
-  fan.show(facts.ping);
   const now = notice.draw();
   fan.setMood(now ? now.picture : 'fresh');
   drawHead(facts);
@@ -178,6 +178,7 @@ async function beginScene() {
 function frame() {
   const begins = !sceneBegun && sceneMayBegin();
   fan.show(facts.ping);
+  drawHistory($('history'), facts);
   scene?.draw();
   if (begins) beginScene();
   requestAnimationFrame(frame);
@@ -215,8 +216,7 @@ function maximise(pane) {
 
 function showMap() {
   $('map').value = fan.mapName;
-  const g = $('ramp').getContext('2d');
-  g.putImageData(new ImageData(new Uint8ClampedArray(fan.map), 256, 1), 0, 0);
+  requestAnimationFrame(() => $('ramp').getContext('2d').putImageData(new ImageData(new Uint8ClampedArray(fan.map), 256, 1), 0, 0));
 }
 function showGain() {
   $('gain').value = String(Math.log2(fan.gain));

@@ -84,7 +84,6 @@ export class Fan {
   }
   toggleFreeze() {
     this.frozen = !this.frozen;
-    if (!this.frozen) this.show(this.facts.ping);
     return this.frozen;
   }
 

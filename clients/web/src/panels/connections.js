@@ -70,14 +70,15 @@ export function drawConnections(facts) {
   const wait = facts.listened ? '' : ' · waits for the driver';
   showList($('addresses'), [addresses, wait], () =>
     addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), a.sonar_speaks_first ? ' · sends without a request' : wait)));
-  drawHistory($('history'), facts);
 }
 
-/// The pings made a second in the last minute; the newest on the right.
-function drawHistory(canvas, facts) {
+/// The pings made a second in the last minute; the newest on the right. Draws only what has changed.
+export function drawHistory(canvas, facts) {
   const ratio = Math.min(2, devicePixelRatio || 1);
   const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(34 * ratio)];
-  if (width === 0) return;
+  const shown = [width, height, facts.sonar, facts.history.at(-1)?.time_s, facts.wantedRate, document.documentElement.dataset.theme].join();
+  if (width === 0 || canvas.shown === shown) return;
+  canvas.shown = shown;
   if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
   const g = canvas.getContext('2d');
   g.clearRect(0, 0, width, height);
