@@ -309,6 +309,7 @@ class Live(PageChecks, unittest.TestCase):
                     page.close()
 
     def test_axe_finds_nothing_serious(self):
+        """On the page as it opens, and after it was used: a fault, a refused setting, a held picture, the help."""
         axe = self.axe()
         with Sonard(mount=MOUNT, trajectory="orbit", arguments=["--faults"]) as daemon, Driver(daemon.address):
             for theme in ("dark", "light"):
@@ -319,7 +320,26 @@ class Live(PageChecks, unittest.TestCase):
                         for tab in ("fan",) if width > 800 else ("fan", "clients", "faults", "log"):
                             page.run(f"document.querySelector('#tabs [data-tab={tab}]').click()")
                             self.assertEqual(self.serious(page, axe), [], tab)
+                        self.use(page)
+                        self.assertEqual(self.serious(page, axe), [], "used")
+                        for tab in () if width > 800 else ("fan", "clients", "faults"):
+                            page.run(f"document.querySelector('#tabs [data-tab={tab}]').click()")
+                            self.assertEqual(self.serious(page, axe), [], f"used, {tab}")
+                        page.press("?")
+                        self.assertEqual(self.serious(page, axe), [], "with the help")
                         page.close()
+
+    def use(self, page):
+        """Brings up what does not show at first. A click hides a refusal, so it comes last."""
+        page.run("document.querySelector('#freeze').click()")
+        page.wait("document.querySelector('#freeze').textContent === 'Go on'")
+        page.wait("!!" + self.trouble("Thin tether"))
+        page.run(f"{self.trouble('Thin tether')}.click()")
+        page.wait("!!document.querySelector('.fault-card')")
+        field = "document.querySelector('[name=\"/front/range_m\"]')"
+        page.wait(f"!!{field}")
+        page.run(f"((f) => {{ f.focus(); f.value = '999'; f.dispatchEvent(new Event('change')); f.blur(); }})({field})")
+        page.wait("!document.querySelector('#refusal').hidden")
 
     @staticmethod
     def serious(page, axe):
