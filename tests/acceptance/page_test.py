@@ -63,6 +63,18 @@ LOG_AFTER = """(connections) => {
   return facts.log.map((line) => line.message).join('');
 }"""
 
+# The page takes the software renderer for a graphics processor.
+NAMED_GRAPHICS = """window.Worker = class {
+  constructor() { setTimeout(() => this.onmessage({ data: 'ANGLE (a graphics processor)' })); }
+  terminate() {}
+}"""
+# The brightest of the picture's pixels.
+BRIGHTEST = """(() => {
+  const copy = Object.assign(document.createElement('canvas'), { width: 300, height: 300 }).getContext('2d');
+  copy.drawImage(document.querySelector('#fan'), 0, 0, 300, 300);
+  return Math.max(...copy.getImageData(0, 0, 300, 300).data.filter((_, i) => i % 4 === 0));
+})()"""
+
 # Notes the canvases that are drawn on by other tasks than animation frames.
 DRAWN_OUTSIDE = """window.outside = [], window.inside = new Set();
 {
@@ -262,6 +274,19 @@ class Page(PageChecks, unittest.TestCase):
         self.picture(page, "no-webgl")
         page.run("1")
         self.assertEqual(page.errors, [])
+
+    def test_a_graphics_processor_draws_the_fan(self):
+        page = self.open(1100, 760, script=NAMED_GRAPHICS)
+        shown(page)
+        page.wait("!!document.querySelector('#fan').getContext('webgl2')")  # null of a canvas that has another context
+        number = page.text("#ping-number")
+        page.wait(f"document.querySelector('#ping-number').textContent !== '{number}'")
+        page.wait(BRIGHTEST + " > 100")
+        for key in "cfg+":
+            page.press(key)
+        page.size(1000, 700)
+        page.wait(BRIGHTEST + " > 100")
+        self.assert_quiet(page, self.url)
 
     def test_canvases_are_drawn_in_animation_frames_alone(self):
         """After another task that draws, the browser may wait for the graphics, and clicks wait with it."""
