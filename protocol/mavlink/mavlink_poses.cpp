@@ -20,9 +20,6 @@ constexpr std::int64_t longest_sinking_ms = 1000;  // the depth is extrapolated 
 
 std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
-/// Whether only vehicles or their simulators send this message. Ground stations send the others too.
-bool contains_pose(std::uint32_t id) { return id != Heartbeat::id && id != SystemTime::id && id != GpsGlobalOrigin::id; }
-
 Stamp boot_stamp(std::int64_t at_ms) { return {ClockDomain::sim, at_ms * 1'000'000}; }
 
 /// A parameter of a command that is a count. nullopt: it is not a whole number, or it is too large.
@@ -68,6 +65,7 @@ void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
   reported_.reset();
   autopilot_component_ = first_autopilot;
   received_.clear();
+  told_ignored_.clear();
   local_in_world_.reset();
   newest_ns_ = {};
   last_pose_ = {};
@@ -100,10 +98,9 @@ bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
   }
   if (system_ && frame.system == *system_) return true;
   if (system_ && now - last_received_ <= system_silence) return false;
-  const bool identifies_vehicle =
-      frame.id == Heartbeat::id ? message_in<Heartbeat>(frame).autopilot != Heartbeat::no_autopilot : contains_pose(frame.id);
-  if (identifies_vehicle) select_vehicle(frame.system, now);
-  return identifies_vehicle;
+  if (!identifies_vehicle(frame)) return false;
+  select_vehicle(frame.system, now);
+  return true;
 }
 
 /// Accepts each message from one component only, because two components may send different estimates of the same pose: from the
@@ -138,12 +135,15 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
       continue;
     }
     if (!is_from_vehicle(*frame, now)) {
-      note_ignored(*frame);
+      note_ignored(*frame, out);
       continue;
     }
     last_received_ = now;
     out.from_vehicle = true;
-    if (is_selected_component(*frame, now)) on_frame(*frame, {now, out});
+    if (is_selected_component(*frame, now))
+      on_frame(*frame, {now, out});
+    else if (contains_pose(frame->id))
+      tell_ignored(*frame, out);
   }
   add_counts(frames.counts(), out);
   return out;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -115,6 +116,11 @@ class MavlinkPoses {
     Reaction& out;
   };
 
+  static constexpr std::size_t most_told = 16;  // ignored systems and components that notices name
+  /// Whether only vehicles or their simulators send this message. Ground stations send the others too.
+  static bool contains_pose(std::uint32_t id);
+  /// Whether only a vehicle sends this frame: the heartbeat of an autopilot, or a pose.
+  static bool identifies_vehicle(const Frame& frame);
   bool is_from_vehicle(const Frame& frame, Time now);
   bool is_selected_component(const Frame& frame, Time now);
   void select_vehicle(std::uint8_t system, Time now);
@@ -149,9 +155,8 @@ class MavlinkPoses {
   bool receives(std::uint32_t message, Time now) const { return received_within(message, now, system_silence); }
   bool received_within(std::uint32_t message, Time now, std::chrono::nanoseconds within) const;
   bool has_poses(Time now) const;
-  void note_ignored(const Frame& frame) {
-    if (frame.component != own_component) ignored_ = {frame.system, frame.component};
-  }
+  void note_ignored(const Frame& frame, Reaction& out);
+  void tell_ignored(const Frame& frame, Reaction& out);
   void request_messages(Reaction& out);
 
   Settings settings_;
@@ -170,6 +175,7 @@ class MavlinkPoses {
   std::optional<bool> reported_;    // whether poses arrive
   std::chrono::nanoseconds reminder_period_{0};
   std::optional<std::pair<int, int>> ignored_;  // system and component of the last ignored message
+  std::set<std::pair<int, int>> told_ignored_;  // those that a notice has named since the vehicle was selected
   std::map<std::uint32_t, Arrival> received_;
 
   Attitudes attitudes_;

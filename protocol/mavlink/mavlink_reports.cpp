@@ -87,6 +87,34 @@ void MavlinkPoses::request_messages(Reaction& out) {
   ask(GpsGlobalOrigin::id, 1);
 }
 
+bool MavlinkPoses::contains_pose(std::uint32_t id) {
+  return id != Heartbeat::id && id != SystemTime::id && id != GpsGlobalOrigin::id;
+}
+
+bool MavlinkPoses::identifies_vehicle(const Frame& frame) {
+  return frame.id == Heartbeat::id ? message_in<Heartbeat>(frame).autopilot != Heartbeat::no_autopilot : contains_pose(frame.id);
+}
+
+void MavlinkPoses::note_ignored(const Frame& frame, Reaction& out) {
+  if (frame.component == own_component) return;
+  ignored_ = {frame.system, frame.component};
+  if (system_ && identifies_vehicle(frame)) tell_ignored(frame, out);
+}
+
+/// Each system and component is named once: two vehicles at one port are a mistake that nothing else shows.
+void MavlinkPoses::tell_ignored(const Frame& frame, Reaction& out) {
+  if (told_ignored_.size() >= most_told || !told_ignored_.emplace(frame.system, frame.component).second) return;
+  const auto name_of = [](int system, int component) {
+    return "system " + std::to_string(system) + ", component " + std::to_string(component);
+  };
+  const auto known = received_.find(frame.id);
+  const int steering = frame.system == *system_ && known != received_.end() ? known->second.component : autopilot_component_;
+  out.notices.push_back(name_of(frame.system, frame.component) + " sends " + std::string(find_message(frame.id)->name) +
+                        " and is ignored: " + name_of(*system_, steering) + " steers " + settings_.vehicle +
+                        (frame.system == *system_ ? "; component_id selects another"
+                                                  : "; give each vehicle a port of its own, or select one by system_id"));
+}
+
 /// The reason why x and y do not change, and the messages that would change them.
 std::string MavlinkPoses::held_text() const {
   std::string why = " has no fix, and there is no LOCAL_POSITION_NED: no DVL or the like";

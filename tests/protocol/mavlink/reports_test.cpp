@@ -208,6 +208,29 @@ TEST(MavlinkReports, ALinkOnWhichTheRightOneNeverSpeaksIsReported) {
               ElementsAre(Pair(5, HasSubstr("system 255, component 190 sends messages, but neither"))));
 }
 
+TEST(MavlinkReports, WhoIsIgnoredBesideTheVehicleIsNamedOnce) {
+  Settings settings;
+  settings.vehicle = "rov";
+  MavlinkPoses poses(settings);
+  Sender one{{7, 1, 0}}, two{{8, 1, 0}}, companion{{7, 191, 0}}, station{{255, 190, 0}};
+  Heartbeat of_station;
+  of_station.type = 6, of_station.autopilot = 8;
+  EXPECT_THAT(poses.on_datagram(one(odometry(1, 0)), at_s(0)).notices, IsEmpty());
+  EXPECT_THAT(poses.on_datagram(station(of_station), at_s(0.1)).notices, IsEmpty()) << "ground stations may be there";
+  EXPECT_THAT(poses.on_datagram(two(autopilot_heartbeat()), at_s(0.2)).notices,
+              ElementsAre(AllOf(HasSubstr("system 8, component 1 sends HEARTBEAT and is ignored"),
+                                HasSubstr("system 7, component 1 steers rov; give each vehicle a port of its own"))));
+  EXPECT_THAT(poses.on_datagram(two(odometry(1, 0)), at_s(0.3)).notices, IsEmpty()) << "once";
+  EXPECT_THAT(poses.on_datagram(companion(odometry(1, 0)), at_s(0.4)).notices,
+              ElementsAre(AllOf(HasSubstr("system 7, component 191 sends ODOMETRY and is ignored"),
+                                HasSubstr("system 7, component 1 steers rov; component_id selects another"))));
+  for (int system = 9; system < 250; ++system) {
+    Sender more{{static_cast<std::uint8_t>(system), 1, 0}};
+    const auto notices = poses.on_datagram(more(odometry(1, 0)), at_s(0.5)).notices;
+    EXPECT_EQ(notices.empty(), system >= 23) << system;
+  }
+}
+
 TEST(MavlinkReports, AnotherSystemIsReportedToo) {
   MavlinkPoses poses({});
   poses.on_datagram(Sender{{1, 1, 0}}(odometry(1, 0)), at_s(0));
