@@ -10,6 +10,7 @@
 #include <unordered_set>
 
 #include "core/base/regular_file.hpp"
+#include "core/base/utf8.hpp"
 #include "core/text/yaml_tree.hpp"
 
 namespace sonar::text {
@@ -140,8 +141,10 @@ std::optional<Refused> check_characters(std::string_view text) {
     if ((c < 0x20 && c != '\n' && c != '\r' && c != '\t') || c == 0x7f) {
       return Refused{line, column, {}, "a control character; this is not a text file"};
     }
-    if (c == 0xFF || c == 0xFE) return Refused{line, column, {}, "not UTF-8; save the file as UTF-8"};
-    ++column;
+    const std::size_t length = utf8_length(text.substr(i));
+    if (length == 0) return Refused{line, column, {}, "not UTF-8; save the file as UTF-8"};
+    i += length - 1;
+    column += static_cast<int>(length);
     if (c == '\n') ++line, column = 1;
   }
   constexpr int open_brackets_at_most = 256;
