@@ -8,6 +8,7 @@ namespace sonar::recording::mcap {
 namespace {
 
 constexpr std::size_t most_channels = 4096;
+constexpr std::size_t most_summary_records = 1 << 20;
 constexpr std::uint64_t most_described_bytes = 16 << 20;  // limit for all schemas and channels that are kept
 
 std::string at_byte(std::uint64_t at) { return " at byte " + std::to_string(at); }
@@ -84,7 +85,8 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   }
   const std::uint64_t behind = scan_.position() + length;
   if (code == Opcode::data_end || code == Opcode::footer) {
-    ended_ = !in_chunk;
+    if (!in_chunk) end_at(at);
+    if (ended_) return std::nullopt;
   } else if (code == Opcode::chunk && !in_chunk) {
     enter_chunk(at, length, false);
     if (chunk_end_ != 0) return std::nullopt;
@@ -103,6 +105,26 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   }
   scan_.seek(behind);
   return std::nullopt;
+}
+
+/// `at`: of the record behind all data. Finds the end of the file's summary: what follows it, such as a second file, is not read.
+void Reader::end_at(std::uint64_t at) {
+  ended_ = true;
+  for (std::size_t looked_at = 0; looked_at < most_summary_records; ++looked_at) {
+    if (source_->size() - at < record_front_bytes) return;
+    scan_.seek(at);
+    RecordReader front(scan_.read(record_front_bytes));
+    const auto code = front.number<Opcode>();
+    const auto length = front.number<std::uint64_t>();
+    if (!front.ok() || length > source_->size() - at - record_front_bytes) return;  // all data were read
+    at += record_front_bytes + length;
+    if (code != Opcode::footer) continue;
+    at += magic.size();
+    if (at < source_->size())
+      damages_.add(std::to_string(source_->size() - at) + " bytes behind the end of the recording" + at_byte(at) +
+                   " are not read: are several files joined in this one?");
+    return;
+  }
 }
 
 /// Keeps a schema or a channel. Files may repeat them in each chunk; the first one applies.

@@ -30,6 +30,7 @@ class Reader {
   void enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut);
   bool is_chunk_sound(std::uint64_t from, std::uint64_t size, std::uint32_t crc);
   void stop(std::string why);
+  void end_at(std::uint64_t at);
 
   std::unique_ptr<Source> source_;
   Scan scan_;

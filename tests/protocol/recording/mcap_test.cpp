@@ -162,6 +162,25 @@ TEST(Mcap, WithoutItsEndEverythingButTheLastChunkIsThere) {
   EXPECT_THAT(opened->reader->damage()->text, HasSubstr("it was not closed"));
 }
 
+TEST(Mcap, WhatFollowsTheEndIsReported) {
+  const Bytes whole = session(conversation());
+  for (const Bytes& more : {whole, bytes_of("x")}) {
+    Bytes joined = whole;
+    joined.insert(joined.end(), more.begin(), more.end());
+    auto opened = open_bytes(joined);
+    ASSERT_TRUE(opened);
+    expect_same(read_all(*opened->reader), conversation());
+    ASSERT_TRUE(opened->reader->damage());
+    EXPECT_THAT(opened->reader->damage()->text,
+                HasSubstr(std::to_string(more.size()) + " bytes behind the end of the recording at byte " +
+                          std::to_string(whole.size()) + " are not read"));
+  }
+  auto cut = open_bytes({whole.begin(), whole.end() - 1});
+  ASSERT_TRUE(cut);
+  expect_same(read_all(*cut->reader), conversation());
+  EXPECT_FALSE(cut->reader->damage()) << "its data are whole";
+}
+
 TEST(Mcap, WhatIsWholeInACutChunkIsRead) {
   std::vector<RecordedMessage> messages = conversation();
   messages.resize(6);
