@@ -47,6 +47,7 @@ struct HostPing {
   std::size_t lines = 1, whole_lines = 1;
   std::vector<std::string> errors = {};           // errors of identities and sequence
   std::vector<std::string> echo_mismatches = {};  // settings that do not have the requested value yet
+  std::vector<std::string> limited = {};          // settings that the ping echoes as requested, but was not made with
   std::optional<double> fired_s = {};             // by the clock of the device
   /// Makes the drawing for users. Unset: a fan of `picture` is drawn.
   std::function<SonarPicture()> drawing = {};

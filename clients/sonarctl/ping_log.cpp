@@ -27,6 +27,7 @@ void PingLog::add(const HostPing& ping, Seconds at) {
   summary_.bytes += ping.facts.message_size;
   summary_.identity_errors += ping.errors.size();
   if (ping.echo_mismatches.empty() && !summary_.echo_satisfied_at) summary_.echo_satisfied_at = summary_.pings;
+  if (ping.echo_mismatches.empty()) summary_.limited = ping.limited;
   if (!ping.echo_mismatches.empty() && summary_.echo_satisfied_at) ++summary_.echo_lost;
 }
 
@@ -87,6 +88,9 @@ std::string text_from(const PingSummary& s, bool asked, std::string_view rate_un
                  std::string(rate_unit).c_str(), s.interval_p50_ms, s.interval_p99_ms, s.interval_max_ms,
                  s.pings > 0 ? s.rate_hz * static_cast<double>(s.bytes) / static_cast<double>(s.pings) / 1e6 : 0.0);
   if (asked) text += "\nsettings echoed as asked: " + echo_text(s);
+  std::string limits;
+  for (const std::string& limit : s.limited) limits += (limits.empty() ? "" : "; ") + limit;
+  if (!limits.empty()) text += "\nthe sonar limits them: its pings have " + limits;
   return text;
 }
 
@@ -118,6 +122,7 @@ std::string json_from(const PingSummary& s, bool asked) {
                      {"interval_p50_ms", s.interval_p50_ms},
                      {"interval_p99_ms", s.interval_p99_ms},
                      {"interval_max_ms", s.interval_max_ms}};
+  if (!s.limited.empty()) out["limited"] = s.limited;
   if (asked) out["echo_satisfied_at"] = s.echo_satisfied_at ? nlohmann::json(*s.echo_satisfied_at) : nlohmann::json(nullptr);
   return nlohmann::json{{"summary", out}}.dump();
 }

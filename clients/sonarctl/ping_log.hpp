@@ -24,6 +24,7 @@ struct PingSummary {
   std::optional<std::uint64_t> echo_satisfied_at;  // number of the first ping with the requested settings, from 1; nullopt =
                                                    // none, or nothing was requested
   std::uint64_t echo_lost = 0;                     // pings after that one whose echo differed
+  std::vector<std::string> limited;                // HostPing::limited of the last ping with the requested settings
   double rate_hz = 0;
   double interval_p50_ms = 0, interval_p99_ms = 0, interval_max_ms = 0;
 };

@@ -1,6 +1,7 @@
 #include "protocol/oculus/host.hpp"
 
 #include <charconv>
+#include <cmath>
 
 #include "core/text/format.hpp"
 #include "protocol/oculus/decode.hpp"
@@ -41,6 +42,16 @@ protocol::PingFacts facts_of(const DecodedPing& ping) {
           f.row_count * f.range_resolution_m,
           f.frequency_hz,
           ping.message.size()};
+}
+
+/// The sonar echoes what was requested, and makes its pings with the nearest values that it has.
+std::vector<std::string> limits_of(const FireSettings& asked, const protocol::PingFacts& made) {
+  std::vector<std::string> limits;
+  constexpr double whole_rows = 1.5;  // a range ends with a whole row
+  if ((asked.flags & flag::range_in_metres) != 0 && std::abs(made.range_m - asked.range) > whole_rows * made.row_m)
+    limits.push_back(text::format("range %.2f m, not %g m", made.range_m, asked.range));
+  if ((asked.flags & flag::beams_512) != 0 && made.beams < 512) limits.push_back(text::format("%u beams, not 512", made.beams));
+  return limits;
 }
 
 /// Sends a fire message when the connection is open, and again on each ping until the settings that pings state agree with it, as
@@ -92,6 +103,7 @@ class OculusHost final : public protocol::Host {
     out.errors = ping.violations;
     for (std::string& error : sequence_.add(ping)) out.errors.push_back(std::move(error));
     if (asked_) out.echo_mismatches = echo_violations(*asked_, ping);
+    if (asked_ && out.echo_mismatches.empty()) out.limited = limits_of(asked_->settings, out.facts);
     if (const double s = ping.head.fixed.ping_start_time_s; s > 0) out.fired_s = s;
     is_satisfied_ = is_satisfied_ || out.echo_mismatches.empty();
     out.picture = [kept = std::make_shared<const DecodedPing>(std::move(ping))] { return picture_of(*kept); };

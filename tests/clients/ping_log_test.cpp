@@ -47,6 +47,20 @@ TEST(PingLog, TellsWhenTheSettingsTookAndWhetherTheyStayed) {
   EXPECT_THAT(complaints(log.summary(std::nullopt), true), ElementsAre(HasSubstr("lost again in 1 pings")));
 }
 
+TEST(PingLog, TellsWhatTheSonarLimited) {
+  PingLog log;
+  HostPing limited = ping(1);
+  limited.limited = {"range 40.00 m, not 1000 m", "256 beams, not 512"};
+  log.add(limited, 0);
+  const PingSummary s = log.summary(std::nullopt);
+  EXPECT_THAT(text_from(s, true, "Hz"),
+              HasSubstr("\nthe sonar limits them: its pings have range 40.00 m, not 1000 m; 256 beams, not 512"));
+  EXPECT_THAT(json_from(s, true), HasSubstr("\"limited\":[\"range 40.00 m, not 1000 m\""));
+  EXPECT_THAT(complaints(s, true), ElementsAre()) << "the settings were echoed";
+  log.add(ping(2), 0.1);
+  EXPECT_THAT(text_from(log.summary(std::nullopt), true, "Hz"), Not(HasSubstr("limits them")));
+}
+
 TEST(PingLog, ComplainsOfSilenceAndJunk) {
   const protocol::Host::Counts junk{0, 0, 3, 0};
   EXPECT_THAT(complaints(PingLog().summary(junk), true), ElementsAre("no ping arrived", HasSubstr("3 bytes between messages")));

@@ -230,6 +230,7 @@ TEST_P(Hosts, SetWhatIsWantedAndGetPings) {
   const HostPing& ping = talk.pings.back();
   EXPECT_THAT(ping.errors, testing::IsEmpty());
   EXPECT_THAT(ping.echo_mismatches, testing::IsEmpty());
+  EXPECT_THAT(ping.limited, testing::IsEmpty());
   EXPECT_NEAR(ping.facts.range_m, make.name() == "waterlinked" ? range_m : talk.settings.range_m, 0.2);
   EXPECT_GT(ping.facts.message_size, 50u);
   const auto picture = ping.picture();
@@ -248,6 +249,19 @@ TEST_P(Hosts, SetWhatIsWantedAndGetPings) {
   const auto raster = PicturePainter(style).draw(*drawing);
   ASSERT_TRUE(raster) << raster.error().text;
   EXPECT_EQ(raster->height, picture_height(*drawing, style));
+}
+
+TEST_P(Hosts, TellTheRangeWhichTheSonarHasInsteadOfThatWhichItEchoes) {
+  Wanted wanted;
+  wanted.settings.range_m = 900;  // no sonar reaches it
+  if (!GetParam().host(wanted)) return;
+  Talk talk(GetParam(), wanted, 0, model_of(GetParam()));
+  talk.run(30);
+  if (talk.pings.empty() || !talk.host->expects_echo()) return;  // it refuses, or shows the range of each ping only
+  const HostPing& ping = talk.pings.back();
+  EXPECT_LT(ping.facts.range_m, 899);
+  EXPECT_THAT(ping.echo_mismatches, testing::IsEmpty());
+  EXPECT_THAT(ping.limited, testing::Contains(HasSubstr("not 900 m")));
 }
 
 TEST_P(Hosts, FindASonarWithSettingsThatItsModelHas) {
