@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 namespace sonar {
@@ -207,13 +208,13 @@ TEST_F(OneViewer, ReadsThousandsOfKeysInProportionToTheirNumber) {
     for (int i = 0; i < keys; ++i) word += ", \"" + std::to_string(100000 + i) + "\":0";
     double shortest = 1e9;
     for (int i = 0; i < 7; ++i) {
-      const auto start = std::chrono::steady_clock::now();
+      const std::clock_t start = std::clock();  // processor time of this process, so that other programs do not count
       viewer.on_text(word + "}", now);
-      shortest = std::min(shortest, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+      shortest = std::min(shortest, static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
     }
     return shortest;
   };
-  EXPECT_LT(shortest_s(4800), 10 * shortest_s(1200)) << "16 times where each key is sought among all";
+  EXPECT_LT(shortest_s(9600), 24 * shortest_s(1200)) << "64 times where each key is sought among all";
 }
 
 TEST_F(OneViewer, CallsServicesFourAtATime) {
