@@ -9,6 +9,7 @@
 #include "core/motion/trajectory_file.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "core/text/format.hpp"
+#include "daemon/emulator/world/angle_unit.hpp"
 #include "daemon/emulator/world/body_axes.hpp"
 
 namespace sonar {
@@ -38,6 +39,7 @@ constexpr const char* turned_cure =
 constexpr const char* order_cure =
     "write w where the format has it: last in a TUM line (t x y z qx qy qz qw), first in one of EuRoC";
 constexpr const char* angle_cure = "angles are radians there: were degrees sent? Multiply them by 0.0174533";
+constexpr const char* radians_cure = "roll_deg, pitch_deg and yaw_deg are degrees: multiply radians by 57.2958";
 constexpr const char* mount_cure =
     "rpy_deg is [roll, pitch, yaw]: a roll near 180, or a pitch beyond 90, turns it over and swaps port and starboard; to look "
     "aft, set yaw 180";
@@ -312,6 +314,8 @@ std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan
   std::vector<Note> notes;
   add(notes, carrier.vehicle,
       doubt_of_all(poses, plan, is_misplaced, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
+  if (const auto why = radians_read_as_degrees(poses))
+    add(notes, carrier.vehicle, Doubt{"the headings of " + plan.file + " " + *why, radians_cure});
   if (const OtherAxes* axes = axes_of(poses)) {
     if (!are_upright(carrier.mounts, *axes))
       add(notes, carrier.vehicle, Doubt{"the poses of " + plan.file + " " + axes->text, axes->cure});

@@ -21,6 +21,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 Config config_with(const std::string& vehicle, const std::string& mount = "{frame: FLU}", const std::string& more = {}) {
   auto config =
@@ -272,6 +273,46 @@ TEST(Plausibility, ATrajectoryAboveTheWaterOrUpsideDown) {
               ElementsAre(HasSubstr("is 2.0 m above the water's surface (z = 0), in 2 of 3 poses of dive.tum; was NED")));
   EXPECT_THAT(notes(playing("# frame: ENU_FLU\nt,x,y,z,roll_deg,pitch_deg\n0,0,0,-3,170,40\n", "dive.csv")),
               ElementsAre(AllOf(HasSubstr("rov is upside down"), HasSubstr("in 1 of 1 poses of dive.csv"))));
+}
+
+/// Circles of 5 m radius with the bow ahead, or a turn on the spot; the yaw column holds degrees or radians.
+std::string circling(const char* frame, double z_m, double unit_per_rad, double radius_m) {
+  std::string lines = std::string("# frame: ") + frame + "\nt_s,x_m,y_m,z_m,roll_deg,pitch_deg,yaw_deg\n";
+  for (int i = 0; i < 400; ++i) {
+    const double angle = 0.0321 * i, yaw = std::remainder(angle + pi / 2, 2 * pi);
+    const double x = radius_m * std::cos(angle), y = radius_m * std::sin(angle);  // in NED the same turns clockwise
+    for (const double v : {0.1 * i, x, y, z_m, 0.05 * std::sin(angle) * unit_per_rad, 0.0}) lines += std::to_string(v) + ",";
+    lines += std::to_string(yaw * unit_per_rad) + "\n";
+  }
+  return lines;
+}
+
+TEST(Plausibility, ATrajectoryWithRadiansInColumnsOfDegrees) {
+  for (const char* frame : {"ENU_FLU", "NED_FRD"}) {
+    const double z_m = std::string(frame) == "ENU_FLU" ? -3 : 3;
+    for (const double radius_m : {0.0, 5.0}) {
+      EXPECT_THAT(notes(playing(circling(frame, z_m, deg_from_rad(1), radius_m), "dive.csv")), IsEmpty()) << frame << radius_m;
+      EXPECT_THAT(notes(playing(circling(frame, z_m, 1, radius_m), "dive.csv")),
+                  ElementsAre(AllOf(HasSubstr("the headings of dive.csv stay within 6.3 deg, and "),
+                                    HasSubstr(radius_m > 0 ? "would follow the course" : "jump by 6.28 deg"),
+                                    HasSubstr("multiply radians by 57.2958"))))
+          << frame << radius_m;
+    }
+  }
+}
+
+TEST(Plausibility, AVehicleThatHoldsItsHeadingHasDegrees) {
+  // A survey in lanes with the bow always north, and small swings of the heading.
+  std::string lanes = "# frame: ENU_FLU\nt_s,x_m,y_m,z_m,yaw_deg\n", ferry = lanes;
+  for (int i = 0; i < 400; ++i) {
+    const int lane = i / 50, along = lane % 2 == 0 ? i % 50 : 49 - i % 50;
+    const double swing = 2.5 * std::sin(0.7 * i);
+    lanes += std::to_string(0.1 * i) + "," + std::to_string(0.2 * along) + "," + std::to_string(lane) + ",-3," +
+             std::to_string(swing) + "\n";
+    ferry += std::to_string(0.1 * i) + "," + std::to_string(0.1 * i) + ",0,-3," + std::to_string(swing) + "\n";
+  }
+  EXPECT_THAT(notes(playing(lanes, "dive.csv")), IsEmpty());
+  EXPECT_THAT(notes(playing(ferry, "dive.csv")), Not(testing::Contains(HasSubstr("radians"))));
 }
 
 TEST(Plausibility, OfALongTrajectorySomePosesAreLookedAt) {
