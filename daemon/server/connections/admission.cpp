@@ -32,10 +32,14 @@ std::uint64_t most_descriptors() {
   return static_cast<std::uint64_t>(limit.rlim_cur);
 }
 
+/// At least half of the descriptors are for clients.
+std::uint64_t spare_of(const LimitConfig& limits) {
+  return std::min(static_cast<std::uint64_t>(limits.spare_descriptors), most_descriptors() / 2);
+}
+
 /// The first descriptor number that this purpose may not use. The kernel hands out the lowest free number.
 std::uint64_t first_spare(const LimitConfig& limits, Admission::Purpose purpose) {
-  const std::uint64_t most = most_descriptors();
-  const auto spare = std::min(static_cast<std::uint64_t>(limits.spare_descriptors), most / 2);
+  const std::uint64_t most = most_descriptors(), spare = spare_of(limits);
   return most - (purpose == Admission::Purpose::control ? spare / 2 : spare);
 }
 
@@ -64,7 +68,13 @@ void close_by_reset(tcp::socket& socket) {
   socket.close(ec);
 }
 
-Admission::Admission(const LimitConfig& limits, Log& log) : limits_(limits), log_(log), reserve_(open_reserve()) {}
+Admission::Admission(const LimitConfig& limits, Log& log) : limits_(limits), log_(log), reserve_(open_reserve()) {
+  const std::uint64_t most = most_descriptors(), spare = spare_of(limits);
+  if (spare < static_cast<std::uint64_t>(limits.spare_descriptors))
+    log_.warning(
+        "limits.spare_descriptors is more than half of this process's descriptors: lower it, or raise LimitNOFILE or ulimit -n",
+        {{"descriptors", most}, {"spare", spare}});
+}
 
 Admission::~Admission() {
   if (reserve_ >= 0) ::close(reserve_);

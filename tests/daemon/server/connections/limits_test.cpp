@@ -152,6 +152,27 @@ TEST(Limits, TheLastDescriptorsAreNotForClients) {
   setrlimit(RLIMIT_NOFILE, &was);
 }
 
+TEST(Limits, MoreSpareDescriptorsThanHalfOfAllAreReportedAtTheStart) {
+  rlimit was{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &was), 0);
+  rlimit low = was;
+  low.rlim_cur = 200;
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &low), 0);
+  LimitConfig limits;
+  std::string said;
+  LogOptions options;
+  options.sink = [&](LogLevel, const std::string& line) { said += line; };
+  Log log(options);
+  limits.spare_descriptors = 100;
+  const Admission half(limits, log);
+  EXPECT_EQ(said, "");
+  limits.spare_descriptors = 101;
+  const Admission more(limits, log);
+  EXPECT_THAT(said, testing::HasSubstr("limits.spare_descriptors is more than half of this process's descriptors: lower it"));
+  EXPECT_THAT(said, testing::HasSubstr("100"));
+  setrlimit(RLIMIT_NOFILE, &was);
+}
+
 asio::awaitable<void> let_in(Admission& admission, tcp::acceptor& acceptor, Admission::Purpose purpose,
                              std::vector<tcp::socket>& in) {
   while (auto socket = co_await admission.next_visitor(acceptor, purpose)) in.push_back(*std::move(socket));
