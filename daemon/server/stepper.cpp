@@ -25,6 +25,7 @@ Stepper::Due Stepper::next_due() {
 // that may still be answered has its answer.
 bool Stepper::step(const std::function<bool()>& enough_served) {
   skip();
+  if (time_.end_left()) on_change_();
   const std::list<Device>& devices = fleet_.devices();
   if (!std::all_of(devices.begin(), devices.end(), [](const Device& d) { return d.sonar().settled(); })) return false;
   const Due due = next_due();

@@ -2,13 +2,14 @@
 stamps its poses and waits for each answer. Both give the same bytes in every run, independent of the wall clock."""
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 import unittest
 
-from oculus_reader import Client, fire_message
+from oculus_reader import Client, fire_message, reading
 from running_sonard import ROOT, SONARCTL, Sonard, eventually, run
 
 sys.path.insert(0, str(ROOT / "clients/python"))
@@ -103,6 +104,42 @@ class Clocks(unittest.TestCase):
             result = run(SONARCTL, "step", "0.1", "--control", f"{daemon.address}:14770")
             self.assertNotEqual(result.returncode, 0)
             self.assertIn("only with clock: lockstep", result.stderr)
+
+    def test_a_step_ends_with_its_connection(self):
+        """The client of a long step leaves; time stands again, for every way to ask for a step."""
+        def by_http(daemon, _where):
+            asking = socket.create_connection((daemon.address, 8088))
+            body = b'{"dt_s": 3000}'
+            asking.sendall(b"POST /api/v1/step HTTP/1.1\r\nHost: %s\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n%s"
+                           % (daemon.address.encode(), len(body), body))
+            return asking.close
+
+        def by_stream(_daemon, where):
+            asking = subprocess.Popen([str(SONARCTL), "step", "3000", "--control", where], stderr=subprocess.DEVNULL)
+
+            def leave():
+                asking.kill()
+                asking.wait(60)
+            return leave
+
+        for ask in by_http, by_stream:
+            with Sonard(arguments=["--clock", "lockstep"]) as daemon, Client(daemon.address) as client:
+                where = f"{daemon.address}:14770"
+                client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=5))
+                control = self.when_pinging(daemon)
+                with reading(client):  # time waits for clients
+                    leave = ask(daemon, where)
+                    eventually(lambda: int(control.status()["now_ns"]) > 500_000_000)
+                    leave()
+
+                    def stands():
+                        before = control.status()["now_ns"]
+                        time.sleep(0.5)
+                        return control.status()["now_ns"] == before
+                    eventually(stands)
+                    now_ns = int(control.status()["now_ns"])
+                    self.assertLess(now_ns, 2000e9, ask.__name__)
+                    self.assertEqual(control.step(0.25)["now_ns"], now_ns + 250_000_000, "the next step has its whole length")
 
 
 if __name__ == "__main__":

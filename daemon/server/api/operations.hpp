@@ -29,10 +29,12 @@ struct OperationResult {
 class Operations {
  public:
   using Done = std::function<void(OperationResult)>;
+  using HasLeft = std::function<bool()>;
   virtual ~Operations() = default;
 
-  /// `done` is called once: before this returns, or later when the operation takes time (scenes); never after stop().
-  virtual void perform(const control::Operation& operation, const Sender& sender, Done done) = 0;
+  /// `done` is called once: before this returns, or later when the operation takes time (scenes); never after stop(). `has_left`
+  /// returns true once the client has closed its end of the connection; a step then ends.
+  virtual void perform(const control::Operation& operation, const Sender& sender, Done done, HasLeft has_left = {}) = 0;
   /// Counters and histograms as Prometheus text, version 0.0.4.
   virtual std::string metrics() const = 0;
   /// Returns a sentence about a problem, or an empty text. /healthz and the watchdog of the service manager use it.

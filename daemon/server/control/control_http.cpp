@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "daemon/server/recording/recording_file.hpp"
+#include "daemon/server/system/listen.hpp"
 #include "daemon/server/view/view_feed.hpp"
 #include "protocol/control/answers.hpp"
 
@@ -72,11 +73,16 @@ HttpAnswer ControlHttp::health(bool with_text) const {
 /// The result may arrive at once, after minutes, or after the time limit.
 asio::awaitable<HttpAnswer> ControlHttp::perform(control::Operation operation, HttpConnection& from) {
   const auto result = std::make_shared<std::optional<OperationResult>>();
-  targets_.operations.perform(operation, from.sender(), [weak = from.weak_from_this(), result](OperationResult done) {
-    *result = std::move(done);
+  const Operations::Done done = [weak = from.weak_from_this(), result](OperationResult made) {
+    *result = std::move(made);
     // The operation may end after its connection.
     if (const auto connection = weak.lock()) connection->wait_timer().cancel();
-  });
+  };
+  const Operations::HasLeft has_left = [weak = from.weak_from_this()] {
+    const auto connection = weak.lock();
+    return !connection || connection->over() || sonar::has_left(connection->socket());
+  };
+  targets_.operations.perform(operation, from.sender(), done, has_left);
   asio::steady_timer& timer = from.wait_timer();
   timer.expires_after(operation_limit);
   while (!*result && !from.over() && timer.expiry() > HttpConnection::Steady::now()) {  // cancelled when the result arrives

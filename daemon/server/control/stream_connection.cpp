@@ -233,14 +233,19 @@ bool StreamConnection::accept_greeted(const control::Request& request) {
 void StreamConnection::perform(std::uint64_t id, const control::Operation& operation) {
   const bool unasked = is_unasked(id, operation);
   if (!unasked) ++in_progress_;
-  targets_.operations.perform(operation, sender_, [weak = weak_from_this(), id, unasked](OperationResult result) {
+  const auto done = [weak = weak_from_this(), id, unasked](OperationResult result) {
     const auto self = weak.lock();
     if (!self) return;
     if (!unasked) --self->in_progress_;
     self->wake_reader_.cancel();
     const bool silent = unasked && result.code == OperationResult::Code::done;
     if (!silent) self->answer(response_to(id, result));
-  });
+  };
+  const auto has_left = [weak = weak_from_this()] {
+    const auto self = weak.lock();
+    return !self || self->over() || sonar::has_left(self->socket_);
+  };
+  targets_.operations.perform(operation, sender_, done, has_left);
 }
 
 /// A subscription holds a listener only while it selects a kind of event.

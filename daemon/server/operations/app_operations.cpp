@@ -6,10 +6,10 @@
 
 namespace sonar {
 
-void AppOperations::perform(const control::Operation& operation, const Sender& sender, Done done) {
+void AppOperations::perform(const control::Operation& operation, const Sender& sender, Done done, HasLeft has_left) {
   std::visit(Overloaded{[&](const control::GetStatus&) { done({.status = monitoring_.status()}); },
                         [&](const control::PoseSample& asked) { time_.take(asked, sender, std::move(done)); },
-                        [&](const control::Step& asked) { time_.step(asked, std::move(done)); },
+                        [&](const control::Step& asked) { time_.step(asked, std::move(done), std::move(has_left)); },
                         [&](const control::SetTrajectory& asked) { done(time_.steer(asked, sender)); },
                         [&](const control::SetSonar& asked) { done(sonars_.set(asked, sender)); },
                         [&](const control::SetEnvironment& asked) { done(sonars_.set(asked, sender)); },

@@ -17,7 +17,7 @@ class AppOperations final : public Operations {
                 FaultOperations& faults)
       : scene_(scene), sonars_(sonars), time_(time), monitoring_(monitoring), faults_(faults) {}
 
-  void perform(const control::Operation& operation, const Sender& sender, Done done) override;
+  void perform(const control::Operation& operation, const Sender& sender, Done done, HasLeft has_left = {}) override;
   std::string metrics() const override { return monitoring_.metrics(); }
   std::string problem() const override { return monitoring_.problem(); }
 

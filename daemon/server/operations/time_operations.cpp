@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/text/format.hpp"
 #include "daemon/server/operations/operation_results.hpp"
 #include "protocol/control/answers.hpp"
 
@@ -18,13 +19,19 @@ void TimeOperations::take(const control::PoseSample& sample, const Sender& sende
     return done(
         failed("the pose was accepted, but too many earlier poses wait for their pings; this answer is "
                "sent before the pose's own pings"));
-  time_.wait([done = std::move(done)](Time) { done({}); });
+  time_.wait([done = std::move(done)](Time, bool) { done({}); });
 }
 
-/// The answer comes when the step is over, with the pings made since the answer before.
-void TimeOperations::step(const control::Step& asked, Operations::Done done) {
+/// The answer comes when the step is over, with the pings made since the answer before. A client that has shut down only its half
+/// of the connection still gets an answer.
+void TimeOperations::step(const control::Step& asked, Operations::Done done, Operations::HasLeft has_left) {
   if (std::string why = time_.step(asked.dt_s); !why.empty()) return done(refused(std::move(why)));
-  time_.wait([this, done = std::move(done)](Time then) {
+  const auto reached = [this, done = std::move(done)](Time then, bool is_whole) {
+    if (!is_whole)
+      return done(
+          failed(text::format("the step ended early, at %.9g s: its client closed the connection; keep it open until the "
+                              "answer",
+                              seconds(then.time_since_epoch()))));
     const std::uint64_t before = std::exchange(pings_reported_, pings_made());
     // If a reload removed a sonar, its pings are gone too.
     const std::uint64_t pings = pings_reported_ - std::min(before, pings_reported_);
@@ -32,7 +39,8 @@ void TimeOperations::step(const control::Step& asked, Operations::Done done) {
     stepped->set_now_ns(then.time_since_epoch().count());
     stepped->set_pings(pings);
     done({.stepped = stepped});
-  });
+  };
+  time_.wait(reached, std::move(has_left));
   on_change_();
 }
 

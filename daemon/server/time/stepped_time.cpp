@@ -37,7 +37,27 @@ std::string SteppedTime::step(double dt_s) {
   return {};
 }
 
-void SteppedTime::wait(Reached reached) { waiting_.push_back({bound(), std::move(reached)}); }
+void SteppedTime::wait(Reached reached, HasLeft has_left) {
+  waiting_.push_back({bound(), std::move(reached), std::move(has_left)});
+}
+
+bool SteppedTime::end_left() {
+  bool any = false;
+  while (!waiting_.empty() && waiting_.front().has_left && waiting_.front().has_left()) {
+    const Waiting gone = std::move(waiting_.front());
+    waiting_.pop_front();
+    any = true;
+    const std::chrono::nanoseconds rest =
+        gone.until.then ? std::max(*gone.until.then - clock_.now(), std::chrono::nanoseconds(0)) : std::chrono::nanoseconds(0);
+    asked_ -= rest;
+    for (Waiting& later : waiting_) {
+      later.until.last_tick -= rest;
+      if (later.until.then) *later.until.then -= rest;
+    }
+    gone.reached(clock_.now(), false);
+  }
+  return any;
+}
 
 bool SteppedTime::answer(std::optional<Time> next) {
   // The bound becomes smaller when a vehicle that is behind joins those that are followed. A request that waits for a later time
@@ -48,7 +68,7 @@ bool SteppedTime::answer(std::optional<Time> next) {
     const Waiting done = std::move(waiting_.front());
     waiting_.pop_front();
     any = true;
-    done.reached(done.until.then.value_or(clock_.now()));
+    done.reached(done.until.then.value_or(clock_.now()), true);
   }
   return any;
 }

@@ -38,10 +38,15 @@ class SteppedTime {
   /// Adds a step of `dt_s` after all previous steps; ticks at its end belong to the next step. Returns an empty text, or why not.
   std::string step(double dt_s);
 
-  using Reached = std::function<void(Time then)>;
-  /// `reached` is called when every ping that bound() allows at this moment has been served, and it is `then`.
-  void wait(Reached reached);
-  /// True if no more requests may wait. A request whose client closes is kept until its time is reached.
+  /// `is_whole`: every ping that bound() allowed when the wait began has been served. False: the client has left before.
+  using Reached = std::function<void(Time then, bool is_whole)>;
+  using HasLeft = std::function<bool()>;
+  /// `reached` is called once. While a step is under way, `has_left` is asked before each ping; a step ends when it is true.
+  void wait(Reached reached, HasLeft has_left = {});
+  /// Ends the step that is under way if its client has left: the rest of its time does not pass, and later steps move forward.
+  /// Returns whether one has ended.
+  bool end_left();
+  /// True if no more requests may wait.
   bool is_full() const { return waiting_.size() >= most_waiting; }
   bool follows_poses() const { return mode_ == ClockMode::follow; }
   /// Call it when everything before `next` is done; nullopt = nothing more is due. Returns whether a request was answered.
@@ -51,6 +56,7 @@ class SteppedTime {
   struct Waiting {
     Bound until;
     Reached reached;
+    HasLeft has_left;
   };
 
   ClockMode mode_;

@@ -18,7 +18,7 @@ namespace sonar::testing_daemon {
 /// Stores its requests; tests set its answers, and when they come. I/O thread only, except where marked.
 class FakeOperations final : public Operations {
  public:
-  void perform(const control::Operation& operation, const Sender& sender, Done done) override {
+  void perform(const control::Operation& operation, const Sender& sender, Done done, HasLeft = {}) override {
     ++asked;
     last_sender = sender;
     if (const auto* pose = std::get_if<control::PoseSample>(&operation)) last_pose = pose->pose.position_m;

@@ -133,11 +133,76 @@ TEST(Lockstep, NoMoreThanSomeThousandsMayWait) {
   SteppedTime time(ClockMode::lockstep, clock, world);
   for (std::size_t i = 0; i < SteppedTime::most_waiting; ++i) {
     ASSERT_EQ(time.step(1e-6), "");
-    time.wait([](Time) {});
+    time.wait([](Time, bool) {});
   }
   EXPECT_THAT(time.step(1e-6), HasSubstr("4096 requests wait"));
   time.answer({});
   EXPECT_EQ(time.step(1e-6), "");
+}
+
+TEST(Lockstep, TheStepOfAClientThatHasLeftEndsAndLaterStepsKeepTheirLength) {
+  Clock clock(true);
+  const World world({}, {{"rov", {}, false}}, {}, Time{});
+  SteppedTime time(ClockMode::lockstep, clock, world);
+  std::vector<std::string> ended;
+  bool first_left = false;
+  const auto wait = [&](const std::string& name, SteppedTime::HasLeft has_left) {
+    time.wait(
+        [&ended, name](Time then, bool is_whole) {
+          ended.push_back(name + (is_whole ? " whole at " : " cut at ") +
+                          std::to_string(then.time_since_epoch().count() / 1000000));
+        },
+        std::move(has_left));
+  };
+  ASSERT_EQ(time.step(3600), "");
+  wait("first", [&] { return first_left; });
+  ASSERT_EQ(time.step(0), "dt_s must be more than 0 and at most 3600 seconds");
+  clock.advance_to(Time(milliseconds(1500)));
+  EXPECT_FALSE(time.end_left());
+  ASSERT_THAT(time.step(10), HasSubstr("would take more than 3600 seconds")) << "3598.5 s wait already";
+  first_left = true;
+  EXPECT_TRUE(time.end_left());
+  EXPECT_FALSE(time.end_left());
+  EXPECT_THAT(ended, ElementsAre("first cut at 1500"));
+  EXPECT_EQ(time.bound().then, Time(milliseconds(1500)));
+
+  first_left = false;
+  ASSERT_EQ(time.step(10), "");
+  wait("second", [&] { return first_left; });
+  ASSERT_EQ(time.step(0.25), "");
+  wait("third", {});
+  clock.advance_to(Time(milliseconds(2000)));
+  first_left = true;
+  EXPECT_TRUE(time.end_left());
+  EXPECT_EQ(time.bound().then, Time(milliseconds(2250)));
+  clock.advance_to(Time(milliseconds(2250)));
+  EXPECT_TRUE(time.answer({}));
+  EXPECT_THAT(ended, ElementsAre("first cut at 1500", "second cut at 2000", "third whole at 2250"));
+}
+
+TEST(Lockstep, AStepEndsWhenItsClientLeavesWhileAnotherWaits) {
+  DaemonSetup setup = with_clock("lockstep");
+  setup.engine_takes = milliseconds(5);
+  Pinging p(std::move(setup));
+  const auto left = std::make_shared<std::atomic<bool>>(false);
+  std::promise<OperationResult> cut;
+  p.daemon.on_io_thread([&] {
+    p.daemon.app().operations().perform(
+        Step{3000}, {"control test", "control"}, [&cut](OperationResult result) { cut.set_value(std::move(result)); },
+        [left] { return left->load(); });
+  });
+  EXPECT_TRUE(eventually([&] { return p.daemon.requests().size() > 2; }));
+  auto other = p.daemon.ask_later(Step{0.05});
+  *left = true;
+  auto answer = cut.get_future();
+  ASSERT_EQ(answer.wait_for(patience), std::future_status::ready);
+  const OperationResult first = answer.get();
+  EXPECT_EQ(first.code, Code::failed);
+  EXPECT_THAT(first.text, HasSubstr("its client closed the connection"));
+  ASSERT_EQ(other.wait_for(patience), std::future_status::ready);
+  const std::int64_t now_ns = other.get().stepped->now_ns();
+  EXPECT_LT(now_ns, 2'000'000'000'000);
+  EXPECT_EQ(p.daemon.status().now_ns(), now_ns) << "time stands again";
 }
 
 TEST(Lockstep, ADaemonThatStopsAnswersNoStep) {
