@@ -113,6 +113,15 @@ TEST(StatusText, HasTheMeasuredRateBesideTheOneThatIsSet) {
               HasSubstr("  10 Hz, preview 5.0 Hz  gain"));
 }
 
+TEST(StatusText, TellsHowLongAHostWithoutAConnectionIsSilent) {
+  const auto text_of = [](const std::string& silent) {
+    return text_from(control::message_from<v1::DaemonStatus>(R"(sonars { profile: "ping360" clients { address: "10.0.0.7:1" )" +
+                                                             silent + " connected_s: 90 } }"));
+  };
+  EXPECT_THAT(text_of("silent_s: 41.2"), HasSubstr("0.0 MB, 90 s, last heard 41 s ago\n"));
+  EXPECT_THAT(text_of("silent_s: 0.4"), HasSubstr("0.0 MB, 90 s\n"));
+}
+
 TEST(StatusText, TellsEvents) {
   const auto told = [](const std::string& event) { return text_from(control::message_from<v1::Event>(event)); };
   EXPECT_EQ(told(R"(client { sonar: "front" client: "10.0.0.9:4000" connected: true })"),

@@ -14,6 +14,8 @@ namespace {
 using text::counted;
 using text::format;
 
+constexpr double told_silence_s = 3;
+
 unsigned long long wide(std::uint64_t value) { return value; }
 
 std::string duration_text(double seconds) {
@@ -59,7 +61,8 @@ std::string sonar_text(const v1::SonarStatus& s) {
   for (const v1::ClientStatus& c : s.clients())
     text += line("  client", format("%s  %llu pings, %llu dropped, %.1f MB, ", c.address().c_str(), wide(c.pings_written()),
                                     wide(c.pings_dropped()), static_cast<double>(c.bytes_written()) / 1e6) +
-                                 duration_text(c.connected_s()));
+                                 duration_text(c.connected_s()) +
+                                 (c.silent_s() >= told_silence_s ? format(", last heard %.0f s ago", c.silent_s()) : ""));
   return text;
 }
 

@@ -29,6 +29,8 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
     looks_ = 0;
     wake_.cancel();  // the request may have set another limit of silence
   }
+  std::chrono::nanoseconds connected_for() const { return std::chrono::steady_clock::now() - began_at_; }
+  std::chrono::nanoseconds silent_for() const { return std::chrono::steady_clock::now() - heard_at_; }
   ConnectionId id() const { return id_; }
 
  private:
@@ -42,7 +44,7 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   ConnectionId id_;
   std::chrono::nanoseconds gap_;
   asio::steady_timer wake_, pause_;
-  std::chrono::steady_clock::time_point heard_at_ = std::chrono::steady_clock::now(), looked_at_;
+  std::chrono::steady_clock::time_point began_at_ = std::chrono::steady_clock::now(), heard_at_ = began_at_, looked_at_;
   int looks_ = 0;  // number of looks since heard_at_
   bool finishing_ = false, by_host_ = false;
   std::string why_;

@@ -90,7 +90,12 @@ v1::SonarStatus Device::status(Time now) const {
     if (c.role == Role::stream)
       for (const Endpoint& to : sonar_.connections().receivers(c)) s.add_receivers(text_of(to));
     if (c.role != Role::client || c.state != Connection::State::served) continue;
-    fill(*s.add_clients(), c, session_of(c.id).get());
+    v1::ClientStatus& client = *s.add_clients();
+    fill(client, c, session_of(c.id).get());
+    if (const StreamPointer dialogue = stream_of(c.id)) {
+      client.set_connected_s(seconds(dialogue->connected_for()));
+      client.set_silent_s(seconds(dialogue->silent_for()));
+    }
   }
   s.set_asked_by(sonar_.asked_by());
   if (!sonar_.transmits()) s.set_silenced_by(silenced_by_);

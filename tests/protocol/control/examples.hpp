@@ -61,7 +61,7 @@ inline v1::DaemonStatus full_status() {
            observers: "127.0.0.3:41003" observing: 2 status_to: "127.255.255.255:52102" status_to: "10.0.0.7:52102"
            pinging: true range_m: 10 rate_hz: 11 gain_db: -12 frequency_hz: 2.1e6 beams: 512 rows: 437
            clients { address: "127.0.0.1:40000" pings_written: 1 pings_dropped: 2 bytes_written: 3 connected_s: 4.5
-                     bytes_read: 9 requests: 10 complaint: "odd" unread_s: 0.5 taking: 11 unsent_bytes: 12 }
+                     bytes_read: 9 requests: 10 complaint: "odd" unread_s: 0.5 taking: 11 unsent_bytes: 12 silent_s: 13.5 }
            asked_by: "127.0.0.1:40000" silenced_by: "http 127.0.0.1" waiting: 1 asking_observer: "127.0.0.1:40002"
            turned_away { address: "10.0.0.9:1" why: "no slot is free" utc_ns: 1234567890123456780 ago_s: 5.5 }
            clients { address: "127.0.0.1:40001" pings_written: 5 pings_dropped: 6 bytes_written: 7 connected_s: 8.5 }

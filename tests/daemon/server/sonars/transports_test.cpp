@@ -458,6 +458,16 @@ TEST(Transports, NoClientNamesABroadcastOrGroupThatTheConfigurationDoesNot) {
   }
 }
 
+TEST(Transports, TheStatusTellsHowLongAHostByDatagramsIsSilent) {
+  Daemon daemon(made_up());
+  UdpSocket host;
+  host.send("silence 600\n", daemon.address(), data_port);
+  EXPECT_EQ(host.next(), "ok\n");
+  const auto client = [&] { return daemon.status().sonars(0).clients(0); };
+  EXPECT_TRUE(eventually([&] { return client().silent_s() > 0.2; }));
+  EXPECT_GE(client().connected_s(), 0.2);
+}
+
 TEST(Transports, AHostByDatagramsThatIsSilentIsGivenUpUnlessItsComputerAnswersForIt) {
   Daemon daemon(made_up());
   UdpSocket host;
