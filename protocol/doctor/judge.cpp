@@ -163,10 +163,11 @@ class SonarJudge {
   void check_who_left() {
     const v1::Visit& gone = sonar_.gone();
     if (!is_recent(gone) || gone.by_itself()) return;
-    // It has connected again, and gets pings; then the other connection is of the past.
+    // It has connected again, and gets pings; then the other connection is of the past. A client of the same host that was
+    // connected before is another driver.
     const auto host = [](const std::string& address) { return address.substr(0, address.rfind(':')); };
     const bool is_back = std::any_of(sonar_.clients().begin(), sonar_.clients().end(), [&](const v1::ClientStatus& client) {
-      return client.pings_written() > 0 && host(client.address()) == host(gone.address());
+      return client.pings_written() > 0 && host(client.address()) == host(gone.address()) && client.connected_s() <= gone.ago_s();
     });
     const bool got_none = gone.without_ping() && !is_back && gone.why() != ended_by_fault;
     add(got_none ? Level::fail : Level::warn, "driver",

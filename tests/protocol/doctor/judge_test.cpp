@@ -198,6 +198,9 @@ TEST(Judge, OneThatWasDisconnectedAndIsBack) {
   const std::string gone =
       R"(gone { address: "127.0.0.1:1" why: "is no link" utc_ns: 3723000000000 without_ping: true ago_s: 5 })";
   EXPECT_TRUE(any_fails(with(pinging + silent + "}" + gone))) << "connected, without a ping";
+  EXPECT_TRUE(
+      any_fails(with(pinging + silent + R"(pings_written: 3 } gone { address: "127.0.0.1:1" without_ping: true ago_s: 2 })")))
+      << "another driver of that host, which was connected before";
   const Finding f = trouble(with(pinging + silent + "pings_written: 3 }" + gone), "driver");
   EXPECT_EQ(f.level, Level::warn);
   EXPECT_EQ(f.cure, "");
