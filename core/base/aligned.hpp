@@ -1,4 +1,4 @@
-// Vectors of floats that begin on a cache line, because loops over whole vector registers need this.
+// Vectors of floats aligned to cache lines, as loops over whole vector registers require.
 #pragma once
 
 #include <cstddef>

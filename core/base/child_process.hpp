@@ -1,5 +1,5 @@
-// Runs one of our programs for work that may crash the process. Its standard streams are files in memory, and it inherits no
-// other files of this process.
+// Runs one of our programs as a child process, for work that may crash. The child's standard streams are files in memory; it
+// inherits no other open files.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace sonar {
 
-/// A file without a name, which is gone when the last process closes it.
+/// A file in memory, without a name. It is deleted when the last process closes it.
 class MemoryFile {
  public:
   static Result<MemoryFile> make(const char* name);
@@ -30,8 +30,9 @@ struct ChildEnd {
   int exit_code = 0;  // -1: unknown, because this process ignores its children
 };
 
-/// Runs the program and waits for its end. It gets `arguments` after its name, this process's environment and folder, and the
-/// three files as its standard streams; no other descriptor, no blocked or ignored signal, and a process group of its own.
+/// Runs the program and waits for its end. The program gets `arguments`, the environment and working folder of this process,
+/// and the three files as its standard streams. It inherits no other descriptor and no blocked or ignored signal, and has its
+/// own process group.
 Result<ChildEnd> run_child(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                            const MemoryFile& input, const MemoryFile& output, const MemoryFile& errors);
 

@@ -1,5 +1,5 @@
-// Limits which files a program can read while it loads files of unknown origin, because these can name any
-// file of this computer.
+// Limits which files a program can read while it loads files of unknown origin, because such files can refer to any file of
+// this computer.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// Enums and their names: an enum with names has an array of names beside it, in the order of its values.
+// Finds enum values by name. An array beside each such enum has the names, in the order of the values.
 #pragma once
 
 #include <algorithm>

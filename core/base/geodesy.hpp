@@ -1,5 +1,5 @@
 // Converts latitudes and longitudes (WGS84), by way of earth-centred coordinates, to the plane that is tangent to the ground at
-// an origin. It is used for senders with satellite positions. All is in double, exact to micrometres near the origin.
+// an origin. Used for poses with satellite positions. All calculations are in double, exact to micrometres near the origin.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // Vectors, quaternions and poses of all modules: plain structs, shared with device code.
-// World is ENU (z up), body and sonar are FLU (x ahead, y to port, z up); quaternions are Hamilton, body to world.
-// C++17-clean on purpose: nvcc reads it too.
+// World axes are ENU (z up), axes of bodies and sonars are FLU (x ahead, y to port, z up). Quaternions are Hamilton, body to
+// world. Only C++17, because nvcc compiles this file too.
 #pragma once
 
 #include <cmath>
@@ -23,11 +23,11 @@ struct Pose {
   Vec3d position_m;
   Quatd orientation;
 };
-/// Row-major rotation, for code that turns many vectors by one quaternion.
+/// A rotation matrix, row-major, for code that rotates many vectors by one quaternion.
 struct Rotation {
   double m[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 };
-/// Intrinsic Z-Y-X angles (yaw, then pitch, then roll) in the frame of the quaternion they came from.
+/// Intrinsic Z-Y-X angles (yaw, then pitch, then roll) in the frame of the quaternion from which they were computed.
 struct RollPitchYaw {
   double roll_rad = 0, pitch_rad = 0, yaw_rad = 0;
 };
@@ -123,7 +123,7 @@ SONAR_HD constexpr Rotation transposed(const Rotation& r) {
   return t;
 }
 
-/// The rotation about the vector's direction by its length [rad].
+/// The rotation about the vector's direction; the vector's length is the angle [rad].
 SONAR_HD inline Quatd turned_by(Vec3d rotation_rad) {
   const double angle = length(rotation_rad);
   const double part = angle > 0 ? std::sin(angle / 2) / angle : 0.5;

@@ -29,13 +29,13 @@ std::uint64_t number_after(const path& file, const std::string& word) {
   return 0;
 }
 
-struct Names {  // names of the files of one version
+struct Names {  // files of one version of control groups
   const char *limit, *used, *cache;
 };
 constexpr Names version_1{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file "};
 constexpr Names version_2{"memory.max", "memory.current", "inactive_file "};
 
-/// Memory left to a control group and to those above it that are visible to this process.
+/// Minimum of the memory left to a control group and to its parents, as far as this process can see them.
 std::optional<std::uint64_t> left_of_groups(const path& mount, path group, const Names& names) {
   std::optional<std::uint64_t> least;
   for (group = group.relative_path();; group = group.parent_path()) {

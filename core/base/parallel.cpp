@@ -17,7 +17,7 @@ struct Parallel::Pool {
   std::mutex mutex;
   std::condition_variable start, finished;
   std::vector<std::thread> workers;
-  int free_places = 0, busy = 0;  // in this call: number of workers that may still join, and that compute
+  int free_places = 0, busy = 0;  // workers of this call that may still join; workers that compute
   bool stop = false;
 
   std::atomic<std::size_t> next{0};
@@ -41,7 +41,7 @@ struct Parallel::Pool {
   }
 
   void work(int worker, int nice_by) {
-    // On Linux, niceness belongs to the thread. Without it, other threads may only run less smoothly.
+    // On Linux, niceness belongs to the thread. A failure is ignored: other threads only run less smoothly.
     if (nice_by != 0 && ::nice(nice_by) == -1) {
     }
     while (true) {
@@ -96,7 +96,7 @@ void Parallel::run(std::size_t count, void* body, Call call) {
   for (int i = 0; i < places; ++i) p.start.notify_one();
   p.run_items(0);
   std::unique_lock lock(p.mutex);
-  p.free_places = 0;  // all items are taken: threads that have not started must not join
+  p.free_places = 0;  // all items are taken: workers that have not joined yet must not join
   p.finished.wait(lock, [&] { return p.busy == 0; });
   if (p.fault) std::rethrow_exception(std::exchange(p.fault, nullptr));
 }

@@ -1,5 +1,5 @@
-// A fixed pool of compute threads for the loops inside the stages of a ping. core/ has no other threads. Threads take
-// items from an atomic counter; results must not depend on which thread takes which item.
+// A fixed pool of compute threads for the loops inside the stages of a ping. core/ has no other threads. An atomic counter
+// hands out the items; results must not depend on which thread processes which item.
 #pragma once
 
 #include <cstddef>

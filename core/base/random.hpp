@@ -1,5 +1,6 @@
-// Counter-based random numbers: every draw is a function of its key and counter, so no order, thread or device can change it.
-// Source: Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3" (Philox4x32-10); known-answer vectors in tests.
+// Counter-based random numbers: every draw is a function of its key and counter, so it does not depend on the order of draws,
+// on threads or on the device. Source: Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3" (Philox4x32-10);
+// known-answer vectors in tests.
 #pragma once
 
 #include <cmath>
@@ -9,7 +10,7 @@
 
 namespace sonar {
 
-enum class Seed : std::uint64_t;  // core/base/units.hpp, which device code cannot read
+enum class Seed : std::uint64_t;  // defined in core/base/units.hpp, which device code cannot include
 
 struct Random4 {
   std::uint32_t v[4];
@@ -36,23 +37,24 @@ SONAR_HD constexpr Random4 philox(std::uint32_t c0, std::uint32_t c1, std::uint3
   return {{c0, c1, c2, c3}};
 }
 
-/// All streams of draws of pings and of scenes. Different values make the streams independent: most values are the last word of
-/// the counter; where a comment says so, the value is combined with another word by exclusive or.
+/// The independent streams of random numbers. A value is the last word of the counter unless its comment states otherwise;
+/// "combined with" means exclusive or.
 enum class Domain : std::uint32_t {
-  cells = 0,                // speckle and places of surface cells; the counter's last word is the level
-  cell_blocks = 0x6e6574u,  // places within blocks of cells; combined with the key's low word
+  cells = 0,                // speckle and positions of surface cells; the counter's last word is the level
+  cell_blocks = 0x6e6574u,  // positions within blocks of cells; combined with the key's low word
   texture = 0x74657874u,    // combined with the index of the object
   grain = 0x67726169u,      // the same
   noise_table = 0x6e6f6973u,
   noise_place = 0x706c6163u,
-  leak = 0x6c65616bu,           // with noise_place: combined with the number of the sonar
+  leak = 0x6c65616bu,           // with noise_place; combined with the sonar's number
   fixed_fan = 0x66616eu,        // a hit of the fixed fan
   paper_speckle = 0x50323521u,  // a hit of the modes paper and raster
-  other_sonar = 0x6f746872u,  // phase and carrier offset of another sonar; of each of its pulses if the key's words are exchanged
-  range_speckle = 0x72736b6cu,    // speckle of a ray in range images, by the place that the ray hit
+  other_sonar =
+      0x6f746872u,  // phase and carrier offset of another sonar; with the key's words swapped, those of each of its pulses
+  range_speckle = 0x72736b6cu,    // speckle of a ray in range images, by the hit point of the ray
   range_noise = 0x726e6f69u,      // noise of a pixel in range images
-  relief_value = 0x76616c75u,     // seabed and rocks: the key's high word; combined with the stream
-  relief_gradient = 0x67726164u,  // the same, not combined
+  relief_value = 0x76616c75u,     // seabed and rocks; used as the key's high word, combined with the stream
+  relief_gradient = 0x67726164u,  // likewise, not combined
 };
 
 /// The key of one stream of draws.
@@ -67,7 +69,7 @@ SONAR_HD constexpr Random4 philox(std::uint32_t c0, std::uint32_t c1, std::uint3
   return philox(c0, c1, c2, key.domain, key.low, key.high);
 }
 
-/// (0, 1): never 0, so that its logarithm is finite.
+/// A number in (0, 1): never 0, so that its logarithm is finite.
 SONAR_HD constexpr float uniform_open(std::uint32_t bits) { return (static_cast<float>(bits >> 9) + 0.5f) * (1.0f / 8388608.0f); }
 
 /// Circular complex Gaussian with E|z|^2 = 1 (Box-Muller).

@@ -54,7 +54,7 @@ Result<OpenFile> open_regular(const std::filesystem::path& file) {
                    file.string() + ": is a " + kind_of(status.st_mode) + ", not a regular file; save the contents in one");
   };
   if (::stat(file.c_str(), &status) != 0) return not_opened(file);
-  if (!S_ISREG(status.st_mode)) return is_other();  // opening a device may start an action of it
+  if (!S_ISREG(status.st_mode)) return is_other();  // opening a device may start an action
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   if (descriptor < 0) return not_opened(file);
   OpenFile opened(::fdopen(descriptor, "rb"));
@@ -62,8 +62,8 @@ Result<OpenFile> open_regular(const std::filesystem::path& file) {
     ::close(descriptor);
     return not_opened(file);
   }
-  // Another file may have taken the name in the meantime. Because of O_NONBLOCK open() did not wait for it; for a regular file
-  // the flag has no effect.
+  // Another file may have replaced it since the check. O_NONBLOCK kept open() from waiting for a FIFO; it has no effect on
+  // regular files.
   if (::fstat(descriptor, &status) != 0) return not_opened(file);
   if (!S_ISREG(status.st_mode)) return is_other();
   return opened;

@@ -1,5 +1,5 @@
-// Opens the files that configurations, scenes and users name, only if they are regular files. A FIFO could block for ever;
-// reading a device could never end or could trigger it. Every reader of such files opens them here.
+// Opens the files that configurations, scenes and users name, only if they are regular files. Opening a FIFO can block forever;
+// reading a device may never end, or may start an action. Every reader of such files opens them here.
 #pragma once
 
 #include <cstddef>
@@ -17,11 +17,11 @@ struct CloseFile {
 };
 using OpenFile = std::unique_ptr<std::FILE, CloseFile>;
 
-/// Opens a file for reading, as binary. Error: missing_file if it does not exist or is not a regular file ("x.png: is a FIFO, not
-/// a regular file").
+/// Opens a file for reading in binary mode. Error: missing_file if it does not exist or is not a regular file ("x.png: is a
+/// FIFO, not a regular file").
 Result<OpenFile> open_regular(const std::filesystem::path& file);
-/// Reads the file, but at most `most_bytes` + 1 bytes, so that the caller can reject a file that is too long. Errors: io when
-/// reading fails, unavailable when memory does not suffice.
+/// Reads at most `most_bytes` + 1 bytes of the file, so that the caller can detect a file that is too long. Errors: io if
+/// reading fails, unavailable if there is too little memory.
 Result<std::string> read_regular(const std::filesystem::path& file, std::size_t most_bytes);
 
 }  // namespace sonar

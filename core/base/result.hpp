@@ -1,4 +1,4 @@
-// How functions report failures with an outside cause: they return a value or an error. See docs/architecture.md, "Errors".
+// Result<T>: a value or an error. Functions that can fail for an outside cause return it. See docs/architecture.md, "Errors".
 #pragma once
 
 #include <string>

@@ -1,11 +1,11 @@
-// Texts without the blanks at their ends.
+// Removes blanks at both ends of a text.
 #pragma once
 
 #include <string_view>
 
 namespace sonar {
 
-/// The text without those of the characters `blanks` that are at its start or end.
+/// The text without leading and trailing characters that `blanks` contains.
 constexpr std::string_view trimmed(std::string_view text, std::string_view blanks) {
   const auto first = text.find_first_not_of(blanks);
   if (first == std::string_view::npos) return {};

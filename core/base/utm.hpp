@@ -19,12 +19,12 @@ struct UtmZone {
 
 /// "33N", "33S".
 std::string text_of(UtmZone zone);
-/// From "33N" or "33 south"; empty for all else.
+/// Reads "33N" or "33 south"; empty for any other text.
 std::optional<UtmZone> utm_zone_from(std::string_view text);
-/// The zone that a place lies in, without the exceptions of Norway and Svalbard.
+/// The zone in which a place lies, without the exceptions for Norway and Svalbard.
 UtmZone utm_zone_at(const Geodetic& place);
 
-/// Whether the coordinates [m] can lie in a zone or in the margin of grids around it.
+/// Whether the coordinates [m] can lie in a zone or in the usual margin around it.
 bool are_utm(double easting_m, double northing_m);
 /// The place on the ellipsoid with these coordinates [m].
 Geodetic geodetic_from_utm(UtmZone zone, double easting_m, double northing_m);

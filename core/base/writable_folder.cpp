@@ -14,8 +14,9 @@
 namespace sonar {
 namespace {
 
-/// File systems whose files the kernel makes or interprets. Even the superuser cannot write a file of his own there.
-constexpr unsigned long mqueue_magic = 0x19800202, configfs_magic = 0x62656570, fusectl_magic = 0x65735543;  // of kernel sources
+/// File systems whose files the kernel makes or interprets. Even root cannot create ordinary files there.
+constexpr unsigned long mqueue_magic = 0x19800202, configfs_magic = 0x62656570,
+                        fusectl_magic = 0x65735543;  // from the kernel's sources
 constexpr std::array<unsigned long, 19> kernels_own{PROC_SUPER_MAGIC, SYSFS_MAGIC,    CGROUP_SUPER_MAGIC, CGROUP2_SUPER_MAGIC,
                                                     DEBUGFS_MAGIC,    TRACEFS_MAGIC,  SECURITYFS_MAGIC,   DEVPTS_SUPER_MAGIC,
                                                     BPF_FS_MAGIC,     PSTOREFS_MAGIC, HUGETLBFS_MAGIC,    BINFMTFS_MAGIC,
@@ -27,7 +28,7 @@ std::optional<dev_t> file_system_of(const char* file) {
   return ::stat(file, &status) == 0 ? std::optional(status.st_dev) : std::nullopt;
 }
 
-/// True for /dev and folders in it that have no file system of their own, as /dev/shm has.
+/// True for /dev and its folders, except those with their own file system, such as /dev/shm.
 bool is_of_devices(const std::filesystem::path& folder) {
   const auto devices = file_system_of("/dev");
   return devices && devices != file_system_of("/") && devices == file_system_of(folder.c_str());

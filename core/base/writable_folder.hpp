@@ -1,4 +1,4 @@
-// Checks whether files can be made in a folder that a user named, without making one.
+// Checks, without writing, whether files can be created in a folder that a user named.
 #pragma once
 
 #include <filesystem>
@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// The reason why not, to follow the folder's name in an error: "is not a folder"; empty = files can be made.
+/// The reason why files cannot be created there, for an error after the folder's name: "is not a folder". Empty = they can be.
 std::string why_no_files_in(const std::filesystem::path& folder);
 
 }  // namespace sonar
