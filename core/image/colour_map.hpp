@@ -25,7 +25,7 @@ struct ColourMap {
   std::string_view name;
   std::vector<Anchor> anchors;
 
-  /// Values outside 0..1 take the end colours; NaN takes the first.
+  /// Values outside 0..1 get the colour at that end; NaN gets the first colour.
   Rgb colour(float value) const;
 };
 

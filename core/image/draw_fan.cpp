@@ -10,8 +10,8 @@
 namespace sonar {
 namespace {
 
-/// The fractional position in the beam table; beam k spans [k - 0.5, k + 0.5]. nullopt outside the fan; never for a full
-/// turn.
+/// The fractional position in the beam table; beam k spans [k - 0.5, k + 0.5]. nullopt outside the fan; a full circle has no
+/// outside.
 std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azimuth) {
   const auto next = std::lower_bound(azimuth_rad.begin(), azimuth_rad.end(), azimuth, std::greater<>());
   const auto right = std::clamp<std::ptrdiff_t>(next - azimuth_rad.begin(), 1, std::ssize(azimuth_rad) - 1);

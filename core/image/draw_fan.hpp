@@ -1,6 +1,6 @@
-// Draws the rows and beams of a ping as a fan: the sonar is at the bottom, range increases upwards, port is on the left. Of a
-// sonar that looks down the sonar is on top. It uses the direction of each beam, and averages over the footprint of each pixel,
-// so that no sample is skipped.
+// Draws the rows and beams of a ping as a fan: the sonar is at the bottom, range increases upwards, port is on the left. For a
+// sonar that looks down, the sonar is at the top. It uses the direction of each beam, and averages over the footprint of each
+// pixel, so that no sample is skipped.
 #pragma once
 
 #include <cmath>
@@ -22,7 +22,7 @@ struct FanStyle {
   bool rings = true;  // range rings and their ranges in metres
 };
 
-enum class Opens { upwards, downwards };  // direction in which range increases
+enum class Opens { upwards, downwards };  // direction of increasing range
 
 /// Relation of metres to pixels in the picture: the sonar is at (apex_x, apex_y), y increases downwards.
 struct FanLayout {
@@ -36,11 +36,12 @@ struct FanLayout {
 /// Layout of the fan of an image that draw_fan accepts.
 FanLayout fan_layout(const PolarImage& image, const FanStyle& style, Opens opens = Opens::upwards);
 
-/// Error for an image without rows or beams, or with bearings that do not fall from port to starboard within a circle.
+/// Error if the image has no rows or beams, or if its bearings do not decrease from port to starboard or span more than a
+/// circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 
-/// Draws one ping after another, like draw_fan, but in a third of the time: it keeps the footprint of each pixel until rows,
-/// beams, bearings or the direction change. It needs 32 bytes per pixel.
+/// Draws a series of pings like draw_fan, but in a third of the time: it reuses the footprint of each pixel until the number of
+/// rows or beams, the bearings or the direction change. It needs 32 bytes per pixel.
 class FanPainter {
  public:
   explicit FanPainter(FanStyle style) : style_(std::move(style)) {}

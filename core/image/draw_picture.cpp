@@ -12,7 +12,7 @@ namespace {
 constexpr Rgb head_colour{79, 184, 255};
 constexpr double waterfall_shape = 0.75;  // height over width
 
-/// The cells [first, last) of `cells` under pixel `at` of `pixels`; at least one cell.
+/// The cells [first, last) that pixel `at` covers when `cells` cells fill `pixels` pixels; at least one cell.
 std::pair<std::size_t, std::size_t> cells_under(int at, int pixels, std::size_t cells) {
   const auto first = static_cast<std::size_t>(at) * cells / static_cast<std::size_t>(pixels);
   return {first, std::max(first + 1, static_cast<std::size_t>(at + 1) * cells / static_cast<std::size_t>(pixels))};
@@ -39,7 +39,7 @@ Raster draw_cells(const PolarImage& image, std::size_t rows, const FanStyle& sty
   return raster;
 }
 
-/// Upright lines at multiples of `step`, from `left` to `right` across the picture.
+/// Draws vertical lines at multiples of `step`; `left` and `right` are the values at the edges of the picture.
 void draw_axis(Raster& raster, double left, double right, double step, const char* unit) {
   const int scale = std::max(1, raster.width / 400);
   const double low = std::min(left, right), high = std::max(left, right);

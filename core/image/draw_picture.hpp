@@ -1,4 +1,4 @@
-// Draws pictures of sonars for people (sonar_picture.hpp), for every kind of picture.
+// Draws every kind of sonar_picture.hpp.
 #pragma once
 
 #include <utility>
@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-/// Multibeams, whose pictures are points, look down.
+/// Pictures of points are those of multibeam echo sounders, which look down.
 inline Opens opens_of(const SonarPicture& picture) {
   return picture.kind == PictureKind::points ? Opens::downwards : Opens::upwards;
 }
@@ -16,11 +16,12 @@ inline Opens opens_of(const SonarPicture& picture) {
 /// Height of the picture in pixels, for the width in `style`. PicturePainter must accept the picture.
 int picture_height(const SonarPicture& picture, const FanStyle& style);
 
-/// Draws one picture after another. With rings it also draws the head of a sweep, or axes in pictures that are not fans.
+/// Draws a series of pictures. If rings are on, it also draws the head direction of a sweep, and axes in pictures that are not
+/// fans.
 class PicturePainter {
  public:
   explicit PicturePainter(FanStyle style) : style_(style), fan_(std::move(style)) {}
-  /// The errors are those of draw_fan.
+  /// Errors: as draw_fan.
   Result<Raster> draw(const SonarPicture& picture);
 
  private:

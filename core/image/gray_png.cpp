@@ -38,8 +38,8 @@ Result<std::vector<std::byte>> encode_gray_png(std::span<const std::byte> values
   png_set_write_fn(png, &bytes, append, flush);
   png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits, PNG_COLOR_TYPE_GRAY,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_BASE, PNG_FILTER_TYPE_BASE);
-  png_set_compression_level(png, 1);         // noise cannot be compressed: a higher level takes several times as long for 3 %
-  png_set_compression_strategy(png, Z_RLE);  // labels are runs; in noise the longer matches of other strategies take more bytes
+  png_set_compression_level(png, 1);         // noise hardly compresses: a higher level takes several times as long and saves 3 %
+  png_set_compression_strategy(png, Z_RLE);  // labels are runs of equal values; for noise, other strategies produce more bytes
   png_set_filter(png, 0, PNG_FILTER_SUB);
   png_write_info(png, info);
   if (bits == 16) png_set_swap(png);

@@ -1,4 +1,4 @@
-// Grey PNG files of integers of 8 or 16 bits: samples and labels without a colour map.
+// Writes 8-bit or 16-bit integers, such as samples and labels, as grey PNG files without a colour map.
 #pragma once
 
 #include <cstddef>

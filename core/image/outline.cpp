@@ -16,7 +16,8 @@ std::vector<Outline> outlines(int x0, int y0, int x1, int y1, const std::functio
   for (int y = y0; y < y1; ++y)
     for (int x = x0; x < x1; ++x) {
       if (!in(x, y) || in(x, y - 1) || followed[place(x, y)]) continue;
-      // Follows the edge with the region on the right. These are the pixels ahead of a corner, right and left, by direction.
+      // Follows the edge with the region on the right. The tables have, for each direction, the pixels ahead of a corner on the
+      // right and left.
       constexpr int dx[] = {1, 0, -1, 0}, dy[] = {0, 1, 0, -1};
       constexpr int right_x[] = {0, -1, -1, 0}, right_y[] = {0, 0, -1, -1}, left_x[] = {0, 0, -1, -1}, left_y[] = {-1, 0, 0, -1};
       Outline outline{{x, y}};
@@ -35,7 +36,7 @@ std::vector<Outline> outlines(int x0, int y0, int x1, int y1, const std::functio
           way = (way + 3) % 4;
         if (way != before && !(at == outline.front())) outline.push_back(at);
       } while (!(at == outline.front() && way == 0));
-      if (twice_area > 0) found.push_back(std::move(outline));  // outlines of holes have the other direction
+      if (twice_area > 0) found.push_back(std::move(outline));  // outlines of holes run in the opposite direction
     }
   return found;
 }

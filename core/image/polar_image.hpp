@@ -1,5 +1,5 @@
-// A ping as a picture before it is drawn as a fan: samples by range row and beam, with the direction of each beam. It is
-// made of a decoded ping of any vendor; draw_fan draws it, and image_statistics measures it.
+// The samples of a decoded ping by row (range) and beam, with the direction of each beam, independent of the vendor. draw_fan
+// draws it; image_statistics measures it.
 #pragma once
 
 #include <algorithm>
@@ -9,9 +9,9 @@
 
 namespace sonar {
 
-/// The brightness of wide linear samples. A make has its own, after the maker's viewer.
+/// How wide linear samples become brightness. Each make defines it after the maker's viewer.
 struct Shades {
-  std::size_t per_mille = 999;  // samples in a thousand that are not brighter than the map's end
+  std::size_t per_mille = 999;  // this many of a thousand samples are within the colour map; brighter ones saturate
   float gamma = 1;              // brightness is (code / full scale)^gamma
 };
 
@@ -20,12 +20,12 @@ struct PolarImage {
   double row_spacing_m = 0;         // row i covers start_m + [i, i + 1) * row_spacing_m
   std::vector<double> azimuth_rad;  // [beams], positive to port, strictly falling
   std::vector<float> samples;       // [rows][beams], codes as sent
-  float full_scale = 255;           // the code drawn brightest
+  float full_scale = 255;           // the code with the brightest colour
   double start_m = 0;               // there are no samples nearer than this
   Shades shades = {};
 
   float at(std::size_t row, std::size_t beam) const { return samples[row * beams + beam]; }
-  /// The code that `per_mille` of a thousand samples do not exceed, at least 1.
+  /// The code, at least 1, that `per_mille` of a thousand samples do not exceed.
   float brightest(std::size_t per_mille) const {
     std::vector<float> codes = samples;
     const auto place = codes.begin() + static_cast<std::ptrdiff_t>((codes.size() - 1) * per_mille / 1000);

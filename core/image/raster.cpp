@@ -34,7 +34,8 @@ std::uint8_t mix(std::uint8_t under, std::uint8_t over, float opacity) {
   return static_cast<std::uint8_t>(std::lround(static_cast<float>(under) * (1 - opacity) + static_cast<float>(over) * opacity));
 }
 
-/// Opens an empty file that no other process or thread writes or renames until it is closed. -1 and errno on failure.
+/// Opens an empty file and locks it, so that no other process or thread writes or renames it before it is closed. Failure: -1
+/// and errno.
 int open_alone(const std::filesystem::path& file) {
   while (true) {
     const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
@@ -52,7 +53,7 @@ int open_alone(const std::filesystem::path& file) {
   }
 }
 
-/// The file behind symbolic links, which need not exist.
+/// The target of symbolic links; it need not exist.
 std::filesystem::path behind_links(std::filesystem::path file) {
   constexpr int most_links = 40;  // as many as the system follows
   std::error_code error;
@@ -107,7 +108,7 @@ Result<std::vector<std::byte>> encode_png(const Raster& raster) {
 }
 
 Result<void> write_whole_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts) {
-  const bool replaces = !is_device_or_pipe(file);  // a device or a pipe stays what it is, and is written
+  const bool replaces = !is_device_or_pipe(file);  // devices and pipes are written, not replaced
   const std::filesystem::path target = replaces ? behind_links(file) : file;
   const std::filesystem::path unfinished = replaces ? target.string() + ".tmp" : target.string();
   const int lock = replaces ? open_alone(unfinished) : ::open(target.c_str(), O_WRONLY | O_CLOEXEC);

@@ -1,4 +1,4 @@
-// The picture of a sonar for people: for most products a fan of the last ping, for others a picture made of several pings.
+// The picture that viewers show of a sonar: for most products a fan of the last ping, for others made of several pings.
 // protocol/<vendor>/host.cpp makes it; PicturePainter (draw_picture.hpp) draws it for `sonarctl view`, the live view and other
 // viewers.
 #pragma once
@@ -15,8 +15,8 @@ namespace sonar {
 
 enum class PictureKind {
   fan,          // the last ping, by bearing and range
-  points,       // places by bearing and range, drawn on a fan
-  sweep,        // a fan or a full circle, scanned beam by beam by a head that turns
+  points,       // points by bearing and range, drawn on a fan
+  sweep,        // a fan or a full circle that a rotating head scans beam by beam
   range_image,  // a pixel for each azimuth and elevation: near is bright
   waterfall,    // one beam: a row for each ping, the newest on top, by range
 };
@@ -25,13 +25,13 @@ inline constexpr std::string_view name_of(PictureKind kind) { return picture_kin
 
 struct SonarPicture {
   PictureKind kind = PictureKind::fan;
-  /// A range image has a row for each elevation, the highest first. A waterfall has a row for each ping and a column for each
-  /// range: `row_spacing_m` apart from `start_m` on, without bearings.
+  /// A range image has a row for each elevation, the highest first. A waterfall has no bearings; it has a row for each ping and
+  /// a column for each range, `row_spacing_m` apart, beginning at `start_m`.
   PolarImage image;
   double head_rad = 0;       // sweep: direction of the head, positive to port
-  double elevation_rad = 0;  // range image: elevation of the highest row; that of the lowest is its negative
+  double elevation_rad = 0;  // range image: elevation of the highest row; the lowest row has the negative value
   std::vector<std::pair<double, double>> points = {};             // points: azimuth, range
-  enum class Column { none, sent, model } column = Column::none;  // points: what `image` holds; none: it is empty
+  enum class Column { none, sent, model } column = Column::none;  // points: content of `image`; none: it is empty
 
   bool is_polar() const { return kind == PictureKind::fan || kind == PictureKind::points || kind == PictureKind::sweep; }
   /// Far end of the shown ranges [m].
@@ -41,7 +41,7 @@ struct SonarPicture {
   }
 };
 
-/// Most rows of a waterfall, and least rows of its picture; rows without a ping are empty.
+/// Largest number of rows of a waterfall, and smallest number of rows of its picture; rows without a ping are empty.
 inline constexpr std::size_t waterfall_rows = 300, waterfall_fewest_rows = 100;
 
 }  // namespace sonar

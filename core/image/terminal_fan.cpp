@@ -26,7 +26,7 @@ struct Grid {
   }
 };
 
-/// The mean over one half of a cell, which is a square of the drawn picture.
+/// The mean colour of half a cell, which is a square of the drawn picture.
 Rgb mean_colour(const Raster& raster, int left, int top) {
   int r = 0, g = 0, b = 0, count = 0;
   for (int y = top; y < std::min(top + dots, raster.height); ++y) {
@@ -39,7 +39,7 @@ Rgb mean_colour(const Raster& raster, int left, int top) {
   return {static_cast<std::uint8_t>(r / count), static_cast<std::uint8_t>(g / count), static_cast<std::uint8_t>(b / count)};
 }
 
-/// The cells of the drawn picture. Its corner lies outside every fan, so cells of that colour are outside.
+/// The cells of the drawn picture. Its corner lies outside every fan, so cells of the corner's colour are outside.
 Grid grid_from(const Raster& raster, int columns) {
   Grid grid;
   grid.columns = columns;
@@ -59,7 +59,7 @@ Grid grid_from(const Raster& raster, int columns) {
 
 void put_labels(Grid& grid, const PolarImage& image, const FanLayout& layout) {
   const double spacing = ring_spacing_m(image.range_m()), edge = image.azimuth_rad.back();
-  int last_line = grid.lines;  // one label a line, from near to far
+  int last_line = grid.lines;  // at most one label per line, from near to far
   for (int ring = 1; ring * spacing <= image.range_m() * 1.0001; ++ring) {
     const int line = static_cast<int>(layout.y_of(edge, ring * spacing) / (2 * dots));
     const int column = static_cast<int>(layout.x_of(edge, ring * spacing) / dots) + 2;

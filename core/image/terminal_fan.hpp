@@ -1,5 +1,5 @@
-// A sonar's picture as lines of text for a terminal: coloured half blocks, with two picture points per character, or letters if
-// there are no colours. It uses PicturePainter; sonarctl view --term prints it.
+// A sonar's picture as lines of text for a terminal: coloured half blocks, each character showing two pixels, or letters if
+// there are no colours. `sonarctl view --term` prints it.
 #pragma once
 
 #include <string>
@@ -18,13 +18,13 @@ enum class TerminalColours {
 };
 
 struct TerminalStyle {
-  int columns = 80, lines = 24;  // room for the picture, which keeps its shape and may be smaller
+  int columns = 80, lines = 24;  // available space; the picture keeps its shape and may be smaller
   TerminalColours colours = TerminalColours::none;
   ColourMap map;       // unused without colours
   bool labels = true;  // metres at the starboard edge
 };
 
-/// Lines without newline characters; each restores the terminal's colours. Errors: those of draw_fan, and room for less than 24
+/// Lines without newline characters; each line restores the terminal's colours. Errors: as draw_fan, and less space than 24
 /// columns and 8 lines.
 Result<std::vector<std::string>> draw_terminal_picture(const SonarPicture& picture, const TerminalStyle& style);
 
