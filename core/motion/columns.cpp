@@ -26,9 +26,9 @@ Complaint not_a_number(std::string_view word, const char* what = "a number") {
   return in_quotes(word) + " is not " + what + std::string(text::number_hint(word));
 }
 
-/// Finite, decimal; leading zeros do not mean octal numbers in tables.
+/// A finite decimal number. Leading zeros are accepted: in tables they do not mean octal.
 std::optional<double> number(std::string_view word) {
-  // from_chars takes no plus sign.
+  // from_chars accepts no plus sign.
   if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
   double v = 0;
   const char* const last = word.data() + word.size();
@@ -37,7 +37,7 @@ std::optional<double> number(std::string_view word) {
   return v;
 }
 
-/// Names of columns that other programs write.
+/// Column names that other programs write.
 constexpr std::array<std::array<std::string_view, 2>, 10> other_names{{{"time", "t"},
                                                                        {"timestamp", "t"},
                                                                        {"stamp", "t"},
@@ -89,7 +89,7 @@ bool is_of_degrees(std::string_view name) {
 
 }  // namespace
 
-// The names in the order of enum Column. The long names carry the unit, which is the same for the short ones.
+// Names in the order of enum Column. The long names state the unit; it also holds for the short names.
 const std::array<std::string_view, Columns::columns> Columns::long_names{
     "t_s",       "t_ns",    "x_m",    "y_m",    "z_m",    "qw",       "qx",       "qy",       "qz",  "roll_deg",
     "pitch_deg", "yaw_deg", "vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps", "body"};
@@ -188,7 +188,7 @@ Complaint Columns::refuse_vector(const Words& words, Column first, const char* w
     if (!value) return not_a_number(text);
     *parts[i] = *value;
   }
-  // The limit is beyond every scene [m]. At 1e8 m a double still resolves 1e-8 m.
+  // No scene is as large as the limit. At 1e8 m a double still resolves 1e-8 m.
   if (largest(out) > farthest) return std::string(what) + " is beyond 1e8";
   return std::nullopt;
 }
@@ -227,7 +227,7 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
   const auto fill = [&](std::initializer_list<Column> group) -> Complaint {
     std::size_t i = 0;
     for (const Column c : group) {
-      // Angles that have no column are 0; a quaternion has all four.
+      // Angles without a column are 0. Quaternions always have all four columns.
       const auto value = has(c) ? number(word(words, c)) : 0.0;
       if (!value) return not_a_number(word(words, c));
       v[i++] = *value;

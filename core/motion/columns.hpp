@@ -35,18 +35,19 @@ class Columns {
   static Columns tum();
   /// 8 words: without velocity; 11: with velocity; 17: with velocity and the biases of an IMU, which are ignored.
   static Columns euroc(std::size_t words);
-  /// Twelve numbers, the first three rows of the matrix that converts points of the body to the world; no time.
+  /// Twelve numbers and no time: the first three rows of the matrix that converts points from the body's axes to the world's.
   static Columns kitti();
 
   std::size_t count() const { return count_; }
-  /// Unless the header names the unit: whole numbers too large for seconds are read as milliseconds, microseconds or nanoseconds
-  /// since 1970. `words`: the first line with values.
+  /// If the header does not name the unit: whole numbers too large for seconds are read as milliseconds, microseconds or
+  /// nanoseconds since 1970. `words`: the first line with values.
   void guess_unit(const Words& words);
-  /// False if the file does not state the unit; it is then that of the format, 10^power() ns.
+  /// False if the file does not state the unit; the unit is then that of the format, 10^power() ns.
   bool says_unit() const { return says_unit_ || matrix_; }
   int power() const { return power_; }
   void set_power(int power) { power_ = power; }
-  /// Reads a line before its unit is known: the stamp as it is written, the position, the body. False if a word is not a number.
+  /// Reads stamp, position and body of a line before the unit is known; the stamp is as written. False if a word is not a
+  /// number.
   bool peek(const Words& words, double& stamp, Vec3d& position_m, std::string_view& of) const;
   /// Unit of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
   std::string_view unit() const;
@@ -55,7 +56,7 @@ class Columns {
   bool has_body() const { return has(body); }
   bool has_velocity() const { return has(vx); }
   bool has_angular_velocity() const { return has(wx); }
-  /// Reads a line, or returns its error. `words` must have count() elements.
+  /// Reads a line. Returns the error, or nullopt. `words` must have count() elements.
   std::optional<std::string> refuse(const Words& words, Row& out) const;
 
  private:

@@ -13,7 +13,7 @@ constexpr std::int64_t one = 1'000'000;  // in millionths
 }  // namespace
 
 std::optional<Speed> Speed::from(double factor) {
-  // The condition rejects NaN, too. With whole millionths, a product with nanoseconds is exact.
+  // The condition also rejects NaN. Whole millionths make products with nanoseconds exact.
   if (!(factor >= slowest && factor <= fastest)) return std::nullopt;
   return Speed{std::llround(factor * static_cast<double>(one))};
 }
@@ -30,7 +30,7 @@ Ns Playback::line(Time clock) const {
   Wide passed = product / one;
   if (product % one < 0) --passed;  // rounds downwards, also before clock_at_
   constexpr auto last_ns = static_cast<Wide>(std::numeric_limits<std::int64_t>::max());
-  // Limited to 292 years, which is more than stamps of a file may have.
+  // Limited to 292 years; stamps of a file are smaller.
   return Ns(static_cast<std::int64_t>(std::clamp(place_at_.count() + passed, -last_ns, last_ns)));
 }
 

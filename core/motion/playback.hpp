@@ -1,5 +1,5 @@
-// Computes the time in a trajectory for a time of a clock, with start, speed, loop, pause and seek. It uses integer
-// nanoseconds and millionths, so that a stepped run gives the same times every time; daemon/emulator/world has one per body.
+// Converts clock time to time in a trajectory, with start, speed, loop, pause and seek. It uses integer nanoseconds and
+// millionths, so that a stepped run can be repeated exactly. daemon/emulator/world has one object per body.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ struct PlaybackRules {
 
 /// A trajectory that a body follows, the rules of its playback, and its origin.
 struct Plan {
-  std::shared_ptr<const Trajectory> trajectory = {};  // null = nothing
+  std::shared_ptr<const Trajectory> trajectory = {};  // null = none
   PlaybackRules rules = {};
   std::string file = {};   // name of the file as the user wrote it
   std::string about = {};  // format, frame, length, for people
@@ -48,17 +48,17 @@ class Playback {
 
   struct Place {
     Ns at{0};         // time in the trajectory, 0 to its duration
-    double rate = 0;  // seconds of the trajectory for one of the clock: 0 while paused, before the start, after the end
+    double rate = 0;  // seconds of the trajectory per second of the clock: 0 while paused, before the start, after the end
   };
-  /// A round of a loop is as long as the file: the last time of a round is the first time of the next one.
+  /// A round of a loop lasts as long as the file: the end of one round is the start of the next.
   Place place(Time clock) const;
 
-  /// Pauses from `clock` on. Later calls of place() with earlier times may give other results than before.
+  /// Pauses from `clock` on. After this call, place() may return other results for earlier times.
   void pause(Time clock);
   void resume(Time clock);
   void seek(Time clock, Ns to);  // 0 to duration
   void use_speed(Time clock, Speed speed);
-  /// To be called when the clock jumps ahead by `by`: the place in the trajectory does not change.
+  /// Call it when the clock jumps ahead by `by`: the place in the trajectory then does not change.
   void skip(Ns by) { clock_at_ += by; }
 
   bool paused() const { return paused_; }
@@ -67,7 +67,7 @@ class Playback {
   const PlaybackRules& rules() const { return rules_; }
 
  private:
-  /// Time in the trajectory without its ends and without loops.
+  /// Time in the trajectory, not limited to its ends and not wrapped by loops.
   Ns line(Time clock) const;
   void begin_anew(Time clock);
 

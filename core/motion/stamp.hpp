@@ -1,5 +1,4 @@
-// Reads time stamps from text, exact to the nanosecond; a double would round UNIX times to a quarter of a microsecond. Readers of
-// trajectory files use it.
+// Reads time stamps from text, exact to the nanosecond; a double would round UNIX times to a quarter of a microsecond.
 #pragma once
 
 #include <cstdint>

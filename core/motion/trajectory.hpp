@@ -1,5 +1,5 @@
-// The trajectory of one body: poses at known times, and the pose and motion at any time between them.
-// trajectory_file.hpp reads it from files; playback.hpp plays it by a clock. It uses neither clocks nor files.
+// The trajectory of one body: poses at known times. Computes the pose and motion at any time between them. trajectory_file.hpp
+// reads it from files; playback.hpp plays it by a clock. It uses neither clocks nor files.
 #pragma once
 
 #include <chrono>
@@ -22,13 +22,13 @@ struct Moment {
   Motion moves;
 };
 
-/// Poses in the order of time, with velocities if the file has them. `times` count from the start of the file. All bodies of a
-/// file have the same start and end, so that the first pose of a body may be later, and its last one earlier.
+/// Poses in order of time, with velocities if the file has them. `times` count from the start of the file, which is the same
+/// for all its bodies; the first pose of a body may be later than the start, and its last pose earlier than the end.
 struct Points {
   std::vector<Ns> times;                        // times, not negative, in increasing order
-  std::vector<Pose> poses;                      // as many poses as times
-  std::vector<Vec3d> velocities_mps;            // world axes; as many, or none
-  std::vector<Vec3d> angular_velocities_radps;  // body axes; as many, or none
+  std::vector<Pose> poses;                      // one for each time
+  std::vector<Vec3d> velocities_mps;            // world axes; one for each time, or none
+  std::vector<Vec3d> angular_velocities_radps;  // body axes; one for each time, or none
 
   bool operator==(const Points&) const = default;
 };
@@ -38,9 +38,9 @@ class Trajectory {
   /// Needs at least one point. `duration` is that of the whole file, not less than the last time.
   explicit Trajectory(Points points, Ns duration = Ns{0});
 
-  /// Between points the pose moves in a straight line (lerp) and turns at constant rate (slerp); outside of them it does not
-  /// change, and the motion is at rest. The motion is interpolated from the file's velocities, else it is that between the two
-  /// points. At a point it is that of the next interval, at the last point that of the interval before.
+  /// Between points the body moves in a straight line (lerp) and turns at constant rate (slerp); before the first and after the
+  /// last point it rests. The motion is interpolated from the file's velocities; without these it is the mean motion of the
+  /// interval. At a point the interval is the one that begins there; at the last point, the one that ends there.
   Moment at(Ns time) const;
 
   Ns duration() const { return duration_; }

@@ -19,7 +19,7 @@ namespace {
 // Limits that stop the reader early if a file is not a trajectory.
 constexpr std::size_t most_bodies = 256;
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
-constexpr std::uint64_t memory_of_a_line = 200;  // bytes: a stamp, a pose and two velocities, and a copy while a vector grows
+constexpr std::uint64_t memory_of_a_line = 200;  // bytes: a stamp, a pose and two velocities, twice while a vector grows
 
 constexpr std::array<std::string_view, 5> format_names{"auto", "csv", "tum", "euroc", "kitti"};
 constexpr std::array<std::string_view, 2> frame_names{"ENU_FLU", "NED_FRD"};
@@ -52,7 +52,7 @@ bool is_comment(std::string_view line) {
   return line.front() == '#' || line.starts_with("//") || line.starts_with("% ") || line == "%";
 }
 
-/// Distinguishes a line of numbers from a header.
+/// Used to distinguish a line of numbers from a header.
 bool is_number(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);
   double v = 0;
@@ -200,7 +200,7 @@ class Reader {
     return Format::tum;
   }
 
-  /// EuRoC's nanoseconds are whole numbers, or, as some programs write them, 1.4e+18.
+  /// EuRoC has nanoseconds: whole numbers or, from some programs, 1.4e+18.
   static bool has_seconds(std::string_view word) {
     constexpr std::int64_t least_ns = 100'000'000'000'000'000;  // 1973
     return word.find('.') != word.npos && nanoseconds_of_nanoseconds(word).value_or(0) < least_ns;
@@ -243,7 +243,7 @@ class Reader {
   }
 
   Track* track_of(std::string_view body) {
-    // Lines of one body mostly follow each other.
+    // Consecutive lines mostly belong to the same body.
     if (last_ < tracks_.size() && tracks_[last_].body == body) return &tracks_[last_];
     for (last_ = 0; last_ < tracks_.size(); ++last_)
       if (tracks_[last_].body == body) return &tracks_[last_];
@@ -299,7 +299,7 @@ class Reader {
   std::optional<Frame> frame_;
   std::optional<Columns> columns_;
   char between_ = ' ', line_end_ = '\n';
-  std::string_view from_here_;  // the text from the line that is taken
+  std::string_view from_here_;  // the text from the current line on
   bool unit_by_steps_ = false;
   double lowest_yaw_ = INFINITY, highest_yaw_ = -INFINITY, largest_angle_ = 0;  // angles whose unit is not named
   Words words_;

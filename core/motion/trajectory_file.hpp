@@ -1,5 +1,5 @@
-// Reads files of trajectories: our CSV with a header, TUM, EuRoC CSV and KITTI matrices (docs/poses.md). Used by `sonard run` and
-// `sonard render`. The result is in our frames, with times from the start of the file.
+// Reads trajectory files: our CSV with a header, TUM, EuRoC CSV and KITTI matrices (docs/poses.md). The result is in our
+// frames, with times from the start of the file.
 #pragma once
 
 #include <filesystem>
@@ -21,8 +21,8 @@ std::string_view name_of(Frame frame);
 
 struct ReadOptions {
   Format format = Format::automatic;   // found from the first line with numbers or names
-  std::optional<Frame> frame = {};     // needed if the file does not state it; it is an error if the file states another
-  std::optional<double> rate_hz = {};  // lines per second; for KITTI files only, which have no times
+  std::optional<Frame> frame = {};     // required if the file does not state it; an error if the file states a different one
+  std::optional<double> rate_hz = {};  // lines per second; only for KITTI files, which have no times
   bool operator==(const ReadOptions&) const = default;
 };
 

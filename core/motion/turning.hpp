@@ -1,5 +1,4 @@
-// Rotations from one orientation to another, and interpolation between the two. Trajectories and
-// daemon/emulator/world/pose_history use them.
+// Rotations from one orientation to another, and interpolation between the two.
 #pragma once
 
 #include "core/base/geometry.hpp"
