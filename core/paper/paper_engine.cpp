@@ -20,7 +20,7 @@ class ComparisonEngine {
       : rays_(scene, pool.threads()), scene_(std::move(scene)), pool_(pool), options_(options), sum_(sum) {}
 
   Ping run(const PingRequest& asked) {
-    // At the sea surface a ping is computed at another pose than requested, but states the requested one.
+    // At the sea surface, a ping is computed at a different pose from the requested one, which its result states.
     std::vector<PingRequest> room;
     const PingRequest& request = in_water({&asked, 1}, *scene_, room).front();
     if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
@@ -57,7 +57,7 @@ class ModeRouter final : public PingEngine {
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
     std::vector<Ping> pings;
     pings.reserve(requests.size());
-    std::vector<PingStatistics> each;  // pings run in between have their own statistics
+    std::vector<PingStatistics> each;  // statistics of each run of successive canonical pings
     while (!requests.empty()) {
       if (!is_canonical(requests.front())) {
         if (!comparison_) comparison_ = make_comparison_();
@@ -106,7 +106,7 @@ class ModeRouter final : public PingEngine {
 
   std::unique_ptr<PingEngine> canonical_;
   std::function<std::unique_ptr<ComparisonEngine>()> make_comparison_;
-  std::unique_ptr<ComparisonEngine> comparison_;  // made for its first ping, because it needs a ray scene of its own
+  std::unique_ptr<ComparisonEngine> comparison_;  // made for the first ping of its modes, because it needs its own ray scene
   std::deque<bool> passed_on_;                    // for each submitted ping: whether the canonical engine has it
   std::vector<PingStatistics> each_;              // statistics of the last run
   bool last_was_canonical_ = true;

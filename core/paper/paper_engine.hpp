@@ -1,5 +1,5 @@
-// Chooses the engine of a ping by its mode (Switches::mode): the given engine computes canonical pings; pings in the modes paper
-// and raster are computed here, on the CPU. core/pipeline does not depend on it.
+// An engine for pings of all modes (Switches::mode). It passes canonical pings to the given engine, and computes pings in the
+// modes paper and raster itself, on the CPU.
 #pragma once
 
 #include <memory>
@@ -9,9 +9,9 @@
 
 namespace sonar {
 
-/// Adds the comparison modes to an engine of canonical pings over the same scene. They need no time or memory before the first
-/// such ping. They contain echoes of surfaces and point targets only: no noise, no specular echoes, no motion within the ping.
-/// Speckle differs between pings: each ray has a draw from (seed, ping number, beam, ray).
+/// Adds the comparison modes (paper, raster) to an engine of canonical pings over the same scene. They need no time or memory
+/// before the first such ping. Their pings contain only echoes of surfaces and point targets: no noise, no specular echoes, no
+/// motion within the ping. Speckle differs between pings: each ray has a draw from (seed, ping number, beam, ray).
 std::unique_ptr<PingEngine> with_comparison_modes(std::unique_ptr<PingEngine> canonical, std::shared_ptr<const Scene> scene,
                                                   Parallel& pool, const EngineOptions& options,
                                                   paper::FrequencySum sum = paper::FrequencySum::fast);

@@ -12,7 +12,7 @@
 
 namespace sonar::paper {
 
-/// Rays per column if the request does not state them: those of the paper's model, and those left in its raster run.
+/// Default number of rays per column: that of the paper's model, and the number of rows of its raster run.
 inline constexpr int default_rays = 300, default_raster_rows = 11;
 
 /// Directions of the rays, with one column per beam. Fan (paper): uniform in azimuth and elevation. Grid (raster): uniform on an
@@ -32,7 +32,7 @@ struct PaperFan {
   double elevation_rad(int column, int row) const {
     return perspective ? std::asin(direction(column, row).z) : first_row + row * row_step;
   }
-  /// Solid angle of a ray [sr]. Fan: dtheta dphi as printed in eq. (2), without cos(phi).
+  /// Solid angle of a ray [sr]. Fan: dtheta dphi, without cos(phi), as printed in eq. (2).
   double solid_angle_sr(int column, int row) const;
 };
 

@@ -1,5 +1,5 @@
-// Computes a ping in paper or raster mode: rays, eq. (2), the frequency sum, the beam correction, the inverse transform, samples.
-// The engine of core/paper calls it. The result depends only on request and scene.
+// Computes a ping in paper or raster mode: rays, eq. (2), frequency sum, beam correction, inverse transform, samples. The
+// result depends only on request and scene.
 #pragma once
 
 #include <memory>
@@ -42,7 +42,7 @@ bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNo
 void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene, const Prepared& prepared,
                const PingScalars& scalars, const PingRequest& request, const simd::Kernels& kernels, PaperEchoes& echoes);
 
-/// Bodies must have been placed.
+/// The caller must have set the poses of moving bodies.
 Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
               Parallel& pool, double (*now_s)(), PingStatistics& statistics);
 

@@ -1,6 +1,6 @@
 // Computes beams from hits as printed in Choi 2025 (Sensors 25(5):1516, "P25"): eq. (1)-(4) per column, the beamforming of the
-// reference code, an inverse transform. Second stage of core/paper; what differs from the canonical model: docs/acoustics.md,
-// section 8.
+// reference code, an inverse transform. Second stage of core/paper; docs/acoustics.md, section 8, lists the differences from
+// the canonical model.
 #pragma once
 
 #include <complex>
@@ -30,7 +30,7 @@ struct PaperEcho {
   double turns = 0;
   spectral::Complex amplitude;  // [uPa] e^{-i 2 pi f_c tau} included; in expected power the power [uPa^2]
 };
-/// The scatterers of one column, side by side.
+/// The scatterers of one column, as a structure of arrays.
 struct PaperEchoes {
   std::vector<double> turns, re, im;
 
@@ -62,8 +62,8 @@ void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, c
 /// sum of all V^2. `squared` for expected power. [beams][columns]
 std::vector<float> make_correction(std::span<const double> azimuth_rad, double spacing_rad, bool squared);
 
-/// The same for uniform azimuths, where V depends only on the distance of two azimuths; not squared. Null if azimuths are not
-/// uniform.
+/// The correction for uniform azimuths, where V depends only on the difference of two azimuths; not squared. Null if the
+/// azimuths are not uniform.
 std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad);
 /// out[j][...] = sum_k V_jk in[k][...] by these tables; rows have `values` floats, a multiple of 32.
 void correct(const BeamTransformTables& even, std::span<const float> in, int values, const simd::Kernels& kernels, Parallel& pool,
@@ -90,7 +90,7 @@ class InverseTransform {
   std::vector<spectral::Complex> baseband_;   // [samples] e^{i 2 pi f_1 t_n}
 };
 
-/// Table of |p|^2 of a single echo in the record, of which expected power is a sum.
+/// Table of |p|^2 of a single echo in the record. Expected power is a sum of such pulses.
 class PulsePower {
  public:
   PulsePower(const PaperSpectrum& spectrum, const InverseTransform& inverse);
