@@ -1,5 +1,4 @@
-// The directions of beams whose delays were computed for another sound speed than that of the water (docs/acoustics.md, section
-// 6).
+// Directions of beams whose delays were computed for a sound speed other than that of the water (docs/acoustics.md, section 6).
 #pragma once
 
 #include <algorithm>
@@ -10,8 +9,8 @@
 
 namespace sonar {
 
-/// Sine of the true direction of a beam divided by that of the reported one; 1 if bearings are true. It is rounded to steps of
-/// 1.2e-4, so that tables need no change until the vehicle has changed its depth by some 10 m.
+/// Ratio of the sines of a beam's true and reported directions; 1 if bearings are true. It is rounded to steps of 1.2e-4, so
+/// that tables stay valid until the vehicle's depth has changed by about 10 m.
 inline double bearing_scale_of(const PingRequest& r) {
   constexpr double steps = 1 << 13;
   if (r.bearings == Bearings::are_true) return 1;

@@ -22,7 +22,7 @@ namespace sonar {
 enum class Mode {
   canonical,  // surface cells: the model of docs/acoustics.md
   paper,      // Choi 2025 as printed: a fixed fan of rays, a frequency sum, its own beamforming
-  raster,     // as paper, but with scatterers on a perspective pixel grid, as in simulators that rasterise
+  raster,     // like paper, but with scatterers on a perspective pixel grid, like simulators that rasterise
 };
 inline constexpr std::array<std::string_view, 3> mode_names = {"canonical", "paper", "raster"};
 
@@ -36,10 +36,10 @@ struct Switches {
   bool keep_pressure = false;   // fill Ping::pressure_upa
   bool keep_beams = false;      // fill Ping::beam_signal_upa
   bool keep_truth = false;      // fill Ping::truth
-  bool keep_labels = false;     // fill Ping::labels, where samples can have them; only the CPU engine computes such pings
+  bool keep_labels = false;     // fill Ping::labels; only the CPU engine computes such pings
 
-  // The switches below have names for users, see named_switches. A part (volume, interference, leak, ...) for which the scene or
-  // the model has no data has no effect, even when it is on.
+  // The switches below have names for users, see named_switches. A part (volume, interference, leak, ...) has no effect, even
+  // when it is on, if the scene or the model has no data for it.
   bool noise = true;
   bool specular = true;
   bool texture = true;
@@ -58,7 +58,7 @@ struct Switches {
   bool defocus = true;
   bool shared_noise = true;
   bool truncation = true;
-  bool interleave = false;  // computes one ping for each ping that a picture is made of
+  bool interleave = false;  // computes each of the pings from which a picture is combined
 
   bool operator==(const Switches&) const = default;
 };
@@ -104,14 +104,14 @@ struct PingFindings {
   virtual ~PingFindings() = default;
 };
 
-/// Base class of settings that a vendor's protocol needs beside PingSettings, such as the client's request: the message of a ping
-/// states the settings with which the ping was made. core does not read them. Exceptions: RangeImageSettings
+/// Base class of settings that a vendor's protocol needs beside PingSettings, such as the client's request, because the message
+/// of a ping states the settings with which it was made. core reads only two derived types: RangeImageSettings
 /// (core/sonar/range_image.hpp) makes the ping a range image, PhasedSettings (core/sonar/phases.hpp) keeps signals of beams.
 struct VendorSettings {
   virtual ~VendorSettings() = default;
-  /// Whether a client would see no difference between the two. `other` is of the same vendor.
+  /// Whether a client would see no difference between these settings and `other`, which must be of the same vendor.
   virtual bool equals(const VendorSettings& other) const = 0;
-  /// The device's findings in a ping that was made with these settings; null: it looks for none.
+  /// The device's findings in a ping that was made with these settings; null if the device makes none.
   virtual std::shared_ptr<const PingFindings> look_at(const Ping&) const { return nullptr; }
 };
 
@@ -129,14 +129,14 @@ struct PingRequest {
   Pose sonar_in_world;                // at the time of firing
   Twist sonar_moves;                  // from firing to the last echo
   Pose vehicle_in_world;              // for the attitude and heading in packets
-  std::vector<Pose> bodies_in_world;  // moving bodies, in the scene's order; empty = where the scene file put them
+  std::vector<Pose> bodies_in_world;  // moving bodies, in the scene's order; empty = poses of the scene file
   Water water;
   PingSettings settings;
   std::shared_ptr<const VendorSettings> vendor_settings;  // may be null
   std::uint32_t sonar_id = 0;                             // part of the key of the receiver noise
   Seed seed{};
   Bearings bearings = Bearings::are_true;
-  bool blank = false;  // noise only, no scene: poses are stale (on_stale: blank), or the sonar is out of the water
+  bool blank = false;  // noise only: poses are stale (on_stale: blank), or the sonar is out of the water
   Switches switches;
 };
 

@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// How the amplitude v becomes a code; v is pressure times TVG and gain over full scale, so the linear scale saturates at v = 1
+/// How the amplitude v becomes a code. v is (pressure x TVG x gain) / full scale, so the linear scale saturates at v = 1
 /// (docs/acoustics.md, eq. 37, 40).
 struct SampleFormat {
   enum class Scale {
@@ -24,17 +24,17 @@ struct SampleFormat {
 };
 
 /// Ranges use the sound speed that the device assumes. Row i covers range_start_m + [i, i + 1) range_bin_m. The picture ends at
-/// range_start_m + range_bin_count range_bin_m, which is range_m except for the vendor's rounding to whole rows.
+/// range_start_m + range_bin_count * range_bin_m, which is range_m apart from the vendor's rounding to whole rows.
 struct PingSettings {
   int mode = 0;  // index into SonarModel::modes
   int beam_count = 512;
   int range_bin_count = 437;      // rows
   double range_m = 10;            // the far end of the picture, as the device rounds it
-  double range_start_m = 0;       // the near edge of row 0, below range_m; of nearer echoes only the tails of their pulses show
+  double range_start_m = 0;       // the near edge of row 0, below range_m; nearer echoes show only the tails of their pulses
   double range_bin_m = 0.0229;    // row spacing; packets carry it exactly
   double row_centre = 0.5;        // position of the samples' centre in a row, see range_of_row: 0 near edge, 1 far edge
   float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (docs/acoustics.md, section 4)
-  int samples_per_row = 1;        // 1: a row is the sample at its centre; n: it has the mean power of n samples
+  int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples
   float rate_hz = 10;             // 0 = standby
   double ping_interval_s = 0;     // between the pings of a picture, see FrequencyMode::interleaved_pings
   float gain_db = 0;

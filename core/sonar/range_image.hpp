@@ -1,5 +1,5 @@
-// Range images: one transmission lights the whole field of view, and each direction of a grid of beams reports one return, its
-// range and its strength. These are the settings and samples of such a ping, in no vendor's format.
+// Range images: one transmission covers the whole field of view, and each beam of a grid reports the range and strength of one
+// return. These are the vendor-independent settings and samples of such a ping.
 #pragma once
 
 #include <cmath>
@@ -18,15 +18,16 @@ namespace sonar {
 /// centres of the outer beams lie on its edges. pattern.azimuth_width_rad is the two-way -3 dB width of a beam.
 struct RangeImageSettings : VendorSettings {
   double beam_height_rad = 0;        // two-way -3 dB width of a beam in elevation
-  double range_unit_m = 0;           // unit of the ranges in samples; 65535 of them must reach range_m
+  double range_unit_m = 0;           // unit of the ranges in samples; 65535 units must be at least range_m
   std::uint32_t least_strength = 1;  // weaker returns are dropped
   double detection = 16;             // returns below so many times the noise power are dropped
   bool nearest = false;              // use the nearest return of a direction, not the strongest
-  bool chosen_as_heard = false;      // choose the strongest cell with speckle, which each range cell has of its own
-  bool range_of_loudest = false;     // report the range of the loudest return in the chosen cell, not the centre of all returns
-  double range_sample_m = 0;         // ranges are whole multiples of it, 0 = any
-  // The filters of the device, in the order of use. Neighbours of a pixel are those of the eight around it in its block of rows.
-  int block_rows = 0;        // rows that are measured together, with speckle of their own; 0 = all
+  bool chosen_as_heard = false;      // choose the strongest cell with speckle included (each range cell has its own)
+  bool range_of_loudest = false;  // report the range of the strongest return in the chosen cell, not the centroid of all returns
+  double range_sample_m = 0;      // ranges are whole multiples of it, 0 = any
+  // The filters of the device, in order of use. The neighbours of a pixel are those of the eight around it that are in its
+  // block of rows.
+  int block_rows = 0;        // number of rows that are measured together, each block with its own speckle; 0 = all
   int least_confirming = 0;  // a return is dropped if fewer of its neighbours confirm it
   double confirming_m = 0;   // a neighbour confirms a return if its range differs by no more than this
   int median_passes = 0;     // number of passes that replace each range by the median of itself and its neighbours
@@ -36,8 +37,8 @@ inline const RangeImageSettings* range_image_of(const PingRequest& request) {
   return dynamic_cast<const RangeImageSettings*>(request.vendor_settings.get());
 }
 
-/// A pixel in Ping::samples, little-endian. The upper 16 bits are the strength, so that the sample as a whole can be used as a
-/// level; the lower 16 bits are the range. 0 = no return. Row 0 is the lowest; column 0 is the one farthest to port.
+/// A pixel in Ping::samples, little-endian. The upper 16 bits are the strength, so that the whole sample can serve as a level;
+/// the lower 16 bits are the range. 0 = no return. Row 0 is the lowest; column 0 is the one farthest to port.
 struct RangePixel {
   static constexpr std::uint32_t most_range = 0xFFFF, most_strength = 0x7FFF;
   std::uint32_t strength = 0, range = 0;  // amplitude, linear; in range_unit_m

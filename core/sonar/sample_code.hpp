@@ -1,4 +1,4 @@
-// Samples of a ping as unsigned integers.
+// Reads samples of a ping as unsigned integers.
 #pragma once
 
 #include <cstddef>

@@ -9,9 +9,10 @@
 
 namespace sonar {
 
-/// Aperture shading of the receive array; sets the side lobes. `unit` switches the pattern off (1 everywhere).
+/// Aperture shading of the receive array; it determines the side lobes. `unit` switches the pattern off (1 everywhere).
 enum class Taper { uniform, taylor30, hamming, hann, unit };
-/// Whether the data sheet's vertical width is that of one pattern, or of transmit times receive (docs/acoustics.md, section 6).
+/// Whether the data sheet's vertical width is that of one pattern, or of the product of transmit and receive patterns
+/// (docs/acoustics.md, section 6).
 enum class ElevationWidthIs { one_way, two_way };
 enum class BeamSpacing {
   uniform_in_sine,   // beam azimuths asin(s), s linear over +-sin(half aperture): Oculus
@@ -27,23 +28,24 @@ struct BeamPattern {
   ElevationWidthIs elevation_width_is = ElevationWidthIs::two_way;
 };
 
-/// Differences between beams that a recording shows (docs/acoustics.md, sections 5 and 6). The tables have values at sines that
-/// are uniform from the port edge of the sector to its starboard edge; empty = no difference.
+/// Measured differences between beams (docs/acoustics.md, sections 5 and 6). The values of each table are at uniform steps of
+/// sine, from the port edge of the sector to its starboard edge; empty = no difference.
 struct BeamProfile {
   std::vector<float> noise_db;       // receiver noise re (30), far from the sonar
   std::vector<float> near_noise_db;  // the same at range 0; same length as noise_db
   float near_m = 0.2f;               // weight of noise_db at range r: 1 - e^{-r / near_m}
-  std::vector<float> blend;          // amplitude of each neighbour, half a beam width away, that is added to a beam, re its own
+  std::vector<float> blend;          // amplitude, re the beam's own, with which the neighbours half a beam width away are added
 };
 
 /// Noise that receive channels share, with opposite signs in neighbours (docs/acoustics.md, section 5).
 struct SharedNoise {
   float level_db = -200;  // level of a channel, re the channel's own noise; below -150 = none
   int channels = 128;     // even
-  int group = 32;      // number of neighbours that share it, with weights that fall to both ends; even; its half divides channels
-  float sine = 0.56f;  // sine of the direction it seems to come from, at long range: half a wavelength / channel spacing
+  int group =
+      32;  // number of neighbours that share it, with weights that decrease to both ends; even; half of it divides `channels`
+  float sine = 0.56f;    // sine of its apparent direction at long range: half a wavelength / channel spacing
   float full_m = 0.25f;  // below this range its power is proportional to the range
-  float steady = 0;      // fraction of its power that is the same in every ping and has one phase in all channels
+  float steady = 0;      // fraction of its power that is the same in every ping and in phase in all channels
   float focus_rows = 0;  // number of rows by which the array's focus lies behind the centre of a row
   float nearest_focus_m = 0;
 };
@@ -55,16 +57,18 @@ struct ReceiverModel {
   float tvg_ceiling_db = 80;  // infinity switches it off
   float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
-  float noise_width = 1;      // -3 dB width of the noise filter divided by the pulse's; with a measured pulse it is the pulse's
-  float crosstalk_db = -200;  // amplitude of every channel that is added to every beam, re the channel; below -150 = none
+  float noise_width =
+      1;  // -3 dB width of the noise filter divided by the pulse's; unused with a measured pulse, which is the filter
+  float crosstalk_db = -200;  // amplitude, re the channel, with which every channel is added to every beam; below -150 = none
   float leak_upa = 0;         // rms pressure of the transmitter's direct leakage, at range 0; 0 = none
   float leak_decay_db_per_m = 30;
   std::vector<float>
       leak_ring_db;  // level re leak_upa at multiples of leak_ring_step_m, none after the last; replaces leak_decay_db_per_m
   float leak_ring_step_m = 0.003f;
-  bool leak_is_shared = false;  // the channels share it, like shared_noise; false: each column has a random phase
+  bool leak_is_shared = false;  // true: the channels share it, like shared_noise; false: each column has a random phase
   BeamProfile profile;
-  /// Gains of the receive channels, from port; the same number of neighbouring beams uses each. Empty = no difference.
+  /// Gains of the receive channels, from port; each channel serves the same number of neighbouring beams. Empty = no
+  /// difference.
   std::vector<float> channel_gain_db;
   SharedNoise shared_noise;
   /// 0: receive beams are focused at every range and bearing. 1: all use the delays of broadside, so that other beams are blurred
@@ -88,7 +92,7 @@ struct FrequencyMode {
   /// listed: -3 dB width of each beam in azimuth, in its own direction; empty = pattern.azimuth_width_rad at broadside for all,
   /// which widens as 1 / cos(azimuth). The noise level is that of a beam of the pattern's width.
   std::vector<float> beam_widths_rad;
-  /// A picture is made of so many successive pings, which neighbouring beams come from in turn; the last beam is from the first
+  /// A picture combines this many successive pings; neighbouring beams come from them in turn, the last beam from the first
   /// ping (docs/acoustics.md, section 6).
   int interleaved_pings = 1;
   BeamPattern pattern;

@@ -1,6 +1,6 @@
-// Properties of the water, its sound speed and its absorption. The physics uses them, and so do devices that compute the sound
-// speed that they assume. Comments name the formulae and sources; tests of the oracles 27 to 29 are in tests/core/sonar. The code
-// is C++17 and uses only the standard library.
+// Properties of the water, its sound speed and its absorption. The physics uses them, and so do emulated devices that compute
+// their assumed sound speed. Comments name formulae and sources; oracles 27 to 29 in tests/core/sonar test them. The code is
+// C++17 and uses only the standard library.
 #pragma once
 
 namespace sonar {
@@ -18,13 +18,13 @@ constexpr bool operator==(const Water& a, const Water& b) {
 
 /// Francois & Garrison 1982. Frequency [Hz], depth [m]; one-way, dB/m.
 double absorption_db_per_m(const Water& water, double depth_m, double frequency_hz);
-/// Ainslie & McColm 1998, to check the other formula. dB/m.
+/// Ainslie & McColm 1998, to check Francois & Garrison. dB/m.
 double absorption_ainslie_mccolm_db_per_m(const Water& water, double depth_m, double frequency_hz);
 /// Mackenzie 1981. T 2..30 C, S 25..40, depth 0..8000 m.
 double sound_speed_mackenzie_mps(double temperature_c, double salinity_psu, double depth_m);
 /// Chen & Millero / UNESCO 1983. T 0..40 C, S 0..40, gauge pressure 0..1000 bar.
 double sound_speed_unesco_mps(double temperature_c, double salinity_psu, double pressure_bar);
-/// Bilaniuk & Wong, 148 points: fresh water at the surface, 0..100 C.
+/// Bilaniuk & Wong, fit to 148 points: fresh water at the surface, 0..100 C.
 double sound_speed_fresh_mps(double temperature_c);
 /// Density from temperature and salinity [kg/m^3] (UNESCO EOS-80 at the surface).
 double density_kg_per_m3(double temperature_c, double salinity_psu);

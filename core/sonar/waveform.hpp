@@ -1,4 +1,4 @@
-// The output of the matched filter for one point echo: the pulse p(t), p(0) = 1. Its shape is a constant of the product. Its
+// The pulse p(t), p(0) = 1: the output of the matched filter for one point echo. The shape is a constant of the product; the
 // width is PingSettings::pulse_width_m unless the pulse was measured (docs/acoustics.md, section 4).
 #pragma once
 
@@ -21,7 +21,8 @@ struct Waveform {
   /// measured: complex envelope after the matched filter at sample_rate_hz, the peak in the middle, at most 65536 samples.
   std::vector<std::complex<float>> samples;
   double sample_rate_hz = 0;
-  /// Uses synthesis in the frequency domain (exact up to the band limit), not a table of the pulse; `measured` always does.
+  /// Synthesises in the frequency domain (exact up to the band limit) instead of using a table of the pulse; `measured` always
+  /// does so.
   bool exact = false;
 #if __cplusplus >= 202002L  // device code is C++17 and needs no comparison
   bool operator==(const Waveform&) const = default;
