@@ -55,7 +55,7 @@ std::vector<std::string> option_names(const CLI::App& app) {
   return names;
 }
 
-/// The first command with words that the parser could not place, and the first of these words.
+/// The first command with words that the parser did not recognise, and the first of these words.
 struct UnknownWord {
   const CLI::App* command = nullptr;
   std::string word;
@@ -81,7 +81,7 @@ std::string error_of_unknown(const UnknownWord& unknown) {
   return "unexpected argument " + in_quotes(unknown.word);
 }
 
-/// The text of CLI11, except for missing commands and arguments, for which it names neither the commands nor their meaning.
+/// The text of CLI11, except for missing commands and arguments: of these CLI11 names neither choices nor meaning.
 std::string error_of_parser(const CLI::App& asked, const CLI::ParseError& error) {
   if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::RequiredError)) return error.what();
   if (asked.get_require_subcommand_min() > 0) return "a command is required: " + joined(command_names(asked), ", ");
@@ -172,7 +172,7 @@ std::string complaint_about(const CLI::App& app, const CLI::ParseError& error, c
   if (is_help && unknown.command == nullptr) return {};
   std::string text =
       unknown.command != nullptr ? error_of_unknown(unknown) : with_its_source(error_of_parser(asked, error), app, words);
-  // Makes one line of any input.
+  // Replaces line breaks, so that the error is one line.
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
   return text + where_help_is(app);

@@ -26,8 +26,8 @@ CLI::Validator in_small_letters();
 void parse(CLI::App& app, int argc, const char* const* argv);
 
 /// The error of a command line as one line that ends with where_help_is(): `unknown command "veiw"; did you mean
-/// "view"?` (an option likewise), else the parser's text. A value from an environment variable is reported under the variable's
-/// name. Empty for --help and --version without an unknown word. `words`: as typed, without the program.
+/// "view"?` (options alike); for other errors, the parser's text. A value from an environment variable is reported under the
+/// variable's name. Empty for --help and --version without an unknown word. `words`: as typed, without the program.
 std::string complaint_about(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& words);
 
 /// " (sonarctl pose circle --help)": the help option of the innermost command that the parser has recognised.

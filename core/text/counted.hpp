@@ -1,4 +1,4 @@
-// Numbers of things in texts for users.
+// Formats a number with its noun.
 #pragma once
 
 #include <concepts>

@@ -13,7 +13,7 @@ std::optional<std::int64_t> parse_integer(std::string_view text);
 std::optional<std::uint64_t> parse_unsigned(std::string_view text);
 /// inf, .inf and Inf with an optional sign; nothing else.
 std::optional<double> parse_infinity(std::string_view text);
-/// A hint how to correct a text that is not such a number, beginning with "; ", or empty.
+/// A hint, beginning with "; ", how to correct a text that parse_decimal() rejects; empty if there is none.
 std::string_view number_hint(std::string_view text);
 
 }  // namespace sonar::text

@@ -1,5 +1,5 @@
 // Recognises files of unexpected kinds by their first bytes: archives, web pages and other results of failed downloads. Readers
-// of meshes, grids and trajectories use it, so that the error names the kind of file and not a single wrong word.
+// of meshes, grids and trajectories use it, so that the error names the kind of file instead of a wrong word in it.
 #pragma once
 
 #include <string_view>

@@ -1,4 +1,4 @@
-// Formats texts with numbers by printf. Output to users has them: banner, status, doctor, tables.
+// Formats numbers for output to users: banner, status, doctor, tables.
 #pragma once
 
 #include <string>

@@ -42,7 +42,7 @@ std::string_view nearest(std::string_view name, std::span<const std::string_view
   for (const std::string_view candidate : candidates) {
     const std::string c = folded(candidate);
     std::size_t d = distance(wanted, c);
-    // Half a name is a common mistake too: "xyz" for "xyz_m", "temperature" for "temperature_c".
+    // A missing suffix is a common mistake too: "xyz" for "xyz_m", "temperature" for "temperature_c".
     if (wanted.size() >= 3 && (c.starts_with(wanted + "_") || wanted.starts_with(c + "_"))) d = std::min<std::size_t>(d, 1);
     if (d < best_distance) {
       best_distance = d;

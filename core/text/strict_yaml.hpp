@@ -1,5 +1,5 @@
-// Strict YAML: cursors over a parsed file that have the position of every value and reject unknown keys.
-// Configuration files and scenes are read by it. Only strict_yaml.cpp may include yaml-cpp.
+// Strict YAML: cursors over a parsed file that know the position of every value and reject unknown keys. Configuration files
+// and scenes are read through it. Only strict_yaml.cpp may include yaml-cpp.
 //
 //   auto document = text::parse_yaml_file(path, {.error_kind = ErrorKind::config});
 //   if (!document) return tl::make_unexpected(document.error());
@@ -9,8 +9,8 @@
 //   for (text::Node sonar : root.required("sonars").items(1, 16)) read_sonar(sonar.map());
 //   if (auto error = document->finish()) return tl::make_unexpected(*error);
 //
-// Readers never stop at an error: a wrong value is read as the fallback (or zero, or empty), and finish() gives the first error,
-// an unknown key before a missing one. Subset: one document, no anchors, aliases, tags or merge keys; keys are plain words.
+// Readers never stop at an error: a wrong value is read as the fallback (or zero, or empty), and finish() returns the first
+// error, unknown keys before missing ones. Subset: one document, no anchors, aliases, tags or merge keys; keys are plain words.
 #pragma once
 
 #include <array>
@@ -65,7 +65,7 @@ class Node {
   std::int64_t integer(std::int64_t min, std::int64_t max) const;
   std::int64_t integer_or(std::int64_t fallback, std::int64_t min, std::int64_t max) const;
   std::uint64_t unsigned_integer_or(std::uint64_t fallback, std::uint64_t max = std::numeric_limits<std::uint64_t>::max()) const;
-  /// true or false, nothing else.
+  /// Only the words true and false.
   bool boolean() const;
   bool boolean_or(bool fallback) const;
 
@@ -148,7 +148,7 @@ class Document {
   ~Document();
 
   Map root() const;
-  /// The first error: wrong values first, then unknown keys and missing keys of every map that was opened.
+  /// The first error: wrong values come first, then unknown and missing keys of every map that was opened.
   std::optional<Error> finish() const;
   /// The first wrong value so far; unknown keys are not checked.
   std::optional<Error> error() const;
@@ -158,7 +158,7 @@ class Document {
 };
 
 struct YamlLimits {
-  // Kind of every error in the document, except for a file that cannot be opened (missing_file).
+  // Kind of every error in the document; a file that cannot be opened is always missing_file.
   ErrorKind error_kind = ErrorKind::config;
   std::size_t max_bytes = std::size_t{4} << 20;
   std::size_t max_nodes = 400000;

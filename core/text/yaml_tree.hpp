@@ -1,5 +1,5 @@
-// The tree of a parsed text, which Node and Map refer to. With it, only strict_yaml.cpp needs yaml-cpp.
-// It is internal to core/text; readers use strict_yaml.hpp.
+// The tree of a parsed text, to which Node and Map refer. Because of it, only strict_yaml.cpp needs yaml-cpp. It is internal to
+// core/text; readers use strict_yaml.hpp.
 #pragma once
 
 #include <cstddef>
