@@ -1,4 +1,4 @@
-// The one ping that a dialogue has requested and waits for, where hosts ask for each scan line.
+// The ping for which a dialogue waits, in protocols whose hosts request each scan line.
 #pragma once
 
 #include <chrono>
@@ -13,7 +13,7 @@ class AwaitedPing {
  public:
   bool is_under_way() const { return fired_ != nullptr; }
   Time fired_at() const { return fired_at_; }
-  /// Time at which the ping counts as lost. It is still sent if it comes later.
+  /// Time at which the ping counts as lost. A ping that arrives later is still sent.
   Time lost_at() const { return fired_at_ + longest_wait; }
 
   /// Begins to wait for a ping. `with`: RequestPing::with, by which arrive() recognises it.
@@ -21,21 +21,22 @@ class AwaitedPing {
     fired_ = std::move(with);
     fired_at_ = now;
   }
-  /// Call it at lost_at(). False: the request has not been started, because an earlier ping is still being computed
-  /// (`ping_pending`), and gets the whole time again.
+  /// Call it at lost_at(). False: the ping is not lost; its computation has not begun (`ping_pending`), so the wait starts
+  /// again.
   bool lose(bool ping_pending, Time now) {
     if (ping_pending) return fired_at_ = now, false;
     late_ = std::exchange(fired_, nullptr);
     return true;
   }
-  /// A ping that came: `other` was made for a request that a newer one has replaced, `late` had been counted as lost.
+  /// Kind of a ping that has arrived: `other` belongs to a request that a newer one has replaced; `late` had been counted as
+  /// lost.
   enum class Arrival { other, late, awaited };
   Arrival arrive(const VendorSettings* made_with) {
     if (late_ && made_with == late_.get()) return late_.reset(), Arrival::late;
     if (fired_ && made_with == fired_.get()) return fired_.reset(), Arrival::awaited;
     return Arrival::other;
   }
-  /// Stops waiting. If the ping still comes, arrive() returns `other`.
+  /// Stops waiting. If the ping still arrives, arrive() returns `other`.
   void forget() {
     fired_.reset();
     late_.reset();

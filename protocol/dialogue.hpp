@@ -26,19 +26,19 @@ struct Endpoint {
   bool operator==(const Endpoint&) const = default;
 };
 
-/// The receivers of the datagrams of pings from now on. If a client requests it in a conversation, the list belongs to its
-/// connection, beside those of others, and ends with it. If it is requested by a datagram or over HTTP, it is the device's own
-/// list, which replaces Port::group.
+/// Sets the receivers of ping datagrams. If a client requests it on its connection, the list belongs to this connection and
+/// ends with it; other connections have their own lists. If it is requested by a datagram or over HTTP, it sets the device's
+/// own list, which replaces Port::group.
 struct SetReceivers {
-  std::vector<Endpoint> to;  // address 0.0.0.0 = that of the host which requests it
+  std::vector<Endpoint> to;  // address 0.0.0.0 = that of the requesting host
   std::size_t stream = 0;    // index of the vendor's port of kind udp_stream, counted from 0
 };
-/// The client replaces the device's settings, perhaps by the same ones: some drivers repeat them for every ping.
+/// Replaces the device's settings. They may be equal to the present ones, because some drivers repeat them for every ping.
 struct ChangeSettings {
   PingSettings settings;
   std::shared_ptr<const VendorSettings> vendor_settings;
   std::string summary;                         // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
-  std::optional<SetReceivers> receivers = {};  // the device's own list, where it is one of the settings
+  std::optional<SetReceivers> receivers = {};  // the device's own list, if the settings contain it
 };
 /// Settings that the control interface or a fault changes, in terms that all makes share. Unset fields keep their value; all
 /// values must be finite.
@@ -48,11 +48,11 @@ struct SettingsOverride {
   std::optional<std::uint32_t> sample_bits = {};
   std::optional<bool> row_gains = {};
 };
-/// The client requests one ping now.
+/// Requests one ping now.
 struct RequestPing {
-  bool joins = false;  // a ping that is already being made serves the request too
-  /// For a mechanical scan: the ping is fired with the sonar turned to port by `head_rad` about its own z axis, and framed with
-  /// the settings `with` in place of the device's. Both hold until the next request.
+  bool joins = false;  // a ping that is already being computed also serves the request
+  /// For a mechanical scan: the ping is fired with the sonar rotated to port by `head_rad` about its own z axis, and framed
+  /// with the settings `with` instead of the device's. Both hold until the next request.
   double head_rad = 0;
   std::shared_ptr<const VendorSettings> with = nullptr;
 };
@@ -77,8 +77,8 @@ struct Reaction {
   std::vector<Bytes> replies;  // whole messages, in order
 };
 
-/// The messages with which one client gets a ping: one for each prefix, which is the prefix and then the bytes that all clients
-/// share.
+/// The messages that deliver a ping to one client: one for each prefix. A message is the prefix followed by the bytes that all
+/// clients share.
 struct Delivery {
   std::vector<Bytes> prefixes;
   std::vector<Event> events;  // events that follow from the delivery, such as the request of the next ping
@@ -89,23 +89,23 @@ class Dialogue {
   virtual ~Dialogue() = default;
   /// Reads the stream in pieces of any size, with any content. It never throws and never keeps bytes without bound.
   virtual Reaction on_bytes(BytesView received, Time now) = 0;
-  /// Makes what the time demands, such as keep-alives and pings of a subscription. Called at or after next_tick().
-  /// `ping_pending`: a client has requested one ping of the device, and it has not been started.
+  /// Does what is due, such as keep-alives and pings of a subscription. Called at or after next_tick(). `ping_pending`: a
+  /// client has requested a ping whose computation has not begun.
   virtual Reaction on_tick(Time now, bool ping_pending) = 0;
   virtual Time next_tick() const = 0;
-  /// Time of the next ping that on_tick() will request by itself. Stepped time advances to it, but not for keep-alives alone.
+  /// Time of the next ping that on_tick() will request unasked. Stepped time advances to it, but not to keep-alives.
   virtual std::optional<Time> next_ping_request() const { return std::nullopt; }
   /// A client that sends nothing for longer is disconnected. Counted in wall time, because clients run in wall time even if the
   /// time of on_bytes() and on_tick() is simulated. nullopt: no limit.
   virtual std::optional<std::chrono::milliseconds> longest_silence() const { return std::nullopt; }
-  /// Whether known hosts send nothing while they get pings. Then, with longest_silence() and datagrams, an answer of the host's
-  /// computer counts as a message of the host.
+  /// Whether known hosts are silent while they receive pings. If so, and with datagrams, longest_silence() accepts an answer of
+  /// the host's computer as a message of the host.
   virtual bool hosts_fall_silent() const { return false; }
-  /// Called when a ping was put into this client's outbox, so that a keep-alive can wait.
+  /// Called when a ping was put into this client's outbox; it postpones the keep-alive.
   virtual void on_ping_queued(Time now) = 0;
-  /// Called when a ping is ready that was made under the settings `made_with` (null: the initial ones); its framed size is
-  /// `shared_bytes`. In most protocols every client gets every ping; where hosts request single pings, only those that requested
-  /// one get it. It calls on_ping_queued() itself if something is delivered.
+  /// Called when a ping is ready. `made_with`: the settings of the ping (null: the initial ones); `shared_bytes`: its framed
+  /// size. In most protocols every client gets every ping; in protocols with requests for single pings, only the clients that
+  /// requested it. It calls on_ping_queued() itself if it delivers something.
   virtual Delivery on_ping(const VendorSettings* made_with, std::size_t shared_bytes, Time now) {
     static_cast<void>(made_with), static_cast<void>(shared_bytes);
     on_ping_queued(now);

@@ -1,4 +1,4 @@
-// Holds the settings of a make in the device, and in a ping request until the ping is framed.
+// Stores a make's settings: in the device, and in a ping request until the ping is framed.
 #pragma once
 
 #include <memory>
@@ -22,7 +22,7 @@ std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping&) {
   return nullptr;
 }
 
-/// Findings of type T.
+/// The findings of type T, as PingFindings.
 template <class T>
 struct Found final : PingFindings {
   explicit Found(T v) : value(std::move(v)) {}
@@ -57,7 +57,7 @@ auto settings_in(const VendorSettings* held) {
   return of != nullptr ? of->settings : decltype(of->settings){};
 }
 
-/// The settings after the changes of `reaction`, which the daemon has not made yet; without a change the settings `now`.
+/// The settings that will hold after the daemon has carried out `reaction`; without a change, the settings `now`.
 inline const VendorSettings* settings_after(const Reaction& reaction, const VendorSettings* now) {
   for (const Event& event : reaction.events)
     if (const auto* change = std::get_if<ChangeSettings>(&event)) now = change->vendor_settings.get();

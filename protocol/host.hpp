@@ -1,6 +1,6 @@
-// The driver's side of a make's protocol: it makes the messages of a driver, and pings from the bytes of a sonar. It is the
-// counterpart of Dialogue and as pure: no sockets, no clock, no log. The caller opens the ports, passes on the bytes that arrive,
-// and carries out the HostActions.
+// The driver's side of a make's protocol: it makes the messages of a driver, and decodes pings from the bytes of a sonar. It is
+// the counterpart of Dialogue and equally pure: no sockets, no clock, no log. The caller opens the ports, passes on the bytes
+// that arrive, and carries out the HostActions.
 #pragma once
 
 #include <algorithm>
@@ -23,11 +23,11 @@
 
 namespace sonar::protocol {
 
-/// The settings that a user requests. Unset values stay as the sonar has them, or are those that a usual driver sends.
+/// The settings that a user requests. For unset values the sonar keeps its own, or the host sends those of a usual driver.
 struct Wanted {
   bool as_it_is = false;                         // send no settings; request pings only from makes that need a request for each
   bool stamped = false;                          // prefer messages that state when a ping was fired
-  SettingsOverride settings;                     // the same for every make
+  SettingsOverride settings;                     // settings that all makes share
   std::map<std::string, std::string> more = {};  // settings of one make: name of sonarctl's option without dashes, and value
 };
 
@@ -36,16 +36,16 @@ struct PingFacts {
   unsigned beams = 0, rows = 0, bits = 0;
   double row_m = 0, range_m = 0;  // range_m: far end of the last row
   double frequency_hz = 0;
-  std::size_t message_size = 0;  // bytes, of all its messages
+  std::size_t message_size = 0;  // bytes of all its messages
   std::string note = {};         // text at the end of a ping's line, such as its distance
 };
 /// A ping as a host decoded it.
 struct HostPing {
   PingFacts facts;
-  std::function<Result<PolarImage>()> picture;  // for a mechanical scan: the sector as scanned so far
-  /// Number of scan lines in a picture of many pings, one line each, and the number that makes it whole.
+  std::function<Result<PolarImage>()> picture;  // for a mechanical scan: the sector scanned so far
+  /// For a picture of many pings, one scan line each: the number of lines so far, and of a complete picture.
   std::size_t lines = 1, whole_lines = 1;
-  std::vector<std::string> errors = {};           // errors of identities and sequence
+  std::vector<std::string> errors = {};           // violated identities, and errors of the sequence
   std::vector<std::string> echo_mismatches = {};  // settings that do not have the requested value yet
   std::vector<std::string> limited = {};          // settings that the ping echoes as requested, but was not made with
   std::optional<double> fired_s = {};             // by the clock of the device
@@ -61,13 +61,13 @@ struct HostSend {
   std::size_t port = 0;
   Bytes bytes;
 };
-/// Actions that the caller carries out in order. ResourceRequest: to port 0, of kind http; the reply goes to on_reply(). Error:
-/// the host gives up. Its text begins with the verb of the sonar ("refuses a request: ..."); with ErrorKind::usage it is a whole
-/// sentence.
+/// Actions that the caller carries out in order. ResourceRequest goes to port 0, of kind http, and its reply to on_reply().
+/// Error: the host gives up; the sonar is the subject of its text ("refuses a request: ..."), except with ErrorKind::usage,
+/// where the text is a whole sentence.
 using HostAction = std::variant<HostSend, ResourceRequest, HostPing, Notice, Error>;
 using HostActions = std::vector<HostAction>;
 
-/// A port that a host opens. The first is the one that a user may give another number.
+/// A port that a host opens. A user may change the number of the first.
 struct HostPort {
   enum class Kind {
     tcp,         // connects to `number` of the device
@@ -91,13 +91,13 @@ class Host {
     static_cast<void>(reply), static_cast<void>(now);
     return {};
   }
-  /// Makes keep-alives and repeats requests. Called at or after next_tick().
+  /// Sends keep-alives and repeats requests. Called at or after next_tick().
   virtual HostActions on_tick(Time now) {
     static_cast<void>(now);
     return {};
   }
   virtual std::optional<Time> next_tick() const { return std::nullopt; }
-  /// Called whenever the caller waits for a ping. Protocols in which each ping is requested then make a request.
+  /// Called whenever the caller waits for a ping. Hosts that must request each ping then do so.
   virtual HostActions on_demand(Time now) {
     static_cast<void>(now);
     return {};
@@ -109,22 +109,22 @@ class Host {
   virtual bool is_open() const { return true; }
   /// A text such as "an ARIS" or "a BlueView P900-90, serial 7001".
   virtual std::string about() const = 0;
-  /// Counts of a protocol whose messages differ from other bytes and whose pings are numbered.
+  /// Counts of skipped bytes and missing pings, for protocols that recognise messages and number pings.
   struct Counts {
     std::uint64_t messages = 0, dummies = 0, junk_bytes = 0, missing_pings = 0;
   };
   virtual std::optional<Counts> counts() const { return std::nullopt; }
-  /// Whether pings echo the settings that were sent, so that HostPing::echo_mismatches is to be judged.
+  /// Whether pings echo the sent settings, so that HostPing::echo_mismatches is meaningful.
   virtual bool expects_echo() const { return false; }
 };
 
 /// The content of a beacon that hosts need.
 struct Announcement {
-  Ipv4 address{}, client{};  // address where hosts connect; who is connected, 0.0.0.0: no one
+  Ipv4 address{}, client{};  // address to which hosts connect; address of the connected host (0.0.0.0: none)
   std::uint32_t device_id = 0;
-  std::vector<std::string> complaints;  // deviations that hosts reject
+  std::vector<std::string> complaints;  // faults because of which hosts would reject the beacon
 };
-/// The datagram to all addresses by which hosts find sonars, and its answer.
+/// The broadcast by which hosts find sonars, and its answer.
 struct Search {
   struct Answer {
     std::uint16_t port = 0;
@@ -139,32 +139,32 @@ struct Search {
 struct Make {
   const Vendor* device = nullptr;
   std::string_view title;    // "an ARIS"
-  std::string_view request;  // what a driver must send to get pings, for "no valid ... among them"
+  std::string_view request;  // the message by which a driver gets pings, for the text "no valid ... among them"
   std::string_view remedy;   // "send a fire message (type 0x15)"
   std::span<const HostPort> ports;
-  /// usage: a setting that such a sonar does not have.
+  /// Error usage: a setting that this make does not have.
   Result<std::unique_ptr<Host>> (*host)(const Wanted& wanted) = nullptr;
   recording::Codec codec;
   std::optional<Announcement> (*announced)(BytesView beacon) = nullptr;  // nullopt: not a beacon; null: hosts need no beacon
   const Search* search = nullptr;                                        // null: hosts do not search
 
   std::string_view usual_settings = {};  // settings that a host sends if none are given, as options of sonarctl: "--rate 10"
-  std::string_view driver_call = {};     // call that opens the sonar at {at}, for makes whose drivers use a library of ours
+  std::string_view driver_call = {};     // call that opens the sonar at {at}, for makes whose drivers use one of our libraries
   char own_faults = 0;                   // first letter of the kinds of faults that only this make has
-  bool each_ping_requested = false;      // by its hosts; a rate is a limit
-  bool own_numbers = false;              // pings have numbers of their own, not those of sonard's events
-  bool shares_port = false;              // another make has its port: the host of each serves both
-  bool scans = false;                    // pings come as fast as its head turns
+  bool each_ping_requested = false;      // hosts request each ping; the rate is only a limit
+  bool own_numbers = false;              // ping numbers of the wire differ from those of sonard's events
+  bool shares_port = false;              // another make uses the same port: the host of each serves both
+  bool scans = false;                    // the turning head determines the ping rate
   std::string_view demo_name = {};       // NAME of `sonard --demo NAME`; empty: name()
   std::string_view demo_profile = {};    // product of the demo; empty: the first model
-  std::optional<RollPitchYaw> demo_mount = {};  // in the demo; nullopt: it looks ahead
+  std::optional<RollPitchYaw> demo_mount = {};  // mount in the demo; nullopt: the sonar looks ahead
   PictureKind picture = PictureKind::fan;
-  Shades shades = {};  // shades of its pictures
+  Shades shades = {};  // for its pictures
 
   std::string_view name() const { return device->name(); }
   bool has_several_streams() const { return std::ranges::count(ports, HostPort::Kind::tcp, &HostPort::kind) > 1; }
   bool is_by_udp() const { return ports.front().kind == HostPort::Kind::udp; }  // hosts send by UDP
-  /// The unit of a rate of pings. In some kinds of pictures a ping is one line.
+  /// The unit of the ping rate. In some kinds of pictures a ping is one line.
   std::string_view rate_unit() const {
     return picture == PictureKind::sweep || picture == PictureKind::waterfall ? "lines/s" : "Hz";
   }
@@ -179,8 +179,8 @@ const Make* find_make(std::string_view name);
 /// The make of a product; for an unknown product the first make.
 const Make& make_of_profile(std::string_view profile);
 
-/// Checks that all wanted settings are among `known`: "range", "rate", "gain", "mode", ... as sonarctl's options. usage: one is
-/// not.
+/// Checks that all wanted settings are among `known`, the names of sonarctl's options: "range", "rate", "gain", "mode", ...
+/// Error usage: one is not.
 Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::initializer_list<std::string_view> known);
 
 }  // namespace sonar::protocol

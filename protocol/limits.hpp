@@ -1,5 +1,5 @@
-// Refusals of wanted settings that all makes share. They use the names and units of SettingsOverride, and give the field of the
-// protocol in brackets.
+// Texts that refuse wanted settings, shared by all makes. They use the names and units of SettingsOverride, with the protocol's
+// field in brackets.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace sonar::protocol {
 
-/// The refusal of a range, such as "the range of a Surveyor is 0.01 to 200 m, not 400 m (end_mm)". Empty: `range_m` is from
+/// The refusal of a range, such as "the range of a Surveyor is 0.01 to 200 m, not 400 m (end_mm)". Empty if `range_m` is from
 /// `low_m` to `high_m`. `of`: the sonar, such as "a Surveyor".
 inline std::string range_complaint(double range_m, std::string_view of, double low_m, double high_m,
                                    std::string_view field = {}) {

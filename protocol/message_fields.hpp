@@ -7,7 +7,7 @@
 
 namespace sonar::protocol {
 
-/// The meaning of a message's field, whatever a vendor calls it.
+/// The meaning of a message's field, independent of the vendor's name for it.
 enum class FieldName {
   magic,
   source_id,
@@ -44,7 +44,7 @@ enum class FieldName {
   connected_address,
   mac,
 };
-/// fields() of a message says with these what a field means: visit("pingId", m.ping_id, means::ping_id).
+/// fields() of a message marks the meaning of a field with these: visit("pingId", m.ping_id, means::ping_id).
 namespace means {
 using enum FieldName;
 }
@@ -58,7 +58,7 @@ inline constexpr std::array<std::string_view, 34> field_names{
     "address",   "netmask",     "connected_address", "mac"};
 static_assert(field_names.size() == static_cast<std::size_t>(FieldName::mac) + 1);
 
-/// The message that carries a ping, as a client receives it, prefix included; the beacon.
+/// ping: the message of a ping as a client receives it, prefix included.
 enum class Part { ping, beacon };
 /// Regions of a ping: the header that every message has, the other fields, the table of the beams' directions, the samples.
 enum class Region { header, metadata, bearings, image };

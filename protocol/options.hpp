@@ -1,4 +1,4 @@
-// Options of a sonar in the configuration: what a make offers, and the values, complete as check_options() makes them.
+// Options of a sonar in the configuration: those that a make offers, and the values; check_options() adds the defaults.
 #pragma once
 
 #include <charconv>
@@ -12,14 +12,14 @@
 
 namespace sonar::protocol {
 
-/// One named choice of a protocol's unknowns, settable under `options:` of a sonar in the configuration.
+/// A property that no source states; users set it under `options:` of a sonar in the configuration.
 struct Option {
   std::string_view name;
-  std::vector<std::string_view> allowed;  // first = default; empty = a number, or the word of default_value
+  std::vector<std::string_view> allowed;  // the first is the default; empty = a number or the word of default_value
   std::string_view default_value;
   std::string_view meaning;
   double lowest = 0, highest = 0;  // limits of a number, inclusive
-  std::string_view word = {};      // word that may stand for a number, beside the default
+  std::string_view word = {};      // word that is allowed in place of a number, beside the default
   bool whole = false;              // the number has no fraction
 };
 /// A text such as "number from 5 to 170" or "whole number from 0 to 255".

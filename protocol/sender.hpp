@@ -1,4 +1,4 @@
-// Which make sent a recorded message, and to which port of its hosts.
+// Finds the make that sent a recorded message, and the host's port that receives it.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +13,9 @@ struct SentBy {
   const protocol::Make* make = nullptr;
   Sender sender;
 };
-/// nullopt: it is of a client, or of no make that is known.
+/// nullopt: a client sent it, or no known make.
 std::optional<SentBy> sender_of(const RecordedMessage& message);
-/// The port at which a host of the make takes messages of this carrier; nullopt: it takes none.
+/// The index of the port at which a host of the make receives messages of this carrier; nullopt: there is none.
 std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by);
 
 }  // namespace sonar::recording

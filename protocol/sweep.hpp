@@ -1,4 +1,4 @@
-// The picture of a sonar whose head turns: a line by range for each direction, the newest of each.
+// The picture of a sonar whose head turns: the newest scan line of each direction.
 #pragma once
 
 #include <memory>
@@ -16,15 +16,15 @@ class Sweep {
   /// starboard.
   explicit Sweep(std::size_t directions) : lines_(directions) {}
   std::size_t directions() const { return lines_.size(); }
-  /// Adds a line. If it has other rows than the lines before, those are dropped. `ping` gets the picture, which is whole when the
-  /// half ahead has been scanned.
+  /// Adds a line and puts the picture into `ping`; it is complete once the half circle ahead has been scanned. If the rows
+  /// differ from those of earlier lines, the earlier lines are dropped.
   void add(std::size_t direction, Line line, double row_m, HostPing& ping);
 
  private:
   double bearing_rad(std::size_t direction) const;
   std::size_t ahead_begin() const { return lines_.size() / 4; }
   std::size_t ahead_end() const { return lines_.size() - lines_.size() / 4 + 1; }
-  /// The half ahead, as long as only that half was scanned.
+  /// The picture to show: the half circle ahead while only that half was scanned, else the full circle.
   PolarImage shown() const;
 
   std::size_t rows_ = 0;

@@ -11,23 +11,23 @@
 
 namespace sonar::protocol {
 
-/// A transport of the device. A vendor may have several of a kind, but one beacon.
+/// A port of the device. A vendor may have several ports of a kind, but only one beacon.
 struct Port {
   enum class Kind {
-    tcp_stream,    // listens at `number`: one Dialogue for each connection; observers use the vendor's first such port
+    tcp_stream,    // listens at `number`; each connection has a Dialogue; observers use the vendor's first such port
     udp_beacon,    // sends Vendor::beacon to `number` of the configured addresses: broadcast, multicast or hosts
-    udp_answer,    // passes datagrams that arrive at `number`, broadcast ones too, to Vendor::on_datagram
+    udp_answer,    // passes datagrams that arrive at `number`, including broadcasts, to Vendor::on_datagram
     udp_stream,    // sends Vendor::datagrams of each ping from `number` (0: any; may be that of a udp_answer) to the receivers
     http,          // serves Vendor::on_http at `number`
     udp_dialogue,  // one Dialogue at `number` with the host that sent the last request; it gets Vendor::datagrams of its pings
   } kind{};
   std::uint16_t number = 0;
   std::chrono::milliseconds period{0};  // period of a beacon
-  bool on_change = false;               // a beacon is also sent at once when a client comes or goes
+  bool on_change = false;               // the beacon is also sent when a client connects or leaves
   Endpoint group{};                     // receiver of a udp_stream until SetReceivers, often a multicast group; port 0 = none
   bool any_group = false;               // receivers of a udp_stream may be multicast groups that the configuration does not name
-  /// udp_stream: least time between two datagrams of a ping. tcp_stream: pause between the parts of a ping, which
-  /// Vendor::datagrams returns singly and Vendor::frame joined.
+  /// udp_stream: shortest time between two datagrams of a ping. tcp_stream: pause between the parts of a ping;
+  /// Vendor::datagrams returns the parts, Vendor::frame the whole.
   std::chrono::nanoseconds gap{0};
 };
 
@@ -35,7 +35,7 @@ struct Port {
 struct DriverAddress {
   std::string_view protocol;  // "tcp", "udp", "http", "multicast", "status": status messages, by UDP
   Endpoint at;
-  bool sonar_speaks_first = false;  // if false, the driver does
+  bool sonar_speaks_first = false;  // false: the driver speaks first
 };
 
 /// One request for a resource of the device, its sizes already limited by the server.

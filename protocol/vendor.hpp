@@ -1,5 +1,5 @@
-// The one interface between the daemon and a vendor's protocol. A vendor is a pure translator: no sockets, no clock, no log. The
-// daemon keeps the time and the buffers to be sent; a Dialogue is one client's conversation, a Vendor frames pings and beacons.
+// The only interface between the daemon and a vendor's protocol. A Vendor encodes pings and beacons; its Dialogues are the
+// conversations with clients. All are pure: no sockets, no clock, no log. The daemon has the time and the send buffers.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ namespace sonar::protocol {
 
 using wire::Field;
 
-/// The emulated device as its own packets describe it. Owned by the daemon's Device; read on the I/O thread only.
+/// The state of the emulated device that its messages describe. Owned by the daemon's Device; read on the I/O thread only.
 struct DeviceState {
   std::string name;
   std::uint16_t id = 0;  // serial number, never 0
@@ -40,11 +40,11 @@ struct DeviceState {
   Water water;  // at the device, as measured by its sensors
   double depth_m = 0;
   OptionValues options;                            // complete: defaults filled in by check_options
-  std::shared_ptr<const VendorSettings> settings;  // now; null = Vendor::initial_settings
-  std::uint32_t last_ping = 0;                     // number of the ping that was fired last
+  std::shared_ptr<const VendorSettings> settings;  // present ones; null = Vendor::initial_settings
+  std::uint32_t last_ping = 0;                     // number of the last fired ping
   Time framed_at{};                                // stamp of the previously framed ping; Time{} = none
-  std::chrono::nanoseconds skipped{0};             // how far stamps of pings are ahead of the dialogues' time
-  bool simulated_time = false;                     // it may stop while clients wait
+  std::chrono::nanoseconds skipped{0};             // by which stamps of pings are ahead of the dialogues' time
+  bool simulated_time = false;                     // time may stop while clients wait
   StoredAddress stored_address;
 };
 
@@ -54,7 +54,7 @@ enum class PingsBy { stream, datagrams, either };
 
 /// The distance that a range finder, such as an altimeter, measures with one ping.
 struct Distance {
-  double range_m = 0;          // in the device's metres
+  double range_m = 0;          // as the device computes it
   int confidence_percent = 0;  // 0 = no echo was found
 };
 
@@ -70,7 +70,7 @@ class Vendor {
       if (port.kind == kind) return &port;
     return nullptr;
   }
-  /// True if each of several TCP ports sends bytes of its own for a ping.
+  /// True if several TCP ports each send different bytes of a ping.
   bool has_several_streams() const { return std::ranges::count(ports(), Port::Kind::tcp_stream, &Port::kind) > 1; }
   virtual std::span<const Option> options() const { return {}; }
   virtual int default_max_clients() const = 0;
@@ -80,30 +80,30 @@ class Vendor {
     static_cast<void>(options);
     return model;
   }
-  /// The settings before any client has sent some (the device's stored configuration).
+  /// The settings before any client has sent settings (the device's stored configuration).
   virtual ChangeSettings initial_settings(const DeviceState& device) const = 0;
-  /// The settings that a client of this vendor would have requested: those that hold now (DeviceState::settings) with the
-  /// override applied. A refusal states what the product can do.
+  /// The present settings (DeviceState::settings) with the override applied, as a client of this vendor would request them. The
+  /// error states the product's limits.
   virtual Result<ChangeSettings> apply_override(const SettingsOverride& wanted, const DeviceState& device) const = 0;
-  /// The gain as in SettingsOverride::gain_percent: per cent of the range in which a client can set it.
+  /// The present gain, in the unit of SettingsOverride::gain_percent: per cent of the range that a client can set.
   virtual double gain_percent(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& device) const {
     static_cast<void>(device);
     return false;
   }
-  /// The settings to which the device changes by itself after a ping, such as an automatic range. nullopt: they stay.
+  /// Changes that the device makes itself after a ping, such as an automatic range. nullopt: no change.
   virtual std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const {
     static_cast<void>(ping), static_cast<void>(device);
     return std::nullopt;
   }
-  /// Whether its sonars are range finders: they measure one distance with each ping.
+  /// Whether its sonars are range finders, which measure one distance with each ping.
   virtual bool measures_distance() const { return false; }
   /// The distance in a ping, as the device reports it. nullopt: the sonar is not a range finder.
   virtual std::optional<Distance> distance_in(const Ping& ping) const {
     static_cast<void>(ping);
     return std::nullopt;
   }
-  /// Ping `number`, counted from 1, of a mechanical scan as a usual host requests it. nullopt: the sonar does not scan.
+  /// The request of a usual host for ping `number` (counted from 1) of a mechanical scan. nullopt: the sonar does not scan.
   struct ScanStep {
     RequestPing aim;
     PingSettings settings;
@@ -117,12 +117,12 @@ class Vendor {
     static_cast<void>(device), static_cast<void>(now);
     return {};
   }
-  /// Answers a datagram, of any bytes, at a port of kind udp_answer; each reply is one datagram to the sender.
+  /// Answers a datagram with any content at a port of kind udp_answer; each reply is one datagram to the sender.
   virtual Reaction on_datagram(const Port& port, BytesView datagram, const DeviceState& device, Time now) const {
     static_cast<void>(port), static_cast<void>(datagram), static_cast<void>(device), static_cast<void>(now);
     return {};
   }
-  /// Answers a request, of any path, method and body, at a port of kind http.
+  /// Answers a request with any path, method and body at a port of kind http.
   virtual ResourceReply on_http(const Port& port, const ResourceRequest& request, const DeviceState& device, Time now) const {
     static_cast<void>(port), static_cast<void>(request), static_cast<void>(device), static_cast<void>(now);
     return {404, "not found\n", "text/plain"};
@@ -148,7 +148,8 @@ class Vendor {
     return nullptr;
   }
   /// The datagrams of a ping in order, at most 65,507 bytes each, for a port of kind udp_stream with receivers, or udp_dialogue.
-  /// For one of kind tcp_stream: the parts of frame() between which it pauses; several such ports each have their own bytes.
+  /// For a port of kind tcp_stream: the parts of frame(), between which the device pauses; with several such ports, the bytes
+  /// of this port.
   virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
     static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
     return {};
@@ -159,14 +160,14 @@ class Vendor {
     static_cast<void>(part), static_cast<void>(name), static_cast<void>(message);
     return {};
   }
-  /// Replaces an integer that has no fixed place in its message, such as a varint, by `change` of it. False: there is no such
-  /// integer; of an empty `message`: no message of that kind has it.
+  /// Replaces an integer without a fixed place in the message, such as a varint, by `change(integer)`. False: the message has
+  /// no such integer or, if `message` is empty, no message of this kind has it.
   virtual bool change_integer(Part part, FieldName name, const std::function<std::int64_t(std::int64_t)>& change,
                               Bytes& message) const {
     static_cast<void>(part), static_cast<void>(name), static_cast<void>(change), static_cast<void>(message);
     return false;
   }
-  /// Corrects the checksums of a ping whose fields were changed; it has the size of `before`.
+  /// Corrects the checksums of a ping whose fields were changed. `before`: the unchanged ping, of the same size.
   virtual void reseal(BytesView before, Bytes& message) const { static_cast<void>(before), static_cast<void>(message); }
   /// {offset, size} of a region of a ping. nullopt: the vendor has no such region, or the ping is too short. For an empty `ping`
   /// it is {0, 0} if the vendor has such a region.
@@ -176,7 +177,7 @@ class Vendor {
   }
 };
 
-/// A sonar that sends its pings to every client of one TCP port, from power-up on and without a request.
+/// A sonar that sends its pings without a request, from power-up on, to every client of one TCP port.
 class PushingVendor : public Vendor {
  public:
   explicit PushingVendor(std::uint16_t tcp_port) : ports_{{{.kind = Port::Kind::tcp_stream, .number = tcp_port}}} {}
@@ -188,8 +189,8 @@ class PushingVendor : public Vendor {
   std::array<Port, 1> ports_;
 };
 
-/// Checks options and adds the defaults of those that are not given. Unknown names and values are errors that suggest the nearest
-/// valid one.
+/// Checks options and adds the defaults of the missing ones. Unknown names and values are errors that suggest the nearest valid
+/// one.
 Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& given);
 
 /// The devices of makes() (protocol/host.hpp), in that order.

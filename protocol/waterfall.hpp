@@ -1,4 +1,4 @@
-// The picture of a sonar whose pings are lines by range: one below the other, the newest on top.
+// The picture of a sonar whose pings are single lines: one below the other, the newest on top.
 #pragma once
 
 #include <deque>
@@ -14,7 +14,8 @@ using Line = std::vector<float>;  // by range, [dB]
 /// The lines of the last pings.
 class Waterfall {
  public:
-  /// Adds a line. If it has other rows than the lines before, those are dropped. `ping` gets the drawing.
+  /// Adds a line and puts the drawing into `ping`. If the rows differ from those of earlier lines, the earlier lines are
+  /// dropped.
   void add(Line line, double start_m, double row_m, HostPing& ping);
 
  private:

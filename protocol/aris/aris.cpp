@@ -13,7 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 
 using PortKind = protocol::Port::Kind;
-// No source gives the gap between the parts of a frame. With 20 us a receive buffer of 64 kB does not overflow.
+// unknown: the gap between the parts of a frame. With 20 us a receive buffer of 64 kB does not overflow.
 constexpr std::array<protocol::Port, 3> port_table{
     {{.kind = PortKind::tcp_stream, .number = command_port},
      {.kind = PortKind::udp_beacon, .number = beacon_port, .period = 1000ms, .on_change = true},

@@ -1,4 +1,4 @@
-// Sound Metrics ARIS as a Vendor.
+// Sound Metrics ARIS: the implementation of Vendor.
 #pragma once
 
 #include "protocol/vendor.hpp"

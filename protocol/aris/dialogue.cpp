@@ -24,7 +24,7 @@ constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hos
 bool is_multicast(protocol::Ipv4 ip) { return ip[0] >= 224 && ip[0] < 240; }
 
 /// One controller's conversation (docs/protocols/aris.md, "Session"). The device never answers over TCP; beacons and frame
-/// headers state what it does. It sends frames after it has got both valid acoustic settings and a receiver, in either order.
+/// headers report its state. It sends frames once it has both valid acoustic settings and a receiver, in either order.
 class ArisDialogue final : public protocol::Dialogue {
  public:
   explicit ArisDialogue(const DeviceState& device) : device_(device), seen_(device.settings), first_ping_(device.last_ping) {}
@@ -52,8 +52,8 @@ class ArisDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  private:
-  /// The settings that the next command starts from. These are the ones commanded last, even if a fault still holds them back, or
-  /// the device's if something else has replaced them, such as the control interface.
+  /// The settings on which the next command is based: the last commanded ones, even if a fault still holds them back; or the
+  /// device's, if something else, such as the control interface, has replaced them.
   Settings base() {
     if (device_.settings != seen_) {
       const auto applied = std::find(waiting_.begin(), waiting_.end(), device_.settings);

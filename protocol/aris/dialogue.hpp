@@ -1,4 +1,5 @@
-// One controller's connection to an emulated ARIS: commands in, settings and receivers out. The device answers nothing.
+// One controller's connection to an emulated ARIS: commands in, changes of settings and receivers out. The device never
+// replies.
 #pragma once
 
 #include <memory>
@@ -10,7 +11,7 @@ namespace sonar::aris {
 /// The state must outlive the dialogue.
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device);
 
-/// The time in a text such as "2014-Jan-31 23:58:15", read as UTC. nullopt: the text has another form.
+/// The time in a text such as "2014-Jan-31 23:58:15", in UTC. nullopt: the text has another form.
 std::optional<Time> parse_date_time(const std::string& text);
 
 }  // namespace sonar::aris

@@ -11,7 +11,7 @@ namespace sonar::aris {
 namespace {
 
 /// Each ping of a frame forms 16 beams, one for each channel of the digitiser. With n pings a frame, channel k of ping p holds
-/// beam n sixteenth[k] + p. This order is a property of the hardware; the vendor's library puts beams in order likewise.
+/// beam n sixteenth[k] + p. This order is a property of the hardware; the vendor's library has the same table.
 constexpr std::array<std::size_t, channels> sixteenth{10, 2, 14, 6, 8, 0, 12, 4, 11, 3, 15, 7, 9, 1, 13, 5};
 constexpr std::size_t first_part_samples = 620, part_samples = 1370;  // samples in a datagram of 1400 bytes
 constexpr std::size_t largest_picture = std::size_t{most_samples} * 128;
@@ -70,7 +70,7 @@ void set_attitude(FrameHeader& h, const Quatd& sonar_in_world) {
   h.acceleration_g = {static_cast<float>(down.x), static_cast<float>(down.y), static_cast<float>(down.z)};
 }
 
-/// All times of a frame are the same here: the emulated sonar has no delay between trigger, ping and frame.
+/// All times of a frame are equal: the emulated sonar has no delay between trigger, ping and frame.
 FrameHeader header_of(const Ping& ping, const protocol::DeviceState& device, const Settings& settings, std::int32_t index) {
   const PingRequest& request = ping.request;
   FrameHeader h;
@@ -127,7 +127,8 @@ std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesVie
   return parts;
 }
 
-// Pings of the daemon are numbered through all connections; frames begin at 1 in each (docs/protocols/aris.md, "Session").
+// The daemon numbers pings across all connections; frame numbers begin at 1 in each connection (docs/protocols/aris.md,
+// "Session").
 std::vector<Bytes> encode_frame(const Ping& ping, const protocol::DeviceState& device, const Settings& settings) {
   const auto number = static_cast<std::uint32_t>(ping.request.number);
   const auto index = static_cast<std::int32_t>(number > settings.first_ping ? number - settings.first_ping : number);

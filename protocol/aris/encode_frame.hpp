@@ -1,4 +1,4 @@
-// A Ping as the datagrams of a frame: header, channel order, parts. It also converts back, for tools and tests.
+// Converts a Ping to the datagrams of a frame (header, order of channels, parts), and back for tools and tests.
 #pragma once
 
 #include <functional>
@@ -20,12 +20,13 @@ inline constexpr std::size_t longest_datagram = 1400;  // an older sample progra
 Bytes raw_from_picture(BytesView picture, std::size_t samples, int pings);
 Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings);
 
-/// The datagrams of a frame. The first has the header; all have samples. `longest`: at most so many bytes each, 1400 or more.
+/// The datagrams of a frame. The first has the header; all have samples. `longest`: largest size of a datagram in bytes, at
+/// least 1400.
 std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples,
                             std::size_t longest = longest_datagram);
 std::vector<Bytes> encode_frame(const Ping& ping, const protocol::DeviceState& device, const Settings& settings);
 
-/// The first datagram of a frame.
+/// Finds a field in the first datagram of a frame.
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView first_part);
 std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView first_part);
 
@@ -37,15 +38,15 @@ bool change_part(protocol::FieldName name, const std::function<std::int64_t(std:
 /// Oculus: 0x4000 too hot, 0x8000 stopped by heat).
 bool change_beacon(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& beacon);
 
-/// A frame put together from all its parts.
+/// A frame, assembled from all its parts.
 struct DecodedFrame {
   std::int32_t index = 0;
   FrameHeader header;
   Bytes picture;  // [samples][beams], beam 0 most to starboard
   std::size_t samples = 0, beams = 0;
 };
-/// Collects datagrams of a frame until it is complete. If the next frame begins earlier, the incomplete one is dropped and
-/// counted.
+/// Collects the datagrams of a frame until it is complete. If the next frame begins before that, the incomplete one is dropped
+/// and counted.
 class FrameAssembler {
  public:
   std::optional<DecodedFrame> add(BytesView datagram);
@@ -57,7 +58,7 @@ class FrameAssembler {
   std::size_t total_ = 0, received_ = 0;
   bool done_ = true;
   Bytes header_, samples_;
-  std::vector<bool> has_;  // bytes of the samples
+  std::vector<bool> has_;  // for each byte of the samples: whether it has arrived
   std::uint64_t incomplete_ = 0;
 };
 

@@ -143,7 +143,7 @@ class ArisHost final : public protocol::Host {
     actions.emplace_back(protocol::HostSend{commands, framed(command)});
   }
 
-  /// Adds two notices, each at most once: the sonar does not use the settings that were sent; frames were lost.
+  /// Adds notices, each at most once: the sonar does not use the sent settings; frames were lost.
   void warn_of(const DecodedFrame& frame, HostActions& actions) {
     constexpr int settled = 3;  // the first frames may have been made before the settings arrived
     const FrameHeader& h = frame.header;

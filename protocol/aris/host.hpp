@@ -8,7 +8,7 @@
 
 namespace sonar::aris {
 
-/// Frames arrive at any free port (0): the controller sends its number to the device by SET_FRAMESTREAM_RECEIVER.
+/// Frames arrive at any free port (0); the controller sends the port number to the device by SET_FRAMESTREAM_RECEIVER.
 inline constexpr std::array<protocol::HostPort, 2> host_ports{
     {{protocol::HostPort::Kind::tcp, command_port}, {protocol::HostPort::Kind::udp_listen, 0}}};
 

@@ -1,5 +1,6 @@
-// Finds fields in the first datagram of a frame and in the beacon. Integers of the protobuf messages are varints, whose place and
-// size change with other values, so they are read, changed and written anew; fields of the frame header have a fixed place.
+// Finds fields in the first datagram of a frame and in the beacon. Fields of the frame header have a fixed place. Integers of
+// the protobuf messages are varints, whose place and size depend on other values; to change one, the message is decoded and
+// encoded again.
 #include <algorithm>
 
 #include "protocol/aris/encode_frame.hpp"
@@ -10,7 +11,7 @@ namespace {
 using protocol::Field;
 using protocol::FieldName;
 
-constexpr std::int64_t too_hot = 0x4000, stopped_by_heat = 0x8000;  // status bits of an Oculus, as faults have them
+constexpr std::int64_t too_hot = 0x4000, stopped_by_heat = 0x8000;  // status bits of an Oculus, which faults use
 
 using Place = std::pair<std::size_t, std::size_t>;  // offset, size
 
@@ -26,7 +27,7 @@ std::optional<FramePart> first_of(BytesView first_part) {
 
 }  // namespace
 
-// Without a datagram the place is that in the header itself, as Vendor::field() demands for an empty message.
+// Without a datagram, the place in the header itself, as Vendor::field() requires for an empty message.
 std::optional<Field> locate(FieldName name, BytesView first_part) {
   auto found = wire::locate<FrameHeader>(name);
   if (!found || first_part.empty()) return found;

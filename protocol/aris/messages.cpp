@@ -2,7 +2,7 @@
 
 namespace sonar::aris {
 
-// The length in front is big-endian, unlike all other numbers of the protocol (vendor's SDK).
+// The length prefix is big-endian, unlike all other numbers of the protocol (vendor's SDK).
 Bytes framed(const Command& command) {
   const Bytes message = protobuf::bytes_of(command);
   Bytes out;
@@ -19,7 +19,7 @@ void CommandFramer::append(BytesView received) {
   if (!broken_) buffer_.insert(buffer_.end(), received.begin(), received.end());
 }
 
-// A length beyond the limit cannot be skipped: the stream would have to be read for up to 4 GiB.
+// A message beyond the limit is not skipped, because it could have 4 GiB.
 std::optional<BytesView> CommandFramer::next() {
   const BytesView waiting = BytesView(buffer_).subspan(begin_);
   if (broken_ || waiting.size() < length_prefix) return std::nullopt;

@@ -1,5 +1,5 @@
 // The messages of an ARIS: availability beacon, commands, parts of a frame. Each is described once, with the field numbers of the
-// vendor's published protocol (docs/protocols/aris.md); aris.proto says the same for readers and for tests.
+// vendor's published protocol (docs/protocols/aris.md); aris.proto has the same description, for readers and for tests.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ using wire::Bytes;
 using wire::BytesView;
 
 inline constexpr std::uint16_t beacon_port = 56124, command_port = 56888;
-inline constexpr std::size_t longest_command = 4096;  // chosen: real ones have 4 to 60 bytes
+inline constexpr std::size_t longest_command = 4096;  // chosen; real commands have 4 to 60 bytes
 inline constexpr std::size_t length_prefix = 4;       // length in front of a command: u32, big-endian
 
 enum class SystemType : std::uint32_t { aris_1800 = 0, aris_3000 = 1, aris_1200 = 2 };
@@ -155,7 +155,7 @@ void fields(V& visit, M& m) {
   visit(1, m.value);
 }
 struct Focus {
-  std::uint32_t position = 0;  // 0 to 1000, of controllers before 2.6
+  std::uint32_t position = 0;  // 0 to 1000; only controllers before 2.6 send it
   float range_m = 0;
 };
 template <class V, wire::Like<Focus> M>
@@ -164,7 +164,7 @@ void fields(V& visit, M& m) {
   visit(2, m.range_m);
 }
 
-/// A command, with those sub-messages that have an effect. A missing type is 0, because proto3 does not send zeros.
+/// A command, with only the sub-messages that have an effect. A missing type means 0, because proto3 does not send zeros.
 struct Command {
   CommandType type{};
   std::optional<DateTime> date_time;
@@ -204,16 +204,16 @@ void fields(V& visit, M& m) {
   visit(5, m.data_offset);
 }
 
-/// A command as it is sent over TCP: length and message.
+/// The bytes of a command on the TCP connection: length and message.
 Bytes framed(const Command& command);
 
 /// Splits the stream of a controller, which arrives in pieces of any size, into commands. Keeps at most longest_command bytes.
 class CommandFramer {
  public:
   void append(BytesView received);
-  /// The next whole message; points into the framer until the next call.
+  /// The next whole message; the view is valid until the next call.
   std::optional<BytesView> next();
-  /// True after a length beyond longest_command: the rest of the stream cannot be read.
+  /// True after a length above longest_command; the rest of the stream is then unreadable.
   bool broken() const { return broken_; }
 
  private:

@@ -15,17 +15,17 @@
 namespace sonar::aris {
 
 /// The receiver integrates over a sample period, so a row is the mean power of samples that are at most 1 / 1.5 pulses apart.
-/// Evidence in SMP: levels spread about their local mean like the mean of 1.7 independent values, and not like a single one.
+/// Evidence in SMP: levels spread about their local mean like means of 1.7 independent values.
 inline constexpr double samples_per_pulse = 1.5;
 inline constexpr int most_samples_per_row = 8;  // 1 would be no integration
 
 inline constexpr int channels = 16;  // beams that one ping of a frame forms
-/// Gains of the channels from starboard [dB], from SMP: the level of each channel's beams in frames 1 to 3, relative to the beams
-/// beside them. Frames 4 to 6 give the same within 0.25 dB rms. unknown: the gains of other units; here they are the same.
+/// Gains of the channels from starboard [dB], from SMP: the level of each channel's beams in frames 1 to 3, relative to the
+/// beams beside them. Frames 4 to 6 agree within 0.25 dB rms. unknown: the gains of other units; all emulated units have these.
 inline constexpr std::array<float, channels> channel_gain_db{-1.13f, 1.39f, -0.99f, 0.55f, -0.07f, -0.12f, -0.18f, 0.72f,
                                                              -0.48f, 0.63f, -0.74f, 0.67f, 0.23f,  -0.56f, 0.53f,  -0.45f};
 
-/// A ping mode: a frame consists of `pings` pings of 16 beams each, which interleave.
+/// A ping mode: a frame consists of `pings` interleaved pings of 16 beams each.
 struct PingMode {
   std::uint32_t number = 0;
   int pings = 0;
@@ -41,7 +41,7 @@ struct Product {
   double pulse_energy_us_hz = 0;           // longest pulse times frame rate
   double window_end_m = 0;
   double small_period_margin = 0, period_margin = 0;  // margins of a cycle, with sample periods up to 4 us and above
-  Acoustics initial;                                  // until a controller sends some; those of the vendor's sample program
+  Acoustics initial;                                  // used until a controller sends settings; from the vendor's sample program
 };
 
 std::span<const std::shared_ptr<const SonarModel>> models();

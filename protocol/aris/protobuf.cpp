@@ -29,7 +29,7 @@ void Writer::operator()(unsigned number, BytesView value) {
   out_.insert(out_.end(), value.begin(), value.end());
 }
 
-// A varint has 7 bits a byte, the lowest first; the top bit says that another byte follows. More than 10 bytes are an error.
+// A varint has 7 bits per byte, the lowest first; the top bit means that another byte follows. More than 10 bytes are an error.
 std::optional<std::uint64_t> RawReader::varint() {
   std::uint64_t value = 0;
   for (unsigned shift = 0; shift < 64 && !rest_.empty(); shift += 7) {
@@ -53,7 +53,7 @@ std::optional<std::uint64_t> RawReader::fixed(std::size_t bytes) {
   return value;
 }
 
-// Groups (wire types 3 and 4) are not read: ARIS messages have none, and proto3 has abolished them.
+// Groups (wire types 3 and 4) are errors: ARIS messages and proto3 have none.
 std::optional<RawField> RawReader::next() {
   if (rest_.empty() || !ok_) return std::nullopt;
   const auto key = varint();

@@ -1,6 +1,6 @@
-// The encoding of Protocol Buffers, as far as ARIS messages need it. A message is described once, by fields(visit, message) with
-// the numbers of its fields; the visitors here write and read it. protoc's classes are not used: they leave out fields that are
-// zero, and older controllers ignore a sonar whose model or state is missing.
+// The part of the Protocol Buffers encoding that ARIS messages need. A message is described once, by fields(visit, message)
+// with the numbers of its fields; the visitors here write and read it. protoc's classes are not used, because they omit fields
+// that are zero, and older controllers ignore a sonar whose beacon lacks its model or state.
 #pragma once
 
 #include <bit>
@@ -21,7 +21,7 @@ enum class WireType : std::uint8_t { varint = 0, fixed64 = 1, length_delimited =
 
 void append_varint(Bytes& out, std::uint64_t value);
 
-/// Appends a message's fields, those that are zero too; an empty std::optional or vector is left out.
+/// Appends a message's fields, including zeros; an empty std::optional or vector is omitted.
 class Writer {
  public:
   explicit Writer(Bytes& out) : out_(out) {}
@@ -55,7 +55,7 @@ class Writer {
   Bytes& out_;
 };
 
-/// One field as it lies in a message.
+/// One undecoded field of a message.
 struct RawField {
   unsigned number = 0;
   WireType type{};
@@ -63,7 +63,7 @@ struct RawField {
   BytesView bytes;          // a length-delimited field; points into the message
 };
 
-/// The fields of a message, one after the other, without an interpretation.
+/// Reads the fields of a message one by one, without interpreting them.
 class RawReader {
  public:
   explicit RawReader(BytesView message) : rest_(message) {}
@@ -81,7 +81,8 @@ class RawReader {
 template <class M>
 bool read(BytesView bytes, M& message);
 
-/// Visits the description of a message with one field, and stores its value where number and type agree.
+/// Visits the description of a message with one received field, and stores its value in the member with the same number and
+/// type.
 class Reader {
  public:
   explicit Reader(const RawField& field) : field_(field) {}

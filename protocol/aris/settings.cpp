@@ -9,7 +9,7 @@
 namespace sonar::aris {
 namespace {
 
-constexpr std::uint32_t rest_us = 360;                  // the SDK document: a cycle lasts so long after its last sample
+constexpr std::uint32_t rest_us = 360;                  // from the SDK document: rest of a cycle after its last sample
 constexpr double lenient_share = 0.05;                  // assumed: the vendor's C++ sample sends cycles that are too short
 constexpr auto focus_travel = std::chrono::seconds(1);  // from 0 to 1000; the device's log has about a second
 
@@ -43,7 +43,7 @@ std::string out_of_range(const Acoustics& a, const Product& product) {
 
 }  // namespace
 
-// The salinity is the one of the three commands' values that is nearest to the water; the focus is at an eighth of the window.
+// The salinity is that of the three allowed values that is nearest to the water's; the focus is at an eighth of the window.
 Settings initial_settings(const protocol::DeviceState& device) {
   Settings s;
   const Product& product = product_of(*device.model);
@@ -70,8 +70,8 @@ std::uint32_t shortest_cycle_us(const Acoustics& a) {
   return a.start_delay_us + a.sample_period_us * a.samples_per_beam + rest_us;
 }
 
-// The formula of the vendor's SDK: the time of a frame is that of its cycles with a margin, which depends on the product, and of
-// its packets if they are sent with a delay.
+// The formula of the vendor's SDK: a frame lasts as long as its cycles plus a margin, which depends on the product, plus the
+// time of its packets if they are sent with a delay.
 double highest_frame_rate_hz(const Product& product, const Acoustics& a, std::optional<std::uint32_t> packet_delay_us) {
   constexpr double overhead_us = 420, per_packet_us = 16.6;
   const PingMode& mode = *find_ping_mode(product, a.ping_mode);
@@ -153,7 +153,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.range_bin_m = a.sample_period_us * m_per_us;
   s.range_start_m = a.start_delay_us * m_per_us;
   s.range_m = s.range_start_m + s.range_bin_count * s.range_bin_m;
-  s.row_centre = 0;  // sample i lies at the start delay and i sample periods
+  s.row_centre = 0;  // sample i lies at the start delay plus i sample periods
   // -3 dB of a tone in its matched filter (docs/acoustics.md, eq. 23).
   const double width_m = (2 - std::sqrt(2.0)) * a.pulse_us * m_per_us;
   s.pulse_width_m = static_cast<float>(width_m);
@@ -164,7 +164,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.gain_db = a.gain_db;
   s.transmit = a.transmit;
   s.device_sound_speed_mps = static_cast<float>(speed);
-  s.device_absorption_db_per_m = 0;  // unknown: assumed, since the level of a real recording falls with range all the way
+  s.device_absorption_db_per_m = 0;  // unknown: assumed, because the level of a real recording falls with range throughout
   s.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = 0, .ceiling_db = 80};
   return s;
 }

@@ -27,7 +27,7 @@ struct Settings {
   Time focus_set_at{};
   bool delays_packets = false;
   std::uint32_t packet_delay_us = 0;
-  std::chrono::nanoseconds clock_offset{0};  // offset of the device's clock, from SET_DATETIME
+  std::chrono::nanoseconds clock_offset{0};  // added to the device's clock, from SET_DATETIME
   std::uint32_t first_ping = 0;              // number of the last ping before the controller connected
   bool operator==(const Settings&) const = default;
 };
@@ -59,7 +59,7 @@ Verdict apply(Settings& settings, const Acoustics& asked, const protocol::Device
 
 /// Position of the focus motor for a range: 0 at the sonar, 1000 at the end of the product's longest window.
 std::uint32_t focus_position(double range_m, const Product& product);
-/// Position of the focus motor at one moment. The motor takes a second from 0 to 1000.
+/// Position of the focus motor at one moment. The motor needs one second from 0 to 1000.
 struct FocusNow {
   std::uint32_t position = 0;
   bool moves = false;
@@ -69,7 +69,7 @@ FocusNow focus_at(const Settings& settings, Time at);
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 
-/// The change that a controller would have caused by a SET_ACOUSTICS of the override's values.
+/// The change that a SET_ACOUSTICS with the override's values would cause.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
 }  // namespace sonar::aris

@@ -12,7 +12,7 @@ constexpr std::uint32_t shortest_period_us = 4, longest_period_us = 100, longest
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
-/// Sets the mode, or, without one, the ping mode with the wanted number of beams.
+/// Sets the wanted mode; without one, the ping mode with the wanted number of beams.
 Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   const Product& product = product_of(*device.model);
   if (wanted.mode) {

@@ -1,4 +1,4 @@
-// Teledyne BlueView as a Vendor: serves the drop-in SDK libraries of clients/bvtsdk.
+// Teledyne BlueView: the implementation of Vendor. Its clients are the drop-in SDK libraries of clients/bvtsdk.
 #pragma once
 
 #include "protocol/vendor.hpp"

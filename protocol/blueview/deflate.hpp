@@ -1,4 +1,4 @@
-// Compression of samples by zlib's deflate.
+// Compresses samples by zlib's deflate.
 #pragma once
 
 #include "protocol/wire/wire.hpp"

@@ -24,12 +24,12 @@ constexpr auto keep_alive_after = 2s;  // since the sonar sent its last message
 constexpr auto longest_host_silence = 10s;
 constexpr std::size_t most_waiting = 8;  // PING requests of one host that may be unanswered at a time
 constexpr std::uint32_t longest_wait_ms = 600000;
-constexpr float housing_above_water_c = 2;  // unknown: difference of the housing's temperature to that of the water
+constexpr float housing_above_water_c = 2;  // unknown: housing temperature minus water temperature
 
-/// A connection has one state, `greeted_`: before HELLO every request but HELLO is refused. After it a host gets pings in two
-/// ways that do not exclude each other: single PING requests, which wait in `waiting_` for a ping of their head and settings, and
-/// one subscription, which requests a ping each interval. All hosts share the settings and the sonar computes one ping at a time,
-/// so both only ask the device for a ping, and on_ping() decides which requests it answers.
+/// A connection has one state, `greeted_`: before HELLO, all other requests are refused. After it, a host can get pings in two
+/// ways at the same time: by PING requests, which wait in `waiting_` for a ping of their head and settings, and by one
+/// subscription, which requests a ping per interval. All hosts share the settings, and the sonar computes one ping at a time;
+/// so both ways only request a ping of the device, and on_ping() decides which requests the ping answers.
 class BlueViewDialogue final : public protocol::Dialogue {
  public:
   BlueViewDialogue(const DeviceState& device, Time now) : device_(device), spoke_at_(now) {}
@@ -40,7 +40,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     framer_.append(received);
     while (const auto frame = framer_.next()) {
       on_frame(*frame, now, reaction);
-      // A frame that closes the connection ends it: later frames of the same piece have no effect.
+      // After a frame that closes the connection, later frames have no effect.
       if (!reaction.events.empty() && std::holds_alternative<Close>(reaction.events.back())) return reaction;
     }
     if (!framer_.broken().empty()) reaction.events.emplace_back(Close{framer_.broken()});
@@ -51,15 +51,14 @@ class BlueViewDialogue final : public protocol::Dialogue {
   Reaction on_tick(Time now, bool ping_pending) override {
     Reaction reaction;
     settings_ = settings_from(device_.settings.get(), device_);
-    // on_ping_request() keeps the ends of the waits in order, so the first one ends first.
+    // on_ping_request() keeps the deadlines in order, so the first entry expires first.
     while (!waiting_.empty() && waiting_.front().until <= now) {
       reaction.replies.push_back(make_error(waiting_.front().request_id, Code::timeout, "no ping in the time given"));
       waiting_.pop_front();
     }
     if (subscription_ && subscription_->next <= now) {
       subscription_->wanted = true;
-      // A pending PING request for another head comes first. Else a subscription with a short interval would never let it
-      // through.
+      // A pending PING request for another head comes first; otherwise a subscription with a short interval would starve it.
       if (!ping_pending || settings_.active_head == subscription_->head) ask_for_ping(subscription_->head, reaction);
       // Intervals that have passed are skipped, so that a late tick requests one ping and not a burst.
       subscription_->next += ((now - subscription_->next) / subscription_->interval + 1) * subscription_->interval;
@@ -90,8 +89,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const HeadSettings& fired = fired_with.heads[static_cast<std::size_t>(head)];
     const HeadSettings now_set = settings_from(device_.settings.get(), device_).heads[static_cast<std::size_t>(head)];
     for (auto it = waiting_.begin(); it != waiting_.end();) {
-      // The host sent SET and then PING. A ping that was fired before the SET does not answer: its settings differ both from
-      // those at the request and from the present ones.
+      // If the host sent SET and then PING, a ping fired before the SET does not answer: its settings differ both from those at
+      // the request and from the present ones.
       if (it->head != head || (fired != it->asked_with && fired != now_set)) {
         ++it;
         continue;
@@ -104,7 +103,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
       subscription_->wanted = false;
     }
     const bool subscriber_waits = subscription_ && subscription_->wanted;
-    if (!waiting_.empty() || subscriber_waits) {  // they need another head or other settings: request that ping next
+    if (!waiting_.empty() || subscriber_waits) {  // the others need another head or other settings: request that ping next
       Reaction reaction;
       settings_ = settings_from(device_.settings.get(), device_);
       ask_for_ping(waiting_.empty() ? subscription_->head : waiting_.front().head, reaction);
@@ -122,7 +121,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     Time until{};
     HeadSettings asked_with;
   };
-  /// `wanted`: the ping of the present interval has been requested and not sent yet.
+  /// `wanted`: the ping of the present interval was requested but not sent yet.
   struct Subscription {
     int head = 0;
     std::chrono::milliseconds interval{0};
@@ -132,7 +131,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
 
   int base() const { return text_option(device_.options, option_name::heads_base) == "1" ? 1 : 0; }
 
-  /// Index of the head that the host calls `id`. Hosts number heads from 0 or from 1; with one head, both numbers mean that head.
+  /// Index of the head with the host's number `id`. Hosts number heads from 0 or from 1; if there is one head, both mean that
+  /// head.
   std::optional<int> head_of(std::int32_t id) const {
     const int count = static_cast<int>(settings_.heads.size());
     const int index = id - base();

@@ -1,4 +1,4 @@
-// One host's conversation over BVE1: greeting, settings, triggers, subscription, keep-alives. docs/protocols/blueview-link.md.
+// One host's conversation over BVE1: greeting, settings, triggers, subscription, keep-alives (docs/protocols/blueview-link.md).
 #pragma once
 
 #include <memory>

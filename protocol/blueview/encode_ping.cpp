@@ -41,7 +41,7 @@ wire::Bytes beam_major(const Ping& ping, const HeadGrid& grid) {
   const auto bins = static_cast<std::size_t>(grid.bins), skipped = static_cast<std::size_t>(grid.skipped);
   assert(ping.samples.size() == 2 * beams * (skipped + bins));
   wire::Bytes out(2 * beams * bins);
-  constexpr std::size_t block = 32;  // square blocks, so that the rows read and the beams written stay in cache
+  constexpr std::size_t block = 32;  // square blocks, so that both the source rows and the target beams stay in cache
   for (std::size_t j0 = 0; j0 < beams; j0 += block)
     for (std::size_t k0 = 0; k0 < bins; k0 += block)
       for (std::size_t j = j0; j < std::min(beams, j0 + block); ++j)

@@ -1,4 +1,5 @@
-// A Ping as the payload of PING_DATA: beam-major 16-bit samples, near to far, left to right, and the vehicle's navigation data.
+// Encodes a Ping as the payload of PING_DATA: the vehicle's navigation data, and 16-bit samples, beam by beam from left to
+// right, each beam from near to far.
 #pragma once
 
 #include "protocol/blueview/frames.hpp"
@@ -7,7 +8,7 @@
 
 namespace sonar::blueview {
 
-/// Bits of the mask that states which navigation fields follow it. They follow in the order of the bits.
+/// Bits of the mask of navigation fields. The fields that it names follow it, in the order of the bits.
 enum NavField : std::uint16_t {
   nav_time = 1 << 0,              // f64, seconds since 1970 UTC
   nav_latitude = 1 << 1,          // f64, degrees
@@ -24,7 +25,7 @@ enum NavField : std::uint16_t {
 
 enum class Compression : std::uint8_t { none = 0, deflate = 1 };
 
-/// The payload before its samples, with the navigation data of the daemon.
+/// The part of the payload before the samples, with the navigation data that the daemon sends.
 struct PingHead {
   std::int32_t head = 0;
   std::uint32_t number = 0;

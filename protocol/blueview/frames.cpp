@@ -19,7 +19,7 @@ std::string read_text(wire::Reader& reader, std::string_view name) {
   return text;
 }
 
-// A value has its kind in front, so that a host can read a key that it does not have.
+// The kind precedes the value, so that a host can read the value of an unknown key.
 void put_value(wire::Bytes& out, const Value& value) {
   const Put write(out);
   const auto kind = [&](Kind k) { write("kind", k); };

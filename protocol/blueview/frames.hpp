@@ -17,7 +17,7 @@ namespace sonar::blueview {
 
 namespace means = protocol::means;
 
-inline constexpr std::size_t longest_request = 70000;  // longest message of a host: fits a text of 65535 bytes
+inline constexpr std::size_t longest_request = 70000;  // longest message of a host; a text of 65535 bytes fits
 
 struct FrameHeader {
   std::array<std::uint8_t, 4> magic = blueview::magic;
@@ -63,7 +63,7 @@ void put_value(wire::Bytes& out, const Value& value);
 std::optional<Value> read_value(wire::Reader& reader, Key key);
 
 wire::Bytes make_frame(FrameType type, std::uint32_t request_id, wire::BytesView payload);
-/// The header of a frame, 16 bytes, which states the length of the payload.
+/// The header of a frame (16 bytes) with the given payload length.
 wire::Bytes make_header(FrameType type, std::uint32_t request_id, std::size_t payload_length);
 wire::Bytes make_error(std::uint32_t request_id, Code code, std::string_view text);
 
@@ -72,7 +72,8 @@ struct Frame {
   wire::BytesView payload;
 };
 
-/// Splits a stream into frames. After bytes that are not a frame, next() returns nothing more, and broken() states the reason.
+/// Splits a stream into frames. After bytes that are not a frame, next() returns nullopt for ever, and broken() returns the
+/// reason.
 class Framer {
  public:
   /// `longest`: longest accepted payload; a host passes longest_payload.

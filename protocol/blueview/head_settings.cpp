@@ -29,8 +29,8 @@ std::optional<double> number_in(const Value& value) {
 
 Applied refused(Code code, std::string text) { return {std::nullopt, {code, std::move(text)}}; }
 
-/// Sets start and stop together, because the start must lie before the stop. Values out of range are clamped, or refused if
-/// `strict`; the answer has the applied values, so that a host sees the difference.
+/// Sets start and stop together, because the start must be less than the stop. Values out of range are clamped, or refused if
+/// `strict`; the answer has the applied values.
 Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, float stop, bool strict, Key key) {
   if (!std::isfinite(start) || !std::isfinite(stop)) return refused(Code::bad_parameter, "a range must be a finite number");
   const bool fine = start >= mode.min_range_m && stop <= mode.max_range_m && start < stop;
@@ -39,7 +39,7 @@ Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, 
                 static_cast<double>(stop), static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m));
   if (!fine && strict) return refused(Code::bad_range, text);
   const float shortest = std::max(0.1f, 0.01f * mode.max_range_m);
-  // The stop is clamped first; then the start, to leave a window of `shortest` below it.
+  // The stop is clamped first, then the start, so that the window is at least `shortest`.
   head.stop_m = std::clamp(stop, mode.min_range_m + shortest, mode.max_range_m);
   head.start_m = std::clamp(start, 0.0f, head.stop_m - shortest);
   if (key == Key::range) return {Value(FloatPair{head.start_m, head.stop_m}), {}};
@@ -107,7 +107,7 @@ SonarSettings settings_from(const VendorSettings* settings, const protocol::Devi
   return of != nullptr ? *of : initial_sonar_settings(device);
 }
 
-// All checks of a SET are here; a refused one changes nothing.
+// All checks of a SET are here; a refused SET changes nothing.
 Applied apply(SonarSettings& settings, int head_index, Key key, const Value& value, const protocol::DeviceState& device) {
   if (head_index < 0 || head_index >= static_cast<int>(settings.heads.size()))
     return refused(Code::no_head, "no head " + std::to_string(head_index));
@@ -171,8 +171,8 @@ HeadGrid grid_of(const HeadSettings& head, double finest_bin_m) {
   const double start = static_cast<double>(head.start_m), stop = static_cast<double>(head.stop_m);
   grid.bin_m = std::max(finest_bin_m, (stop - start) / most_bins);
   grid.bins = std::max(1, static_cast<int>(std::lround((stop - start) / grid.bin_m)));
-  // The pipeline makes rows from the sonar on. The rows before the start are dropped, and the grid is shifted by a part of a row,
-  // so that the centre of the first bin lies half a bin beyond the start.
+  // The pipeline's rows begin at the sonar. The rows before the start are dropped, and the grid is shifted by a fraction of a
+  // row, so that the centre of the first bin lies half a bin after the start.
   const double rows_before = start / grid.bin_m;
   grid.skipped = static_cast<int>(std::floor(rows_before + 0.5));
   grid.row_centre = std::clamp(0.5 + rows_before - grid.skipped, 0.0, 1.0);
@@ -200,11 +200,12 @@ PingSettings ping_settings(const SonarSettings& all, const protocol::DeviceState
   s.transmit = head.transmit != 0;
   s.gain_db = base_gain_db + head.gain_db;
   s.device_sound_speed_mps = static_cast<float>(head.sound_speed_mps);
-  // The device compensates the absorption for the fluid that the host states; with `other` for the water as it is.
+  // The device compensates the absorption of the fluid that the host states; for `other`, that of the actual water.
   Water believed = device.water;
   if (head.fluid == 0) believed.salinity_psu = std::max(believed.salinity_psu, 30.0);
   if (head.fluid == 1) believed.salinity_psu = 0;
-  // The slope is added to the absorption. A host gives it per metre of range, the absorption counts the way there and back.
+  // The slope is added to the absorption. It counts once per metre of range, the absorption counts there and back: so half of the
+  // slope.
   s.device_absorption_db_per_m =
       static_cast<float>(absorption_db_per_m(believed, device.depth_m, static_cast<double>(mode.centre_hz)) +
                          0.5 * static_cast<double>(head.tvg_db_per_m));

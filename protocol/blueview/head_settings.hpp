@@ -23,7 +23,7 @@ struct HeadSettings {
   std::int32_t transmit = 1;
   std::int32_t ping_interval_ms = 0;  // 0 = at the rate of the requests
   std::int32_t dynamic_power = 0;
-  float source_level_db = 0;  // kept and read back; no effect
+  float source_level_db = 0;  // stored and returned; no effect
   bool operator==(const HeadSettings&) const = default;
 };
 
@@ -48,7 +48,7 @@ struct Applied {
   std::optional<Value> value;
   Refusal refusal;  // if there is no value
 };
-/// Sets one key of a head and returns the applied value, which may be the nearest valid one.
+/// Sets one key of a head and returns the applied value: the nearest valid one.
 Applied apply(SonarSettings& settings, int head, Key key, const Value& value, const protocol::DeviceState& device);
 std::optional<Value> read_back(const SonarSettings& settings, int head, Key key);
 

@@ -34,8 +34,8 @@ struct Greeting {
   std::string model, serial;
   std::vector<GreetedHead> heads;
 };
-/// Reads HELLO_OK (docs/protocols/blueview-link.md, "Requests"). Fields that this host does not need are read and dropped.
-/// nullopt: it is cut short, or has no head.
+/// Reads HELLO_OK (docs/protocols/blueview-link.md, "Requests"). Fields that this host does not need are skipped. nullopt: the
+/// payload is too short, or has no head.
 std::optional<Greeting> read_greeting(wire::BytesView payload) {
   wire::Reader reader(payload);
   std::uint16_t version = 0, beams = 0;
@@ -76,8 +76,8 @@ struct DecodedPing {
   PingHead head;
   wire::Bytes samples;
 };
-/// bad_data: an invalid ping. The payload cannot be read with fields(PingHead): that describes a ping of the emulated sonar,
-/// which fills five of the eleven navigation fields, whereas the protocol allows any of them.
+/// bad_data: an invalid ping. fields(PingHead) cannot read the payload, because it describes pings of the emulated sonar, which
+/// fills five of the eleven navigation fields; the protocol allows any of them.
 Result<DecodedPing> read_ping(wire::BytesView payload) {
   constexpr std::size_t fixed = wire::wire_size<PingHead>() - 8 - 4 * 4 - 4;  // bytes before the navigation data
   DecodedPing ping;
@@ -211,7 +211,7 @@ class BlueViewHost final : public protocol::Host {
   }
 
   /// Handles the answer to the last request. Requests go out one by one: HELLO, a SET for each setting, then pings. Each answer
-  /// triggers the next SET; without a further one the host is open.
+  /// triggers the next SET; after the last one the host is open.
   void on_answer(const Frame& frame, Time now, HostActions& actions) {
     const auto fail = [&actions](ErrorKind kind, std::string text) { actions.emplace_back(Error{kind, std::move(text)}); };
     if (frame.header.type == FrameType::error)

@@ -1,5 +1,5 @@
-// The driver of a BlueView sonar on sonard's link (docs/protocols/blueview-link.md): greeting, settings, pings requested one by
-// one.
+// The driver's side of a BlueView sonar on sonard's link (docs/protocols/blueview-link.md): it greets, sends settings and
+// requests pings one by one.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@ namespace sonar::blueview {
 
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
 
-/// Samples are linear: the brightest 1 % may saturate in a picture, or the weak ones would be black.
+/// Samples are linear. The brightest 1 % saturate in pictures; otherwise weak samples would be black.
 inline constexpr Shades shades{.per_mille = 990};
 
 extern const protocol::Search search;

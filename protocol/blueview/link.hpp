@@ -15,7 +15,7 @@ inline constexpr std::array<std::uint8_t, 4> magic{'B', 'V', 'E', '1'};
 inline constexpr std::array<std::uint8_t, 4> discovery_question{'B', 'V', 'E', '?'};
 inline constexpr std::array<std::uint8_t, 4> discovery_answer{'B', 'V', 'E', '!'};
 inline constexpr std::size_t header_size = 16;             // magic, type, flags, request id, payload length
-inline constexpr std::size_t longest_payload = 64u << 20;  // from the sonar; frames.hpp limits requests of a host
+inline constexpr std::size_t longest_payload = 64u << 20;  // limit for messages of the sonar; frames.hpp has that for hosts
 
 /// A reply has the type of its request with this bit set.
 inline constexpr std::uint16_t reply_bit = 0x8000;
@@ -28,7 +28,7 @@ enum class FrameType : std::uint16_t {
   keep_alive = 0x0006,
   nav_data = 0x0101,
   event_mark = 0x0102,
-  index = 0x0103,  // only in recordings: the offsets of the frames
+  index = 0x0103,  // only in recordings: offsets of the frames
   hello_ok = hello | reply_bit,
   ping_data = ping | reply_bit,
   error = 0xFFFF,
@@ -57,7 +57,7 @@ enum class Key : std::uint16_t {
 /// Type of a value in SET and GET.
 enum class Kind : std::uint8_t { integer = 0, number = 1, text = 2 };
 
-/// Error codes of the vendor's SDK, those that an error frame of this link can have.
+/// The error codes of the vendor's SDK that an error frame of this link can have.
 enum class Code : std::int32_t {
   bad_parameter = 6,
   timeout = 18,

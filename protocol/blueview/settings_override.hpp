@@ -1,4 +1,4 @@
-// Turns a SettingsOverride into the settings that a BlueView host would have made. The Vendor of BlueView calls this.
+// Converts a SettingsOverride to the settings that a BlueView host would set.
 #pragma once
 
 #include "protocol/vendor.hpp"
@@ -9,7 +9,7 @@ namespace sonar::blueview {
 float gain_db_from(double percent);
 double gain_percent_from(double gain_db);
 
-/// The shortest is 1 ms, the longest an hour. `rate_hz`: above 0.
+/// The interval between pings, limited to 1 ms up to one hour. `rate_hz` must be above 0.
 std::int32_t ping_interval_ms(double rate_hz);
 
 /// Selects the head `wanted.mode`, if set, and changes on the active head only the fields that are set. Refuses values that the

@@ -1,5 +1,5 @@
-// Status, events and answers are the classes that protoc makes of control.proto: the daemon fills them, clients read them. They
-// take a second to compile: only the files named in tests/architecture/check_floors.py include this header.
+// Status, events and answers: the classes that protoc generates from control.proto. The daemon fills them, clients read them.
+// They take a second to compile, so only the files named in tests/architecture/check_floors.py may include this header.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ v1::Response response_of(std::uint64_t id, StatusCode code, const std::string& t
 
 void fill(v1::Vec3& out, Vec3d v);
 void fill(v1::Quat& out, Quatd q);
-/// Numbers that have been checked; an orientation that is not given is level.
+/// Converts checked numbers to a Pose; a missing orientation is the identity.
 Pose pose_from(const v1::Vec3& position, const v1::Quat& orientation);
 
 /// Fills messages that have a position and an orientation in the world, ENU and FLU, metres.

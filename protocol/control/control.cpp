@@ -72,7 +72,7 @@ Bytes encode_request(const Request& request) {
   return serialized(message);
 }
 
-// Clients check responses as strictly as the daemon checks requests, so that tools do not compute with NaN.
+// Clients check responses as strictly as the daemon checks requests, so that tools never compute with NaN.
 Result<std::shared_ptr<const v1::Response>> decode_response(BytesView bytes) {
   auto message = std::make_shared<v1::Response>();
   if (!parse(*message, bytes)) return failure(ErrorKind::bad_data, "message is not a Response");

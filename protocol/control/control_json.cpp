@@ -1,5 +1,5 @@
-// The control protocol's messages as JSON text. Text from outside is read twice: by our own strict reader, which bounds depth and
-// refuses invalid JSON and duplicate keys, and then by protobuf's, which checks the messages.
+// The control protocol's messages as JSON text. Received text is parsed twice: first by our strict reader, which limits the
+// depth and refuses invalid JSON and duplicate keys, then by protobuf's, which checks the messages.
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/util/json_util.h>
 
@@ -94,7 +94,8 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
   const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
   if (field == nullptr || field->containing_oneof() == nullptr) return refused("unknown request");
   if (json.size() > largest_json) return refused("longer than 1 MiB");
-  // The strict reader takes a zero byte as the end of the text, protobuf's reader does not: what follows would be unchecked.
+  // For the strict reader a zero byte ends the text, for protobuf's reader it does not, so the text after it would be
+  // unchecked.
   if (const auto zero = json.find('\0'); zero != std::string_view::npos)
     return refused("not JSON: a zero byte at character " + std::to_string(zero + 1));
   StrictReader reader;

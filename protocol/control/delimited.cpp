@@ -6,8 +6,7 @@ constexpr std::size_t longest_length_field = 5;  // bytes of a varint of 32 bits
 }
 
 Result<std::optional<std::vector<std::byte>>> DelimitedParser::next() {
-  // The length is read anew at each call until the whole message is there; its limit is checked before any memory is reserved for
-  // it.
+  // Each call reads the length again until the whole message has arrived; the limit is checked before any memory is reserved.
   std::uint64_t length = 0;
   std::size_t used = 0;
   while (true) {
@@ -34,7 +33,7 @@ Result<std::optional<std::vector<std::byte>>> DelimitedParser::next() {
   return std::optional(std::move(message));
 }
 
-// protobuf's varint: 7 bits a byte, the lowest first; the top bit says that another byte follows.
+// protobuf's varint: 7 bits per byte, the lowest first; the top bit means that another byte follows.
 std::vector<std::byte> delimited(std::span<const std::byte> message) {
   std::vector<std::byte> out;
   out.reserve(message.size() + longest_length_field);

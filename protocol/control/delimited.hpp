@@ -1,5 +1,5 @@
-// Framing of the control stream: a varint length, then that many bytes. Incremental and without I/O: any split of the stream.
-// Source: protobuf encoding guide, "varint"; the cap is ours (control.proto).
+// Framing of the control stream: a varint length, then that many bytes. Incremental and without I/O: the stream may arrive in
+// any pieces. Source: protobuf encoding guide, "varint"; the limit of the length is ours (control.proto).
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ class DelimitedParser {
   /// `most`: bytes of a message, at most largest_message.
   explicit DelimitedParser(std::size_t most = largest_message) : most_(std::min(most, largest_message)) {}
   void feed(std::span<const std::byte> received) { buffer_.insert(buffer_.end(), received.begin(), received.end()); }
-  /// The next whole message; nullopt = more bytes are needed; an error is final: the stream has no meaning after it.
+  /// The next whole message; nullopt if more bytes are needed. After an error the rest of the stream cannot be read.
   Result<std::optional<std::vector<std::byte>>> next();
 
  private:

@@ -1,5 +1,5 @@
-// A fault as users write it, in the configuration, by HTTP, on the control stream, in sonarctl and in Python. The daemon checks
-// it (daemon/config/faults/fault.hpp).
+// A fault as users write it: in the configuration, over HTTP, on the control stream, in sonarctl and in Python. The daemon
+// checks it (daemon/config/faults/fault.hpp).
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ struct FaultRecord {
   std::map<std::string, std::string> with;
   std::string sonar;   // empty = all
   std::string client;  // "" or all, newest, oldest, an ordinal counted from 1, an address, a prefix 10.0.0.0/8
-  struct At {          // one of them; none = at once
+  struct At {          // at most one is set; none = at once
     std::optional<std::uint64_t> ping, every;
     std::uint64_t phase = 0;  // remainder, with `every`
     std::optional<double> time_s, probability;

@@ -5,7 +5,7 @@
 
 namespace sonar::control {
 
-/// Looks at nesting only: brackets outside strings.
+/// True if brackets outside strings nest deeper than `most`; other syntax is not checked.
 inline bool nests_deeper(std::string_view json, int most) {
   int depth = 0;
   bool in_string = false, escaped = false;

@@ -1,5 +1,5 @@
-// Poses as JSON lines: the keys of ArduPilot's JSON simulator reply, so that a physics back-end can send a copy of what
-// it already has. Source: ArduPilot libraries/SITL/examples/JSON (timestamp, position, attitude, quaternion, velocity).
+// Poses as JSON lines: the keys of ArduPilot's JSON simulator reply, so that a physics back-end can send a copy of its message.
+// Source: ArduPilot libraries/SITL/examples/JSON (timestamp, position, attitude, quaternion, velocity).
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace sonar::control {
 
 inline constexpr std::size_t longest_line = 4096;
 
-/// One line, without or with its newline. Unknown keys are ignored (ArduPilot sends an imu block); never throws.
+/// Parses one line, with or without its newline. Unknown keys are ignored (ArduPilot sends an imu block); never throws.
 ///   timestamp   s, the sender's clock; absent = arrival
 ///   position    [n, e, d] m, required
 ///   attitude    [roll, pitch, yaw] rad, or quaternion [w, x, y, z]; one of the two is required
@@ -36,11 +36,11 @@ class LineParser {
   };
   void feed(std::span<const std::byte> received);
   std::optional<Line> next();
-  /// Call it when a part of the stream was dropped. The line that has begun is discarded, and so are all bytes up to the next
-  /// line end, because they may be the end of a dropped line.
+  /// Call it when a part of the stream was dropped. It discards the current line and all bytes up to the next line end, because
+  /// they may belong to a dropped line.
   void skip_gap();
-  /// Whether the line that has begun can become a JSON object: so far only blanks have come, or its first character is a brace. A
-  /// request line of HTTP never can.
+  /// Whether the current line can become a JSON object: it is blank so far, or its first character is a brace. A request line
+  /// of HTTP never can.
   bool may_become_object() const;
 
  private:

@@ -1,5 +1,5 @@
-// Converts requests between protoc's classes of control.proto and plain structs. Included by files of this folder only;
-// control.cpp and control_json.cpp add bytes and text.
+// Converts requests between protoc's classes of control.proto and plain structs. Only files of this folder include it;
+// control.cpp and control_json.cpp convert to bytes and text.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -18,9 +18,9 @@ void keep_protobuf_quiet();
 
 /// Path of the first number that is NaN or infinite: "sonar.range_m".
 std::optional<std::string> first_unreal_number(const google::protobuf::Message& message);
-/// Path of the first orientation that is given and has another length than 1.
+/// Path of the first orientation whose length is not 1.
 std::optional<std::string> first_bad_orientation(const google::protobuf::Message& message);
-/// Texts become what protobuf and JSON allow: bytes that are not UTF-8 become '?'.
+/// Makes all texts valid for protobuf and JSON: bytes that are not UTF-8 become '?'.
 void repair_texts(google::protobuf::Message& message);
 
 // ---- poses (pose_messages.cpp)

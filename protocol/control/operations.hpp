@@ -1,6 +1,6 @@
 // Requests to a running daemon as plain structs: the messages of control.proto, checked and in sonard's frames (world ENU, body
-// FLU, SI). protocol/control converts from protobuf and JSON; daemon/server/api/operations.hpp executes them. Answers and events
-// stay protobuf: protocol/control/answers.hpp.
+// FLU, SI). protocol/control converts from protobuf and JSON; daemon/server/api/operations.hpp executes them. Answers and
+// events are protobuf classes (protocol/control/answers.hpp).
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,13 @@ namespace sonar::control {
 
 struct GetStatus {};
 
-/// Sonar in vehicle, FLU. What is not given stays.
+/// Pose of the sonar on the vehicle, FLU. Unset parts keep their values.
 struct MountChange {
   std::optional<Vec3d> position_m;
   std::optional<Quatd> orientation;
 };
 
-/// Fields that are not given keep their values. Finite numbers only; the daemon checks them against the product.
+/// Unset fields keep their values. Numbers must be finite; the daemon checks them against the product.
 struct SetSonar {
   std::string sonar;  // empty = the only one there is
   std::optional<double> range_m, rate_hz, gain_percent;
@@ -49,7 +49,7 @@ struct SetObject {
   std::optional<bool> visible;
   std::optional<Pose> in_world;
 };
-/// Playback of the trajectory of a vehicle or a moving object. Fields that are not given keep their values.
+/// Playback of the trajectory of a vehicle or a moving object. Unset fields keep their values.
 struct SetTrajectory {
   PoseSample::Of of = PoseSample::Of::vehicle;
   std::string name;  // empty = the only vehicle there is
@@ -77,7 +77,7 @@ struct EndFaults {
 };
 struct GetFaults {
   bool kinds = false;               // also lists the catalogue
-  std::uint64_t journal_after = 0;  // also lists the journal's entries after this one
+  std::uint64_t journal_after = 0;  // also lists the journal's entries after this number
 };
 struct Subscribe {
   bool pings = false, clients = false, poses = false, scene = false, faults = false;

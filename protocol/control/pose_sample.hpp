@@ -1,5 +1,5 @@
-// A pose as a sender gave it, checked and converted to our frames: world ENU, body FLU, SI units, int64 nanoseconds.
-// protocol/control makes these from protobuf and JSON; daemon/emulator/world/world.hpp keeps them.
+// A received pose, checked and converted to our frames: world ENU, body FLU, SI units, int64 nanoseconds. protocol/control
+// makes these from protobuf and JSON; daemon/emulator/world/world.hpp keeps them.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ inline constexpr double largest_norm_error = 1e-3;
 enum class ClockDomain {
   wall,     // UNIX time of a computer whose clock agrees with ours
   sim,      // the sender's own, any origin
-  arrival,  // no stamp: the moment of receipt counts
+  arrival,  // no stamp: the time of arrival is used
 };
 /// About 142 years on either side of 1970; sums and differences of such stamps fit int64 nanoseconds.
 inline constexpr std::int64_t largest_stamp_ns = 4'500'000'000'000'000'000;
@@ -28,7 +28,7 @@ struct Stamp {
   ClockDomain domain = ClockDomain::arrival;
   std::int64_t ns = 0;
 };
-/// The axes in which a sender gives poses: those of the world and those of the body together.
+/// The axes of a sender's poses: those of the world and of the body.
 enum class Frame { ned_frd, enu_flu };
 std::string_view name_of(Frame frame);  // "NED/FRD"
 
@@ -36,16 +36,16 @@ struct PoseSample {
   enum class Of { vehicle, object };
   Of of = Of::vehicle;
   std::string name;       // name of the vehicle or object; empty = the only one there is
-  std::uint64_t seq = 0;  // 0 = the sender does not count
+  std::uint64_t seq = 0;  // 0 = the sender does not number its poses
   Stamp stamp;
   Pose pose;                                    // body (FLU) in world (ENU)
   std::optional<Vec3d> velocity_mps;            // body axes, FLU
   std::optional<Vec3d> angular_velocity_radps;  // body axes, FLU
-  std::uint32_t reset_counter = 0;              // a change means: do not interpolate across
-  bool hidden = false;                          // objects only: out of the scene for now
-  double largest_angle_rad = 0;  // largest roll, pitch or yaw that can hardly be radians; 0 = they may be, or it was a quaternion
-  Frame sent_in = Frame::enu_flu;  // for the log
-  std::string fields;              // for the log: what the message contained
+  std::uint32_t reset_counter = 0;              // after a change, do not interpolate from the pose before
+  bool hidden = false;                          // objects only: removed from the scene until a pose without it
+  double largest_angle_rad = 0;                 // largest roll, pitch or yaw if it is implausible as radians; else 0
+  Frame sent_in = Frame::enu_flu;               // for the log
+  std::string fields;                           // for the log: what the message contained
 };
 
 /// The numbers of a message before checked() has validated them. Velocities are in the body axes of `frame`.
@@ -57,11 +57,11 @@ struct RawPose {
   std::optional<std::array<double, 3>> angular_velocity_radps;
   double largest_angle_rad = 0;  // as in PoseSample
 };
-/// The largest angle, whatever its sign, where one of them can hardly be radians: a roll or pitch of more than half a turn, or a
-/// yaw of more than ten turns, since headings are sent unwrapped, too. Else 0.
+/// The largest absolute angle if one of the angles is implausible as radians: a roll or pitch above half a turn, or a yaw above
+/// ten turns (some senders do not wrap headings). Else 0.
 double angle_beyond_radians(const std::array<double, 3>& rpy_rad);
-/// Fills pose and velocities of `sample` from `raw`, or refuses with one sentence: no frame, NaN or infinity, absurd size, or a
-/// quaternion whose norm is off by more than 1e-3 (a smaller drift is renormalised).
+/// Fills pose and velocities of `sample` from `raw`, or returns an error in one sentence: no frame, NaN or infinity, an absurd
+/// size, or a quaternion whose norm differs from 1 by more than 1e-3 (smaller errors are corrected).
 Result<PoseSample> checked(PoseSample sample, const RawPose& raw);
 
 }  // namespace sonar::control

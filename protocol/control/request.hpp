@@ -25,7 +25,7 @@ struct Hello {
   std::string name;
   std::string token = {};  // the content of control.token_file
 };
-struct Unsupported {  // a request that this version does not have
+struct Unsupported {  // a request that this version does not know
 };
 struct Request {
   std::uint64_t id = 0;
@@ -40,7 +40,7 @@ struct RefusedRequest {  // a refused message, with the id that the Response rep
   std::uint64_t id = 0;
   std::string why;
   bool pose = false;        // true for a malformed pose
-  bool is_protobuf = true;  // the message is a Request with a wrong content; false: it cannot be parsed
+  bool is_protobuf = true;  // true: a Request with wrong content; false: the bytes cannot be parsed
 };
 
 }  // namespace sonar::control

@@ -1,4 +1,4 @@
-// Checks of a status that sonarctl and the daemon have in common, and their texts. Pure.
+// Checks of a status, and their texts, shared by sonarctl and the daemon. Pure.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ inline constexpr const char* free_a_place = "stop the other client, or raise cli
 /// A text such as "computing takes 138 ms per ping: 7.2 Hz at most here".
 std::string computing_text(double ms_per_ping);
 
-/// Adds findings for vehicles whose poses come or have stopped, notes, and refused poses.
+/// Adds findings for arriving and stopped poses of each vehicle, for notes, and for refused poses.
 void check_poses(const v1::DaemonStatus& status, std::vector<Finding>& findings);
 
 }  // namespace sonar::doctor

@@ -1,5 +1,5 @@
-// A finding of doctor: something that works, or a fault with its cause and a remedy. Made by sonarctl doctor from outside, and by
-// the daemon from inside for the live view (judge.hpp).
+// A finding of doctor: something that works, or a fault with its cause and a remedy. `sonarctl doctor` makes findings from
+// outside; the daemon makes them for the live view (judge.hpp).
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace sonar::doctor {
 enum class Level { ok, warn, fail };
 struct Finding {
   Level level = Level::ok;
-  std::string check;  // "status", "ping", "rate", "ports", ...: for programs
+  std::string check;  // for programs: "status", "ping", "rate", "ports", ...
   std::string text;
   std::string cure;         // empty for Level::ok
   std::string sonar = {};   // name of the sonar; empty = none

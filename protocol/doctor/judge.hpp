@@ -1,5 +1,5 @@
-// Finds out why a driver gets no pings, from the daemon's status alone: one finding per check. sonarctl doctor checks from
-// outside, as a driver would. Pure.
+// Finds out from the daemon's status why a driver gets no pings: one finding per check. Pure. (`sonarctl doctor` checks from
+// outside, as a driver would.)
 #pragma once
 
 #include <vector>
@@ -9,19 +9,19 @@
 
 namespace sonar::doctor {
 
-/// Connection attempts of programs on the daemon's computer: they show a driver on a wrong address. Read only while
+/// Connection attempts of programs on the daemon's computer: evidence of a driver with a wrong address. Used only while
 /// looks_elsewhere().
 struct Elsewhere {
   std::vector<SocketLine> tcp;
-  std::uint64_t refused = 0;  // connections, in the last seconds
+  std::uint64_t refused = 0;  // refused connections of the last seconds
 };
 
-/// An active fault first, then the worst first. `before`: a status of about two seconds earlier, for what changes with time;
+/// Active faults come first, then the worst findings. `before`: a status from about two seconds earlier, for changes with time;
 /// null = none.
 std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere = {});
 
-/// Whether drivers at wrong addresses are searched for: none is connected, and no fault acts that may refuse connections at the
-/// right address.
+/// Whether to search for drivers with wrong addresses: no driver is connected, and no active fault may refuse connections at
+/// the right address.
 bool looks_elsewhere(const v1::DaemonStatus& status);
 
 }  // namespace sonar::doctor

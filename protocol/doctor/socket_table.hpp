@@ -9,9 +9,9 @@
 namespace sonar::doctor {
 
 struct SocketLine {
-  std::string local_host, remote_host;  // "127.0.0.2"; IPv6 in brackets, but addresses of IPv4 as such
+  std::string local_host, remote_host;  // "127.0.0.2"; IPv6 in brackets; mapped IPv4 addresses as IPv4
   std::uint16_t local_port = 0, remote_port = 0;
-  int state = 0;  // as the kernel numbers them
+  int state = 0;  // the kernel's number
   std::uint64_t inode = 0;
 };
 inline constexpr int established = 1, syn_sent = 2, listening = 10;

@@ -14,10 +14,10 @@ struct Outcome {
   Json result = nullptr;
   std::string error = {};
 };
-/// Carries out a command, and changes `settings` if it sets some. nullopt: there is no such command.
+/// Carries out a command; commands that set values change `settings`. nullopt: there is no such command.
 std::optional<Outcome> carry_out(const std::string& command, const Json& parameters, const protocol::DeviceState& device,
                                  Time now, Settings& settings);
-/// The answer to get_version_info. The version names sonard, so that a log shows what it came from.
+/// The answer to get_version_info. The version names sonard, so that a log shows that the device was emulated.
 Json version_info(const protocol::DeviceState& device);
 protocol::Bytes response_line(const std::string& to, const Outcome& outcome);
 

@@ -5,9 +5,9 @@
 
 namespace sonar::dvl {
 
-/// Over TCP.
+/// The conversation in JSON over TCP.
 std::unique_ptr<protocol::Dialogue> converse_in_json(const protocol::DeviceState& device, Time now);
-/// On the serial line.
+/// The conversation in sentences on the serial line.
 std::unique_ptr<protocol::Dialogue> converse_in_sentences(const protocol::DeviceState& device, Time now);
 
 }  // namespace sonar::dvl

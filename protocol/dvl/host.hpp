@@ -6,7 +6,7 @@
 namespace sonar::dvl {
 
 inline constexpr std::uint16_t tcp_port = 16171;
-inline constexpr std::uint16_t serial_port = 4001;  // where the serial line is reached: chosen, as of servers of serial devices
+inline constexpr std::uint16_t serial_port = 4001;  // TCP port of the serial line: chosen, usual for servers of serial devices
 inline constexpr protocol::HostPort host_ports[]{{protocol::HostPort::Kind::tcp, tcp_port}};
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);

@@ -16,7 +16,7 @@ struct Beam {
 
 using Covariance = std::array<std::array<double, 3>, 3>;
 
-/// The report of the device for a ping. Vectors are in the vehicle's frame: that of the device, turned by the mounting rotation.
+/// The report of the device for a ping. Vectors are in the vehicle's frame: the device's frame, rotated by the mounting angle.
 struct Measurement {
   std::array<Beam, beam_count> beams;
   bool is_valid = false;
@@ -27,9 +27,9 @@ struct Measurement {
 };
 
 /// The velocity of the ground along the beams comes from PingRequest::sonar_moves, which World derives from the poses of the
-/// vehicle: senders give poses, not velocities.
+/// vehicle: senders need not send velocities.
 Measurement measure(const Ping& ping);
-/// The same, from the findings of the ping if it has them.
+/// The measurement among the findings of the ping; computed if there is none.
 inline Measurement measured_in(const Ping& ping) { return protocol::found_in(ping, measure); }
 
 /// The range mode of the next ping.
@@ -39,7 +39,7 @@ Reckoning reckoned(const Reckoning& before, const Measurement& measured, const P
 /// The position at `now`, some time after the last ping, extrapolated with the last velocity.
 Reckoning extrapolated(const Reckoning& last, Time now);
 
-/// Weighted least squares of the velocities of the valid beams, at least three, in the device's frame.
+/// The velocity in the device's frame, by weighted least squares from the valid beams (at least three).
 struct Estimate {
   Vec3d velocity_mps;
   Covariance covariance{};

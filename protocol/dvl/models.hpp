@@ -13,7 +13,7 @@ namespace sonar::dvl {
 
 inline constexpr std::size_t beam_count = 4;
 inline constexpr double tilt_rad = rad_from_deg(22.5);  // angle between a beam and the axis
-/// A distance along a beam, and the altitude above level ground that it belongs to.
+/// Altitude above level ground divided by the distance along a beam.
 inline const double altitude_per_distance = std::cos(tilt_rad);
 
 struct Product {
@@ -36,12 +36,13 @@ RangeMode range_mode(int index, const Product& product);
 /// Unit vector of a beam in the device's frame: x forward, y to starboard, z down.
 Vec3d beam_direction(std::size_t beam);
 
-/// The beams lie in a grid that a ping traces as a range image, `grid_size` by `grid_size` directions about the device's axis.
+/// A ping is computed as a range image of `grid_size` by `grid_size` directions about the device's axis; the beams are four of
+/// them.
 inline constexpr int grid_size = 27;
 /// Index of a beam's pixel in Ping::samples.
 std::size_t pixel_of(std::size_t beam);
 
-/// A vector in the axes of the sonar, which looks along x with z "up", in the device's frame; and back, by the same formula.
+/// Converts a vector from the sonar's axes (it looks along x, z up) to the device's frame. The same formula converts back.
 constexpr Vec3d device_from_sonar(Vec3d v) { return {v.z, -v.y, v.x}; }
 
 }  // namespace sonar::dvl

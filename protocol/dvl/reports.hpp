@@ -1,4 +1,4 @@
-// The lines that the device sends, written and read. JSON, one object a line.
+// Writes and reads the lines that the device sends: JSON, one object per line.
 #pragma once
 
 #include <optional>
@@ -16,11 +16,11 @@ inline constexpr std::size_t longest_line = 16384;
 
 inline constexpr double nsd_dbm = -90;  // DOC: -88 to -97 in its example; unknown: assumed the same for all
 
-/// Unix time, as the reports have it.
+/// Unix time, the unit of the reports.
 std::int64_t microseconds(Time at);
 /// The angles of the vehicle since the start of dead reckoning.
 RollPitchYaw angles_of(const Reckoning& reckoning);
-/// The text as bytes, with the end of a line.
+/// The bytes of the text and a line end.
 Bytes line_of(std::string text);
 Bytes velocity_line(const Measurement& measured, std::chrono::nanoseconds since_last, Time sent_at);
 Bytes position_line(const Reckoning& reckoning, Time at);

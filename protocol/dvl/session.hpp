@@ -10,7 +10,7 @@ namespace sonar::dvl {
 /// disabled it pings only for triggers, which each client queues for itself.
 class Session : public protocol::Dialogue {
  public:
-  /// `device` outlives it.
+  /// `device` must outlive it.
   Session(const protocol::DeviceState& device, Time now) : device_(device), due_(next_report_after(now)) {}
 
   protocol::Reaction on_tick(Time now, bool ping_pending) override;
@@ -24,7 +24,7 @@ class Session : public protocol::Dialogue {
 
   const protocol::DeviceState& device() const { return device_; }
   Settings settings() const { return settings_from(device_.settings.get()); }
-  /// The settings after the changes of this call, which the daemon has not made yet.
+  /// The settings that will hold after the daemon has carried out `reaction`.
   Settings settings_after(const protocol::Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
@@ -37,8 +37,8 @@ class Session : public protocol::Dialogue {
 
   const protocol::DeviceState& device_;
   Time due_;             // time of the next report of dead reckoning
-  int waiting_ = 0;      // pings that this client has triggered and not got yet
-  Time requested_at_{};  // when the first of them was requested
+  int waiting_ = 0;      // triggered pings that this client has not received yet
+  Time requested_at_{};  // time at which the first of them was requested
 };
 
 }  // namespace sonar::dvl

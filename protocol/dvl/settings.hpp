@@ -11,14 +11,14 @@
 
 namespace sonar::dvl {
 
-/// Dead reckoning, in the axes of the vehicle (x forward, y to starboard, z down) as they were at its start.
+/// Dead reckoning, in the vehicle's axes (x forward, y to starboard, z down) at the start of the reckoning.
 struct Reckoning {
   bool is_started = false;
   Time at{};                  // time of the last ping
   Quatd first, last;          // vehicle in the world: at the start, and at the last ping
   Vec3d position_m;           // at the last ping
-  Vec3d velocity_mps;         // from then on, in those axes
-  double std_m = 0, fom = 0;  // fom: by which std_m grows [m/s]
+  Vec3d velocity_mps;         // since the last ping, in these axes
+  double std_m = 0, fom = 0;  // fom: growth of std_m [m/s]
 };
 
 /// The reports on the serial line, by the numbers of the command that selects them.
@@ -29,7 +29,7 @@ struct Settings {
   bool acoustics = true, dark = false, cycles = true;
   std::string range_mode = "auto", ntp_address = "auto";
   SerialOutput serial_output = SerialOutput::old_and_new;    // unknown: assumed
-  int lowest_mode = 0, highest_mode = range_mode_count - 1;  // that range_mode allows
+  int lowest_mode = 0, highest_mode = range_mode_count - 1;  // allowed by range_mode
   bool is_triggered = false;                                 // a client has requested a ping while acoustics are off
 
   int mode = 2;  // range mode of the next ping
@@ -51,9 +51,9 @@ struct HeldSettings final : RangeImageSettings {
 /// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Allows the modes of "auto", "=a" or "a<=b". False: the text has another form.
+/// Sets the allowed modes from "auto", "=a" or "a<=b". False: the text has another form.
 bool allow_modes(std::string_view text, Settings& settings);
-/// The text that allows the modes up to the one that reaches this altitude.
+/// The range_mode text that allows all modes up to the first one that reaches `range_m`.
 std::string range_mode_for(double range_m, const Product& product);
 
 PingSettings ping_settings(const Settings& settings, const Product& product);

@@ -1,5 +1,5 @@
-// The binary messages of the Foxglove WebSocket protocol, little-endian; the first byte gives the type. Its text is in the
-// history of https://github.com/foxglove/ws-protocol (the commit before 8e2a044). Pure.
+// The binary messages of the Foxglove WebSocket protocol, little-endian; the first byte is the type. The specification is in
+// the history of https://github.com/foxglove/ws-protocol (the commit before 8e2a044). Pure.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ struct PlaybackState {
   Time at{};
   float speed = 1;
   bool did_seek = false;
-  std::string request;  // id of the request; empty = nothing was asked
+  std::string request;  // id of the request; empty = not a request
 };
 Bytes playback_frame(const PlaybackState& state);
 
@@ -44,8 +44,7 @@ struct PlaybackControl {
   Time to{};  // target of a seek
   std::string request;
 };
-/// Reads a frame that a viewer sent. bad_data: it is shorter than its layout, its lengths do not fit, or viewers do not send that
-/// opcode here.
+/// Reads a frame that a viewer sent. bad_data: it is too short, its lengths do not fit, or its opcode is not one of a viewer.
 Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView frame);
 
 /// The bytes of a call or a playback control, as a viewer sends them; for tests and clients.

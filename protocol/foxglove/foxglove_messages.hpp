@@ -1,5 +1,5 @@
-// Messages of the live view as protobuf, in Foxglove's schemas (schemas/foxglove.proto) and our own (schemas/view.proto): plain
-// structs in, bytes out. World ENU, bodies FLU, metres. Pure.
+// Messages of the live view as protobuf, in Foxglove's schemas (schemas/foxglove.proto) and our own (schemas/view.proto):
+// functions from plain structs to bytes. World ENU, bodies FLU, metres. Pure.
 #pragma once
 
 #include <cstdint>
@@ -24,24 +24,24 @@ namespace sonar::foxglove {
 using wire::Bytes;
 using wire::BytesView;
 
-/// The FileDescriptorSet of a message such as "foxglove.RawImage" or "sonar.v1.PingEvent", with all files that it imports. Empty:
-/// no message of this name is linked in.
+/// The FileDescriptorSet of a message such as "foxglove.RawImage" or "sonar.v1.PingEvent", with all files that it imports.
+/// Empty: the program has no message of this name.
 Bytes descriptor_set(const std::string& name);
-/// The descriptor set in base64, as channels of the socket state it.
+/// The schema of a channel: the descriptor set in base64.
 Schema protobuf_schema(const std::string& name);
 
-/// A message of the channel with other times: its stamps, and fields of our own in nanoseconds of the daemon's time.
+/// Changes the times in a message of the channel: its stamps, and our own fields in nanoseconds of the daemon's time.
 Bytes with_stamps(const Channel& of, BytesView message, const std::function<Time(Time)>& stamp);
 
-/// A picture whose samples may be those of a ping, shared.
+/// A picture. It can share the samples of a ping.
 struct Image {
   std::uint32_t width = 0, height = 0;
   std::string encoding;
   std::size_t bytes_per_sample = 1;
   std::shared_ptr<const Bytes> samples;  // [height][width], little-endian
 };
-/// Samples as sent: row 0 nearest, column 0 most to port; mono8, mono16, or for 24 and 32 bits 32FC1 as parts of `max_code`.
-/// `codes`: [rows][beams], little-endian, of `bits` = 8, 16, 24 or 32.
+/// A picture of the sent samples: row 0 nearest, column 0 farthest to port. The encoding is mono8, mono16, or for 24 and 32
+/// bits 32FC1 with fractions of `max_code`. `codes`: [rows][beams], little-endian, `bits` = 8, 16, 24 or 32.
 Image image_of(std::size_t beams, std::size_t rows, int bits, std::uint32_t max_code, std::shared_ptr<const Bytes> codes);
 Image image_of(const std::shared_ptr<const Ping>& ping);
 /// The bytes of a foxglove.RawImage before the samples, which are its last field.
@@ -65,9 +65,9 @@ struct Model {
 };
 struct Lines {
   std::string id, frame;
-  std::vector<Vec3d> points;  // two a line
+  std::vector<Vec3d> points;  // two for each line
 };
-// foxglove.SceneUpdate of one entity each. Updates one after the other are one update: so protobuf has it.
+// A foxglove.SceneUpdate with one entity. Concatenated updates are one update, because protobuf merges repeated fields.
 Bytes scene_update(Time at, const Model& model);
 Bytes scene_update(Time at, const Lines& lines);
 Bytes scene_deletion(Time at, const std::string& id);
@@ -81,7 +81,7 @@ struct CloudPoint {
 };
 Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> points);
 
-/// sonar.v1.PingGeometry. `number` = 0: to compare geometries of different pings.
+/// sonar.v1.PingGeometry. Pass `number` = 0 to compare the geometries of different pings.
 Bytes geometry(const Ping& ping, std::uint32_t number);
 /// sonar.v1.PingTruth of a ping that was made with SimulationSwitches::keep_truth.
 Bytes truth(const Ping& ping);

@@ -1,4 +1,4 @@
-// The JSON messages of the Foxglove WebSocket protocol, both ways (source: foxglove_frames.hpp). Pure.
+// Reads and writes the JSON messages of the Foxglove WebSocket protocol (source: foxglove_frames.hpp). Pure.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace sonar::foxglove {
 
-inline constexpr std::size_t longest_word = 64u << 10;  // longest word that a viewer may send
+inline constexpr std::size_t longest_word = 64u << 10;  // longest JSON message of a viewer
 inline constexpr std::size_t most_parameters = 64;      // limit for one request
 
 /// A description of messages for viewers. `text` is base64 if the encoding is "protobuf".
@@ -30,10 +30,10 @@ struct Channel {
 };
 struct Service {
   std::uint32_t id = 0;
-  std::string name, type;  // JSON objects both ways
+  std::string name, type;  // requests and answers are JSON objects
 };
 
-/// A parameter's value. monostate = unset; OtherValue = of a type that no parameter of ours has.
+/// A parameter's value. monostate = unset; OtherValue = a type that none of our parameters has.
 struct OtherValue {
   bool operator==(const OtherValue&) const = default;
 };
@@ -80,7 +80,7 @@ struct WatchParameters {
   std::vector<std::string> names;  // none = all
   bool on = true;
 };
-/// An operation of the protocol that needs a capability which sonard does not have.
+/// An operation that needs a capability which sonard does not offer.
 struct Incapable {
   std::string op, capability;
 };
@@ -88,8 +88,8 @@ struct UnknownWord {
   std::string op;
 };
 using ViewerWord = std::variant<UnknownWord, Subscribe, Unsubscribe, GetParameters, SetParameters, WatchParameters, Incapable>;
-/// Reads a JSON message of a viewer. `stray`, if not null, gets the name of a field that the protocol does not have, or nothing.
-/// bad_data: no JSON object, nested deeper than 16, no "op", or a field of a wrong type.
+/// Reads a JSON message of a viewer. If `stray` is not null, it is set to the name of an unknown field, or to an empty text.
+/// bad_data: not a JSON object, nested deeper than 16, no "op", or a field of a wrong type.
 Result<ViewerWord> word_of_viewer(std::string_view text, std::string* stray = nullptr);
 
 }  // namespace sonar::foxglove

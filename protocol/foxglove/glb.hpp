@@ -10,8 +10,8 @@
 
 namespace sonar::foxglove {
 
-/// One mesh with one material. glTF is y-up, we are z-up: (x, y, z) is written as (x, z, -y), which viewers turn back. Normals
-/// are means over the triangles at a vertex, by area. `colour`: red, green, blue from 0 to 1.
+/// One mesh with one material. glTF is y-up, we are z-up: (x, y, z) is written as (x, z, -y), which viewers reverse. The normal
+/// of a vertex is the mean over its triangles, weighted by area. `colour`: red, green, blue from 0 to 1.
 wire::Bytes glb(std::span<const Vec3> vertices, std::span<const std::array<std::uint32_t, 3>> triangles,
                 const std::array<double, 3>& colour);
 

@@ -1,4 +1,4 @@
-// Figures of a sonar as a ROS 2 message in CDR: PlotJuggler reads no other encoding over this socket. Pure.
+// Figures of a sonar as a ROS 2 message in CDR, the only encoding that PlotJuggler reads over this socket. Pure.
 #pragma once
 
 #include <array>

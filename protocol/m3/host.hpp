@@ -8,7 +8,8 @@ namespace sonar::m3 {
 
 inline constexpr protocol::HostPort host_ports[]{{protocol::HostPort::Kind::tcp, tcp_port}};
 
-/// Assumed: samples are amplitudes, which the maker's program shows in decibels. A root is near that, and needs no floor.
+/// Assumed: samples are amplitudes, which the maker's program shows in decibels. A square root looks similar and needs no lower
+/// limit.
 inline constexpr Shades shades{.gamma = 0.5f};
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);

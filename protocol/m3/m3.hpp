@@ -1,4 +1,5 @@
-// The Kongsberg Mesotech M3 as a Vendor: the stream of beam-formed data that the maker's program sends to its clients.
+// The Kongsberg Mesotech M3: the implementation of Vendor. It sends the stream of beam-formed data that the maker's program
+// sends to its clients.
 #pragma once
 
 #include "protocol/vendor.hpp"

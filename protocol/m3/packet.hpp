@@ -1,4 +1,4 @@
-// A ping as a packet, and a packet as its parts.
+// Converts a ping to a packet, and splits a packet into its parts.
 #pragma once
 
 #include <optional>
@@ -9,8 +9,7 @@
 
 namespace sonar::m3 {
 
-/// The boundaries of packets in a stream. The header that is read for it reaches to the numbers of beams and samples, which have
-/// to agree with the size.
+/// Finds packets in a stream. It checks that the numbers of beams and samples in the data header agree with the size.
 extern const recording::Framing framing;
 
 Bytes encode_packet(const Ping& ping, const protocol::DeviceState& device);

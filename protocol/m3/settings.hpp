@@ -1,4 +1,4 @@
-// Range, rate and gain, which the M3's own program sets and its drivers cannot, and the sampling window that follows from them.
+// Range, rate and gain, which only the M3's own program can set, not drivers, and the sampling window that follows from them.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@
 
 namespace sonar::m3 {
 
-inline constexpr double transmit_s = 25e-6;  // PKT: begin of the pulse after that of the ping
+inline constexpr double transmit_s = 25e-6;  // PKT: start of the pulse, from the start of the ping
 /// unknown: limits of the gain law's c [dB]; the c of PKT is half way between them.
 inline constexpr double least_c_db = -56, most_c_db = 24;
 
@@ -29,7 +29,7 @@ inline Settings settings_from(const VendorSettings* held) { return protocol::set
 /// The near range that the program sets for a far range.
 double near_of(double far_m);
 
-/// When the receiver samples; `start_s` counts from the pulse's start.
+/// The time in which the receiver samples; `start_s` counts from the start of the pulse.
 struct Window {
   double start_s = 0, interval_s = 0;
   int samples = 0, pulse_us = 0;

@@ -1,5 +1,5 @@
-// MAVLink frames, versions 1 and 2: found in a datagram and checked, or written. No field is used before the checksum was
-// verified; protocol/mavlink/mavlink_poses.hpp converts messages to poses.
+// Finds and checks MAVLink frames (versions 1 and 2) in datagrams, and writes them. No field is used before the checksum is
+// verified. protocol/mavlink/mavlink_poses.hpp converts messages to poses.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ struct Frame {
   int version = 2;
   std::uint8_t sequence = 0, system = 0, component = 0;
   std::uint32_t id = 0;
-  std::size_t payload_size = 0;                      // as sent: version 2 leaves out zeros at the end
+  std::size_t payload_size = 0;                      // as sent: version 2 omits trailing zeros
   std::array<std::byte, largest_payload> payload{};  // zeros beyond
 };
 /// The message of a frame; M must be the frame's own.
@@ -31,11 +31,11 @@ M message_in(const Frame& frame) {
 }
 
 struct FrameCounts {
-  std::uint64_t frames = 0;        // good ones
-  std::uint64_t unknown = 0;       // unsupported messages, which are skipped whole
-  std::uint64_t bad_checksum = 0;  // damaged, or of a dialect that gave the number to another message
-  std::uint64_t wrong_size = 0;    // frames of version 1 whose payload has not the length of the message
-  std::uint64_t junk_bytes = 0;    // belong to no frame
+  std::uint64_t frames = 0;        // valid frames
+  std::uint64_t unknown = 0;       // frames of unsupported messages, which are skipped
+  std::uint64_t bad_checksum = 0;  // damaged frames, or a dialect that uses the number for another message
+  std::uint64_t wrong_size = 0;    // frames of version 1 whose payload has a wrong length
+  std::uint64_t junk_bytes = 0;    // bytes that belong to no frame
 };
 
 /// Reads the frames of one datagram, one after the other. `datagram` must outlive the reader.
@@ -64,7 +64,7 @@ struct Identity {
   std::uint8_t system = 1, component = 0;
   std::uint8_t sequence = 0;  // sequence of the next frame
 };
-/// A frame of version 2 around a payload; counts the sender's sequence up.
+/// A frame of version 2 with this payload. Increments the sender's sequence.
 Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Identity& sender);
 template <class M>
 Bytes framed(const M& message, Identity& sender) {

@@ -1,5 +1,5 @@
-// One MAVLink link as a source of poses: selects the system and its messages, and makes the messages to send.
-// No socket and no clock: datagrams and arrival times in; poses for the daemon's World, reports and replies out.
+// One MAVLink link as a source of poses: it selects the system and its messages, and makes the messages to send. No socket and
+// no clock: its inputs are datagrams and arrival times, its outputs are poses for the daemon's World, reports and replies.
 #pragma once
 
 #include <array>
@@ -26,18 +26,18 @@ std::string_view name_of(Source source);
 
 struct Settings {
   std::string vehicle;                           // a vehicle of the configuration; empty = the only one
-  std::uint8_t system_id = 0, component_id = 0;  // 0 = the first that sends; of components the autopilot
+  std::uint8_t system_id = 0, component_id = 0;  // 0 = the first system that sends; its autopilot
   bool request_rates = false;                    // ask the autopilot for its messages
   double rate_hz = 50;
   std::optional<Geodetic> origin;  // origin of the world; needed for latitudes and longitudes
   bool needs_time = false;         // messages without a time stamp are not used
   bool sends_distances = false;    // DISTANCE_SENSOR with every ping of a range finder, until a command changes it
-  Vec3d held_m = {};               // x and y in the world, ENU, of a vehicle that sends its depth and no position
+  Vec3d held_m = {};               // x and y (world, ENU) of a vehicle that sends a depth but no position
 };
 
 /// FAILURE_TYPE of common.xml.
 enum class FailureType : std::uint8_t {
-  ok = 0,  // the unit works again
+  ok = 0,  // ends the failure
   off = 1,
   stuck = 2,
   garbage = 3,
@@ -61,9 +61,9 @@ struct SourcedPose {
 struct Reaction {
   std::vector<SourcedPose> poses;
   std::vector<std::string> refusals;  // errors of messages
-  std::vector<std::string> notices;   // worth a line in the log
-  std::vector<Bytes> replies;         // datagrams: of on_datagram() for its sender, of on_tick() for the vehicle
-  bool from_vehicle = false;          // the datagram held a frame of the selected system
+  std::vector<std::string> notices;   // lines for the log
+  std::vector<Bytes> replies;         // datagrams: from on_datagram() for its sender, from on_tick() for the vehicle
+  bool from_vehicle = false;          // the datagram contained a frame of the selected system
 };
 
 class MavlinkPoses {
@@ -80,15 +80,16 @@ class MavlinkPoses {
   explicit MavlinkPoses(Settings settings, InjectFailure inject = {}, HasRangeFinder has_range_finder = {});
   /// `now` never runs backwards, whatever its origin.
   Reaction on_datagram(BytesView datagram, Time now);
-  /// Call several times a second. Sends heartbeats and requests, and reports the system found and the missing parts of a pose:
-  /// when poses start or stop, and repeatedly at growing intervals while there are none.
+  /// Call several times a second. Sends heartbeats and requests. Reports the selected system and the missing parts of a pose:
+  /// when poses start or stop, and at growing intervals while none arrive.
   Reaction on_tick(Time now);
   /// Empty while poses arrive; else one sentence with everything that is missing.
   std::string health_error(Time now) const;
 
   /// Whether distances are wanted: by the settings, or by the last command of the vehicle.
   bool wants_distances() const { return distances_.wanted(); }
-  /// The datagram of a distance, or none if it is not wanted or the requested interval since the sensor's last one is not over.
+  /// The datagram of a distance; nullopt if distances are not wanted, or less than the requested interval has passed since the
+  /// sensor's last one.
   std::optional<Bytes> distance_message(const DistanceSensor& measured);
 
   const FrameCounts& counts() const { return counts_; }
@@ -182,7 +183,7 @@ class MavlinkPoses {
   PairedPlaces<PlaceReading> local_;
   PairedPlaces<GlobalPlace> global_;
   std::optional<Depth> depth_;
-  std::optional<Pose> local_in_world_;  // origin of the autopilot's local axes; absent: that of the world
+  std::optional<Pose> local_in_world_;  // origin of the autopilot's local axes; absent: the world's origin
   std::int64_t newest_boot_ms_ = 0;
   std::array<std::int64_t, source_count> newest_ns_{};
   std::array<std::optional<Time>, source_count> last_pose_{};

@@ -1,6 +1,7 @@
-// The MAVLink messages that carry poses, and commands, in wire order: base fields sorted by size, extensions as they were added.
-// Each row's number, CRC_EXTRA and lengths are those of minimal.xml, standard.xml and common.xml of the MAVLink project; a test
-// computes CRC_EXTRA and lengths from the fields below. protocol/mavlink/frames.hpp reads and writes them.
+// The MAVLink messages with poses, and commands. Fields are in wire order: base fields sorted by size, then extensions in the
+// order of their addition. Each row's number, CRC_EXTRA and lengths are those of minimal.xml, standard.xml and common.xml of
+// the MAVLink project; a test computes CRC_EXTRA and lengths from the fields below. protocol/mavlink/frames.hpp reads and
+// writes them.
 #pragma once
 
 #include <array>
@@ -230,7 +231,7 @@ constexpr void extensions(V& visit, M& m) {
   visit("covariance", m.covariance), visit("reset_counter", m.reset_counter);
 }
 
-/// Ground truth of a simulator. Has no time stamp.
+/// Ground truth of a simulator. It has no time stamp.
 struct SimState {
   static constexpr std::uint32_t id = 108;
   static constexpr std::uint8_t crc_extra = 32;

@@ -10,7 +10,7 @@
 
 namespace sonar::mavlink {
 
-/// The newest attitudes, by their own time.
+/// The newest attitudes, in order of the sender's time.
 class Attitudes {
  public:
   /// Two attitudes further apart than this are not interpolated; a position between them gets no attitude.
@@ -18,7 +18,8 @@ class Attitudes {
   /// The newest attitude is extrapolated by its angular rates for at most this time.
   static constexpr std::int64_t longest_carry_ms = 20;
 
-  /// `later`: a newer reading is needed first. `never`: the moment is before the first reading, or in a gap that is too long.
+  /// `later`: unknown until a newer reading arrives. `never`: the moment is before the first reading, or in a gap that is too
+  /// long.
   enum class Answer { known, later, never };
   void put(const AttitudeReading& reading);
   void clear() { readings_.clear(); }
@@ -31,7 +32,7 @@ class Attitudes {
   std::deque<AttitudeReading> readings_;
 };
 
-/// Positions that wait for an attitude of the same moment, the oldest first.
+/// Positions that wait for an attitude at their time, the oldest first.
 template <class Place>
 class PairedPlaces {
  public:

@@ -28,11 +28,11 @@ struct PlaceReading {
 };
 PlaceReading place_of(const LocalPositionNed& m);
 
-/// Degrees times 1e7; nullopt at 0, 0, which autopilots send without a fix.
-/// Errors: a latitude or longitude beyond the globe's.
+/// The position, sent as degrees times 1e7; nullopt for 0, 0, which autopilots send without a fix. Errors: a latitude or
+/// longitude beyond the globe's.
 Result<std::optional<Geodetic>> geodetic_of(const GlobalPositionInt& m);
 Result<std::optional<Geodetic>> geodetic_of(const GpsGlobalOrigin& m);
-/// The position in the integers of the message; if they are 0, that in the floats.
+/// The position from the integers of the message; if they are 0, from the floats.
 Result<std::optional<Geodetic>> geodetic_of(const SimState& m);
 
 control::RawPose raw_pose(const AttitudeReading& attitude, const PlaceReading& place);
@@ -43,7 +43,7 @@ control::RawPose raw_pose(const VisionPositionEstimate& m);
 /// Errors: an unsupported frame_id or child_frame_id.
 Result<control::RawPose> raw_pose(const Odometry& m);
 
-/// Whether its position uses the integer extensions, which version 1 cannot carry.
+/// Whether the message has its position in the integer extensions, which version 1 cannot contain.
 bool has_exact_position(const SimState& m);
 
 }  // namespace sonar::mavlink

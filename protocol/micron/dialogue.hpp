@@ -1,4 +1,4 @@
-// A host's conversation with a Micron: signs of life, its start, its parameters, and a scan line for each request.
+// A host's conversation with a Micron: keep-alives, reboot, parameters, and one scan line for each request.
 #pragma once
 
 #include <memory>

@@ -7,7 +7,7 @@
 
 namespace sonar::micron {
 
-inline constexpr std::uint16_t tcp_port = 4001;  // a usual one of converters from serial to TCP
+inline constexpr std::uint16_t tcp_port = 4001;  // usual for serial-to-TCP converters
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();

@@ -35,14 +35,14 @@ enum class Id : std::uint8_t {
 inline constexpr std::uint8_t line_feed = 0x0A, host_node = 255, usual_node = 2;
 inline constexpr std::size_t frame_size = 14;       // size of a message without payload
 inline constexpr std::size_t uncounted = 6;         // bytes that `length` leaves out: the first 5 and the last
-inline constexpr std::size_t longest_frame = 4096;  // that of the longest head data is 1545
+inline constexpr std::size_t longest_frame = 4096;  // the longest real one, head data, has 1545
 
 struct Header {
   std::uint8_t start = '@';
   std::array<std::uint8_t, 4> hex_length{};  // digits
   std::uint16_t length = 0;
   std::uint8_t source = 0, destination = 0;
-  std::uint8_t count = 0;  // length - 5; 0: of head data in one piece
+  std::uint8_t count = 0;  // length - 5; 0 in head data that is not split
   Id id{};
   std::uint8_t sequence = 0x80;  // the last piece
   std::uint8_t node = 0;
@@ -69,7 +69,7 @@ inline constexpr std::uint16_t eight_bits = 1, continuous = 2, to_right = 4, inv
 }
 
 struct HeadCommand {
-  std::uint8_t kind = 1;  // 1: this message; 0x1D: with 16 more bytes
+  std::uint8_t kind = 1;  // 1: this layout; 0x1D: 16 more bytes follow
   std::uint16_t control = 0x2307;
   std::uint8_t device_type = 0x11;
   std::array<std::uint32_t, 4> carriers{};  // transmitter, receiver; not used by this product
@@ -188,7 +188,7 @@ constexpr void fields(V& visit, M& m) {
 }
 static_assert(wire::wire_size<Alive>() == 8 && wire::wire_size<VersionData>() == 11);
 
-/// The whole frame; one of the ends is host_node.
+/// The whole frame. `source` or `destination` must be host_node.
 Bytes framed(Id id, std::uint8_t source, std::uint8_t destination, BytesView payload);
 inline Bytes from_head(Id id, BytesView payload) { return framed(id, usual_node, host_node, payload); }
 inline Bytes from_host(Id id, BytesView payload) { return framed(id, host_node, usual_node, payload); }

@@ -1,4 +1,5 @@
-// Micron: a mechanical scan, one beam whose head turns; a host requests each scan line over a serial line, here TCP.
+// The Micron, a mechanically scanning sonar: its head turns one beam. A host requests each scan line over a serial line, here
+// over TCP.
 #pragma once
 
 #include "protocol/vendor.hpp"

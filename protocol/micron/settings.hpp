@@ -18,7 +18,7 @@ std::span<const protocol::Option> options();
 std::span<const std::shared_ptr<const SonarModel>> models();
 
 inline constexpr int turn = 6400;   // 1/16 grad
-inline constexpr int ahead = 3200;  // and centre
+inline constexpr int ahead = 3200;  // also the centre of the scan
 inline constexpr double bin_unit_s = 640e-9;
 inline constexpr int most_gain = 210;
 
@@ -39,9 +39,9 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// Angle by which the sonar is turned to port, so that it looks to the bearing of its head [rad].
+/// Angle by which the sonar is rotated to port, so that it looks in the direction of its head [rad].
 double head_rad(const Settings& settings);
-/// listening(): time in which the bins of a ping are taken. transfer(): time in which the scan line is sent on the link.
+/// listening(): duration of a ping's bins. transfer(): time to send the scan line on the link.
 std::chrono::nanoseconds listening(const HeadCommand& command);
 std::chrono::nanoseconds transfer(const HeadCommand& command, const protocol::OptionValues& options);
 std::chrono::nanoseconds turning(int sixteenths);
@@ -50,9 +50,9 @@ std::chrono::nanoseconds turning(int sixteenths);
 struct Scan {
   int bearing = ahead;
   bool to_right = true;
-  /// Turns the head into the sector of a new command. Returns the way in 1/16 grad, positive to the right.
+  /// Turns the head into the sector of a new command. Returns the rotation in 1/16 grad, positive to the right.
   int begin(const HeadCommand& command);
-  /// Turns the head to the bearing of the next ping. Returns the way likewise.
+  /// Turns the head to the bearing of the next ping. Returns the rotation likewise.
   int advance(const HeadCommand& command);
 };
 /// HeadData::sweep: 0 within a scan, 1 at its left limit, 2 at its right one.

@@ -1,4 +1,4 @@
-// The driver's end, and the part of the make that recordings need.
+// The driver's side of a Norbit, and its codec for recordings.
 #pragma once
 
 #include "protocol/host.hpp"
@@ -10,7 +10,8 @@ inline constexpr protocol::HostPort host_ports[]{{protocol::HostPort::Kind::tcp,
                                                  {protocol::HostPort::Kind::tcp, column_port},
                                                  {protocol::HostPort::Kind::tcp, command_port}};
 
-/// Assumed: samples are amplitudes, which the maker's program shows in decibels. A root is near that, and needs no floor.
+/// Assumed: samples are amplitudes, which the maker's program shows in decibels. A square root looks similar and needs no lower
+/// limit.
 inline constexpr Shades shades{.gamma = 0.5f};
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);

@@ -18,7 +18,7 @@ using wire::BytesView;
 inline constexpr std::uint16_t command_port = 2209, bathymetry_port = 2210, column_port = 2211;
 
 enum class Type : std::uint32_t { bathymetry = 1, column = 2 };
-enum class PixelType : std::uint32_t { uint16 = 2 };  // others exist
+enum class PixelType : std::uint32_t { uint16 = 2 };  // other values exist
 
 inline constexpr std::uint32_t preamble = 0xDEADBEEF, version = 4;
 struct Header {
@@ -44,10 +44,10 @@ inline constexpr float not_measured = std::numeric_limits<float>::quiet_NaN();
 struct BathymetryFront {
   float sound_mps = 0, sample_hz = 0;
   std::uint32_t beams = 0, ping = 0;
-  double time_s = 0, network_time_s = 0;  // Unix time, when it fires
+  double time_s = 0, network_time_s = 0;  // Unix time of the transmission
   float rate_hz = 0;
   std::uint16_t kind = 4;
-  std::uint8_t beam_mode = 2, sonar_mode = 1;  // 2: 256 beams, even in angle
+  std::uint8_t beam_mode = 2, sonar_mode = 1;  // 2: 256 beams, equally spaced in angle
   std::array<std::uint16_t, 4> reserved{};
   float tilt_rad = 0, gain = 1, frequency_hz = 0, bandwidth_hz = 0, pulse_s = 0, reserved_2 = 0, voltage = not_measured,
         swath_middle_rad = 0, swath_rad = 0, gate_tilt_rad = 0;
@@ -85,7 +85,7 @@ struct Beam {
   std::uint32_t sample = 0;  // 0: no bottom
   float angle_rad = 0;
   std::uint16_t upper_gate = 0, lower_gate = 0;  // samples
-  float intensity = 0;                           // free of gain
+  float intensity = 0;                           // without the gain
   std::uint16_t flags = 0;
   std::uint8_t quality_flag = 0, quality_value = 0;
 };
@@ -101,7 +101,7 @@ constexpr void fields(V& visit, M& m) {
   visit("quality_val", m.quality_value);
 }
 
-/// Analog gain: g1 up to sample t1, g2 from t2 on, straight in dB between.
+/// Analog gain: g1 up to sample t1, g2 from t2 on, linear in dB between them.
 struct ColumnFront {
   float sound_mps = 0, sample_hz = 0;
   std::uint32_t beams = 0, samples = 0;  // samples of a beam

@@ -15,7 +15,7 @@ inline constexpr double farthest_m = 600, fastest_hz = 60;        // DFD
 inline constexpr double frequency_khz = 400, bandwidth_khz = 80;  // DFD
 inline constexpr int amplitude = 15, pulse_us = 500;              // DFD
 
-/// The one that looks down, and the one that looks ahead.
+/// Two products: one looks down, the other ahead.
 std::span<const std::shared_ptr<const SonarModel>> models();
 /// 0: forward, 1: bathymetry; as the sonar is mounted.
 int mode_of(const SonarModel& model);

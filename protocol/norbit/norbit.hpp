@@ -1,4 +1,4 @@
-// NORBIT WBMS, and its forward-looking version, as a Vendor.
+// NORBIT WBMS and its forward-looking version: the implementation of Vendor.
 #pragma once
 
 #include "protocol/vendor.hpp"

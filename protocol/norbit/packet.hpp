@@ -1,4 +1,4 @@
-// A ping as packets, and packets as their parts.
+// Converts a ping to packets, and splits packets into their parts.
 #pragma once
 
 #include <optional>
@@ -26,9 +26,9 @@ struct Column {
   BytesView pixels, directions;  // pixels: row by row, near first; each row in the order of the directions
   double sample_m() const;
 };
-/// nullopt if it is not a whole packet of that type, or its checksum is wrong.
+/// nullopt if `packet` is not a whole packet of this type, or its checksum is wrong.
 std::optional<Bathymetry> read_bathymetry(BytesView packet);
-/// Also nullopt if its pixels have another size than 16 bits.
+/// Also nullopt if its pixels do not have 16 bits.
 std::optional<Column> read_column(BytesView packet);
 
 /// Corrects the checksums of packets whose bytes were changed.

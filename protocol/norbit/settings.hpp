@@ -12,13 +12,13 @@ namespace sonar::norbit {
 inline constexpr double most_gain_db = 40;          // DFD
 inline constexpr double gain_slope_db_per_m = 0.4;  // per metre of two-way range; unknown: assumed
 
-/// Format of the samples from which both packets are made; gain_db is in them.
+/// Format of the samples from which both packets are made; they include gain_db.
 inline constexpr SampleFormat sample_format{
     .bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -120, .ceiling_db = 40};
 
 struct Settings {
   bool power = false;
-  double start_m = 0, stop_m = 10;  // chosen; DFD: 50, or as the product has it
+  double start_m = 0, stop_m = 10;  // chosen; DFD: 50, or the product's value
   double rate_hz = -1;              // -1: as fast as the range permits
   double gain_db = 20;
   int samples = 256, beams = 128;  // size of the water column; the number of samples is approximate
@@ -30,15 +30,15 @@ std::shared_ptr<const PingFindings> findings_of(const Settings& settings, const 
 using HeldSettings = protocol::Held<Settings>;
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Why a sonar cannot have these; empty: it can.
+/// The reason why a sonar cannot have these settings; empty if it can.
 std::string complaint(const Settings& settings);
 
-/// Sample numbers count at sample_hz from the time it fires. A row of the ping is `step` of them, one of the water column `thin`
-/// rows.
+/// Sample numbers count at sample_hz from the transmission. A row of the ping has `step` samples; a row of the water column has
+/// `thin` rows of the ping.
 struct Grid {
   int first = 0, step = 1, rows = 0;  // first: a multiple of step * thin
   int thin = 1;
-  double sample_m = 0;  // range of one
+  double sample_m = 0;  // range per sample
   int column_rows() const { return (rows + thin - 1) / thin; }
 };
 Grid grid_of(const Settings& settings, double sound_mps);

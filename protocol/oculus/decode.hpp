@@ -1,5 +1,5 @@
-// The driver side: an incremental decoder for the messages of a device, and the checks of real drivers.
-// Used by clients/sonarctl and the tests; make_fire (fire.hpp) makes the fire messages.
+// The driver's side: an incremental decoder for the messages of a device, and the checks that real drivers make. Used by
+// clients/sonarctl and the tests; make_fire (fire.hpp) makes the fire messages.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@
 
 namespace sonar::oculus {
 
-/// A ping result. Its fixed part is complete; tables and image are there as far as the message holds them.
+/// A ping result. The fixed part is complete; tables and image are present as far as the message contains them.
 struct DecodedPing {
   PingHead head;                            // version 0 and 1: extension, attitude and ping_start_time_s are 0
   std::vector<std::int16_t> bearings_cdeg;  // [beams], positive to starboard
@@ -28,11 +28,11 @@ struct DecodedPing {
   std::size_t bytes_per_sample() const;
   /// Row 0 nearest, beam 0 the first bearing. row < rows(), beam < beams().
   std::uint32_t sample(std::size_t row, std::size_t beam) const;
-  /// The row's samples as they lie in the message.
+  /// The bytes of the row's samples in the message.
   wire::BytesView row_samples(std::size_t row) const;
   /// Positive to port, sonard's convention.
   double azimuth_rad(std::size_t beam) const;
-  /// Range of a row's centre [m], in the device's metres.
+  /// Range of a row's centre [m], as the device computes it.
   double row_range_m(std::size_t row) const;
 };
 
@@ -47,14 +47,15 @@ struct OtherMessage {  // a type that drivers ignore, or a known type too short 
 };
 using Received = std::variant<DecodedPing, DummyMessage, UserConfigMessage, LogText, OtherMessage>;
 
-/// Any message of at least 16 bytes, as framed.
+/// Decodes a framed message of at least 16 bytes.
 Received decode_message(wire::BytesView message);
-/// nullopt when the fixed part does not fit.
+/// nullopt if the message is shorter than the fixed part.
 std::optional<DecodedPing> decode_ping(wire::BytesView message);
-/// A status datagram: at least 142 bytes with the right magic. bad_data otherwise.
+/// Decodes a status datagram. bad_data: fewer than 142 bytes, or a wrong magic.
 Result<StatusMessage> decode_status(wire::BytesView datagram);
 
-/// The TCP stream of a device in chunks of any size. Lengths above reply_limit are junk; nothing is allocated for them.
+/// Decodes the TCP stream of a device, in chunks of any size. Lengths above reply_limit are junk; nothing is allocated for
+/// them.
 class Decoder {
  public:
   void append(wire::BytesView received) { framer_.append(received); }
@@ -67,7 +68,7 @@ class Decoder {
   Framer framer_{Sender::device};
 };
 
-/// The identities that drivers enforce and this ping result violates (identities.cpp).
+/// The identities between fields that drivers check and this ping result violates (identities.cpp).
 std::vector<std::string> identity_violations(const DecodedPing& ping);
 /// The differences between a request and its echo that drivers check. `gain_echo` as the option.
 std::vector<std::string> echo_violations(const FireRequest& sent, const DecodedPing& ping, std::string_view gain_echo = "auto");

@@ -1,5 +1,4 @@
 // One client's connection to an emulated Oculus: bytes and ticks in, events and replies out. No socket, no clock, no log.
-// The daemon's Session feeds it and executes its events.
 #pragma once
 
 #include <memory>

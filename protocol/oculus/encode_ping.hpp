@@ -1,5 +1,5 @@
-// A ping in the vendor's bytes: echo rules, sizes, bearings. The only place where azimuth (to port) becomes bearing (to
-// starboard). Called by Vendor::frame once per ping; the bare encoder also re-encodes captured pings in the tests.
+// Encodes a ping in the vendor's bytes: echo rules, sizes, bearings. Only this file converts azimuth (to port) to bearing (to
+// starboard). Vendor::frame calls it once per ping; tests re-encode captured pings with the bare encoder.
 #pragma once
 
 #include <span>
@@ -11,8 +11,8 @@
 
 namespace sonar::oculus {
 
-/// Fixed part of either version. header.version selects the fields: below 2 the extension, the attitude and
-/// ping_start_time_s stay behind and ping_start_counter goes instead.
+/// Fixed part of either version. header.version selects the fields: versions below 2 have ping_start_counter instead of the
+/// extension, the attitude and ping_start_time_s.
 struct PingHead {
   PingResultV2 fixed;
   std::uint32_t ping_start_counter = 0;

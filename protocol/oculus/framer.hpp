@@ -1,5 +1,5 @@
-// Cuts a byte stream of either direction into whole messages: any split, junk skipped byte by byte, memory bounded.
-// Stands between the socket's bytes and the Dialogue (device side) or the Decoder (driver side).
+// Splits a byte stream of either direction into whole messages. The stream may arrive in any pieces; junk is skipped byte by
+// byte; memory is bounded. The Dialogue (device side) and the Decoder (driver side) use it.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ class Framer {
  public:
   explicit Framer(Sender sender) : sender_(sender) {}
 
-  /// Adds received bytes. Drain with next() before the next append: less than one message then remains.
+  /// Adds received bytes. Call next() until it returns nullopt before the next append, so that less than one message remains.
   void append(wire::BytesView received);
   /// The next whole message, header included; valid until the next call of append or next.
   std::optional<wire::BytesView> next();
@@ -35,7 +35,7 @@ class Framer {
   std::uint64_t skipped_ = 0;
 };
 
-/// Header of a message of at least 16 bytes.
+/// Reads the header of a message of at least 16 bytes.
 MessageHeader header_of(wire::BytesView message);
 
 }  // namespace sonar::oculus

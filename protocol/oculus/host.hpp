@@ -1,4 +1,4 @@
-// The driver of an Oculus: fire messages out, ping results in.
+// The driver's side of an Oculus: it sends fire messages and decodes ping results.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@ namespace sonar::oculus {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
 
 /// The fire message for the wanted settings. Defaults: high frequency, 10 m, 10 Hz, 50 %, 512 beams, 8 bits. The rate is the
-/// nearest one that a fire message can request. usage: a mode or setting that a fire message does not have.
+/// nearest one that a fire message can request. Error usage: a fire message does not have the mode or setting.
 Result<FireRequest> fire_from(const protocol::Wanted& wanted);
 
 /// Reads a status message.

@@ -8,9 +8,9 @@
 
 namespace sonar::oculus {
 
-/// Vendor::field. The version in the header selects the layout of a ping; an empty message stands for version 2.
+/// Implements Vendor::field. The version in the header selects the layout of a ping; an empty message stands for version 2.
 std::optional<protocol::Field> locate(protocol::Part part, protocol::FieldName name, wire::BytesView message);
-/// Vendor::region.
+/// Implements Vendor::region.
 std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping);
 
 }  // namespace sonar::oculus

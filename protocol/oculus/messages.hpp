@@ -1,6 +1,6 @@
-// Every Oculus message, described once: trade names in the structs, the vendor's spelling in fields(), wire order and widths.
-// Little-endian, byte-packed, sent over TCP 52100 both ways and (status) over UDP 52102; see README.md here.
-// Layouts: docs/protocols/oculus.md and the sources named there; captured pings confirm header and version-1 result.
+// Every Oculus message, described once in wire order: members have our names, fields() has the vendor's names. Little-endian,
+// byte-packed, sent over TCP 52100 in both directions and (status) over UDP 52102; see protocol/oculus/README.md. Layouts:
+// docs/protocols/oculus.md and the sources named there; captured pings confirm header and version-1 result.
 #pragma once
 
 #include "protocol/message_fields.hpp"
@@ -12,21 +12,21 @@ namespace means = protocol::means;
 
 inline constexpr std::uint16_t magic = 0x4F53;  // bytes 53 4F
 inline constexpr std::uint16_t tcp_port = 52100, status_port = 52102;
-inline constexpr std::uint32_t image_offset = 2048;  // from captures; in both versions it is behind the table of bearings
-inline constexpr std::uint32_t request_payload_limit = 4096;  // a client's larger payload size is junk
-inline constexpr std::size_t reply_limit = 4u << 20;  // a device's longer message is junk: the largest real ping has 1.5 MB
+inline constexpr std::uint32_t image_offset = 2048;  // from captures; in both versions the image follows the table of bearings
+inline constexpr std::uint32_t request_payload_limit = 4096;  // a larger payload size from a client is junk
+inline constexpr std::size_t reply_limit = 4u << 20;  // a longer message from a device is junk: the largest real ping has 1.5 MB
 
 enum class MessageType : std::uint16_t {
   status = 0x0001,
   fire = 0x0015,
-  full_ping_result = 0x0022,  // never sent: only answers the non-public full fire message
+  full_ping_result = 0x0022,  // never sent: the answer to the non-public full fire message
   ping_result = 0x0023,
   user_config = 0x0055,
   log = 0x0080,
   dummy = 0x00FF,
 };
 
-/// Ping rates are maxima. Other values occur on the wire (the captured echo has 195) and are kept.
+/// Maximum ping rates. Other values occur on the wire (the captured echo has 195) and are kept.
 enum class PingRate : std::uint8_t { hz10 = 0, hz15 = 1, hz40 = 2, hz5 = 3, hz2 = 4, standby = 5 };
 enum class DataSize : std::uint8_t { bits8 = 0, bits16 = 1, bits24 = 2, bits32 = 3 };
 
@@ -149,7 +149,7 @@ constexpr void fields(V& visit, M& m) {
   visit("pressure", m.pressure_bar, means::pressure);
 }
 
-/// Last fields of a ping result, the same in both versions except for the spare words between beams and offset.
+/// The last fields of a ping result. Both versions have them; only the spare words between beams and offset differ.
 struct ImageSizes {
   std::uint32_t image_offset = 0, image_size = 0, message_size = 0;
 };
@@ -228,8 +228,8 @@ constexpr void fields(V& visit, M& m) {
   visit("sizes", m.sizes);
 }
 
-/// A client reads the stored values with address 0 and writes them with any other. Addresses are integers: 192.168.1.2 is
-/// 0xC0A80102.
+/// A client reads the stored values by sending address 0, and writes them by sending another address. Addresses are integers:
+/// 192.168.1.2 is 0xC0A80102.
 struct UserConfigMessage {
   MessageHeader header;
   std::uint32_t ip_address = 0, ip_mask = 0, dhcp_enable = 0;

@@ -1,5 +1,4 @@
-// Every Oculus product as a row: profile name, part number, frequency modes. Read by the Vendor; the physics sees SonarModel
-// only.
+// A row for every Oculus product: profile name, part number, frequency modes. The physics uses only the SonarModel.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// The Oculus family as a Vendor: names, ports, options, and the four translations (settings, dialogue, ping, beacon).
+// The Oculus family: the implementation of Vendor (names, ports, options, settings, dialogue, ping, beacon).
 #pragma once
 
 #include "protocol/vendor.hpp"

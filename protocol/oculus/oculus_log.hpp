@@ -1,6 +1,6 @@
-// Log files of the vendor's own kind, .oculus version 1 (protocol/oculus/README.md, "Oculus log files"): a file header, then
-// items of 40 bytes and a payload. Type 10 is a whole message, type 1010 the exact time of the one before it. They are read and
-// written as the open-source readers do.
+// The vendor's log files, .oculus version 1 (protocol/oculus/README.md, "Oculus log files"): a file header, then items, each a
+// header of 40 bytes and a payload. Type 10 is a whole message; type 1010 is the exact time of the item before it. The layout
+// is that of the open-source readers.
 #pragma once
 
 #include <memory>
@@ -54,7 +54,7 @@ constexpr void fields(V& visit, M& m) {
   visit("pad2", m.pad2);
 }
 
-/// Exact time of the item before it.
+/// The exact time of the item before this one.
 struct OculusLogTime {
   std::uint64_t seconds = 0, nanoseconds = 0;  // since 1970
 };
@@ -71,7 +71,7 @@ static_assert(wire::wire_size<OculusLogItem>() == 40);
 
 /// Reads a log of version 1. bad_data: another kind of file, a log of version 2, or an encrypted one.
 Result<std::unique_ptr<RecordingReader>> read_oculus_log(std::unique_ptr<Source> source);
-/// Keeps the messages of the device's TCP stream; the format cannot hold the bytes between messages.
+/// Writes the messages of the device's TCP stream; the format cannot store the bytes between messages.
 std::unique_ptr<RecordingWriter> write_oculus_log(std::unique_ptr<Sink> sink);
 
 }  // namespace sonar::recording

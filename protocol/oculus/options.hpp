@@ -1,5 +1,5 @@
-// Options of an emulated Oculus, by name, under `options:` of a sonar in the configuration. Each stands for a behaviour that the
-// public sources leave open or contradict each other about. The first allowed value is the default.
+// Options of an emulated Oculus, by name, under `options:` of a sonar in the configuration. Each selects a behaviour that the
+// public sources do not state, or on which they contradict each other. The first allowed value is the default.
 #pragma once
 
 #include <span>
@@ -28,7 +28,7 @@ using protocol::given_number;
 using protocol::number_option;
 using protocol::text_option;
 
-/// Rows of the table in docs/protocols/oculus.md, section 7: name, values, default, meaning.
+/// The rows of the table in docs/protocols/oculus.md, section 7: name, values, default, meaning.
 std::string options_table();
 
 }  // namespace sonar::oculus

@@ -1,5 +1,5 @@
-// Converts a fire message to PingSettings: rows, rates, gain, gamma, limits, the device's own sound speed. Pure functions, called
-// by the dialogue; encode_ping.hpp converts in the other direction.
+// Converts a fire message to PingSettings: rows, rates, gain, gamma, limits, the device's own sound speed. Pure functions;
+// encode_ping.hpp converts in the other direction.
 #pragma once
 
 #include <string>
@@ -11,13 +11,13 @@
 
 namespace sonar::oculus {
 
-/// Sample rate behind the rows: 37.5 MHz / 143, exact in the capture (M1200d, mode 2). unknown: the rate of other modes; sonard
+/// Sample rate of the rows: 37.5 MHz / 143, exact in the capture (M1200d, mode 2). unknown: the rate of other modes; sonard
 /// uses the same.
 inline constexpr double row_rate_hz = 37.5e6 / 143.0;
 inline constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus issue 13: 0-100 % is 0-96 dB
 inline constexpr int row_limit = 720;             // liboculus node README, measured by its authors
 inline constexpr double row_gain_from_m = 0.58;   // fitted to FIL's row gains, docs/protocols/oculus.md, 5.2
-inline constexpr double native_pulse_m = 0.0025;  // the finest range resolution the data sheets quote
+inline constexpr double native_pulse_m = 0.0025;  // the finest range resolution in the data sheets
 
 /// Rows of a ping (docs/protocols/oculus.md, 5.4): c / (2 fs) doubled until at most 720 rows cover the range.
 struct RowGrid {
@@ -26,9 +26,9 @@ struct RowGrid {
 };
 RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz = row_rate_hz);
 
-/// The rate that a code stands for [Hz]; 0 = standby. Unknown codes count as 10 Hz (chosen).
+/// The rate of a code [Hz]; 0 = standby. Unknown codes count as 10 Hz (chosen).
 double table_rate_hz(PingRate rate);
-/// Exponent of the samples: value / 255, and 1 for 0.
+/// Exponent of the samples: value / 255, but 1 for the value 0.
 float gamma_from_byte(std::uint8_t value);
 /// The format of the samples that a fire message requests: bits, saturation, gamma, row gains.
 SampleFormat sample_format(const FireRequest& fire);
@@ -36,7 +36,7 @@ SampleFormat sample_format(const FireRequest& fire);
 /// g, see option gain_echo.
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo);
 
-/// Option gain_assist: which state of flag bit 4, if any, leaves the gain to the device.
+/// Whether flag bit 4 leaves the gain to the device; option gain_assist states which value of the bit does, if any.
 bool asks_for_gain_assist(const FireSettings& fire, std::string_view option);
 
 /// Row gains of option `row_gain: digital`: the power gain 10^((gain_db + 20 log r) / 10), r at least row_gain_from_m, in 1 to
@@ -51,7 +51,7 @@ int mode_index(const SonarModel& model, std::uint8_t wire_mode);
 /// The sound speed that the device computes when 0 is requested [m/s].
 double device_sound_speed_mps(const protocol::DeviceState& device, double salinity_ppt);
 
-/// The resulting settings, and a message for each clamped value.
+/// The resulting settings, and a text for each clamped value.
 struct ResolvedSettings {
   PingSettings settings;
   std::vector<std::string> clamped;

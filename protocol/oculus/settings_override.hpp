@@ -1,5 +1,5 @@
-// Turns a SettingsOverride into the fire message with which a driver would have requested the same settings. Pings made with
-// these settings carry a copy of that message. The Vendor of Oculus calls this.
+// Converts a SettingsOverride to the fire message by which a driver would request the same settings. Pings with these settings
+// echo that message.
 #pragma once
 
 #include "protocol/vendor.hpp"

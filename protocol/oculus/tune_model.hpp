@@ -1,5 +1,5 @@
-// Replaces apertures and beam widths of a product, which no public source states, by those of the configuration.
-// Made once per sonar when its configuration is read; everything after it sees the tuned model only.
+// Replaces apertures and beam widths of a product, which no public source states, by those of the configuration. Called once
+// per sonar, when its configuration is read; all other code uses the tuned model.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,8 @@
 
 namespace sonar::oculus {
 
-/// The model with the values of the options; without any, the model itself. Error: a value for a mode that the product lacks.
+/// The model with the values of the options; without such options, the model itself. Error: a value for a mode that the product
+/// lacks.
 Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model, const protocol::OptionValues& options);
 
 }  // namespace sonar::oculus

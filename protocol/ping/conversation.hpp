@@ -1,5 +1,4 @@
-// The conversation that every device of the family has with a host: frames, identity, numbers of devices. A product adds its own
-// requests.
+// The conversation that all devices of the family share: frames, identity, device ids. A product adds its own requests.
 #pragma once
 
 #include <string_view>
@@ -13,7 +12,7 @@ namespace sonar::ping {
 using protocol::number_option;
 using protocol::text_option;
 
-/// Options that every product has.
+/// Options of every product.
 namespace option_name {
 inline constexpr std::string_view device_type = "device_type", silence_s = "host_silence_s";
 }
@@ -22,7 +21,7 @@ protocol::Option type_option(std::string_view usual, std::string_view meaning);
 
 class Conversation : public protocol::Dialogue {
  public:
-  /// `device` outlives it. At a port of kind udp_dialogue a frame does not continue in the next datagram.
+  /// `device` must outlive it. At a port of kind udp_dialogue, frames do not continue in the next datagram.
   Conversation(const protocol::DeviceState& device, const protocol::Port& port, DeviceInformation identity, std::uint8_t id)
       : device_(device),
         by_datagrams_(port.kind == protocol::Port::Kind::udp_dialogue),
@@ -35,21 +34,21 @@ class Conversation : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  protected:
-  /// A request of the product, its sum right. False: it has no such request.
+  /// Handles a request with a valid checksum. False: the product has no such request.
   virtual bool on_request(const Frame& frame, Time now, protocol::Reaction& reaction) = 0;
-  /// The message of that number as it is now, beyond those of every product; empty: there is none.
+  /// The product's message `wanted` with its present values; empty: the product has no such message.
   virtual Bytes message_now(Id wanted, Time now) = 0;
-  /// It is sent with every ping, and pings are enabled: the next one is the answer.
+  /// Whether the message is sent with every ping and pings are enabled, so that the next ping answers the request for it.
   virtual bool comes_with_pings(Id) const { return false; }
-  /// It answers the request for that message by itself.
+  /// Whether the product answers the request for this message itself.
   virtual bool on_wanted(Id wanted, Time now, protocol::Reaction& reaction) {
     static_cast<void>(wanted), static_cast<void>(now), static_cast<void>(reaction);
     return false;
   }
-  /// A host has set id_.
+  /// Called when a host has set id_.
   virtual void on_new_id(protocol::Reaction&) {}
 
-  /// A request whose payload is the message; false when that is too short, which is refused.
+  /// Reads the payload of a request as a message. False: it is too short, and the request was refused.
   template <class M>
   bool read(const Frame& frame, M& message, protocol::Reaction& reaction) const {
     wire::Reader reader(frame.payload);
@@ -59,7 +58,7 @@ class Conversation : public protocol::Dialogue {
   }
   void refuse(const Frame& frame, const std::string& why, protocol::Reaction& reaction) const;
   void set_id(const Frame& frame, protocol::Reaction& reaction);
-  /// Answers a request for that message.
+  /// Answers a request for a message.
   void answer(Id wanted, Time now, protocol::Reaction& reaction);
 
   const protocol::DeviceState& device_;

@@ -1,6 +1,5 @@
-// Finds in a ping of one beam the distance to the strongest echo, and from it the range and gain of the next ping, for the range
-// finders of the family. Pure functions; how a real device does this is unknown, so all of it is assumed
-// (docs/protocols/ping1d.md).
+// Finds the strongest echo in a ping of one beam, and derives from it the range and gain of the next ping, for the family's
+// range finders. Pure functions. unknown: the algorithms of real devices; all of this is assumed (docs/protocols/ping1d.md).
 #pragma once
 
 #include <cstdint>
@@ -16,7 +15,7 @@ namespace sonar::ping {
 inline constexpr double nearest_echo_m = 0.3;
 inline constexpr std::uint32_t shortest_range_mm = 1000;
 
-/// The messages that are to be made of a ping, as bits.
+/// The messages to be made from a ping, as bits.
 using Results = unsigned;
 inline constexpr Results no_result = 0;
 /// The messages for the results `wanted` (no_result: as recorded) of a recorded message of the result `own`, in order. `make`
@@ -31,13 +30,13 @@ std::vector<wire::Bytes> messages_for(Results wanted, wire::BytesView recorded, 
 }
 
 struct Echo {
-  double range_m = 0;  // in the device's metres
+  double range_m = 0;  // as the device computes it
   double peak = 0;     // the highest amplitude; 255 is full scale
   int confidence = 0;  // per cent
 };
 /// Finds the strongest echo of a profile, and the range at which it begins.
 Echo find_echo(const Ping& ping);
-/// The same, from the findings of the ping if it has them.
+/// The echo among the findings of the ping; computed if there is none.
 inline Echo echo_in(const Ping& ping) { return protocol::found_in(ping, find_echo); }
 
 /// The range of a ping, counted from the sonar, and its gain.
@@ -46,10 +45,10 @@ struct Reach {
   int gain = 0;  // index of a gain
 };
 struct ReachLimits {
-  std::span<const double> gains;  // amplifications, rising
+  std::span<const double> gains;  // amplification factors, rising
   std::uint32_t most_mm = 0;
 };
-/// Range and gain after a ping that was made with `made_with`, and in which that echo was found.
+/// Range and gain of the next ping, after a ping with `made_with` in which `echo` was found.
 Reach adjusted(const Reach& made_with, const Echo& echo, const ReachLimits& limits);
 
 }  // namespace sonar::ping

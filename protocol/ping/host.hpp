@@ -1,4 +1,4 @@
-// Hosts of the ping protocol (docs/protocols/ping.md): for a Ping360 by UDP, for the others by TCP.
+// The driver's side of the ping protocol (docs/protocols/ping.md): over UDP for a Ping360, over TCP for the others.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// The messages of the ping protocol that the emulated devices use, each described once, and their frames. Little-endian. Source:
-// the public definitions of bluerobotics/ping-protocol.
+// The messages of the ping protocol that the emulated devices use, and their frames. Little-endian. Source: the public
+// definitions of bluerobotics/ping-protocol.
 #pragma once
 
 #include <array>
@@ -36,7 +36,7 @@ enum class Id : std::uint16_t {
   attitude_report = 504,
   ping1d_set_device_id = 1000,
   ping1d_set_range = 1001,
-  set_sound_speed_before = 1002,  // used by a Ping1D, and in older definitions by others
+  set_sound_speed_before = 1002,  // used by a Ping1D and, in older definitions, by other devices
   ping1d_set_mode_auto = 1003,
   ping1d_set_interval = 1004,
   ping1d_set_gain = 1005,
@@ -96,28 +96,28 @@ constexpr void fields(V& visit, M& m) {
   visit("dst_device_id", m.destination, means::destination_id);
 }
 
-/// The whole frame of a message. `source`: id of the device; the frame is for any host.
+/// The whole frame of a message, addressed to any host. `source`: id of the device.
 Bytes framed(Id id, std::uint8_t source, BytesView payload);
 template <class M>
 Bytes framed_message(Id id, std::uint8_t source, const M& message) {
   return framed(id, source, wire::bytes_of(message));
 }
-/// Corrects the sums of frames whose fields were changed. `before`: the frames before the change, which have the same sizes.
+/// Corrects the checksums of frames whose fields were changed. `before`: the unchanged frames, of the same sizes.
 void reseal(BytesView before, Bytes& frames);
 Bytes ack(Id id, std::uint8_t source);
 Bytes nack(Id id, std::uint8_t source, std::string_view why);
 
 struct Frame {
   Header header;
-  Bytes payload;  // empty with a wrong sum
+  Bytes payload;  // empty if the checksum is wrong
   bool sum_is_right = true;
 };
 
-/// Finds the frames of a byte stream, in pieces of any size. A header that states a payload longer than `longest` is not taken as
-/// a frame, and after a wrong sum the search continues behind the start of that frame. So at most one incomplete frame waits. In
-/// a datagram (`all_is_there`) no more bytes come, so the search also continues behind the start of an incomplete frame. The work
-/// is proportional to the number of bytes, also for hostile input: sums_ has the sum of all bytes up to each position, and the
-/// sum of a frame is the difference of two of them.
+/// Finds the frames of a byte stream, which may arrive in pieces of any size. A header with a payload longer than `longest`
+/// does not begin a frame. After a wrong checksum the search continues one byte after the start of that frame. So at most one
+/// incomplete frame waits. In a datagram (`all_is_there`) the search also continues after the start of an incomplete frame. The
+/// work is proportional to the number of bytes, even for hostile input: sums_ has the sum of all bytes before each position, so
+/// a frame's checksum is the difference of two of them.
 class Framer {
  public:
   explicit Framer(std::size_t longest = longest_request, bool all_is_there = false)
@@ -126,9 +126,9 @@ class Framer {
   /// Call it when no more bytes will come.
   void end() { all_is_there_ = true; }
   std::optional<Frame> next();
-  /// The bytes of the last frame whose sum is right, until append().
+  /// The bytes of the last valid frame; valid until append().
   BytesView bytes() const { return BytesView(buffer_).subspan(begin_ - last_size_, last_size_); }
-  /// Drops a frame that is not whole yet.
+  /// Drops an incomplete frame.
   void drop_rest();
   std::size_t waiting_bytes() const { return buffer_.size() - begin_; }
   /// Number of bytes that have been searched, counted from the first that was ever appended.
@@ -138,9 +138,9 @@ class Framer {
   std::size_t longest_;
   bool all_is_there_;
   Bytes buffer_;
-  std::vector<std::uint16_t> sums_{0};  // sums of the bytes before each place, modulo 2^16
-  std::size_t begin_ = 0;               // begin of what is not searched yet
-  std::size_t last_size_ = 0;           // size of the frame that ends there
+  std::vector<std::uint16_t> sums_{0};  // sum of the bytes before each position, modulo 2^16
+  std::size_t begin_ = 0;               // start of the bytes not searched yet
+  std::size_t last_size_ = 0;           // size of the last frame, which ends at begin_
   std::uint64_t erased_ = 0;
 };
 
@@ -150,7 +150,7 @@ std::optional<Frame> whole_frame(BytesView message);
 /// Messages that only devices send. They are not answered: two devices would answer each other without end.
 constexpr bool is_of_device(Id id) { return id == Id::ack || id == Id::nack || id == Id::ascii_text; }
 
-/// A datagram that holds a whole frame of a host with the right sum.
+/// Whether a datagram contains a valid frame of a host.
 bool holds_frame(BytesView datagram);
 
 struct DeviceInformation {

@@ -29,7 +29,7 @@ PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// Message 2198 of a ping.
+/// Encodes a ping as message 2198.
 Bytes profile_of(const Ping& ping, const protocol::DeviceState& device);
 
 }  // namespace sonar::ping::omniscan

@@ -1,4 +1,4 @@
-// The settings that sonars of one beam and one mode do not have.
+// Refuses settings that sonars with one beam and one mode do not have.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The period of pings that goes with a rate, as the family's devices and hosts write it.
+// Converts a ping rate to a period, which devices and hosts of the family use.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// Ping1D: an altimeter, one wide beam that measures the distance to what it looks at. TCP and UDP; a host requests single
-// measurements, or a stream of them.
+// Ping1D: an altimeter with one wide beam. TCP and UDP; a host requests single measurements or a stream of them.
 #pragma once
 
 #include "protocol/vendor.hpp"

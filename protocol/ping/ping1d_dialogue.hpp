@@ -1,4 +1,4 @@
-// A host's conversation with a Ping1D: settings one by one, and measurements that are requested or streamed.
+// A host's conversation with a Ping1D: single settings, and requested or streamed measurements.
 #pragma once
 
 #include <memory>

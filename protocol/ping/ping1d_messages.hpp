@@ -1,11 +1,11 @@
-// The messages that only a Ping1D has, as messages.hpp describes the others. Those of one number are written and read by value.
+// The messages that only a Ping1D has; messages.hpp has the others. Messages that contain a single number have no struct.
 #pragma once
 
 #include "protocol/ping/messages.hpp"
 
 namespace sonar::ping {
 
-/// The range that a host sets, and that the device reports.
+/// The range, set by a host and reported by the device.
 struct ScanRange {
   std::uint32_t start_mm = 0, length_mm = 0;
 };
@@ -67,7 +67,7 @@ constexpr void fields(V& visit, M& m) {
   visit("gain_setting", m.gain, means::gain);
 }
 
-/// Followed by `count` strengths of a byte.
+/// Followed by `count` strengths of one byte each.
 struct Profile : Distance {
   std::uint16_t count = 0;
 };

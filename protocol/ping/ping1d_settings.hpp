@@ -39,11 +39,11 @@ inline Results results_of(Id id) {
 struct Settings {
   std::uint8_t id = 1;  // id of the device
   Parameters parameters;
-  Results results = no_result;  // results for which the ping is fired; a ping without a host has its profile
+  Results results = no_result;  // results for which the ping is fired; without a host: the profile
 };
 /// Compares settings without the results, which differ from ping to ping.
 bool same_settings(const Settings& a, const Settings& b);
-/// The echo.
+/// Finds the echo.
 inline std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) {
   return protocol::found(find_echo(ping));
 }
@@ -61,7 +61,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 
 using ping::Echo;
 using ping::find_echo;
-/// The automatic mode: range and gain after a ping in which that echo was found.
+/// The automatic mode: range and gain after a ping in which `echo` was found.
 Parameters adjusted(const Parameters& made_with, const Echo& echo);
 
 /// The frames for Settings::results, in the order of their numbers.

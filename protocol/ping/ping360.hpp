@@ -1,4 +1,4 @@
-// Ping360: a mechanically scanned single beam. One UDP dialogue, and the discovery of its Ethernet link.
+// Ping360: a mechanically scanned single beam. It has one UDP dialogue, and answers the discovery of its Ethernet interface.
 #pragma once
 
 #include "protocol/vendor.hpp"

@@ -20,11 +20,11 @@ inline constexpr std::string_view firmware = "firmware", mount_grad = "mount_gra
 std::span<const protocol::Option> options();
 std::span<const std::shared_ptr<const SonarModel>> models();
 
-/// The settings that a host has made; pings echo them. `ping.angle` is where the head looks.
+/// The settings that a host has made; pings echo them. `ping.angle` is the direction of the head.
 struct Settings {
   std::uint8_t id = 2;  // id of the device
   Transducer ping;
-  bool scans = false;  // the request is 2602; its other fields follow
+  bool scans = false;  // true: the request was 2602, whose other fields follow
   std::uint16_t start = 0, stop = 399;
   std::uint8_t steps = 1, delay_ms = 0;
 };
@@ -46,22 +46,22 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 
 /// The message of a ping under these settings: auto_device_data in a scan, else device_data.
 Bytes encode(const Settings& settings, BytesView samples);
-/// The ping in such a message. nullopt: the message is another one, is not whole, or its sum is wrong.
+/// The scan line in such a message. nullopt: another message, an incomplete one, or a wrong checksum.
 struct Line {
   Transducer ping;
   Bytes samples;
 };
 std::optional<Line> line_in(BytesView message);
 
-/// Angle by which the sonar is turned to port, so that it looks to the angle of its head [rad]. Angles of the head grow to
+/// Angle by which the sonar is rotated to port, so that it looks in the direction of its head [rad]. Angles of the head grow to
 /// starboard.
 double head_rad(std::uint16_t angle, const protocol::OptionValues& options);
-/// Time in which the samples of a ping are taken.
+/// Duration of the samples of a ping.
 std::chrono::nanoseconds listening(const Transducer& t);
-/// Time in which the answer of a ping is sent on the link.
+/// Time to send a ping's answer on the link.
 std::chrono::nanoseconds transfer(const Transducer& t, const protocol::OptionValues& options);
 
-/// The position of the head while it turns. It takes the shorter way, a grad in 6 ms.
+/// The position of the head while it turns. It turns the shorter way, at 6 ms per grad.
 struct Head {
   int from = 0, to = 0;  // grad; `to` may lie beyond a turn
   Time since{};
@@ -72,8 +72,8 @@ struct Head {
   void turn_to(std::uint16_t angle, Time at);
 };
 
-/// The angle that follows `angle` in a scan. `back` is kept between calls: the scan is on its way back across a sector that holds
-/// angle 0. `oscillates`: option sector_scan.
+/// The angle after `angle` in a scan. `back`: the scan is on its way back; the caller keeps it between calls. `oscillates`:
+/// option sector_scan.
 std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, bool oscillates);
 
 }  // namespace sonar::ping::ping360

@@ -1,4 +1,5 @@
-// The common part of the family's hosts: frames, refusals, the settings that a user requests, and the picture of one beam.
+// The part that all hosts of the family share: frames, refusals, the settings that a user requests, and the picture of one
+// beam.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +21,7 @@ inline constexpr double usual_range_m = 10;
 /// The period for the wanted rate [ms]. 0: no rate is wanted, so the device chooses it.
 double period_ms_of(const protocol::SettingsOverride& wanted);
 
-/// Reads a message off the front of the payload; returns the rest.
+/// Reads a message from the front of the payload; returns the rest.
 template <class M>
 std::optional<BytesView> read_front(const Frame& frame, M& message) {
   wire::Reader reader(frame.payload);
@@ -29,7 +30,7 @@ std::optional<BytesView> read_front(const Frame& frame, M& message) {
   return BytesView(frame.payload).subspan(wire::wire_size<M>());
 }
 
-/// Powers of two bytes each, 0 to 65535 from lowest_db to highest_db, at most `count`.
+/// Reads at most `count` powers of two bytes each; 0 to 65535 is lowest_db to highest_db.
 Line powers_in(BytesView rest, std::size_t count, float lowest_db, float highest_db);
 
 class PingHost : public protocol::Host {
@@ -46,7 +47,7 @@ class PingHost : public protocol::Host {
     if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
   }
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
-  /// Whether it has another request in place of the refused one.
+  /// Whether the host sends another request in place of the refused one.
   virtual bool on_nack(Id refused, protocol::HostActions&) {
     static_cast<void>(refused);
     return false;
@@ -55,11 +56,12 @@ class PingHost : public protocol::Host {
 
  private:
   std::string_view title_;
-  std::optional<Bytes> request_;  // for pings; empty: none are requested
+  std::optional<Bytes> request_;  // the request for pings; empty: the host requests none
   Framer framer_{65535};
 };
 
-/// Checks the wanted settings of a sonar with these options of sonarctl and one mode. usage: a setting that it does not have.
+/// Checks the wanted settings of a sonar with one mode and these options of sonarctl. Error usage: a setting that it does not
+/// have.
 Result<void> check_wanted(std::string_view title, std::initializer_list<std::string_view> known, const protocol::Wanted& wanted);
 
 template <class Product>

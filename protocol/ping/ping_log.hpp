@@ -1,5 +1,5 @@
-// Logs of Cerulean's products, .svlog: frames of the ping protocol back to back, the first a JSON text that says what follows
-// (docs/protocols/ping.md).
+// Logs of Cerulean's products (.svlog): successive frames of the ping protocol. The first has a JSON text that describes the
+// log (docs/protocols/ping.md).
 #pragma once
 
 #include <memory>
@@ -9,9 +9,9 @@
 
 namespace sonar::recording {
 
-/// Each frame as a message of the stream, but the JSON text. Times are those since the device's power-up.
+/// Reads each frame, except the JSON text, as a message of the stream. Times count from the device's power-up.
 std::unique_ptr<RecordingReader> read_ping_log(std::unique_ptr<Source> source);
-/// Takes what a Surveyor, an Omniscan or an S500 sends over TCP; other messages are left out.
+/// Accepts messages that a Surveyor, an Omniscan or an S500 sends over TCP; others are ignored.
 std::unique_ptr<RecordingWriter> write_ping_log(std::unique_ptr<Sink> sink);
 
 }  // namespace sonar::recording

@@ -1,4 +1,4 @@
-// S500: an echo sounder of one narrow beam. TCP and UDP; a host requests single pings or a stream of them.
+// S500: an echo sounder with one narrow beam. TCP and UDP; a host requests single pings or a stream of them.
 #pragma once
 
 #include "protocol/vendor.hpp"

@@ -1,4 +1,4 @@
-// The messages that only an S500 has, as messages.hpp describes the others.
+// The messages that only an S500 has; messages.hpp has the others.
 #pragma once
 
 #include "protocol/ping/messages.hpp"
@@ -9,7 +9,7 @@ struct SetPingParams {
   std::uint32_t start_mm = 0, length_mm = 5000;  // length 0: automatic
   std::int16_t gain = -1, period_ms = -1;        // gain -1: automatic; period -1: a single ping
   std::uint16_t pulse_us = 0;                    // ignored: the device chooses it
-  Id report{};                                   // message that comes of each ping; 0: no pings
+  Id report{};                                   // message that the device sends for each ping; 0: no pings
   std::uint16_t reserved = 0;
   std::uint8_t chirp = 0, decimation = 0;
   bool operator==(const SetPingParams&) const = default;

@@ -16,7 +16,7 @@ std::span<const std::shared_ptr<const SonarModel>> models();
 
 struct Parameters {
   SetPingParams ping;              // as requested
-  Reach reach{.length_mm = 5000};  // in force: as requested, or as the device chose it
+  Reach reach{.length_mm = 5000};  // in use: as requested, or chosen by the device
   std::uint32_t speed_mm_per_s = 1500000;
   std::uint8_t enable = 1;
 };
@@ -37,7 +37,7 @@ struct Settings {
 };
 /// Compares settings without the results and the echoes, which differ from ping to ping.
 bool same_settings(const Settings& a, const Settings& b);
-/// The echo.
+/// Finds the echo.
 inline std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) {
   return protocol::found(find_echo(ping));
 }
@@ -47,9 +47,9 @@ inline Settings settings_from(const VendorSettings* held) { return protocol::set
 
 /// The reason if the device refuses the request, else an empty text.
 std::string complaint(const SetPingParams& wanted);
-/// The parameters in force after the request.
+/// The parameters in use after the request.
 Parameters requested(const Parameters& before, const SetPingParams& wanted);
-/// Least time from a ping to the next.
+/// Shortest interval between pings.
 int interval_ms(const Parameters& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);

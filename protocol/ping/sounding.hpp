@@ -1,4 +1,4 @@
-// The common part of the conversations with range finders, Ping1D and S500: pings are fired one by one for what a host requests
+// The part that the conversations with range finders (Ping1D, S500) share: each ping is fired for results that a host requests
 // or streams.
 #pragma once
 
@@ -10,13 +10,13 @@
 
 namespace sonar::ping {
 
-/// A ping is fired when results are wanted (`once_`, `streamed_`) and its interval is over (`due_`); until it comes, or two
-/// seconds have passed, no other is fired. `Settings`: as for StreamingConversation, and with `results`, for which a ping is
-/// fired. `Held` holds them.
+/// A ping is fired when results are wanted (`once_`, `streamed_`) and the interval is over (`due_`). The next one is fired only
+/// after the ping has arrived or two seconds have passed. `Settings`: as for StreamingConversation, and with `results`, for
+/// which a ping is fired. `Held` holds them.
 template <class Settings, class Held, Settings (*settings_from)(const VendorSettings*)>
 class SoundingConversation : public StreamingConversation<Settings, settings_from> {
   using Base = StreamingConversation<Settings, settings_from>;
-  static constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping is taken as lost
+  static constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping counts as lost
 
  public:
   SoundingConversation(const protocol::DeviceState& device, const protocol::Port& port, DeviceInformation identity, Time now)
@@ -60,7 +60,7 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
   void want_once(Results result, Time now, protocol::Reaction& reaction) { want(once_, result, now, reaction); }
   void stream(Results result, Time now, protocol::Reaction& reaction) { want(streamed_, result, now, reaction); }
   void stop_stream(Results result) { streamed_ &= ~result; }
-  /// The ping that is being made no longer serves a request.
+  /// The ping that is being computed no longer serves a request.
   void forget_ping(Time now) {
     fired_.reset();
     due_ = now;
@@ -78,7 +78,7 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
   }
 
  private:
-  /// The ping that is being made does not serve the new request; the next one does.
+  /// Requests `result`. The next ping serves the request, not the one that is being computed.
   void want(Results& results, Results result, Time now, protocol::Reaction& reaction) {
     // The initial settings enable pings, but the sonar pings only after a first change of settings: this one.
     if (!std::exchange(has_asked_, true)) this->change(reaction, [](Settings&) {});
@@ -87,8 +87,8 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
   }
 
   Results once_ = no_result, streamed_ = no_result;  // results that the host waits for
-  Time due_{};                                       // when the next requested ping is due, if none is under way
-  std::shared_ptr<const Held> fired_;                // the ping that is being made
+  Time due_{};                                       // time of the next requested ping, if none is being computed
+  std::shared_ptr<const Held> fired_;                // the ping that is being computed
   Time fired_at_{};
   bool has_asked_ = false;
 };

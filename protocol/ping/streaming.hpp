@@ -1,4 +1,4 @@
-// The common part of Surveyor, Omniscan and Ping1D: their pings come by TCP or UDP, as long as a host enables them.
+// The part that Surveyor, Omniscan and Ping1D share: they send pings by TCP or UDP while a host enables them.
 #pragma once
 
 #include <array>
@@ -9,7 +9,8 @@
 namespace sonar::ping {
 
 constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number) {
-  // ping-python reads one message of each packet it receives, so messages that are written together would fill its queue. Chosen.
+  // ping-python reads one message of each packet that it receives, so messages in one packet would fill its queue. The value is
+  // chosen.
   constexpr std::chrono::milliseconds between_messages{3};
   return {{{.kind = protocol::Port::Kind::tcp_stream, .number = number, .gap = between_messages},
            {.kind = protocol::Port::Kind::udp_dialogue, .number = number}}};
@@ -20,7 +21,7 @@ constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number) {
 template <class Settings, Settings (*settings_from)(const VendorSettings*)>
 class StreamingConversation : public Conversation {
  public:
-  /// `identity` without its type, which is an option.
+  /// The type in `identity` is ignored: an option sets it.
   StreamingConversation(const protocol::DeviceState& device, const protocol::Port& port,
                         DeviceInformation identity = {.major = 1})
       : Conversation(device, port, typed(identity, device), settings_from(device.settings.get()).id) {}
@@ -73,7 +74,7 @@ class StreamingVendor : public protocol::Vendor {
   void reseal(protocol::BytesView before, protocol::Bytes& ping) const override { sonar::ping::reseal(before, ping); }
 
  protected:
-  /// The frames of a ping, in the order they are sent.
+  /// The frames of a ping, in the order of sending.
   virtual std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) const = 0;
 };
 

@@ -1,4 +1,4 @@
-// Surveyor 240-16: a fan that looks down and sends points of the bottom, over TCP and UDP.
+// Surveyor 240-16: a multibeam echo sounder that sends points of the bottom, over TCP and UDP.
 #pragma once
 
 #include "protocol/vendor.hpp"

@@ -1,5 +1,5 @@
-// Byte sources and sinks of recordings: read at an offset, append at the end. The formats beside this file use nothing else, so
-// that memory and files are read alike; byte_source.cpp is the only file of protocol/ that opens files.
+// Byte sources and sinks of recordings: read at an offset, append at the end. All formats use only these, so that they can be
+// in memory or in files. Only byte_source.cpp opens files in protocol/.
 #pragma once
 
 #include <cstdint>
@@ -22,44 +22,44 @@ class Source {
   /// For error texts.
   virtual const std::string& name() const = 0;
   virtual std::uint64_t size() const = 0;
-  /// Fills `into` from `offset` on; fewer bytes only where the source ends or cannot be read.
+  /// Fills `into` from `offset` on. Returns the number of bytes; it is smaller only if the source ends or cannot be read.
   virtual std::size_t read_at(std::uint64_t offset, std::span<std::byte> into) = 0;
 };
-/// Opens a file. missing_file, io; bad_data: a folder or a pipe.
+/// Opens a file. Errors: missing_file, io; bad_data for a folder or a pipe.
 Result<std::unique_ptr<Source>> open_source(const std::filesystem::path& file);
 std::unique_ptr<Source> source_from(std::string name, Bytes bytes);
 
 class Sink {
  public:
   virtual ~Sink() = default;
-  /// All or nothing: a partial write on a full disk is undone, so that the file ends with a whole record. io; then every later
-  /// call fails the same way.
+  /// Appends all bytes or none: a partial write on a full disk is undone, so that the file ends with a whole record. Error io;
+  /// later calls then fail likewise.
   virtual Result<void> append(BytesView record) = 0;
   /// Replaces bytes that were appended before. Errors: io.
   virtual Result<void> overwrite(std::uint64_t offset, BytesView bytes) = 0;
-  /// After a failure: one more record may be tried, a smaller one.
+  /// After a failure: lets the next call try again, with a smaller record.
   virtual void try_again() {}
-  /// Late errors of the file system. Errors: io.
+  /// Closes the file, and reports late errors of the file system. Errors: io.
   virtual Result<void> close() = 0;
 };
 /// Creates the file, or empties an existing one. Errors: io.
 Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file);
 /// Creates a new file; an existing one is an error and stays unchanged. Errors: io.
 Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file);
-/// Appends to `bytes`, which must outlive it.
+/// A sink that appends to `bytes`, which must outlive it.
 std::unique_ptr<Sink> sink_into(Bytes& bytes);
 
-/// Reads a source front to back, through a buffer.
+/// Reads a source from start to end, through a buffer.
 class Scan {
  public:
   explicit Scan(Source& source, std::uint64_t position = 0) : source_(source), position_(position) {}
 
   std::uint64_t position() const { return position_; }
   std::uint64_t left() const { return source_.size() > position_ ? source_.size() - position_ : 0; }
-  /// The next `count` bytes, fewer at the end; the position moves past them. Valid until the next call. Allocates no more than
-  /// the source holds, but the caller must bound `count`, since sources can be large.
+  /// The next `count` bytes, fewer at the end; the position moves past them. Valid until the next call. It allocates no more
+  /// than the size of the source, but the caller must bound `count`, because sources can be large.
   BytesView read(std::size_t count);
-  /// The next `count` bytes like read(), but the position stays.
+  /// Like read(), but the position does not move.
   BytesView peek(std::size_t count);
   void seek(std::uint64_t position) { position_ = position; }
   void skip(std::uint64_t count) { position_ += std::min(count, left()); }

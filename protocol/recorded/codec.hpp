@@ -1,5 +1,5 @@
-// The part of a make that recordings need: its messages, and the kinds of files that its own programs read. The containers beside
-// this file (captures, MCAP, raw dumps) hold messages of every make.
+// The part of a make that recordings need: its messages, and the file formats of its own programs. The other formats (captures,
+// MCAP, raw dumps) hold messages of every make.
 #pragma once
 
 #include <algorithm>
@@ -27,25 +27,25 @@ inline bool begins_with(BytesView front, std::initializer_list<unsigned> bytes) 
                                                     [](unsigned a, std::byte b) { return a == std::to_integer<unsigned>(b); });
 }
 
-/// A kind of file of a make.
+/// A file format of a make.
 struct FileKind {
-  std::string_view ending;              // ending of its names: ".aris"
+  std::string_view ending;              // extension: ".aris"
   std::string_view name;                // ".aris file"
   std::string_view holds;               // "frames of an ARIS"
-  bool (*begins)(BytesView) = nullptr;  // whether a file begins so; 16 bytes, fewer of a shorter file
+  bool (*begins)(BytesView) = nullptr;  // whether a file with these first 16 bytes (fewer if the file is shorter) has this format
   Result<std::unique_ptr<RecordingReader>> (*read)(std::unique_ptr<Source>) = nullptr;
   std::unique_ptr<RecordingWriter> (*write)(std::unique_ptr<Sink>) = nullptr;
-  bool is_raw_dump = false;  // the same bytes as those of a raw dump, which it reads
+  bool is_raw_dump = false;  // the format equals a raw dump, whose reader is used
 };
 
 /// The device that sent a message, as far as the message identifies it.
 struct Sender {
   std::shared_ptr<const SonarModel> model;
-  std::uint32_t serial = 0;  // 0: not known
+  std::uint32_t serial = 0;  // 0: unknown
   bool names_model = true;   // false: `model` is the first of the make, because this message names none
 };
 
-/// Samples as a message holds them: row 0 nearest, column 0 most to port, little-endian.
+/// The samples of a message: row 0 nearest, column 0 farthest to port, little-endian.
 struct Samples {
   std::size_t beams = 0, rows = 0;
   int bits = 8;
@@ -54,18 +54,18 @@ struct Samples {
 
 /// A message that holds a ping, or the part of a ping that one port sends.
 struct PingPart {
-  std::uint16_t port = 0;               // the sonar's port, if each of several sends parts of its own; else 0
+  std::uint16_t port = 0;               // the sonar's port, if several ports send different parts of a ping; else 0
   std::optional<double> head_rad = {};  // direction of a mechanical scan, as protocol::RequestPing::head_rad
 };
 
 struct Codec {
-  const Framing* framing = nullptr;  // framing of its TCP stream; null: nothing delimits messages
+  const Framing* framing = nullptr;  // framing of its TCP stream; null: messages have no delimiters
   std::span<const FileKind> files = {};
-  /// Finds the sender of a device's message or datagram; nullopt: it is another make's, or does not name its sender.
+  /// The sender of a device's message or datagram; nullopt: another make's message, or one that does not identify its sender.
   std::optional<Sender> (*sender)(const RecordedMessage&) = nullptr;
-  /// Reads the samples of a message that holds them as a picture has them. Null: this make has no such message.
+  /// Reads the samples of a message that contains a whole picture. Null: the make has no such message.
   std::optional<Samples> (*samples)(BytesView message) = nullptr;
-  /// A message as a client gets it of what Vendor::frame() makes of a ping. Null: the same bytes.
+  /// Converts the bytes of Vendor::frame() to the message that a client receives. Null: they are equal.
   Bytes (*message)(BytesView framed) = nullptr;
   /// Set if requests of hosts decide which pings they get, or if pings come by several ports: then a replay is a whole device,
   /// whose pings these are. nullopt: the message is not of a ping. A part of a ping may be a message of its own.

@@ -11,12 +11,12 @@ namespace sonar::recording {
 
 /// The boundaries of messages in a make's stream.
 struct Framing {
-  std::array<std::uint8_t, 2> magic{};  // the bytes that every message begins with
+  std::array<std::uint8_t, 2> magic{};  // first bytes of every message
   std::size_t header_size = 0;
-  /// Total length of the message with this header; nullopt: this is not a header. `strict`: unknown types are refused.
-  std::optional<std::size_t> (*length)(wire::BytesView header, Origin from, bool strict) = nullptr;  // null: lines
+  /// Total length of the message with this header; nullopt: not a header. `strict`: unknown types are not headers either.
+  std::optional<std::size_t> (*length)(wire::BytesView header, Origin from, bool strict) = nullptr;  // null: messages are lines
 
-  /// A header of a known type at the front.
+  /// Whether `bytes` begin with a header of a known type.
   bool begins_message(wire::BytesView bytes, Origin from) const;
 };
 
@@ -25,7 +25,7 @@ class MessageSplitter {
   /// `framing` must outlive it.
   MessageSplitter(Origin from, const Framing& framing) : from_(from), framing_(&framing) {}
 
-  /// Drain with next() before the next append: less than one message then remains.
+  /// Call next() until it returns nullopt before the next append, so that less than one message remains.
   void append(Time at, wire::BytesView bytes);
   /// Reports missing bytes: the incomplete message and all bytes up to the next header are lost.
   void break_off();
@@ -36,7 +36,7 @@ class MessageSplitter {
   /// Bytes of incomplete messages, and the number of such places.
   std::uint64_t lost_bytes() const { return lost_bytes_; }
   std::uint64_t losses() const { return losses_; }
-  /// The bytes of the unfinished message that have come.
+  /// Number of received bytes of the incomplete message.
   std::size_t waiting_bytes() const { return buffer_.size() - begin_; }
 
  private:

@@ -15,7 +15,7 @@ namespace sonar::recording {
 enum class Origin { device, client };
 enum class Carrier { stream, datagram };  // TCP; UDP (status)
 
-/// A whole message, or bytes between messages that do not form one. Never part of a message.
+/// A whole message, or bytes between messages; never a part of a message.
 struct RecordedMessage {
   Time at{};  // time of its last byte
   Origin from = Origin::device;
@@ -23,7 +23,7 @@ struct RecordedMessage {
   wire::Bytes bytes;
 };
 
-/// Reads a recording front to back with bounded memory. Continues after a damaged place.
+/// Reads a recording from start to end with bounded memory. It continues after damage.
 class RecordingReader {
  public:
   virtual ~RecordingReader() = default;
@@ -32,9 +32,9 @@ class RecordingReader {
   /// An error of kind bad_data whose text names the first damage and counts the others. It is complete once next() has returned
   /// nullopt.
   virtual std::optional<Error> damage() const = 0;
-  /// Starts again from the front and forgets the damage.
+  /// Starts again at the beginning and clears the damage.
   virtual void rewind() = 0;
-  /// False when the format stores no times: all are 0.
+  /// False if the format stores no times; all are then 0.
   virtual bool knows_times() const { return true; }
   /// Names the parts of the recording that were skipped, such as other sonars in the same file; empty: nothing was skipped.
   virtual std::string note() const { return {}; }
@@ -43,7 +43,7 @@ class RecordingReader {
 class RecordingWriter {
  public:
   virtual ~RecordingWriter() = default;
-  /// Times must not decrease. After an error (io) the file stays as it was before this message, and later calls write nothing.
+  /// Times must not decrease. After an error (io) the file does not contain this message, and later calls write nothing.
   virtual Result<void> write(const RecordedMessage& message) = 0;
   /// Finishes and closes the file. Errors are of kind io.
   virtual Result<void> close() = 0;

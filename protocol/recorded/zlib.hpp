@@ -11,7 +11,7 @@ namespace sonar::recording {
 /// The decompressed stream; nullopt when it is damaged or decompresses to more than `limit` bytes.
 std::optional<wire::Bytes> inflate(wire::BytesView stream, std::size_t limit);
 
-/// CRC-32 of the bytes; `crc` continues that of the bytes before them.
+/// CRC-32 of the bytes. `crc`: the CRC of preceding bytes, to continue it.
 std::uint32_t crc32(wire::BytesView bytes, std::uint32_t crc = 0);
 
 }  // namespace sonar::recording

@@ -1,4 +1,4 @@
-// The pings of a recording, front to back, as the host of their make decodes them. Used by `sonarctl` and by the live view.
+// Reads the pings of a recording, decoded by the host of their make. Used by `sonarctl` and by the live view.
 #pragma once
 
 #include <deque>
@@ -11,7 +11,7 @@
 namespace sonar::recording {
 
 struct RecordedPing {
-  Time at{};  // 0 where the format stores no times
+  Time at{};  // 0 if the format stores no times
   protocol::HostPing ping;
 };
 
@@ -21,7 +21,7 @@ std::vector<RecordedPing> decode_next(protocol::Host& host, const protocol::Make
 
 class RecordedPings {
  public:
-  /// bad_data: the recording holds no ping of a known sonar.
+  /// bad_data: the recording contains no ping of a known sonar.
   static Result<RecordedPings> open(std::unique_ptr<RecordingReader> reader);
 
   /// nullopt at the end.
@@ -37,7 +37,7 @@ class RecordedPings {
   std::unique_ptr<RecordingReader> reader_;
   SentBy by_;
   std::unique_ptr<protocol::Host> host_;
-  std::deque<RecordedPing> decoded_;  // pings of the last message that are not yet handed out
+  std::deque<RecordedPing> decoded_;  // pings of the last message that next() has not returned yet
 };
 
 }  // namespace sonar::recording

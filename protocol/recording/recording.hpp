@@ -1,5 +1,5 @@
-// A recording of any kind, identified by its first bytes: a capture (pcap, pcapng), MCAP, a file of a make's own kind, or a raw
-// dump. Used by `sonard replay`, and by `sonarctl` for --from.
+// Opens recordings of any format, recognised by their first bytes: captures (pcap, pcapng), MCAP, a make's own format, raw
+// dumps. Used by `sonard replay`, and by `sonarctl` for --from.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace sonar::recording {
 
-/// The endings of all kinds of files that are read and written, such as ".pcap, .mcap, .raw, .oculus".
+/// The extensions of all supported files, such as ".pcap, .mcap, .raw, .oculus".
 std::string file_endings();
 
 struct Recording {
@@ -20,7 +20,7 @@ struct Recording {
   std::unique_ptr<RecordingReader> reader;
 };
 /// `sonar`: selects one of several, by IPv4 address in captures, by name in MCAP; empty = the one with most bytes, or the first.
-/// missing_file, io, bad_data; usage for a sonar that no such file can name.
+/// Errors: missing_file, io, bad_data; usage if a file of this format cannot name such a sonar.
 Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});
 

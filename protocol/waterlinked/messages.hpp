@@ -19,7 +19,7 @@ struct Shot {
   Time at{};
   std::uint32_t sequence = 0;
   float speed_of_sound_mps = 0, range_m = 0;
-  std::uint32_t frequency = 0;  // shots a second
+  std::uint32_t frequency = 0;  // shots per second
   std::uint32_t width = 0, height = 0;
   float horizontal_deg = 0, vertical_deg = 0;
 };
@@ -45,7 +45,7 @@ Bytes packet_of(const RangeMessage& message);
 Bytes packet_of(const StrengthMessage& message);
 Bytes packet_of(const ImuMessage& message);
 
-/// The content of a packet: one of these, or none when it is of another kind or cannot be read.
+/// The content of a packet: at most one is set; none if the packet is of another kind or unreadable.
 struct Decoded {
   std::optional<RangeMessage> ranges;
   std::optional<StrengthMessage> strengths;

@@ -1,4 +1,4 @@
-// The datagrams of the Range Image Protocol: "RIP2", length, Snappy block, CRC-32. "RIP1" is the same without Snappy.
+// The datagrams of the Range Image Protocol: "RIP2", length, Snappy block, CRC-32. "RIP1" has no Snappy compression.
 #pragma once
 
 #include <optional>
@@ -15,9 +15,9 @@ inline constexpr std::size_t rip_overhead = 12;    // bytes around the content
 inline constexpr std::size_t longest_rip = 65507;  // a packet is a datagram
 
 Bytes rip_packet(BytesView content, Rip version = Rip::two);
-/// The length that a packet states; 0: this is not the beginning of one.
+/// The length that a packet states; 0: not the beginning of a packet.
 std::size_t rip_length(BytesView beginning);
-/// The content of a whole packet. nullopt: another length than it states, a wrong CRC, or a block that is not Snappy's.
+/// The content of a whole packet. nullopt: a wrong length, a wrong CRC, or invalid Snappy data.
 std::optional<Bytes> rip_content(BytesView packet);
 
 }  // namespace sonar::waterlinked

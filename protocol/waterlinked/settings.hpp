@@ -1,4 +1,4 @@
-// The settings that clients have made over HTTP, and the PingSettings that they mean.
+// The settings that clients have made over HTTP, and their conversion to PingSettings.
 #pragma once
 
 #include <string>
@@ -22,7 +22,7 @@ struct Settings {
   std::uint16_t unicast_port = 0;
   bool imu = false;
   std::string ntp_address = "auto";
-  std::chrono::nanoseconds clock_offset{0};  // offset of a clock that is not synchronised
+  std::chrono::nanoseconds clock_offset{0};  // offset of the device's clock while it is not synchronised
   double rate_hz = 0;                        // 0 = the mode's
   bool operator==(const Settings&) const = default;
 };
@@ -41,7 +41,7 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
 /// The receivers of the images: none while UDP output is disabled.
 protocol::SetReceivers receivers_of(const Settings& settings);
 
-/// Time as the device's clock shows it.
+/// The time of the device's clock.
 Time device_time(Time at, const Settings& settings, const protocol::DeviceState& device);
 
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);

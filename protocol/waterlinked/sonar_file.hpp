@@ -1,4 +1,4 @@
-// Recordings of a Water Linked Sonar 3D-15, .sonar: its datagrams back to back (docs/protocols/waterlinked.md).
+// Recordings of a Water Linked Sonar 3D-15 (.sonar): its successive datagrams (docs/protocols/waterlinked.md).
 #pragma once
 
 #include <memory>
@@ -8,8 +8,8 @@
 
 namespace sonar::recording {
 
-/// Each packet with the time that is in it. Packets of other kinds have the time of the one before; after damage the search goes
-/// on for the next that is whole.
+/// Reads each packet with the time that it states; packets without a time get that of the packet before. After damage it
+/// searches for the next whole packet.
 std::unique_ptr<RecordingReader> read_sonar_file(std::unique_ptr<Source> source);
 
 }  // namespace sonar::recording

@@ -1,4 +1,4 @@
-// The Water Linked Sonar 3D-15 as a vendor: settings over HTTP, images by UDP.
+// The Water Linked Sonar 3D-15: the implementation of Vendor. Settings over HTTP, images by UDP.
 #pragma once
 
 #include "protocol/vendor.hpp"

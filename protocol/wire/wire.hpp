@@ -95,7 +95,7 @@ class Visitor {
   }
 };
 
-/// Appends to a byte vector it does not own.
+/// Appends to a byte vector, which must outlive it.
 class Writer : public Visitor<Writer> {
  public:
   explicit Writer(Bytes& out, Endian endian = Endian::little) : out_(out), endian_(endian) {}
@@ -112,7 +112,7 @@ class Writer : public Visitor<Writer> {
   Endian endian_;
 };
 
-/// Reads fields from a span. It keeps the first failure; fields read after that stay unchanged.
+/// Reads fields from a span. It remembers the first failure; later fields stay unchanged.
 class Reader : public Visitor<Reader> {
  public:
   struct Failure {
@@ -235,15 +235,16 @@ class Namer : public Visitor<Namer> {
   std::string prefix_;
 };
 
-/// The position of a field in a message, and its type; little-endian. `bytes`: neither an integer nor a floating-point number.
+/// The position of a field in a message, and its type; little-endian. `bytes`: any other type than an integer or a
+/// floating-point number.
 struct Field {
   enum class Type { integer, number, bytes } type{};
   std::size_t offset = 0, size = 0;
   bool operator==(const Field&) const = default;
 };
 
-/// Finds the field of a meaning: the last one that has it, together with those right before it that have it too. An array of
-/// bytes is one field; of another array it is the first element.
+/// Finds the field with a meaning: the last such field, joined with the adjacent ones before it that have the same meaning. An
+/// array of bytes is one field; in another array it is the first element.
 template <class Meaning>
 class Locator : public Visitor<Locator<Meaning>> {
  public:
@@ -272,7 +273,7 @@ class Locator : public Visitor<Locator<Meaning>> {
     Visitor<Locator>::array(name, values);
   }
   Meaning wanted_;
-  bool is_wanted_ = false;  // the next field
+  bool is_wanted_ = false;  // whether the next field has the meaning
   std::size_t offset_ = 0;
 };
 
@@ -285,7 +286,7 @@ constexpr std::size_t wire_size() {
   return counter.bytes;
 }
 
-/// Finds the field of a meaning (Locator) in bytes in which the message begins at `at`. nullopt: no field has the meaning, or
+/// Finds the field with a meaning (Locator) in bytes in which the message begins at `at`. nullopt: no field has the meaning, or
 /// `bytes` are not empty and end before the field does.
 template <class M, class Meaning>
 constexpr std::optional<Field> locate(Meaning meaning, BytesView bytes = {}, std::size_t at = 0) {

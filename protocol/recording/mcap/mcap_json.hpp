@@ -1,4 +1,4 @@
-// JSON messages in schemas of sonard's own: ground truth, faults. Written into MCAP files by mcap_session.
+// JSON messages in sonard's own schemas: ground truth, faults, labels. mcap_session writes them into MCAP files.
 #pragma once
 
 #include <span>
@@ -20,8 +20,8 @@ JsonSchema fault_schema();  // sonard.FaultEntry
 JsonSchema label_schema();  // sonard.PingInstances
 
 struct SceneNames {
-  std::vector<std::string> objects;  // by BeamTruth::object
-  std::vector<std::string> bodies;   // moving bodies, by PingRequest::bodies_in_world
+  std::vector<std::string> objects;  // names, by BeamTruth::object
+  std::vector<std::string> bodies;   // names of moving bodies, by PingRequest::bodies_in_world
   struct Instance {
     std::string name, of_class;
   };
@@ -34,11 +34,11 @@ struct PingTruth {
   Time fired_at{};
   Pose sonar_in_world;
   std::span<const BeamTruth> beams = {};       // beam 0 most to port
-  std::span<const Pose> bodies_in_world = {};  // named by `names`, as objects are
-  const SceneNames* names = nullptr;           // null: neither object names nor bodies are written
+  std::span<const Pose> bodies_in_world = {};  // `names` has their names
+  const SceneNames* names = nullptr;           // null: no names and no bodies are written
 };
 std::string truth_json(const PingTruth& truth);
-/// The instances that the labels of a ping name.
+/// The instances that occur in the labels of a ping.
 std::string instances_json(const PingTruth& truth, const PingLabels& labels);
 
 }  // namespace sonar::recording::mcap

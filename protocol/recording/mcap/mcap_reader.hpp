@@ -1,5 +1,5 @@
-// Reads the messages of an MCAP file front to back, chunk by chunk, with or without summary; a file cut by a crash or a full disk
-// is read up to its end. Uncompressed chunks only; skips chunks with a wrong CRC.
+// Reads the messages of an MCAP file from start to end, chunk by chunk; it needs no summary, so a file truncated by a crash or
+// a full disk is readable. It reads only uncompressed chunks, and skips chunks with a wrong CRC.
 #pragma once
 
 #include <map>
@@ -12,7 +12,7 @@ namespace sonar::recording::mcap {
 
 class Reader {
  public:
-  /// bad_data when the magic number is not there.
+  /// bad_data: the magic number is missing.
   static Result<Reader> open(std::unique_ptr<Source> source);
 
   std::optional<Message> next();

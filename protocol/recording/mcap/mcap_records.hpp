@@ -1,5 +1,5 @@
-// The records of an MCAP file (mcap.dev, version 0): an opcode, a length, and fields little-endian, strings and maps behind their
-// length. Shared by writer and reader.
+// The records of an MCAP file (mcap.dev, version 0): an opcode, a length, and little-endian fields; strings and maps follow
+// their length. Shared by writer and reader.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ enum class Opcode : std::uint8_t {
 };
 inline constexpr std::size_t record_front_bytes = 9;         // opcode and length
 inline constexpr std::size_t message_front_bytes = 22;       // channel, sequence, two times
-inline constexpr std::size_t longest_record = 64 << 20;      // limit for a foreign file; chunks are not read whole
+inline constexpr std::size_t longest_record = 64 << 20;      // limit for files of other programs; chunks are not read whole
 inline constexpr std::size_t longest_description = 1 << 20;  // limit for a schema or channel
 inline constexpr std::uint64_t latest_time_ns = 4'000'000'000'000'000'000u;  // in 2096; later times are damage
 
@@ -74,7 +74,7 @@ class RecordWriter {
   std::size_t length_at_ = 0;
 };
 
-/// Consumes fields of a record's content; ok() is false when one was missing.
+/// Reads fields of a record's content; ok() is false after a missing field.
 class RecordReader {
  public:
   explicit RecordReader(BytesView content) : reader_(content) {}

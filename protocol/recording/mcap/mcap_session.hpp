@@ -1,5 +1,5 @@
-// Writes a session as an MCAP file: the vendor's bytes message by message, a picture of each ping, and poses and ground truth if
-// they are known. The vendor's bytes can be replayed; the rest is for viewers.
+// Writes a session as an MCAP file: the vendor's messages, a picture of each ping, and poses and ground truth if they are
+// known. The vendor's messages can be replayed; the rest is for viewers.
 #pragma once
 
 #include <memory>
@@ -46,7 +46,7 @@ class McapSession final : public RecordingWriter {
   std::uint16_t device_, client_, status_, image_, pose_, tf_, truth_, labels_, share_, caster_, instances_, faults_;
 };
 
-/// Reads the vendor's bytes of the sonar of that name, or of the first one. bad_data: not an MCAP file.
+/// Reads the vendor's messages of the named sonar; without a name, of the first one. bad_data: not an MCAP file.
 Result<std::unique_ptr<RecordingReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar = {});
 
 }  // namespace sonar::recording

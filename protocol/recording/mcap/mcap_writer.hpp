@@ -1,5 +1,5 @@
-// Writes MCAP files: uncompressed chunks with their CRC and indexes, a summary, a footer. Channels and
-// contents of messages are up to the caller (mcap_session.hpp).
+// Writes MCAP files: uncompressed chunks with their CRC and indexes, a summary, a footer. The caller (mcap_session.hpp) defines
+// channels and contents.
 #pragma once
 
 #include <memory>
@@ -10,8 +10,8 @@ namespace sonar::recording::mcap {
 
 class Writer {
  public:
-  static constexpr std::size_t chunk_bytes = 1 << 20;           // a chunk ends behind the message that fills it
-  static constexpr std::chrono::seconds longest_chunk_time{2};  // short, so that little is lost with the program
+  static constexpr std::size_t chunk_bytes = 1 << 20;           // a chunk ends after the message that fills it
+  static constexpr std::chrono::seconds longest_chunk_time{2};  // short, so that a crash loses little
 
   explicit Writer(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
 
@@ -19,8 +19,8 @@ class Writer {
   std::uint16_t add_channel(Channel channel);  // sets its id
   /// Messages of a channel are numbered from 0. io: later calls fail; the file stays readable.
   Result<void> write(std::uint16_t channel, Time at, BytesView data);
-  /// Ends the last chunk, adds summary and footer, closes. After an error of write(): tries to add those of the
-  /// chunks in the file, and returns the first error. Errors: io.
+  /// Ends the last chunk, adds summary and footer, closes. After an error of write() it tries to add the summary of the written
+  /// chunks, and returns the first error. Errors: io.
   Result<void> close();
 
  private:
@@ -29,7 +29,7 @@ class Writer {
     std::uint64_t offset = 0, length = 0, index_length = 0, size = 0;
     std::map<std::uint16_t, std::uint64_t> index_offsets;
   };
-  using Entries = std::vector<std::pair<Time, std::uint64_t>>;  // entries of a channel: time, place in the chunk
+  using Entries = std::vector<std::pair<Time, std::uint64_t>>;  // entries of a channel: time, offset in the chunk
 
   Result<void> begin();
   Result<void> put(const Bytes& bytes);
@@ -44,12 +44,12 @@ class Writer {
   std::vector<Schema> schemas_;
   std::vector<Channel> channels_;
   std::vector<std::uint32_t> next_sequence_;
-  std::vector<bool> announced_, announced_before_;  // in the file or this chunk; in the file
+  std::vector<bool> announced_, announced_before_;  // channels written to the file or this chunk; to the file
   Bytes chunk_;
   Time chunk_first_{}, chunk_last_{};
   std::map<std::uint16_t, Entries> entries_;
   std::vector<ChunkPlace> chunks_;
-  std::map<std::uint16_t, std::uint64_t> counts_;  // numbers of messages in whole chunks
+  std::map<std::uint16_t, std::uint64_t> counts_;  // number of messages in complete chunks
   std::uint64_t position_ = 0;
   std::uint32_t data_crc_ = 0;
   bool begun_ = false;

@@ -1,4 +1,5 @@
-// A captured packet down to its TCP segment or UDP datagram. Second step of reading a capture; tcp_stream.hpp orders segments.
+// Extracts the TCP segment or UDP datagram of a captured packet. Second step of reading a capture; tcp_stream.hpp orders
+// segments.
 #pragma once
 
 #include <compare>
@@ -33,7 +34,7 @@ struct Segment {
 /// IPv6, fragments, cut headers.
 std::optional<Segment> parse_packet(std::uint32_t link_type, wire::BytesView packet);
 
-/// The first fragment of an IPv4 datagram that was sent in several.
+/// Whether the packet is the first fragment of an IPv4 datagram.
 bool begins_fragments(std::uint32_t link_type, wire::BytesView packet);
 
 /// True for link types that parse_packet supports.

@@ -1,5 +1,5 @@
-// Integers at any place in a block of bytes; 0 if the block is too short. Used for the headers of packets and of capture files,
-// which are not read from front to back.
+// Reads integers at any offset of a block of bytes; 0 if the block is too short. Used for the headers of packets and of capture
+// files.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// Packets of a capture file, classic pcap or pcapng, one after the other. First step of reading a capture; ip_packet.hpp takes
-// them apart.
+// Reads the packets of a capture file (classic pcap or pcapng). First step of reading a capture; ip_packet.hpp decodes them.
 #pragma once
 
 #include <memory>
@@ -18,7 +17,7 @@ struct Packet {
 };
 
 /// pcap: seconds and micro- or nanoseconds, either byte order. pcapng: sections, interfaces with their own time unit, enhanced
-/// and simple packets; other blocks are passed over.
+/// and simple packets; other blocks are skipped.
 class PacketReader {
  public:
   static constexpr std::size_t longest_packet = 256 << 10;  // tcpdump's own bound
@@ -26,7 +25,7 @@ class PacketReader {
   static Result<PacketReader> open(Source& source);
 
   std::optional<Packet> next();
-  /// Blocks that were left out, and where the file could not be read any further.
+  /// Skipped blocks, and the position at which the file became unreadable.
   const Damages& damages() const { return damages_; }
   void rewind();
 

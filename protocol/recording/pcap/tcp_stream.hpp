@@ -20,17 +20,17 @@ class TcpStream {
     Time at{};
     wire::Bytes bytes;
     std::uint64_t missing_before = 0;  // bytes that the capture lacks here
-    bool from_middle = false;          // the capture begins after the connection did
+    bool from_middle = false;          // the capture began after the connection
   };
 
-  /// Adds a segment. `sequence`: its sequence number, which is that of its first byte, or that of the SYN.
+  /// Adds a segment. `sequence`: the sequence number of its first byte or, in a SYN, of the SYN.
   void add(Time at, std::uint32_t sequence, wire::BytesView payload, bool syn);
   /// Ends the connection or the capture: releases held segments.
   void finish();
   std::optional<Run> next();
   /// Memory of early segments, including overhead.
   std::size_t held_bytes() const { return waiting_bytes_ + waiting_.size() * 128; }
-  /// True when a SYN with this number begins another connection than the one that is being read.
+  /// True if a SYN with this number begins another connection.
   bool is_other(std::uint32_t syn_sequence) const { return begun_ && (!saw_syn_ || first_ != syn_sequence + 1); }
 
  private:
