@@ -1,4 +1,4 @@
-// A line of the log as data, so that the code that makes it does not depend on where it is written.
+// A log line as data, so that the code that makes it does not depend on the logger.
 #pragma once
 
 #include <string>

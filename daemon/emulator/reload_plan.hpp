@@ -1,4 +1,4 @@
-// Outcome of a reload for running sonars. Pure.
+// Determines what a reload of the configuration does to running sonars. Pure.
 #pragma once
 
 #include <vector>
@@ -7,12 +7,12 @@
 
 namespace sonar {
 
-/// untouched and moved: it keeps its clients; changed: it is replaced; removed: it stops.
+/// untouched and moved sonars keep their clients; a changed one is replaced; a removed one stops.
 enum class SonarChange { untouched, moved, changed, removed };
-/// Change of a sonar that runs as `running`, when `next` takes the place of `now`.
+/// The change of the sonar `running` if configuration `next` replaces `now`.
 SonarChange sonar_change(const SonarConfig& running, const Config& now, const Config& next);
 
-/// Returns null if there is none.
+/// Null if there is no sonar of this name.
 const SonarConfig* sonar_named(const std::vector<SonarConfig>& sonars, const std::string& name);
 
 }  // namespace sonar

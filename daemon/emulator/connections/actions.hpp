@@ -1,4 +1,4 @@
-// Requests of an emulated sonar to its caller, which moves the bytes: returned by every call of Sonar, carried out in order.
+// Instructions that an emulated sonar returns from every call. The caller, which has the sockets, carries them out in order.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ struct ComputePing {
 struct Serve {
   ConnectionId connection = 0;
 };
-/// All slots are taken: keep the connection open, neither read nor write, until Serve.
+/// All slots are taken: keep the connection open, but neither read nor write until Serve.
 struct KeepWaiting {
   ConnectionId connection = 0;
 };
@@ -38,7 +38,7 @@ struct Refuse {
   ConnectionId connection = 0;
   bool reset = false;  // RST in place of FIN
 };
-/// The ports of kind tcp_stream accept connections, or refuse them as a port does that no program listens at. Open from the
+/// Whether the ports of kind tcp_stream accept connections, or refuse them as ports without a listener do. They accept from the
 /// start.
 struct Listen {
   bool on = true;
@@ -48,7 +48,7 @@ struct ReadFrom {
   ConnectionId connection = 0;
   bool on = true;
 };
-/// Write the rest of the message being written without the pauses of a fault.
+/// Write the rest of the current message without the pauses of a fault.
 struct EndPauses {
   ConnectionId connection = 0;
 };
@@ -56,7 +56,7 @@ struct EndPauses {
 struct Wake {
   ConnectionId connection = 0;
 };
-/// Complete the message being written, send no other, and end the stream; on_closed() follows.
+/// Complete the current message, send no other, and end the stream; on_closed() follows.
 struct Finish {
   ConnectionId connection = 0;
   std::string why;
@@ -75,15 +75,15 @@ struct Closed {
   std::string why;
   bool by_client = false;  // the client closed the connection
 };
-/// The status broadcast has news: send it now.
+/// The content of the status broadcast has changed: send it now.
 struct Announce {};
-/// A ping was framed and queued to every client, observer and stream that takes it.
+/// A ping was framed and queued for every client, observer and stream that gets it.
 struct PingQueued {
   std::shared_ptr<const Ping> ping;
   std::shared_ptr<const protocol::Bytes> bytes;                                // null: not sent over TCP
-  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream that has receivers
+  std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // one element for each stream with receivers
   double simulation_s = 0;
-  bool preview = false;                             // for viewers of the live view alone
+  bool preview = false;                             // only for viewers of the live view
   std::optional<protocol::Distance> distance = {};  // result of a range finder, unless a fault withholds the ping
 };
 /// A line for the log. The lines of one topic share a rate limit.
@@ -100,23 +100,23 @@ using Action = std::variant<ComputePing, Serve, KeepWaiting, Refuse, Listen, Rea
                             Announce, PingQueued, Report, EngineFailed>;
 using Actions = std::vector<Action>;
 
-/// Adds a line of that sonar for the log.
+/// Adds a log line about a sonar.
 inline void report(const std::string& sonar, Report::Topic topic, LogLevel level, std::string phrase,
                    std::vector<LogField> fields, Actions& actions) {
   fields.insert(fields.begin(), {"sonar", sonar});
   actions.emplace_back(Report{topic, {level, std::move(phrase), std::move(fields)}});
 }
 
-/// The bytes of a ping as a recording holds them, for each port of the vendor by its number; 0: for every port.
+/// The recorded bytes of a ping, by port number; 0: for every port.
 using PartsByPort = std::vector<std::pair<std::uint16_t, protocol::Bytes>>;
 /// Outcome of a PingRequest.
 struct PingOutcome {
   std::shared_ptr<const Ping> ping = nullptr;  // null on failure
   std::string failure = {};
-  bool refused = false;             // only this ping failed: the request is invalid, or memory is short
-  ErrorKind kind = ErrorKind::bug;  // kind of a failure of the engine
-  double seconds = 0;               // wall time of its computation, without pings of other sonars computed in between
-  std::shared_ptr<const PartsByPort> recorded = nullptr;  // in place of what the vendor makes of the ping; empty: nothing is sent
+  bool refused = false;                                   // only this ping failed: an invalid request, or too little memory
+  ErrorKind kind = ErrorKind::bug;                        // kind of a failure of the engine
+  double seconds = 0;                                     // wall time of its computation, without other sonars' pings in between
+  std::shared_ptr<const PartsByPort> recorded = nullptr;  // sent in place of the vendor's encoding; empty: nothing is sent
 };
 
 }  // namespace sonar

@@ -24,7 +24,7 @@ bool Connection::receives(std::size_t stream) const {
                      [stream](const protocol::SetReceivers& list) { return list.stream == stream && !list.to.empty(); });
 }
 
-// `not_before` bounds the rate of ticks: a dialogue that is always due must not keep the sonar busy.
+// `not_before` limits the rate of ticks, so that a dialogue that is always due cannot keep the sonar busy.
 std::optional<Time> Connection::next_tick() const {
   if (finishing || dialogue == nullptr) return std::nullopt;
   return std::max(dialogue->next_tick(), not_before);
@@ -68,7 +68,7 @@ std::vector<protocol::Endpoint> Connections::receivers(const Connection& stream)
   const std::size_t number = stream.receivers.front().stream;
   std::vector<protocol::Endpoint> all;
   for (const Connection& c : all_) {
-    // The list of the device belongs to the stream itself; those of clients count while they are served.
+    // The stream itself has the device's list; the lists of clients count while they are served.
     const bool counts = c.role == Role::stream ? c.id == stream.id : !c.finishing && c.state == State::served;
     for (const protocol::SetReceivers& list : c.receivers)
       for (const protocol::Endpoint& to : list.to)
@@ -88,7 +88,7 @@ bool Connections::settled() const {
                      [](const Connection& c) { return c.role == Role::observer || c.state != State::served || c.outbox.idle(); });
 }
 
-/// A full sonar takes over, queues or refuses, by the rule `when_full`. The queue is bounded; beyond it clients are refused.
+/// If no slot is free, the rule `when_full` decides: take over, queue or refuse. If the queue is full, clients are refused.
 Connections::Verdict Connections::verdict(Role role) const {
   if (role == Role::observer)
     return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::refuse;

@@ -1,6 +1,6 @@
-// The connections of one emulated sonar: its clients, those that wait for a slot, those that are leaving, and observers, which
-// receive every ping and change nothing. Each has its conversation in the vendor's protocol and its outbox. Streams of datagrams
-// are connections without a conversation. No sockets, no clock.
+// The connections of one emulated sonar: clients, connections that wait for a slot, connections that are ending, and observers,
+// which receive every ping and change nothing. Each has a conversation in the vendor's protocol and an outbox. Streams of
+// datagrams are connections without a conversation. No sockets, no clock.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace sonar {
 
 struct Peer {
   std::string name;     // for the log: "127.0.0.1:40123"
-  protocol::Ipv4 ip{};  // as the status message shows it
+  protocol::Ipv4 ip{};  // as in the status message
   std::uint16_t port = 0;
 };
 
@@ -27,7 +27,7 @@ struct Connection {
   enum class State {
     waiting,  // for a slot
     served,
-    leaving,  // finishing: it gets the rest of its message, and does not count as a client after a take-over
+    leaving,  // ending: it gets the rest of its message; after a take-over it does not count as a client
   };
   ConnectionId id = 0;
   Role role = Role::client;
@@ -37,30 +37,30 @@ struct Connection {
   const protocol::Port* port = nullptr;  // one of the vendor's ports
   std::unique_ptr<protocol::Dialogue> dialogue;
   Outbox outbox;
-  /// Receivers that a client requested, one list for each stream it named; for a stream the device's own list, one.
+  /// Receivers. Of a client: the lists that it requested, one per stream. Of a stream: the device's own list.
   std::vector<protocol::SetReceivers> receivers;
   struct Held {  // held back by a fault
     Outbox::Message ping;
     Time until{};
-    bool after_next = false;  // held until the next ping has overtaken it
+    bool after_next = false;  // held until the next ping has been sent
   };
   std::deque<Held> held;
-  bool finishing = false;  // its bytes are ignored, and no more pings are offered
+  bool finishing = false;  // its bytes are ignored, and it gets no more pings
   Time not_before{};       // earliest next call of dialogue->on_tick, in unskipped time
   std::uint64_t bytes_written = 0, bytes_read = 0;
   std::uint64_t streamed_pings = 0, streamed_bytes = 0;  // sent to the receivers of this client by a stream's datagrams
-  std::uint64_t requests = 0;                            // for settings or a ping
+  std::uint64_t requests = 0;                            // requests for settings or a ping
   std::string complaint = {};                            // the latest complaint about its requests
 
-  /// Returns whether it gets datagrams: its port is of kind udp_stream or udp_dialogue.
+  /// Whether it gets datagrams: its port is of kind udp_stream or udp_dialogue.
   bool takes_datagrams() const { return port != nullptr && port->kind != protocol::Port::Kind::tcp_stream; }
   /// Pings sent to it by its own connection or a stream.
   std::uint64_t pings_written() const { return outbox.pings_written() + streamed_pings; }
-  /// Returns whether it has requested a receiver of that stream.
+  /// Whether it has requested a receiver of that stream.
   bool receives(std::size_t stream) const;
-  /// The next time at which the conversation must be called; none while the connection ends.
+  /// The next time at which the conversation must be called; nullopt while the connection is ending.
   std::optional<Time> next_tick() const;
-  /// The time at which the conversation will request a ping by itself.
+  /// The time at which the conversation will request a ping unasked.
   std::optional<Time> next_request() const;
 };
 
@@ -90,10 +90,10 @@ class Connections {
   std::vector<protocol::Endpoint> receivers(const Connection& stream) const;
   /// True if a client is served or a stream has receivers.
   bool has_audience() const;
-  /// True if every client has received all that it was sent.
+  /// True if nothing waits to be sent to any client.
   bool settled() const;
 
-  /// Decides by the rules of max_clients, when_full and max_observers.
+  /// The decision about a new connection by the rules max_clients, when_full and max_observers.
   enum class Verdict { serve, take_over, wait, refuse };
   Verdict verdict(Role role) const;
   Connection& add(ConnectionId id, Role role, Peer peer, Connection::State state, const protocol::Port* port);

@@ -1,5 +1,4 @@
-// Counters of the running daemon: figures of one sonar and histograms of its times.
-// Plain values, filled by the Sonar and written out by prometheus.hpp; no clock, no I/O.
+// Counters and histograms of one sonar. Plain values: the Sonar updates them, prometheus.hpp prints them; no clock, no I/O.
 #pragma once
 
 #include <array>
@@ -13,7 +12,7 @@
 
 namespace sonar {
 
-/// Counts times by their length. The bounds are fixed, so adding needs no memory and different runs can be compared.
+/// A histogram of durations. The bounds are fixed, so adding needs no memory and runs can be compared.
 class Histogram {
  public:
   static constexpr std::array bounds_s{0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02,
@@ -23,10 +22,10 @@ class Histogram {
   void add(double seconds);
   std::uint64_t count() const { return count_; }
   double sum_s() const { return sum_s_; }
-  /// Counts of times up to and including bounds_s[i], above the bound before; the last counts those beyond all bounds.
+  /// Element i counts durations above bounds_s[i - 1] up to bounds_s[i]; the last element counts those beyond all bounds.
   const std::array<std::uint64_t, bounds_s.size() + 1>& counts() const { return counts_; }
-  /// Estimates a quantile, q in [0, 1], linearly between two bounds: accurate to a factor of 2.5. Beyond the last bound it
-  /// returns that; 0 if empty.
+  /// Estimates a quantile, q in [0, 1], by linear interpolation between two bounds: accurate to a factor of 2.5. Quantiles
+  /// beyond the last bound return that bound; 0 if empty.
   double quantile_s(double q) const;
 
  private:
@@ -39,27 +38,27 @@ class Histogram {
 /// unwanted + those offered to clients; offered = sent + dropped (+ those in the outboxes now).
 struct DeviceFigures {
   std::uint64_t ticks = 0;
-  std::uint64_t skipped_ticks = 0;                       // ticks without a ping
-  SkippedTicks skipped;                                  // the reasons
-  std::uint64_t skipped_stale = 0;                       // another reason: the vehicle's poses had stopped (poses.on_stale: stop)
-  std::uint64_t pings = 0;                               // simulated
-  std::uint64_t refused = 0;                             // pings that the engine refused
-  std::uint64_t unwanted = 0;                            // pings whose clients had gone or had requested other settings
-  std::uint64_t out_of_water = 0;                        // pings of noise only, because the sonar was above the sea surface
-  std::uint64_t served = 0;                              // written whole to at least one client
-  std::uint64_t offered = 0;                             // pings offered to clients: a ping counts for each of them
-  std::uint64_t sent = 0;                                // written whole to a client
-  std::uint64_t dropped = 0;                             // pings that were not written to a client
-  std::array<std::uint64_t, drop_reasons> dropped_by{};  // why, by DropReason
-  std::uint64_t waiting = 0;                             // in outboxes now, not yet begun
+  std::uint64_t skipped_ticks = 0;  // number of ticks without a ping
+  SkippedTicks skipped;             // by reason
+  std::uint64_t skipped_stale = 0;  // one more reason: the vehicle's poses had stopped (poses.on_stale: stop)
+  std::uint64_t pings = 0;          // simulated
+  std::uint64_t refused = 0;        // pings that the engine refused
+  std::uint64_t unwanted = 0;       // pings whose clients had gone or had requested other settings
+  std::uint64_t out_of_water = 0;   // pings of noise only, because the sonar was above the sea surface
+  std::uint64_t served = 0;         // written whole to at least one client
+  std::uint64_t offered = 0;        // pings offered to clients, counted once per client
+  std::uint64_t sent = 0;           // written whole to a client
+  std::uint64_t dropped = 0;        // pings that were not written to a client
+  std::array<std::uint64_t, drop_reasons> dropped_by{};  // by DropReason
+  std::uint64_t waiting = 0;                             // pings in outboxes now that are not being written yet
   std::uint64_t clients = 0, refused_clients = 0;        // since the start
   std::uint64_t clients_now = 0, clients_queued = 0;
   std::uint64_t bytes_written = 0, bytes_read = 0;
   double simulation_s = 0;  // wall time of all pings
   Histogram simulation;     // time to compute a ping
-  Histogram lateness;       // delay from a tick to its processing
-  Histogram jitter;         // difference between the interval of two pings at a client's socket and the interval of their ticks
-  Histogram latency;        // from a ping's tick to its last byte handed to the kernel, for each client
+  Histogram lateness;       // delay from a tick's time to its processing
+  Histogram jitter;         // interval of two pings at a client's socket minus the interval of their ticks
+  Histogram latency;        // from a ping's tick until the kernel has its last byte, for each client
 };
 
 }  // namespace sonar

@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// The bound protects against a client that sends requests and does not read the replies.
+/// The limit protects against clients that send requests but do not read the replies.
 bool Outbox::push_reply(Bytes reply) {
   if (replies_.size() >= most_replies || reply_bytes_ + reply.size() > most_reply_bytes) return false;
   reply_bytes_ += reply.size();
@@ -21,12 +21,12 @@ std::size_t Outbox::Message::size() const {
   return all;
 }
 
-// A slow client gets the newest pings: the oldest that waits is dropped (drop_newest is for a fault). The message that is being
-// written is never dropped, or the stream would be cut.
+// A slow client gets the newest pings: the oldest waiting one is dropped (only a fault uses drop_newest). The message that is
+// being written is never dropped, because that would cut the stream.
 void Outbox::push(Message ping, bool limited) {
   const std::size_t size = ping.size();
   ++pings_offered_;
-  // An empty queue accepts any ping, so that one that exceeds most_ping_bytes can still be sent.
+  // An empty queue accepts any ping, so that a ping larger than most_ping_bytes can be sent.
   const auto full = [&] {
     return limited && !pings_.empty() &&
            (pings_.size() >= static_cast<std::size_t>(rules_.depth) || ping_bytes_ + size > most_ping_bytes);
@@ -35,7 +35,7 @@ void Outbox::push(Message ping, bool limited) {
     count_drop(DropReason::slow);
     return;
   }
-  // The oldest pings make room, so that a slow client gets the newest picture.
+  // Drops the oldest pings, so that a slow client gets the newest picture.
   while (full()) {
     ping_bytes_ -= pings_.front().size();
     pings_.pop_front();
@@ -45,8 +45,8 @@ void Outbox::push(Message ping, bool limited) {
   pings_.push_back(std::move(ping));
 }
 
-// Replies come before pings, because a client may wait for a reply before it reads on. One message is out at a time: the caller
-// returns it by written() or not_written().
+// Replies come before pings, because a client may wait for a reply before it reads more. Only one message is taken at a time:
+// the caller reports its end by written() or not_written().
 Outbox::Message Outbox::take() {
   if (writing_ || (replies_.empty() && pings_.empty())) return {};
   writing_ = true;
@@ -82,7 +82,7 @@ void Outbox::drop_waiting_pings(DropReason why) {
   ping_bytes_ = 0;
 }
 
-// Each ping that was offered is counted once, also the one that is being written: offered = written + dropped (+ waiting).
+// Each offered ping is counted once, including the current one: offered = written + dropped (+ waiting).
 void Outbox::end(DropReason why) {
   drop_waiting_pings(why);
   // The message being written is incomplete at the client, so its ping counts as dropped.

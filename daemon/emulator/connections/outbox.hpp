@@ -1,5 +1,5 @@
 // Messages that wait for one client: the one being written, replies in order, and at most `depth` pings. The Sonar fills it; the
-// session empties it. It holds only whole messages, so a stream is never cut or mixed.
+// session empties it. It contains only whole messages, so messages are never cut or mixed.
 #pragma once
 
 #include <array>
@@ -16,23 +16,23 @@
 
 namespace sonar {
 
-/// The reason why a ping that was offered to a client did not reach it whole.
+/// The reason why a client did not receive an offered ping completely.
 enum class DropReason {
   slow,   // a newer ping replaced it, or the queue was full
   gone,   // the connection ended first
-  stop,   // sonard ended the conversation; only the message being written is completed
-  fault,  // a fault on purpose
+  stop,   // sonard ended the conversation; only the current message is completed
+  fault,  // a fault injected by the user
 };
 inline constexpr std::size_t drop_reasons = 4;
 
 class Outbox {
  public:
   using Bytes = std::vector<std::byte>;
-  /// How a message is written when a fault or the port's gap shapes it. Its bytes stay as they are.
+  /// The pauses and the end with which a fault, or the port's gap, has a message written. The bytes do not change.
   struct Shape {
     struct Pause {
-      std::size_t before = 0;             // the byte of that index
-      std::chrono::nanoseconds length{};  // 0: written separately, without a pause
+      std::size_t before = 0;             // index of the byte after the pause
+      std::chrono::nanoseconds length{};  // 0: a separate write without a pause
     };
     std::vector<Pause> pauses;                            // by increasing index
     enum class End { none, fin, reset } end = End::none;  // how the connection ends after the last byte
@@ -40,15 +40,15 @@ class Outbox {
   struct Message {
     std::shared_ptr<const Bytes> bytes;
     std::uint32_t ping = 0;       // number of the ping; 0 = a reply
-    std::vector<Bytes> prefixes;  // prefixes of a ping: it is sent once for each, the prefix first; none = once, as it is
+    std::vector<Bytes> prefixes;  // a ping is sent once per prefix, after the prefix; none = once, without a prefix
     Time fired_at{};              // when the ping was fired
-    std::shared_ptr<const std::vector<Bytes>> datagrams = nullptr;  // datagrams of a ping, in place of bytes
+    std::shared_ptr<const std::vector<Bytes>> datagrams = nullptr;  // datagrams of a ping, instead of `bytes`
     std::shared_ptr<const Shape> shape = nullptr;  // shape of a message without prefixes and datagrams; may be empty
     explicit operator bool() const { return bytes != nullptr || datagrams != nullptr; }
-    std::size_t size() const;  // bytes, without prefixes
+    std::size_t size() const;  // in bytes, without prefixes
   };
-  static constexpr std::size_t most_ping_bytes = 8u << 20;    // waiting pings of one client
-  static constexpr std::size_t most_reply_bytes = 64u << 10;  // limit for a client that sends requests and does not read
+  static constexpr std::size_t most_ping_bytes = 8u << 20;    // limit for the waiting pings of one client
+  static constexpr std::size_t most_reply_bytes = 64u << 10;  // limit for clients that send requests but do not read
   static constexpr std::size_t most_replies = 256;
 
   explicit Outbox(OutboxRules rules) : rules_(rules) {}
@@ -59,24 +59,24 @@ class Outbox {
     push_ping({std::move(bytes), number, std::move(prefixes), fired_at});
   }
   void push_ping(Message ping) { push(std::move(ping), true); }
-  /// Adds a ping that a fault held back, also beyond the depth.
+  /// Adds a ping that a fault held back, even beyond the depth.
   void push_held(Message ping) { push(std::move(ping), false); }
-  /// Returns the next message to write, replies before pings. Empty while a message is being written, or if none waits.
+  /// Returns the next message to write, replies before pings; empty while a message is being written or if none waits.
   Message take();
-  /// Reports that the message last taken was written completely.
+  /// Call it when the message that take() returned was written completely.
   void written();
-  /// Reports that the message last taken could not be written; it counts as dropped. Later messages may follow.
+  /// Call it when the message that take() returned could not be written; it counts as dropped. Later messages may follow.
   void not_written(DropReason why = DropReason::gone);
-  /// Counts a ping that was offered and dropped without waiting.
+  /// Counts a ping as offered and dropped, without queueing it.
   void drop_offered(DropReason why) { ++pings_offered_, count_drop(why); }
   void use(OutboxRules rules) { rules_ = rules; }
-  /// Keeps the message being written and the replies, which are small.
+  /// Drops the waiting pings. The current message and the replies, which are small, stay.
   void drop_waiting_pings(DropReason why = DropReason::stop);
-  /// Call it when the connection is over: everything that was not written is dropped, the message being written too.
+  /// Call it when the connection has ended: drops all messages, including the current one.
   void end(DropReason why);
 
   bool idle() const { return !writing_ && replies_.empty() && pings_.empty(); }
-  /// At any moment offered = written + dropped + waiting + the one being written.
+  /// At any moment: offered = written + dropped + waiting + the one being written.
   std::uint64_t pings_offered() const { return pings_offered_; }
   std::uint64_t pings_written() const { return pings_written_; }
   std::uint64_t pings_dropped() const;

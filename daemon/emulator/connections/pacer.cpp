@@ -7,7 +7,7 @@ namespace sonar {
 
 namespace {
 
-/// Time until the last echo is back, and a rest of 2 ms before the next ping.
+/// Time until the last echo has returned, plus a rest of 2 ms before the next ping.
 double travel_s(const PingSettings& s) {
   const double sound_speed_mps = s.device_sound_speed_mps > 0 ? static_cast<double>(s.device_sound_speed_mps) : 1500.0;
   return 2.0 * s.range_m / sound_speed_mps + 0.002;
@@ -23,9 +23,10 @@ std::chrono::nanoseconds ping_period(const PingSettings& s) {
 void Pacer::configure(const PingSettings& settings, Time now) {
   const auto period = ping_period(settings);
   travel_ = nanoseconds_from(travel_s(settings));
-  // With an unchanged period the grid stays: some drivers repeat their settings for every ping and would postpone each one.
+  // With an unchanged period the grid stays; otherwise a driver that repeats its settings for every ping would postpone each
+  // one.
   if (running_ && period == period_ && settings.triggered == triggered_) return;
-  // A new grid begins when the last echo has arrived and the shorter of both periods is over.
+  // A new grid begins when the last echo has returned and the shorter of both periods has passed.
   const Time quiet_until = has_fired_ ? std::max(home_at_, last_tick_ + std::min(period_, period)) : now;
   running_ = period.count() > 0;
   // A trigger that waits stays valid only if pings were triggered before and still are.
@@ -61,8 +62,8 @@ void Pacer::forget_trigger() {
   if (std::exchange(trigger_waits_, false)) ++skipped_.trigger;
 }
 
-// States of a triggered sonar: idle; a trigger waits (trigger_waits_) for its time (trigger_at_), which is when the previous ping
-// is over; then fire() fires it.
+// States of a triggered sonar: idle; or a trigger waits (trigger_waits_) until the previous ping is over (trigger_at_), when
+// fire() fires the ping.
 void Pacer::trigger(Time now, bool joins) {
   if (!running_ || !triggered_) return;
   // At most one ping is due. A trigger joins the one that waits, or is counted as skipped.
@@ -74,7 +75,7 @@ void Pacer::trigger(Time now, bool joins) {
   }
   ++ticks_;
   trigger_waits_ = true;
-  // A trigger fires at once if a period has passed since the last ping, else when it has passed.
+  // A trigger fires as soon as a period has passed since the last ping.
   trigger_at_ = has_fired_ ? std::max({now, start_, last_tick_ + period_}) : std::max(now, start_);
 }
 
@@ -84,7 +85,7 @@ std::optional<Time> Pacer::next_tick() const {
   return start_ + index_ * period_;
 }
 
-/// Remembers when the sound of this ping is back: configure() begins no new grid before then.
+/// Remembers when the echoes of this ping will have returned: configure() begins no new grid before then.
 void Pacer::note_ping(Time at) {
   last_tick_ = at;
   home_at_ = at + travel_;
@@ -104,7 +105,7 @@ bool Pacer::fire(Time now, bool busy) {
     note_ping(now);
     return true;
   }
-  // In free running, ticks that have passed, or that come while the simulation is busy, are counted and never repeated.
+  // Free running: missed ticks, and ticks while the simulation is busy, are counted and never repeated.
   const std::int64_t reached = (now - start_) / period_;  // index of the newest tick that has passed
   const auto missed = static_cast<std::uint64_t>(reached - index_);
   ticks_ += missed + 1;
@@ -114,7 +115,7 @@ bool Pacer::fire(Time now, bool busy) {
     ++skipped_.busy;
     return false;
   }
-  // The ping is stamped with its place on the grid, however late the call comes.
+  // The ping's stamp is its time on the grid, however late the call is.
   note_ping(start_ + reached * period_);
   return true;
 }

@@ -1,5 +1,5 @@
-// Computes when the next ping of one sonar is due: on a grid from its start (never a sum of sleeps), or one ping per trigger.
-// Pure arithmetic on times that the caller passes; the caller of the Sonar sets the timer.
+// Computes when the next ping of a sonar is due: at multiples of the period from a start time (never a sum of sleeps), or one
+// ping per trigger. Pure arithmetic on times that the caller passes; the caller of the Sonar sets the timer.
 #pragma once
 
 #include <cstdint>
@@ -10,23 +10,23 @@
 
 namespace sonar {
 
-/// Returns the time between two pings: that of the requested rate, but at least the two-way travel of sound to the range plus 2
-/// ms (docs/protocols/oculus.md, section 5.6). Zero in standby.
+/// The time between two pings: 1 / requested rate, but at least the two-way travel time to the range plus 2 ms
+/// (docs/protocols/oculus.md, section 5.6). Zero in standby.
 std::chrono::nanoseconds ping_period(const PingSettings& settings);
 
 /// Counts of ticks and triggers without a ping.
 struct SkippedTicks {
-  std::uint64_t late = 0;     // the next tick was due already
-  std::uint64_t busy = 0;     // the ping before it was still being computed
-  std::uint64_t trigger = 0;  // another trigger was waiting, or pings stopped before this one was used
+  std::uint64_t late = 0;     // the next tick was already due
+  std::uint64_t busy = 0;     // the previous ping was still being computed
+  std::uint64_t trigger = 0;  // another trigger was waiting, or pings stopped before this trigger was used
   std::uint64_t total() const { return late + busy + trigger; }
 };
 
 class Pacer {
  public:
-  /// New settings. The grid continues if period and trigger mode stay the same; otherwise it restarts at `now`, but not before
-  /// the sound of the last ping has come back, and not sooner after it than the shorter of both periods. A pending trigger is
-  /// kept as long as pings are triggered.
+  /// Uses new settings. If period and trigger mode are unchanged, the grid continues. Otherwise it restarts at `now`, but not
+  /// before the echoes of the last ping have returned and the shorter of both periods has passed since that ping. A pending
+  /// trigger is kept while pings are triggered.
   void configure(const PingSettings& settings, Time now);
   /// Call it when the clock jumps ahead: moves all times by `by`.
   void skip(std::chrono::nanoseconds by);
@@ -34,8 +34,8 @@ class Pacer {
   void hurry(Time now);
   /// No pings until the next configure().
   void stop();
-  /// A client requests a ping. One trigger waits while the previous ping is computed. Further ones count as skipped, or join the
-  /// waiting one.
+  /// A client requests a ping. One trigger can wait while the previous ping is computed. Further triggers count as skipped or,
+  /// with `joins`, share the waiting one.
   void trigger(Time now, bool joins = false);
   /// The time at which fire() must be called next; none in standby, when stopped, or without a trigger.
   std::optional<Time> next_tick() const;
@@ -46,7 +46,7 @@ class Pacer {
   Time last_tick() const { return last_tick_; }
   bool trigger_waits() const { return trigger_waits_; }
   std::chrono::nanoseconds period() const { return period_; }
-  /// Ticks that were due: those skipped, those fired, and a trigger that waits.
+  /// Number of ticks that were due: skipped, fired, and a waiting trigger.
   std::uint64_t ticks() const { return ticks_; }
   const SkippedTicks& skipped() const { return skipped_; }
   std::uint64_t skipped_ticks() const { return skipped_.total(); }
@@ -56,7 +56,7 @@ class Pacer {
   void note_ping(Time at);
 
   bool running_ = false, triggered_ = false, trigger_waits_ = false, has_fired_ = false;
-  std::chrono::nanoseconds period_{0}, travel_{0};  // travel: of sound to the range and back
+  std::chrono::nanoseconds period_{0}, travel_{0};  // travel_: of sound to the range and back
   Time start_{};                                    // start of the grid
   std::int64_t index_ = 0;                          // index of the next tick on the grid
   Time trigger_at_{};

@@ -55,7 +55,7 @@ std::optional<Field> field_of(const Fault& fault, const Vendor& vendor, Part par
 void write_field(const Fault& fault, Bytes& bytes, const Field& field) {
   if (field.type == Field::Type::number)
     write_number(bytes, field, fault.words.contains("value") ? number_of_word(fault.word("value")) : fault.number("value"));
-  else  // fields of several words get the value in each
+  else  // in a field of several words, each gets the value
     for (std::size_t at = 0; at < field.size; at += 4)
       write_integer(bytes, field.offset + at, std::min<std::size_t>(4, field.size - at),
                     static_cast<std::uint64_t>(fault.number("value")));
@@ -106,7 +106,7 @@ Touch insert_message(const Fault& fault, const MessageContext& c, Bytes& bytes) 
   return {};
 }
 
-/// The last row is missing; with `declared` all length fields say so, too.
+/// Removes the last row; with `declared`, all length fields are changed accordingly.
 Touch cut_row(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const auto image = c.vendor.field(Part::ping, FieldName::image_size, bytes);
   const auto rows = c.vendor.field(Part::ping, FieldName::rows, bytes);
@@ -124,7 +124,7 @@ Touch cut_row(const Fault& fault, const MessageContext& c, Bytes& bytes) {
 Touch renumber(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const std::int64_t since = std::int64_t{c.number} - c.first_number;
   const auto other = [&](std::int64_t number) {
-    // D07: numbers approach the wrap of 32 bits. D09: they jump. D10: the first one repeats. D08: they begin again at 0.
+    // D07: numbers approach the overflow of 32 bits. D09: they jump. D10: the first one repeats. D08: they begin again at 0.
     const std::string_view code = fault.kind->code;
     if (code == "D07") return (std::int64_t{1} << 32) - static_cast<std::int64_t>(fault.number("before")) + since;
     if (code == "D09") return number + static_cast<std::int64_t>(fault.number("by"));
@@ -186,7 +186,7 @@ Touch end_inside(const Fault& fault, MessageEdit& m) {
   return {true, m.bytes.size()};
 }
 
-/// The end of the image is that of the previous message, as if the device sent a buffer before it was filled.
+/// Replaces the end of the image by that of the previous message, as if the device had sent a buffer before filling it.
 Touch splice(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const auto image = c.vendor.region(Region::image, bytes);
   if (!image || c.before == nullptr || c.before->size() != bytes.size()) return {false};
@@ -197,7 +197,7 @@ Touch splice(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   return {};
 }
 
-/// A message that is valid and empty: the header declares a payload of 0 bytes.
+/// Makes a valid, empty message: the header states a payload of 0 bytes.
 Touch only_header(const MessageContext& c, Bytes& bytes) {
   const auto header = c.vendor.region(Region::header, bytes);
   const auto size = c.vendor.field(Part::ping, FieldName::payload_size, bytes);
@@ -225,7 +225,8 @@ void write_address(Bytes& bytes, const std::optional<Field>& field, const text::
   for (std::size_t i = 0; i < 4; ++i) bytes[field->offset + i] = static_cast<std::byte>(address[i]);
 }
 
-/// A second device differs in all by which drivers distinguish devices: id, hardware address, and network address if requested.
+/// The second device differs in everything by which drivers distinguish devices: id, hardware address and, if requested,
+/// network address.
 Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
   const auto of = [&](FieldName name) { return vendor.field(Part::beacon, name, bytes); };
   const std::string& address = fault.word("address");
@@ -279,7 +280,7 @@ Touch alter_content(const Fault& fault, const MessageContext& c, MessageEdit& m)
       return {};
     case E::false_sync: {
       Bytes front = filling(fault.word("fill"), static_cast<std::size_t>(fault.number("bytes")), bytes, c.draws);
-      // Inserts the two bytes of the magic number without a message behind them.
+      // Inserts the two bytes of the magic number without a message after them.
       std::copy_n(bytes.begin(), std::min<std::size_t>(2, bytes.size()), front.begin());
       put_before(bytes, front);
       return {};
@@ -331,8 +332,7 @@ Touch alter_content(const Fault& fault, const MessageContext& c, MessageEdit& m)
 Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m) {
   using E = FaultEffect;
   const E effect = fault.kind->effect;
-  // These effects leave a message with one wrong field, so its checksums are corrected. The others damage it as a link
-  // would.
+  // These effects change fields, so checksums are corrected. The others damage the message as a link would.
   const bool of_fields = effect == E::set_field || effect == E::add_to_field || effect == E::renumber;
   const Bytes before = of_fields ? m.bytes : Bytes{};
   const Touch touch = alter_content(fault, c, m);

@@ -33,8 +33,8 @@ class Image {
     for (std::size_t row = 0; row < rows_; ++row)
       for (std::size_t beam = 0; beam < beams_; ++beam) set(row, beam, code(row, beam));
   }
-  /// Moves the signals of the beams, which messages with phases need, as the samples are moved: source(row, beam) is where they
-  /// come from; rows beyond the last have none.
+  /// Moves the complex beam signals (for messages with phases) like the samples. source(row, beam): their position before; rows
+  /// beyond the last are empty.
   template <class Source>
   void move_signal(Source source) {
     auto& signal = ping_.beam_signal_upa;
@@ -55,8 +55,8 @@ std::uint32_t scaled(std::uint32_t code, double factor, std::uint32_t most) {
   return static_cast<std::uint32_t>(std::clamp(static_cast<double>(code) * factor, 0.0, static_cast<double>(most)));
 }
 
-/// A sample of a picture is a level. A sample of a range image has the level in its upper 16 bits and the range of the return
-/// below; a pixel without a return gets none.
+/// Changes levels. A sample of a picture is a level; a sample of a range image has the level in the upper 16 bits and the range
+/// in the lower ones. A pixel without a return stays without one.
 class Levels {
  public:
   Levels(const Ping& ping, std::uint32_t full)
@@ -69,7 +69,7 @@ class Levels {
   std::uint32_t full() const { return full_; }
   bool are_of_ranges() const { return of_ranges_ != nullptr; }
 
-  /// The code of a return in a range image at a multiple of its range; 0, no return, beyond `most_m`.
+  /// The code of a range image's return with its range multiplied by `factor`; 0 (no return) beyond `most_m`.
   std::uint32_t at_range(std::uint32_t code, double factor, double most_m) const {
     const double range = static_cast<double>(code & most_range) * factor;
     if (range < 1 || range > std::min<double>(most_range, most_m / of_ranges_->range_unit_m)) return 0;
@@ -86,7 +86,7 @@ class Levels {
 void alter_rows(const Fault& fault, Image& image, const Ping& ping) {
   const Levels levels(ping, image.full());
   const double most_m = ping.request.settings.range_m;
-  // Read once: a parameter is found by its name, which takes longer than a sample.
+  // Parameters are read once, because finding one by name takes longer than processing a sample.
   const double fraction = fault.number("fraction"), factor = fault.number("factor");
   const std::size_t from = static_cast<std::size_t>(fraction * static_cast<double>(image.rows()));
   using E = FaultEffect;
@@ -131,7 +131,7 @@ void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, s
   Image image(ping);
   const Levels levels(ping, image.full());
   const double share = fault.number("share");
-  // The beams are the same in every ping, because they are drawn for the fault and not for the ping.
+  // The beams are drawn per fault, not per ping, so they are the same in every ping.
   FaultDraws of_fault = draws;
   of_fault.ping = 0;
   const auto chosen_beam = [&](std::size_t beam) {

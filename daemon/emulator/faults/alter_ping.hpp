@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// `kept`: the ping that `stuck` repeats, or null. `begun`: pings since the fault began, 0 for the first.
+/// `kept`: the ping that the effect `stuck` repeats, or null. `begun`: number of pings since the fault began, 0 for the first.
 void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, std::uint64_t begun, Ping& ping);
 
 }  // namespace sonar

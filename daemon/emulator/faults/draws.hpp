@@ -1,4 +1,4 @@
-// Random numbers for faults: functions of (seed, fault, sonar), the ping and the client.
+// Random numbers for faults: functions of the seed, the fault, the sonar, the ping and the client.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace sonar {
 
 struct FaultDraws {
   Seed seed{};
-  std::uint32_t fault = 0;  // made from its name
+  std::uint32_t fault = 0;  // key made from the fault's name
   std::uint32_t sonar = 0, ping = 0, client = 0;
 
   /// Returns the draw with that index, 32 random bits.

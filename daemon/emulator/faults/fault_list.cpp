@@ -1,4 +1,4 @@
-// The list of faults of a sonar: which it can have, how they are added and ended.
+// The list of faults of a sonar: checks, adds and ends faults.
 #include <algorithm>
 
 #include "daemon/config/fault_support.hpp"
@@ -7,9 +7,9 @@
 namespace sonar {
 namespace {
 
-constexpr std::size_t most_over = 64;  // faults listed after their end
+constexpr std::size_t most_over = 64;  // ended faults that stay listed
 
-/// FNV-1a, so that a fault draws the same numbers in every run.
+/// FNV-1a, which is the same in every run, unlike std::hash.
 std::uint32_t key_of_name(const std::string& name) {
   std::uint32_t hash = 2166136261u;
   for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619u;
@@ -20,8 +20,8 @@ std::uint32_t key_of_name(const std::string& name) {
 
 std::optional<FaultRefusal> Faults::why_not(const std::vector<Fault>& faults) const {
   using Code = FaultRefusal::Code;
-  // A trouble consists of several kinds. It is accepted if at least one kind has an effect on this sonar, but a conflict of any
-  // kind refuses all of it.
+  // A trouble consists of several kinds. It is accepted if at least one kind has an effect on this sonar; a conflict of any
+  // kind refuses the whole trouble.
   bool any = faults.empty();
   std::string why;
   for (const Fault& fault : faults) {
@@ -74,7 +74,7 @@ bool Faults::end(const std::string& name, Time now, Actions& actions) {
 
 void Faults::add(Fault fault, bool manual, Time now) {
   forget_old();
-  // Entries are in the order of their stages, in which they act; within a stage in the order in which they were added.
+  // Entries are in the order of their stages, which is the order of action; within a stage, in the order of addition.
   const auto place =
       std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.fault.kind->stage > fault.kind->stage; });
   Entry& entry = *entries_.emplace(place);
@@ -92,7 +92,7 @@ void Faults::add(Fault fault, bool manual, Time now) {
     begin(entry, now);
 }
 
-/// The last few ended faults stay listed.
+/// Removes ended faults, except the last few.
 void Faults::forget_old() {
   std::size_t over =
       static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.over; }));
@@ -104,7 +104,7 @@ void Faults::forget_old() {
   }
 }
 
-/// The fault no longer acts on any ping, not even on one that waits in an outbox.
+/// Ends the fault for all pings, including those that wait in outboxes.
 void Faults::finish(Entry& e, Time now) {
   end(e, now);
   e.over = true;

@@ -1,4 +1,4 @@
-// When faults begin and end, and what that means for the device.
+// Begin and end of faults, and their effects on the device.
 #include "daemon/emulator/faults/faults.hpp"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr std::size_t most_hits = 64;  // pings remembered: more than an outbox holds
+constexpr std::size_t most_hits = 64;  // remembered pings; more than an outbox holds
 
 nanoseconds length_of_power_cycle(const Fault& fault) {
   return nanoseconds_from(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
@@ -45,7 +45,7 @@ Faults::Entry* Faults::active(Effect effect) {
 
 // ---- triggers
 
-/// Whether the trigger of a fault that is not active is met by this ping. Triggers by time and by events are not decided here.
+/// Whether this ping triggers an inactive fault. Triggers by time and by events are handled elsewhere.
 bool Faults::fires(const Entry& e, std::uint32_t ping) const {
   const FaultRecord::At& at = e.fault.at;
   if (at.ping) return e.begun == 0 && ping >= *at.ping;
@@ -54,11 +54,11 @@ bool Faults::fires(const Entry& e, std::uint32_t ping) const {
   return !at.time_s && !e.fault.on && e.begun == 0;  // at once
 }
 
-// States of a fault: it waits (not active, not over) for its trigger; `begins` is set while its delay passes; active until its
-// time or its pings are used up; then it waits again or, after its last time, is over.
+// States of a fault: waiting for its trigger (neither active nor over); delayed, while `begins` is set; active, until its
+// duration or number of pings is used up; then waiting again or, after the last occurrence, over.
 void Faults::begin(Entry& e, Time now) {
   if (e.active || e.over) return;
-  // With a delay this call only sets the time; on_tick() calls again when it has come.
+  // With a delay, this call only sets the time at which on_tick() calls again.
   if (!e.begins) e.begins = now + e.fault.delay;
   if (now < *e.begins) return;
   e.begins.reset();
@@ -74,7 +74,7 @@ void Faults::begin(Entry& e, Time now) {
   begin_effect(e, now);
 }
 
-/// A fault with a bounded number of occurrences is over after the last of them; others wait for their trigger again.
+/// A fault with a limited number of occurrences is over after the last one; others wait for their trigger again.
 void Faults::end(Entry& e, Time now) {
   if (!e.active) return;
   e.active = false;
@@ -84,8 +84,8 @@ void Faults::end(Entry& e, Time now) {
   if (e.fault.span.count != 0 && e.begun >= e.fault.span.count) e.over = true;
 }
 
-/// Only faults that change the device or its connections act here, by orders. Faults of messages and samples act when those
-/// pass.
+/// Faults that change the device or its connections act here, by orders. Faults of messages and samples act when a message is
+/// sent.
 void Faults::begin_effect(Entry& e, Time now) {
   switch (e.fault.kind->effect) {
     case Effect::close_ports:
@@ -97,7 +97,7 @@ void Faults::begin_effect(Entry& e, Time now) {
       orders_.emplace_back(SetListening{false});
       orders_.emplace_back(EndClients{e.fault.word("how") == "reset"});
       orders_.emplace_back(RestartDevice{});
-      // With a gap below 0 the ports open before the first status message; step() opens them.
+      // A negative gap means that the ports open before the first status message; step() opens them.
       if (const double gap = e.fault.number("gap-s"); gap < 0)
         e.step = now + std::max(nanoseconds(0), nanoseconds_from(e.fault.number("boot-s") + gap));
       return;
@@ -152,7 +152,7 @@ void Faults::end_effect(Entry& e) {
       orders_.emplace_back(ServeWaiting{});
       return;
     case Effect::delay_requests:
-      // Requests that were held back take effect now. The settings that clients requested last are in force.
+      // Delayed requests take effect now, so that the last requested settings are in use.
       for (auto& [at, request] : e.late) orders_.emplace_back(std::move(request));
       e.late.clear();
       return;
@@ -172,13 +172,13 @@ void Faults::end_effect(Entry& e) {
 
 // ---- time
 
-/// For each fault in this order: it begins, takes a step, applies late requests, ends clients, ends, expires.
+/// Order of events for each fault: begin, step, delayed requests, ends of clients, end, expiry.
 void Faults::on_tick(Time now) {
   for (Entry& e : entries_) {
     const auto& at = e.fault.at;
     if (!e.over && !e.active && at.time_s && e.begun == 0 && now - start_ >= nanoseconds_from(*at.time_s)) begin(e, now);
     if (e.begins && *e.begins <= now) begin(e, now);
-    // Steps, late requests and ends of clients come before the end of the fault: what is due at that moment still happens.
+    // Steps, delayed requests and ends of clients that are due now happen before the end of the fault.
     if (e.active && e.step <= now) step(e, now);
     while (!e.late.empty() && e.late.front().first <= now) {
       orders_.emplace_back(std::move(e.late.front().second));
@@ -214,9 +214,9 @@ void Faults::on(Occasion occasion, Time now) {
     if (e.fault.on == occasion && (e.fault.span.count == 0 || e.begun < e.fault.span.count)) begin(e, now);
 }
 
-/// A step is a change inside a fault: of a power cycle the opening of the ports, of a flapping link each up and down.
+/// A step is a change within a fault: the opening of the ports in a power cycle, each up and down of a flapping link.
 void Faults::step(Entry& e, Time now) {
-  if (e.fault.kind->effect == Effect::power_cycle) {  // TCP before the first status message
+  if (e.fault.kind->effect == Effect::power_cycle) {  // opens the TCP ports before the first status message
     orders_.emplace_back(SetListening{true});
     e.step = Time::max();
     return;
@@ -230,7 +230,7 @@ void Faults::step(Entry& e, Time now) {
 
 // ---- pings
 
-/// Decides once for each ping which faults act on it, and stores the decision, so that all clients and stages use the same.
+/// Decides once per ping which faults act on it, and stores the decision for all clients and stages.
 void Faults::begin_ping(std::uint32_t number, Time now) {
   if (entries_.empty()) return;
   on_tick(now);
@@ -245,14 +245,14 @@ void Faults::begin_ping(std::uint32_t number, Time now) {
   }
 }
 
-/// Faults of status messages count status messages instead (alter_beacons).
+/// Counts a ping for a fault. Faults of status messages count status messages instead (alter_beacons).
 void Faults::count_ping(Entry& e, Time now) {
   if (e.fault.span.pings == 0 || e.fault.kind->stage == FaultStage::status || --e.pings_left > 0) return;
-  // A power cycle ends by its time.
+  // A power cycle ends by time.
   if (e.fault.kind->effect != Effect::power_cycle) end(e, now);
 }
 
-/// Pings are remembered by number, because a ping may be sent to clients long after it was made.
+/// Whether the fault acts on this ping. Numbers are remembered, because a ping may be sent long after it was made.
 bool Faults::met(const Entry& e, std::uint32_t ping) const {
   return std::find(e.hits.begin(), e.hits.end(), ping) != e.hits.end();
 }
@@ -267,7 +267,7 @@ double Faults::rate_factor() const {
 
 bool Faults::leaves_group() const { return any(Effect::leave_group); }
 
-/// The first fault that holds the ping decides; holds do not add up.
+/// The first fault that holds the ping back decides; delays do not add up.
 Faults::Hold Faults::hold(const Connection& to, std::uint32_t ping, Time now) {
   for (Entry& e : entries_) {
     if (!met(e, ping) || !chosen(e.fault, to)) continue;

@@ -1,6 +1,6 @@
-// The faults of one emulated sonar. The Sonar calls it at every place where a fault may act; without a fault each call finds an
-// empty list. It has no sockets and no clock: what has to be done to ports and connections is returned as orders. Everything
-// random is drawn from (seed, fault, sonar, ping, client), so the same plan gives the same bytes.
+// The faults of one emulated sonar. The Sonar calls this object wherever a fault may act. It has no sockets and no clock:
+// effects on ports and connections are returned as orders. Random numbers depend only on (seed, fault, sonar, ping, client), so
+// the same plan gives the same bytes.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct RestartDevice {
 struct OverrideSettings {
   protocol::SettingsOverride wanted;
 };
-struct ApplyRequest {  // applies a client's request late
+struct ApplyRequest {  // applies a delayed request of a client
   protocol::ChangeSettings change;
   std::string who;
 };
@@ -43,25 +43,26 @@ struct ChangePace {};  // rate_factor() has changed
 struct ReadClients {
   bool on = true;
 };
-struct DropNewestPings {  // for clients that read slowly
+struct DropNewestPings {  // lets outboxes of slow clients drop the newest pings
   bool on = true;
 };
 struct ReleaseHeld {};
-struct StopShaping {};  // ends the shaping of the message that is being written
+struct StopShaping {};  // ends the shaping of the current message
 struct ServeWaiting {};
 using FaultOrder = std::variant<SetListening, EndClients, ForgetSettings, RestartDevice, OverrideSettings, ApplyRequest,
                                 ChangePace, ReadClients, DropNewestPings, ReleaseHeld, StopShaping, ServeWaiting>;
 
 /// The reason why a sonar cannot have faults.
 struct FaultRefusal {
-  /// no_effect: the product has nothing that they could change, but another sonar may. conflict: a present fault prevents them.
+  /// no_effect: they cannot change anything on this product (another sonar may accept them). conflict: a present fault excludes
+  /// them.
   enum class Code { no_effect, conflict } code = Code::conflict;
   std::string text;  // a sentence
 };
 
 class Faults {
  public:
-  /// The references outlive the object. `index` and `seed` key the random numbers.
+  /// The references must outlive the object. `index` and `seed` are part of the key of random numbers.
   struct Around {
     const protocol::Vendor& vendor;
     const Connections& connections;
@@ -73,17 +74,18 @@ class Faults {
   Faults(Around around, Time now) : around_(around), start_(now) {}
 
   // ---- the list of faults
-  /// Why this sonar cannot have these faults; nullopt = it can.
+  /// The reason why this sonar cannot have these faults; nullopt if it can.
   std::optional<FaultRefusal> why_not(const std::vector<Fault>& faults) const;
-  /// Adds those of `faults` that are for this sonar and take effect on it. `manual` ones end after longest_manual_fault.
+  /// Adds those of `faults` that are for this sonar and take effect on it. `manual`: a user added them; they end after
+  /// longest_manual_fault.
   void add(const std::vector<Fault>& faults, bool manual, Time now, Actions& actions);
-  /// Ends the faults of that name, or all if `name` is empty. Returns false if there is none.
+  /// Ends the faults with this name, or all if `name` is empty. Returns false if there is none.
   bool end(const std::string& name, Time now, Actions& actions);
   struct Listed {
     const Fault* fault;
     bool active, over;
     std::uint64_t injections;
-    Time expires;  // Time::max() = with its trigger
+    Time expires;  // Time::max() = not by time
   };
   std::vector<Listed> list() const;
   std::size_t active_count() const;
@@ -100,23 +102,23 @@ class Faults {
   void begin_ping(std::uint32_t number, Time now);
   /// Returns the ping as the device reports it, with changed samples or stamps.
   std::shared_ptr<const Ping> altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state, Time now);
-  /// True if alter_datagrams() has something to do for this ping. Else the clients of a port share the datagrams.
+  /// Whether alter_datagrams() may change this ping. If not, the clients of a port share the datagrams.
   bool alters_datagrams(const Connection& stream, std::uint32_t ping) const;
   void alter_datagrams(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
   bool leaves_group() const;
   /// Changes a message before it is sent to a client. Returns false if it must not be sent.
   bool shape(const Connection& to, Outbox::Message& message, Time now);
-  /// Returns whether a ping is held back before it goes into the outbox of a client.
+  /// Whether and until when a ping is held back before it enters a client's outbox.
   struct Hold {
     enum class Kind { pass, until, after_next, collect } kind = Kind::pass;
     Time until{};
     std::size_t collect = 0;
   };
   Hold hold(const Connection& to, std::uint32_t ping, Time now);
-  /// True if the sonar itself sends nothing of this ping to anyone: the ping is withheld or dropped, or the device is off. Faults
-  /// of links and of single clients do not count.
+  /// True if the sonar sends this ping to no client: a fault withholds or drops it, or the device is off. Faults of links and
+  /// of single clients do not count.
   bool withholds(std::uint32_t ping, Time now) const;
-  /// Factor of the present rate; 0 = no pings.
+  /// The factor by which faults multiply the ping rate; 0 = no pings.
   double rate_factor() const;
 
   // ---- clients
@@ -124,10 +126,11 @@ class Faults {
   Admission admission() const;
   void on_served(const Connection& client, Time now);
   enum class RequestVerdict { apply, ignore, end, reset };
-  /// A client requested settings. `change` may be limited. `ignore`: the sonar does not apply it (it may come back as an order).
+  /// Call it when a client requests settings. It may limit `change`. `ignore`: the sonar must not apply the change now (it may
+  /// follow as an order).
   RequestVerdict on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
                             Time now);
-  /// A client sent bytes, whatever they are.
+  /// Call it when a client has sent any bytes.
   RequestVerdict on_bytes(const std::string& who, Time now);
 
   // ---- status messages
@@ -140,15 +143,15 @@ class Faults {
     std::uint32_t key = 0;
     bool active = false, over = false;
     std::uint64_t begun = 0, injections = 0, pings_left = 0;
-    std::optional<Time> begins;  // set if it begins later, after its delay
+    std::optional<Time> begins;  // set while the fault's delay passes
     Time expires = Time::max(), since{}, until = Time::max(), step = Time::max();
-    bool down = false;               // state of a port or link that goes up and down
+    bool down = false;               // state of a port or link that alternates
     std::deque<std::uint32_t> hits;  // the latest pings on which it acts
     std::optional<std::uint32_t> first_number;
     std::shared_ptr<const Ping> kept;
     std::optional<Time> kept_time;
-    protocol::Bytes before;                           // message before, for splice, older_part and late_part
-    std::vector<std::pair<Time, ConnectionId>> ends;  // when end_after ends connections
+    protocol::Bytes before;                           // previous message, for splice, older_part and late_part
+    std::vector<std::pair<Time, ConnectionId>> ends;  // times at which end_after ends connections
     std::vector<std::pair<Time, ApplyRequest>> late;  // requests that delay_requests holds back
   };
   using Effect = FaultEffect;
@@ -178,7 +181,7 @@ class Faults {
 
   Around around_;
   Time start_;
-  std::list<Entry> entries_;  // in the order of stages, then as they were added
+  std::list<Entry> entries_;  // in the order of stages; within a stage, of addition
   std::vector<FaultOrder> orders_;
 };
 

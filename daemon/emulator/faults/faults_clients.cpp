@@ -1,4 +1,4 @@
-// Faults of clients: which clients they act on, admission, outcomes of requests.
+// Faults of clients: the choice of clients, admission, and outcomes of requests.
 #include "daemon/emulator/faults/faults.hpp"
 
 namespace sonar {
@@ -8,7 +8,8 @@ constexpr std::size_t most_late_requests = 64;
 
 }  // namespace
 
-/// A stream of datagrams is sent to all its receivers at once, so a choice of client does not divide it.
+/// Whether the fault acts on this client. A stream sends the same datagrams to all receivers, so the choice of a client does
+/// not apply to it.
 bool Faults::chosen(const Fault& fault, const Connection& client) const {
   if (client.role == Role::observer) return false;
   using Kind = ClientChoice::Kind;
@@ -25,7 +26,7 @@ bool Faults::chosen(const Fault& fault, const Connection& client) const {
   });
 }
 
-/// The first active fault of this kind decides.
+/// The first active fault of admission decides.
 Faults::Admission Faults::admission() const {
   for (const Entry& e : entries_) {
     if (!e.active) continue;
@@ -36,7 +37,7 @@ Faults::Admission Faults::admission() const {
   return Admission::as_configured;
 }
 
-/// A client that connects while a fault is active is treated as those before it.
+/// Applies active faults to a client that has just connected.
 void Faults::on_served(const Connection& client, Time now) {
   if (entries_.empty()) return;
   on(Occasion::connect, now);
@@ -49,7 +50,7 @@ void Faults::on_served(const Connection& client, Time now) {
 
 Faults::RequestVerdict Faults::on_request(protocol::ChangeSettings& change, const std::string& who,
                                           const protocol::DeviceState& state, Time now) {
-  // The first fault that withholds the request or ends the client decides; limits of several faults add up.
+  // The first fault that withholds the request or ends the client decides; limits of several faults combine.
   on(Occasion::config, now);
   for (Entry& e : entries_) {
     if (!e.active) continue;
@@ -86,7 +87,7 @@ Faults::RequestVerdict Faults::on_request(protocol::ChangeSettings& change, cons
   return RequestVerdict::apply;
 }
 
-/// Ends a client at its first bytes, whatever they are, if the fault is configured so.
+/// Ends a client at its first bytes if a fault demands it.
 Faults::RequestVerdict Faults::on_bytes(const std::string& who, Time now) {
   for (Entry& e : entries_) {
     if (!e.active || e.fault.kind->effect != Effect::end_on_request || e.fault.word("command") != "any") continue;

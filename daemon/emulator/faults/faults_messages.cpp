@@ -1,4 +1,4 @@
-// Effects of faults on pings, on messages and datagrams to clients, and on status messages.
+// Effects of faults on pings, on messages to clients, and on status messages.
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -25,7 +25,7 @@ Bytes whole(const Outbox::Message& message) {
   return all;
 }
 
-/// The time two seconds before a device's 32-bit counter wraps.
+/// The time two seconds before the device's 32-bit counter overflows.
 Time before_wrap(const std::string& unit, Time powered_up_at) {
   constexpr double counts = 4294967296.0, before_s = 2;
   const double unit_s = unit == "milliseconds" ? 1e-3 : 1e-6;
@@ -79,7 +79,7 @@ bool Faults::withholds(std::uint32_t ping, Time now) const {
   });
 }
 
-/// False: the message is not sent. First faults that silence the sonar, then those that change bytes, pace or end.
+/// False: the message must not be sent. Faults that silence the sonar come first, then those that change bytes, pace or end.
 bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
   if (entries_.empty() || to.role == Role::observer) return true;
   for (Entry& e : entries_) {
@@ -98,9 +98,9 @@ bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
     const bool joins = e.fault.kind->effect == Effect::join_late;
     const bool splices = e.fault.kind->effect == Effect::splice;
     if (!of_message || !chosen(e.fault, to)) continue;
-    // A splice copies bytes of the previous message. So each message is kept, even if the fault did not act on its ping.
+    // A splice copies bytes of the previous message, so each message is kept, even if the fault did not act on its ping.
     const Bytes earlier = splices && !e.over ? std::exchange(e.before, whole(message)) : Bytes{};
-    // A late join acts on the first ping of a client only.
+    // A late join acts only on the first ping of a client.
     if (!(joins ? e.active : met(e, message.ping)) || (joins && to.outbox.pings_written() > 0)) continue;
     if (!edit) edit = MessageEdit{whole(message), {}, Outbox::Shape::End::none, false};
     const Bytes before = edit->bytes;
@@ -114,7 +114,7 @@ bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
   if (!edit) return true;
   message.bytes = std::make_shared<const Bytes>(std::move(edit->bytes));
   message.prefixes.clear();
-  message.shape = nullptr;  // the port's shape has positions in the unaltered bytes
+  message.shape = nullptr;  // the positions of the port's shape are those of the unaltered bytes
   if (!edit->pauses.empty() || edit->end != Outbox::Shape::End::none) {
     std::sort(edit->pauses.begin(), edit->pauses.end(), [](const auto& a, const auto& b) { return a.before < b.before; });
     message.shape = std::make_shared<const Outbox::Shape>(Outbox::Shape{std::move(edit->pauses), edit->end});
@@ -135,8 +135,8 @@ void Faults::note_message(Entry& e, const Connection& to, std::uint32_t ping, co
   note(e, FaultEntry::What::injected, now, std::move(more));
 }
 
-/// For a ping that is sent as datagrams: a fault that changes bytes changes the first datagram that has the field or region. A
-/// field without a fixed place is changed in every datagram.
+/// Changes bytes of a ping that is sent as datagrams: in the first datagram with the field or region; a field without a fixed
+/// place is changed in every datagram.
 void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
   using protocol::Part;
   for (Entry& e : entries_) {
@@ -158,7 +158,7 @@ void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Conne
   }
 }
 
-/// True if faults of framing change bytes of this stream's datagrams.
+/// Whether faults of framing change bytes of this stream's datagrams.
 bool Faults::frames_datagrams(const Connection& stream) const {
   return stream.role == Role::client || around_.vendor.pings_by() == protocol::PingsBy::datagrams;
 }
@@ -168,14 +168,14 @@ bool Faults::alters_datagrams(const Connection& stream, std::uint32_t ping) cons
     if (!chosen(e.fault, stream)) return false;
     if (e.fault.kind->stage == FaultStage::framing) return frames_datagrams(stream) && met(e, ping);
     if (e.fault.kind->stage != FaultStage::datagrams) return false;
-    // older_part keeps the first part of each ping; a part that late_part holds back follows even when the fault has ended.
+    // older_part stores the first part of each ping; late_part sends a delayed part even after the fault has ended.
     const bool keeps = e.fault.kind->effect == Effect::older_part && !e.over;
     const bool holds = e.fault.kind->effect == Effect::late_part && !e.before.empty();
     return keeps || holds || met(e, ping);
   });
 }
 
-/// Faults of bytes come first, then those that lose, repeat or reorder datagrams.
+/// Faults that change bytes come first, then those that lose, repeat or reorder datagrams.
 void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
   if (frames_datagrams(stream)) alter_bytes_of_datagrams(datagrams, stream, ping, now);
   for (Entry& e : entries_) {
@@ -205,12 +205,12 @@ void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& st
       note(e, FaultEntry::What::injected, now, std::move(more));
     }
     if (older) e.before = first;
-    // The late part follows the first part of this ping.
+    // The delayed part follows the first part of this ping.
     if (!late.empty()) datagrams.insert(datagrams.begin() + (datagrams.empty() ? 0 : 1), std::move(late));
   }
 }
 
-/// Several faults act on the same status message, one after the other.
+/// Several faults can change the same status message, one after the other.
 void Faults::alter_beacons(std::vector<Bytes>& beacons, Time now) {
   if (entries_.empty() || beacons.empty()) return;
   on(Occasion::status, now);
@@ -220,7 +220,7 @@ void Faults::alter_beacons(std::vector<Bytes>& beacons, Time now) {
   for (Entry& e : entries_) {
     if (!e.active) continue;
     const Effect effect = e.fault.kind->effect;
-    // The device is off until it has booted. A device that sends no pings still sends status messages if `keep-status` says so.
+    // The device is off until it has booted. With `keep-status`, a device that sends no pings still sends status messages.
     const bool off = (effect == Effect::power_cycle && seconds(now - e.since) < e.fault.number("boot-s")) ||
                      (effect == Effect::withhold && e.fault.word("keep-status") == "no");
     if (off) beacons.clear();

@@ -1,4 +1,4 @@
-// Record of a fault's effects as they occur: the truth against which a driver's reaction is judged.
+// The journal of faults: each effect as it occurred, with which a driver's reaction is compared.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,10 @@ struct FaultEntry {
   std::string fault, asked;  // name of the fault; code or trouble as the user wrote it
   const FaultKind* kind = nullptr;
   std::string sonar;
-  std::string client;               // peer; empty = the device
+  std::string client;               // its address; empty = the device itself
   std::uint64_t client_number = 0;  // counted from 1 over the life of the sonar
   std::uint32_t ping = 0;           // 0 = none
-  /// First byte of this client's stream that differs from the undisturbed stream, or where the stream was paused or ended; -1 =
-  /// not at a byte of a stream.
+  /// Position in this client's stream of the first changed byte, of the pause or of the end; -1 = none.
   std::int64_t offset = -1;
   std::uint64_t bytes_before = 0, bytes_after = 0;  // size of the message
   std::map<std::string, std::string> with;          // the parameters used

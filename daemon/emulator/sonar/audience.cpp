@@ -10,7 +10,7 @@ constexpr std::size_t most_receivers = 16;  // limit for one list
 
 bool is_client(const Connection& c) { return c.role == Role::client && c.state == Connection::State::served && !c.finishing; }
 
-/// Drops pings that wait in a stream without receivers: the next receiver must not get pings that were made for the last one.
+/// Drops pings that wait in a stream without receivers, because the next receiver must not get the previous one's pings.
 void drop_unreceived(Connections& connections) {
   for (Connection& c : connections.all())
     if (c.role == Role::stream && connections.receivers(c).empty()) c.outbox.drop_waiting_pings(DropReason::gone);
@@ -20,12 +20,12 @@ void drop_unreceived(Connections& connections) {
 
 // ---- slots
 
-// The new connection is entered after a client that is taken over has begun to leave, so that it is the newest.
+// In a take-over, the previous client begins to end before the new connection is added, which is then the newest.
 Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protocol::Port* port, Faults::Admission by_fault,
                             Actions& actions) {
   using Verdict = Connections::Verdict;
   using Admission = Faults::Admission;
-  // First the rules for slots decide, then a fault of the clients may replace their verdict.
+  // The rules for slots decide first; a fault of clients may then change the verdict.
   Verdict verdict = stopping_ ? Verdict::refuse : connections_.verdict(role);
   const Admission admission = role == Role::client && !stopping_ ? by_fault : Admission::as_configured;
   if (admission == Admission::wait) verdict = Verdict::wait;
@@ -37,7 +37,7 @@ Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protoco
     return nullptr;
   }
   if (verdict == Verdict::take_over) {
-    // The oldest client gets its current message whole, and counts as gone from here on.
+    // The oldest client still gets its current message completely, but counts as gone from now on.
     Connection& oldest = *connections_.oldest_client();
     oldest.state = Connection::State::leaving;
     begin_finish(oldest, "another client took over", actions);
@@ -52,9 +52,9 @@ Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protoco
 void Audience::serve(Connection& connection, Time now, Actions& actions) {
   connection.state = Connection::State::served;
   connection.dialogue = sonar_.vendor.converse(*connection.port, sonar_.state, sonar_.unskipped(now));
-  // Serve makes the session that later actions name, such as the ReadFrom of a fault.
+  // Serve creates the session to which later actions refer, such as the ReadFrom of a fault.
   actions.emplace_back(Serve{connection.id});
-  // Clients are numbered for faults that act on one of them; observers are not.
+  // Clients are numbered, for faults that act on one of them; observers are not.
   if (connection.role != Role::observer) connection.number = ++sonar_.figures.clients;
 }
 
@@ -80,7 +80,7 @@ void Audience::open_stream(ConnectionId id, const protocol::Port& port) {
   if (port.group.port != 0) stream.receivers.front().to.push_back(port.group);
 }
 
-// A client has its own list for each stream; without a client (over HTTP or by a datagram) the list is the device's.
+// A client has its own list for each stream; a request over HTTP or by a datagram sets the device's list.
 void Audience::set_receivers(Connection* from, protocol::Ipv4 ip, protocol::SetReceivers wanted) {
   Connection* const stream = connections_.stream(wanted.stream);
   if (stream == nullptr) return;
@@ -122,7 +122,7 @@ void Audience::stop(const std::string& why, Actions& actions) {
 }
 
 void Audience::remove(Connection& connection, const std::string& why, bool by_client, Actions& actions) {
-  // Pings that a fault holds back are offered to the outbox before it drops them, so that the counters add up.
+  // Pings that a fault holds back enter the outbox before it drops them, so that the counters add up.
   for (Connection::Held& held : connection.held) connection.outbox.push_ping(std::move(held.ping));
   connection.outbox.end(connection.finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection.peer.name, connection.role, connection.state != Connection::State::waiting,

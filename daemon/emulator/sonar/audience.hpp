@@ -1,5 +1,5 @@
-// The connections of an emulated sonar: slots of clients, the queue for slots, take-over, receivers of streams, and the end of a
-// connection. It changes no settings and makes no pings; the Sonar calls has_audience() after each change.
+// Manages the connections of an emulated sonar: slots of clients, the queue for slots, take-over, receivers of streams, and the
+// end of a connection. It changes no settings and makes no pings; the Sonar calls has_audience() after each change.
 #pragma once
 
 #include <exception>
@@ -14,7 +14,7 @@ namespace sonar {
 
 class Audience {
  public:
-  /// `sonar` outlives it.
+  /// `sonar` must outlive it.
   explicit Audience(SonarData& sonar) : sonar_(sonar), connections_(sonar.config) {}
   Audience(const Audience&) = delete;
   Audience& operator=(const Audience&) = delete;
@@ -27,31 +27,32 @@ class Audience {
   bool has_audience() const { return connections_.has_audience(); }
   bool stopping() const { return stopping_; }
 
-  /// Decides about a new connection by the slots, or by a fault of clients (`by_fault`). Returns the connection if it has a slot,
-  /// and serve() must follow; null if it waits or is refused. After a take-over the previous client counts as gone.
+  /// Decides about a new connection by the free slots, or by a fault of clients (`by_fault`). Returns the connection if it gets
+  /// a slot (the caller must then call serve()); null if it waits or is refused. After a take-over the previous client counts
+  /// as gone.
   Connection* admit(ConnectionId id, Role role, Peer peer, const protocol::Port* port, Faults::Admission by_fault,
                     Actions& actions);
   void serve(Connection& connection, Time now, Actions& actions);
-  /// Returns the client that has waited longest for a slot; null if none waits, or if the sonar stops.
+  /// The client that has waited longest for a slot; null if none waits or the sonar is stopping.
   Connection* next_waiting() { return stopping_ ? nullptr : connections_.longest_waiting(); }
   /// Adds the stream of an open port of kind udp_stream.
   void open_stream(ConnectionId id, const protocol::Port& port);
-  /// Gives the dialogue at a port of kind udp_dialogue to another host.
+  /// Transfers the dialogue at a port of kind udp_dialogue to another host.
   void hand_over(ConnectionId id, Peer to);
   /// Sets the list of receivers of client `from`, or of the device if null. An address 0.0.0.0 becomes `ip`.
   void set_receivers(Connection* from, protocol::Ipv4 ip, protocol::SetReceivers wanted);
-  /// Replaces the device's own list of that stream by the list of its stored configuration.
+  /// Restores the device's own list of a stream to that of the stored configuration.
   void restore_receivers(protocol::SetReceivers initial);
-  /// Call it after a client has come or gone: updates the reported client and drops pings that have no receiver left.
+  /// Call it after a client has connected or left: updates the client in status messages, and drops pings without receivers.
   void on_membership();
 
-  /// Waiting pings are dropped; the message that is being written and replies are still sent.
+  /// Ends a connection: waiting pings are dropped, the current message and replies are still sent.
   void finish(Connection& connection);
   void finish(ConnectionId id) {
     if (Connection* const connection = connections_.find(id)) finish(*connection);
   }
   void begin_finish(Connection& connection, const std::string& why, Actions& actions);
-  /// Finishes every connection and admits no more.
+  /// Ends all connections as finish() does, and admits no more.
   void stop(const std::string& why, Actions& actions);
   /// Accounts for a closed connection and removes it.
   void remove(Connection& connection, const std::string& why, bool by_client, Actions& actions);
@@ -62,7 +63,7 @@ class Audience {
   void read_clients(bool on, Actions& actions);
   void drop_newest(bool on);
   void end_pauses(Actions& actions);
-  /// Runs a function; an exception ends this connection and no other. A stream, which belongs to the device, only loses a ping.
+  /// Runs a function; an exception ends only this connection. A stream, which belongs to the device, only loses a ping.
   template <class Call>
   void guarded(Connection& connection, Actions& actions, Call call) {
     try {
@@ -75,7 +76,7 @@ class Audience {
     }
   }
 
-  /// Returns the earliest time of served clients, by Connection::next_tick or next_request, in the daemon's time.
+  /// The earliest Connection::next_tick or next_request of all served clients, in the daemon's time.
   std::optional<Time> earliest(std::optional<Time> (Connection::*of)() const) const;
 
  private:

@@ -1,5 +1,5 @@
-// Delivers the messages of an emulated sonar: a ping is framed once for each port, offered to each connection, perhaps held back
-// by a fault, and taken from the outbox when the connection can write.
+// Delivers the messages of an emulated sonar: frames a ping once per port, offers it to each connection unless a fault holds it
+// back, and returns messages from the outbox when a connection can write.
 #pragma once
 
 #include <memory>
@@ -13,21 +13,21 @@
 
 namespace sonar {
 
-/// The bytes of a ping for each port. The parts for a port are made when they are first needed; connections share them.
+/// The bytes of a ping for each port. They are made when first needed; connections share them.
 class FramedPing {
  public:
   using Bytes = protocol::Bytes;
   using Datagrams = std::shared_ptr<const std::vector<Bytes>>;
 
-  /// `ping` as the device reports it. `recorded`: PingOutcome::recorded. All outlive the object.
+  /// `ping`: as the device reports it. `recorded`: PingOutcome::recorded. All arguments must outlive the object.
   FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping,
              const PartsByPort* recorded = nullptr);
 
   /// The bytes of the ping over TCP; null if the vendor sends only datagrams.
   const std::shared_ptr<const Bytes>& bytes() const { return bytes_; }
-  /// The bytes for clients at that port of kind tcp_stream: bytes(), or the port's own part of them. Null: none.
+  /// The bytes for clients at a port of kind tcp_stream: bytes(), or only the port's part of them. Null: none.
   std::shared_ptr<const Bytes> bytes_at(const protocol::Port& port);
-  /// The parts of the ping at that port: datagrams, or what a port of kind tcp_stream with a gap sends between pauses.
+  /// The parts of the ping at a port: datagrams; for a port of kind tcp_stream with a gap, the bytes between pauses.
   const Datagrams& parts(const protocol::Port& port);
   /// The pauses between the parts of bytes(). Null: bytes() are written without pauses.
   std::shared_ptr<const Outbox::Shape> pauses(const protocol::Port& port);
@@ -38,7 +38,7 @@ class FramedPing {
   const Ping& ping_;
   const PartsByPort* recorded_;
   std::shared_ptr<const Bytes> bytes_;
-  bool is_first_ports_ = false;  // with several streams, bytes_ are those of the vendor's first TCP port
+  bool is_first_ports_ = false;  // with several TCP ports, bytes_ are those of the first
   struct AtPort {
     const protocol::Port* port;
     Datagrams parts;
@@ -51,28 +51,28 @@ class FramedPing {
 
 class Delivery {
  public:
-  /// The arguments outlive the object.
+  /// The arguments must outlive the object.
   Delivery(SonarData& sonar, Audience& audience, Faults& faults) : sonar_(sonar), audience_(audience), faults_(faults) {}
 
-  /// The requests by which clients answer a ping.
+  /// Requests that clients make when they get a ping.
   using Requests = std::vector<std::pair<Connection*, protocol::Event>>;
-  /// Puts the ping into the outbox of every connection that takes it.
+  /// Puts the ping into the outbox of every connection that gets it.
   PingQueued queue(const PingOutcome& outcome, Time now, Requests& requests, Actions& actions);
-  /// Sends pings that a fault held back until now; with `all`, also those that are due later.
+  /// Releases held pings that are due now; with `all`, all held pings.
   void release_held(Time now, bool all, Actions& actions);
-  /// The time at which the next ping that is held back is due.
+  /// The time at which the next held ping is due.
   std::optional<Time> next_release() const;
 
-  /// Returns the present receivers of a stream, or of a dialogue at a port of kind udp_dialogue.
+  /// The present receivers of a stream, or the host of a port of kind udp_dialogue.
   std::vector<protocol::Endpoint> receivers(ConnectionId stream) const;
-  /// Returns the datagrams of a status broadcast.
+  /// The datagrams of a status broadcast.
   std::vector<protocol::Bytes> beacons(Time now);
-  // See Sonar, which passes these on.
+  // Sonar describes these.
   Outbox::Message next_message(ConnectionId id, Time now);
   void on_sent(ConnectionId id, std::size_t bytes);
   void on_not_sent(ConnectionId id);
   void on_written(ConnectionId id, const Outbox::Message& message, Time now);
-  /// Call it when pings are numbered from 1 again.
+  /// Call it when ping numbers begin at 1 again.
   void restart() { last_served_ = {}; }
 
  private:

@@ -22,7 +22,7 @@ protocol::DeviceState device_state(const SonarConfig& sonar, const Config& confi
   s.model = sonar.profile.model;
   s.advertise_ip = sonar.advertise_ip;
   s.netmask = sonar.netmask;
-  // Locally administered, so that it can belong to no real device.
+  // A locally administered address, which no real device can have.
   s.mac = {
       0x02, 0x53, 0x4f, 0x00, static_cast<std::uint8_t>(sonar.device_id >> 8), static_cast<std::uint8_t>(sonar.device_id & 0xff)};
   s.powered_up_at = now;

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-constexpr auto air_reported_every = std::chrono::minutes(1);  // a vehicle on waves leaves the water with each of them
+constexpr auto air_reported_every = std::chrono::minutes(1);  // on waves, a vehicle may leave the water every few seconds
 
 }  // namespace
 
@@ -27,20 +27,20 @@ void PingSource::use_initial_settings() {
   settings_ = initial.settings;
   sonar_.state.settings = std::move(initial.vendor_settings);
   if (initial.receivers) audience_.restore_receivers(*std::move(initial.receivers));
-  // A ping that is being computed was requested with the settings of clients that have left: on_ping() drops it.
+  // The ping that is being computed has the settings of clients that have left: on_ping() drops it.
   busy_unwanted_ = busy_;
 }
 
 void PingSource::change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions) {
-  // Some drivers repeat their settings at ping rate: only a change is worth a line. Equal ones may hold another state of the
-  // device.
+  // Some drivers repeat their settings with every ping, so only changes are logged. Equal settings are stored too, because they
+  // may contain a different state of the device.
   const auto before = std::exchange(sonar_.state.settings, change.vendor_settings);
   if (!asked_ || !change.vendor_settings->equals(*before)) {
-    if (!who.empty()) asked_by_ = who;  // empty: the device itself, perhaps with every ping
+    if (!who.empty()) asked_by_ = who;  // empty: the device itself, which may change them with every ping
     sonar_.report(Report::Topic::settings, who.empty() ? LogLevel::debug : LogLevel::info, "settings: " + change.summary,
                   {{"client", who.empty() ? "the sonar itself" : who}}, actions);
   }
-  settings_ = change.settings;  // also for a repeat, because the device's own sound speed follows its depth
+  settings_ = change.settings;  // also if repeated, because the device's own sound speed depends on its depth
   asked_ = true;
   if (change.receivers) audience_.set_receivers(nullptr, {}, *change.receivers);
   if (change.receivers || wants_pings()) update_pacer(now);
@@ -52,7 +52,7 @@ void PingSource::use_water(const Water& water, Time now) {
   if (wants_pings()) update_pacer(now);
 }
 
-/// The client's request stays. Values that the device derives from it follow the water at its depth.
+/// Recomputes the values that the device derives from the client's request and the water at its depth.
 void PingSource::follow_water() {
   const auto same = sonar_.vendor.apply_override({}, sonar_.state);
   if (same && same->settings.device_sound_speed_mps != settings_.device_sound_speed_mps) settings_ = same->settings;
@@ -81,7 +81,7 @@ void PingSource::override_settings(const protocol::SettingsOverride& wanted, Tim
 
 // ---- when pings are due
 
-/// A sonar pings for viewers (runs_itself), or for an audience after a first request, if its protocol needs one.
+/// A sonar pings by itself (runs_itself) or for an audience; if the protocol requires a request, only after the first one.
 bool PingSource::wants_pings() const {
   if (runs_itself()) return true;
   return !audience_.stopping() && audience_.has_audience() && (asked_ || sonar_.vendor.pings_before_first_request(sonar_.state));
@@ -89,8 +89,8 @@ bool PingSource::wants_pings() const {
 
 void PingSource::update_pacer(Time now) {
   PingSettings paced = settings_;
-  if (runs_itself()) paced.triggered = false;  // no client asks for pings
-  // A fault with factor 0 stops the pings, as rate 0 (standby) does.
+  if (runs_itself()) paced.triggered = false;  // no client sends triggers
+  // A fault with factor 0 stops the pings, like rate 0 (standby).
   if (const double factor = faults_.rate_factor(); factor != 1) paced.rate_hz *= static_cast<float>(factor);
   if (wants_pings())
     pacer_.configure(paced, now);
@@ -131,7 +131,7 @@ Actions PingSource::tick(Time now) {
 
 // ---- pings
 
-/// A device may keep its rhythm while its host cannot keep up. Then pings that were not made have numbers too.
+/// The number of the next ping. With an option, pings that were skipped because of overload are numbered too.
 PingNumber PingSource::next_number() {
   const SkippedTicks& skipped = pacer_.skipped();
   const std::uint64_t lost = skipped.late + skipped.busy;
@@ -140,7 +140,7 @@ PingNumber PingSource::next_number() {
   return PingNumber(sonar_.state.last_ping = ++ping_number_);
 }
 
-/// The request of a ping at a moment. Its number is set by the caller.
+/// The request of a ping at a time. The caller sets its number.
 PingRequest PingSource::request_at(Time at, const protocol::RequestPing& aim) const {
   const Config& config = sonar_.around.config;
   const World& world = sonar_.around.world;
@@ -174,7 +174,7 @@ void PingSource::request_ping(Time at, Actions& actions) {
     ++sonar_.figures.skipped_stale;
     return;
   }
-  // Before the request reads the settings: the sound speed of the device follows the water at its depth.
+  // Must come before the request reads the settings, because the device's sound speed depends on its depth.
   sonar_.update_depth(at);
   follow_water();
   PingRequest request = request_at(at, aim_);
@@ -187,8 +187,8 @@ void PingSource::request_ping(Time at, Actions& actions) {
   actions.emplace_back(ComputePing{std::move(request)});
 }
 
-// Order: counters; the device's own changes after the ping; then the decision whether clients get it. False: the ping failed or
-// has no audience any more, which is counted.
+// First updates counters, then applies the device's own changes after the ping, then decides whether clients get it. False: the
+// ping failed, or its audience has left; both are counted.
 bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions) {
   DeviceFigures& figures = sonar_.figures;
   busy_ = false;
@@ -202,7 +202,7 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
     if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period()),
                                            sonar_.around.config.sonars.size() > 1))
       sonar_.report(Report::Topic::state, LogLevel::warning, *slow, {}, actions);
-  // The gain of the next ping follows this one, also if no client gets it.
+  // The next gain depends on this ping, even if no client gets it.
   if (outcome.ping) gain_assist_.look_at(*outcome.ping);
   // A ping that was made for clients that have left, or that is noise only, must not change the device.
   // Nor must a recorded one: the settings of the recording are not known.
@@ -223,9 +223,9 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
   return false;
 }
 
-/// This ping was requested like any other, and the engine computed only noise, because the sonar is above the sea surface.
+/// Reports that the sonar is above the sea surface or back in the water. Above it the engine computes only noise.
 void PingSource::note_water(const PingRequest& computed, Time now, Actions& actions) {
-  // `busy_blank_` pings were requested as noise only, so they say nothing about the water.
+  // Pings that were requested as noise only (`busy_blank_`) do not show whether the sonar is in the water.
   const bool was_in_air = std::exchange(in_air_, computed.blank && !busy_blank_);
   if (!in_air_) return;
   ++sonar_.figures.out_of_water;

@@ -1,5 +1,5 @@
-// The settings of an emulated sonar, and its pings: when they are due, what each requests from the engine, and how the result
-// changes the device.
+// The settings and the pings of an emulated sonar: the time of each ping, its request to the engine, and the effect of the
+// result on the device.
 #pragma once
 
 #include <memory>
@@ -16,19 +16,19 @@ namespace sonar {
 
 class PingSource {
  public:
-  /// The arguments outlive the object.
+  /// The arguments must outlive the object.
   PingSource(SonarData& sonar, Audience& audience, const Faults& faults);
 
   // ---- settings
 
   const PingSettings& settings() const { return settings_; }
-  /// The name of the client that last changed the settings; empty = they are the initial ones.
+  /// The client that last changed the settings; empty = they are the initial ones.
   const std::string& asked_by() const { return asked_by_; }
-  /// Restores the initial settings, so that the next client finds the device as delivered.
+  /// Restores the initial settings for the next client.
   void use_initial_settings();
-  /// `who` is for the log and for asked_by(); empty = the device itself.
+  /// `who`: the client, for the log and asked_by(); empty = the device itself.
   void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
-  /// Returns whether that was a change.
+  /// Returns whether the value changed.
   bool set_transmit(bool on) { return std::exchange(transmits_, on) != on; }
   bool transmits() const { return transmits_; }
   void use_water(const Water& water, Time now);
@@ -36,25 +36,24 @@ class PingSource {
   // ---- when pings are due
 
   bool wants_pings() const;
-  /// Sets whether the sonar makes pings by itself while it has no client, at the rate of its settings.
+  /// Sets whether the sonar pings without a client, at the rate of its settings.
   void run_itself(bool on, Time now);
-  /// True while it does so.
+  /// True while it pings without a client.
   bool runs_itself() const { return runs_itself_ && !audience_.stopping() && !audience_.has_audience(); }
-  /// The pacer runs while pings are wanted, at the requested rate times the factor of faults.
+  /// Starts or stops the pacer: it runs while pings are wanted, at the requested rate times the factor of faults.
   void update_pacer(Time now);
   const Pacer& pacer() const { return pacer_; }
   std::optional<Time> next_ping() const;
-  /// True if the poses of the vehicle are stale and the configuration forbids pings then.
+  /// True if the vehicle's poses are stale and the configuration forbids pings with stale poses.
   bool waits_for_pose(Time at) const;
-  /// Requests one ping now. With `joins` it makes none if one with these settings is being computed.
+  /// Requests one ping now. With `joins`, a ping with these settings that is being computed also serves.
   void trigger(const protocol::RequestPing& request, Time now);
   Actions tick(Time now);
   void skip(std::chrono::nanoseconds by) { pacer_.skip(by); }
   void stop() { pacer_.stop(); }
   // Effects of faults.
   void forget_settings(Time now);
-  /// Restarts the clock of the device. Unless `clock_only`, pings are numbered from 1 again and the settings are the initial
-  /// ones.
+  /// Restarts the device's clock. Unless `clock_only`, ping numbers begin at 1 again and the settings become the initial ones.
   void restart(bool clock_only, Time now);
   void override_settings(const protocol::SettingsOverride& wanted, Time now, Actions& actions);
 
@@ -64,7 +63,7 @@ class PingSource {
   bool busy() const { return busy_; }
   /// See Sonar::preview_request.
   std::optional<PingRequest> preview_request(PingNumber number, Time at) const;
-  /// Takes the result of the engine. Returns whether the ping goes to clients.
+  /// Handles the engine's result. Returns whether clients get the ping.
   bool on_ping(const PingOutcome& outcome, Time now, Actions& actions);
 
  private:
@@ -82,7 +81,7 @@ class PingSource {
   PingSettings settings_;
   protocol::RequestPing aim_;  // the last
   GainAssist gain_assist_;
-  bool asked_ = false;  // settings were requested since the first client or receiver came
+  bool asked_ = false;  // settings were requested since the first client or receiver connected
   std::string asked_by_;
   bool transmits_ = true, runs_itself_ = false;
 
@@ -90,11 +89,11 @@ class PingSource {
   bool busy_ = false;
   std::shared_ptr<const VendorSettings> busy_settings_;
   bool busy_blank_ = false;     // requested as noise only
-  bool busy_unwanted_ = false;  // the clients that requested it have gone
+  bool busy_unwanted_ = false;  // the clients that requested it have left
 
   std::uint32_t ping_number_ = 0;
-  std::uint64_t numbered_skips_ = 0;  // ticks lost to overload, as of the last ping
-  bool in_air_ = false;               // at the last ping
+  std::uint64_t numbered_skips_ = 0;  // ticks lost to overload before the last ping
+  bool in_air_ = false;               // whether the sonar was above the water at the last ping
   std::optional<Time> air_reported_;
   RateWatch rate_watch_;
 };

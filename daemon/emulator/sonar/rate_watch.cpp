@@ -8,7 +8,7 @@ namespace sonar {
 namespace {
 
 constexpr std::uint64_t ticks_a_stretch = 40;
-constexpr double tolerated_share = 0.1;  // tolerated share of skipped ticks
+constexpr double tolerated_share = 0.1;  // tolerated fraction of skipped ticks
 
 }  // namespace
 
@@ -33,7 +33,7 @@ std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t bu
   ping_s_ += ping_s;
   longest_s_ = std::max(longest_s_, ping_s);
   const std::uint64_t passed = ticks - ticks_before_;
-  // Ticks are judged in stretches of 40, so a single slow ping gives no warning.
+  // Ticks are judged in groups of 40, so that a single slow ping causes no warning.
   if (passed < ticks_a_stretch) return std::nullopt;
   const double skipped = static_cast<double>(busy - busy_before_) / static_cast<double>(passed);
   const double mean_s = ping_s_ / pings_, made_hz = rate_hz * (1 - skipped), alone_hz = 1 / std::max(mean_s, 1e-9);
@@ -41,7 +41,7 @@ std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t bu
   begin(ticks, busy, rate_hz);
   if (skipped <= tolerated_share) return std::nullopt;
   said_ = true;
-  // If pings take less than a period on average, pings of other sonars came between, or single pings took longer.
+  // If pings on average take less than a period, other sonars or single slow pings caused the delay.
   const bool by_itself = alone_hz < rate_hz;
   const double possible_hz = by_itself ? alone_hz : made_hz;
   const std::string why = by_itself    ? std::string()

@@ -1,5 +1,5 @@
-// Detects that a sonar misses the requested rate because pings take too long to compute, and reports it once. It is pure: Sonar
-// passes the figures and gets a sentence.
+// Detects that a sonar does not reach the requested rate because pings take too long to compute, and reports it once. Pure:
+// Sonar passes the figures and gets a sentence.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,16 @@ namespace sonar {
 
 class RateWatch {
  public:
-  /// After each ping. `ticks` and `busy` count since the start, `busy` those of them at which the ping before was still being
-  /// computed; the ping took `ping_s`; `rate_hz` is what the ticks have; `has_others`: other sonars are computed too. A sentence,
-  /// at most once in its life.
+  /// Call it after each ping. `ticks`: ticks since the start; `busy`: those at which the previous ping was still being
+  /// computed; `ping_s`: computing time of this ping; `rate_hz`: rate of the ticks; `has_others`: other sonars use the same
+  /// engine. Returns a sentence at most once.
   std::optional<std::string> look(std::uint64_t ticks, std::uint64_t busy, double ping_s, double rate_hz, bool has_others);
 
  private:
   void begin(std::uint64_t ticks, std::uint64_t busy, double rate_hz);
 
   bool said_ = false;
-  int to_pass_over_ = 5;  // the first pings take longer, because they fill caches; they do not count
+  int to_pass_over_ = 5;  // the first pings do not count: they take longer, because they fill caches
   double rate_hz_ = 0;
   std::uint64_t ticks_before_ = 0, busy_before_ = 0;
   int pings_ = 0;

@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-constexpr auto shortest_rhythm = std::chrono::milliseconds(1);  // between two ticks of one conversation
+constexpr auto shortest_rhythm = std::chrono::milliseconds(1);  // shortest time between two ticks of one conversation
 
 std::optional<Time> earlier(std::optional<Time> a, std::optional<Time> b) { return a && b ? std::min(*a, *b) : a ? a : b; }
 
@@ -98,11 +98,11 @@ Actions Sonar::tick_conversations(Time now) {
   return actions;
 }
 
-// Dialogues do not see the jump: they get unskipped time, so no keep-alive becomes due by it.
+// Dialogues run on unskipped time, so a jump makes no keep-alive due.
 void Sonar::skip(std::chrono::nanoseconds by) {
   data_.state.skipped += by;
   source_.skip(by);
-  // Stamps since power-up omit the skipped time.
+  // Stamps that count from power-up must not include the jump.
   data_.state.powered_up_at += by;
 }
 
@@ -123,7 +123,7 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
 void Sonar::deliver(const PingOutcome& outcome, Time now, Actions& actions) {
   Delivery::Requests requests;
   PingQueued queued = delivery_.queue(outcome, now, requests, actions);
-  // Requests that answer this ping act after all clients were offered it, because they may change the settings.
+  // Requests that follow this ping take effect after all clients were offered it, because they may change the settings.
   for (const auto& [from, event] : requests) on_event(source_of(*from), event, now, actions);
   actions.emplace_back(std::move(queued));
   apply_fault_orders(now, actions);
@@ -149,8 +149,7 @@ Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const
   const bool had_audience = audience_.has_audience(), ran_itself = source_.runs_itself();
   Connection* const admitted = audience_.admit(id, role, std::move(peer), port, faults_.admission(), actions);
   if (admitted == nullptr) return actions;
-  // After a take-over the new client starts from the stored settings if no other client is left.
-  // The first client finds the device as delivered, too.
+  // After a take-over without other clients, the new client starts with the stored settings, and so does the first client.
   if (had_audience ? !audience_.has_audience() : ran_itself && role == Role::client) source_.use_initial_settings();
   serve(*admitted, now, actions);
   return actions;
@@ -174,7 +173,7 @@ void Sonar::serve_waiting(Time now, Actions& actions) {
   }
 }
 
-/// Called after a client has come or gone.
+/// Called after a client has connected or left.
 void Sonar::on_membership(Time now, Actions& actions) {
   if (!audience_.has_audience()) source_.use_initial_settings();
   audience_.on_membership();
@@ -189,7 +188,7 @@ Actions Sonar::open_stream(ConnectionId id, const protocol::Port& port, Time now
   return {};
 }
 
-/// Accounts for the connection before it is removed; then its slot goes to the client that has waited longest.
+/// Counts the connection's traffic before removing it, then assigns its slot to the client that has waited longest.
 Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool by_client) {
   Actions actions;
   Connection* const connection = audience_.connections().find(id);
@@ -207,13 +206,13 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool
     on_membership(now, actions);
     return actions;
   }
-  // Before serve(), which calls on_membership(): then the next client counts as audience, and the settings would stay.
+  // Must come before serve(): after it, the next client would count as audience and the settings would stay.
   if (!audience_.has_audience()) source_.use_initial_settings();
   serve(*next, now, actions);
   return actions;
 }
 
-// Clients get the message that is being written whole; those that wait for a slot are reset.
+// Clients still get the current message completely; connections that wait for a slot are reset.
 Actions Sonar::stop(const std::string& why) {
   Actions actions;
   source_.stop();
@@ -261,7 +260,7 @@ Sonar::Answers Sonar::on_datagram(const protocol::Port& port, const protocol::En
 Sonar::HttpAnswer Sonar::on_http(const protocol::Port& port, const protocol::ResourceRequest& request, Time now) {
   HttpAnswer answer{{500, "internal fault\n", "text/plain"}, {}};
   try {
-    // The time is that of the stamps of pings, because no conversation is open.
+    // Time includes jumps here, like the stamps of pings, because no conversation is involved.
     answer.reply = vendor().on_http(port, request, state(), now);
     const Source from{nullptr, "http " + text::format_ipv4(request.from), request.from};
     for (const protocol::Event& event : answer.reply.events) on_event(from, event, now, answer.actions);
@@ -271,7 +270,7 @@ Sonar::HttpAnswer Sonar::on_http(const protocol::Port& port, const protocol::Res
   return answer;
 }
 
-/// Events come before replies, and a Close after both, so that a client that is closed still gets the replies.
+/// Order: events, replies, then Close, so that a client that is closed still gets the replies.
 void Sonar::handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions) {
   std::string close_why;
   for (const protocol::Event& event : reaction.events) {
@@ -300,7 +299,7 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
   if (notice != nullptr) {
     if (!observer) data_.report(Report::Topic::notice, LogLevel::warning, notice->text, {{"client", from.name}}, actions);
   } else if (observer) {
-    // Settings, triggers and addresses are for clients. An observer that sends them may have meant the other port.
+    // Only clients may send settings, triggers and addresses. An observer that does may use the wrong port.
     data_.report(Report::Topic::ignored, LogLevel::info, "request of an observer ignored: only clients change what a sonar does",
                  {{"observer", from.name}}, actions);
   } else if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
@@ -315,7 +314,7 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
   }
 }
 
-/// A fault may ignore the request, hold it back, or end the connection in place of the change.
+/// A fault may ignore the request, delay it, or end the connection instead.
 void Sonar::change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions) {
   const Faults::RequestVerdict verdict = faults_.on_request(change, from.name, state(), now);
   apply_fault_orders(now, actions);
@@ -339,7 +338,7 @@ bool Sonar::end_faults(const std::string& name, Time now, Actions& actions) {
   return found;
 }
 
-/// Faults leave orders for ports, clients and settings. They are applied after each call that may leave some.
+/// Carries out the orders of faults for ports, clients and settings. Called after each call that may cause some.
 void Sonar::apply_fault_orders(Time now, Actions& actions) {
   for (const FaultOrder& order : faults_.take_orders()) apply(order, now, actions);
 }

@@ -1,10 +1,9 @@
 // One emulated sonar without sockets, threads or a clock. It runs the conversations with its clients and connects three parts:
 // the Audience (the connections), the PingSource (settings and pings) and the Delivery (messages to clients).
 //
-// Flow: the caller reports what happened (a connection, bytes, a finished ping, time passing) with the time it happened; the
-// sonar changes its state and returns the Actions to carry out. Replies and pings wait in outboxes, from which the caller takes
-// whole messages. Time is the daemon's (emulator/time); conversations run on unskipped time, which leaves out what stepped time
-// jumps over.
+// Flow: the caller reports each event (a connection, bytes, a finished ping, a tick) with its time; the sonar changes its state
+// and returns the Actions to carry out. Replies and pings wait in outboxes, from which the caller takes whole messages. Times
+// are the daemon's; conversations run on unskipped time, which does not include the jumps of stepped time.
 #pragma once
 
 #include <deque>
@@ -25,7 +24,7 @@ namespace sonar {
 class Sonar {
  public:
   using Surroundings = SonarData::Surroundings;
-  /// `index` keys its noise; `skipped`: what stepped time has jumped over so far.
+  /// `index`: part of the key of its noise. `skipped`: sum of the jumps of stepped time so far.
   Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time now, std::chrono::nanoseconds skipped = {});
   Sonar(const Sonar&) = delete;
   Sonar& operator=(const Sonar&) = delete;
@@ -35,47 +34,47 @@ class Sonar {
   /// A client or an observer at a port of kind tcp_stream, by default the vendor's first, or a host at one of kind udp_dialogue.
   /// Serve, KeepWaiting or Refuse is among the actions.
   Actions on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port = nullptr);
-  /// A port of kind udp_stream is open: messages for its receivers can be taken under this id.
+  /// Call it when a port of kind udp_stream is open: next_message() then has messages for its receivers under this id.
   Actions open_stream(ConnectionId id, const protocol::Port& port, Time now);
-  /// The present receivers of a stream's message, or of a message to the host at a port of kind udp_dialogue.
+  /// The present receivers of a stream, or the host of a port of kind udp_dialogue.
   std::vector<protocol::Endpoint> receivers(ConnectionId stream) const { return delivery_.receivers(stream); }
   /// Another host takes over the dialogue at a port of kind udp_dialogue.
   void hand_over(ConnectionId id, Peer to) { audience_.hand_over(id, std::move(to)); }
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
-  /// Answers and requests that bytes of clients have caused since the last call.
+  /// Number of replies and events that bytes of clients have caused since the last call.
   std::size_t take_reactions() { return std::exchange(reactions_, 0); }
   /// Returns the next message to write; empty if there is none, or while one is being written.
   Outbox::Message next_message(ConnectionId id, Time now) { return delivery_.next_message(id, now); }
-  /// Reports `bytes` of it as sent; after the last one on_written() follows.
+  /// Reports `bytes` of the message as sent; after the last one on_written() follows.
   void on_sent(ConnectionId id, std::size_t bytes) { delivery_.on_sent(id, bytes); }
   void on_written(ConnectionId id, const Outbox::Message& message, Time now) { delivery_.on_written(id, message, now); }
-  /// Reports that the last message of a stream had no receiver left, or that none of its datagrams could be sent.
+  /// Reports that a stream's last message had no receiver, or that none of its datagrams could be sent.
   void on_not_sent(ConnectionId id) { delivery_.on_not_sent(id); }
-  /// Call it when the connection will be ended after the message being written.
+  /// Ends the connection after the message that is being written.
   void finish(ConnectionId id) { audience_.finish(id); }
-  /// Reports that a connection is closed, also one that waited. `why` is for the log.
+  /// Reports that a connection, served or waiting, is closed. `why` is for the log.
   Actions on_closed(ConnectionId id, const std::string& why, Time now, bool by_client = false);
   /// Counts a client that the caller refused for lack of a slot.
   void count_refused_client() { ++data_.figures.refused_clients; }
-  /// Finishes every connection and requests no more pings; `why` is for the log.
+  /// Ends all connections as finish() does, and requests no more pings; `why` is for the log.
   Actions stop(const std::string& why);
 
   // ---- pings and datagrams
 
   Actions on_ping(PingOutcome outcome, Time now);
-  /// The datagrams of a status broadcast, in order; none when the vendor has no beacon.
+  /// The datagrams of a status broadcast, in order; none if the vendor has no beacon.
   std::vector<protocol::Bytes> beacons(Time now) { return delivery_.beacons(now); }
   struct Answers {
     std::vector<protocol::Bytes> datagrams;  // datagrams to send back, in order
     Actions actions;
   };
-  /// A datagram from a host, at a port of kind udp_answer.
+  /// Handles a datagram of a host at a port of kind udp_answer.
   Answers on_datagram(const protocol::Port& port, const protocol::Endpoint& from, protocol::BytesView datagram, Time now);
   struct HttpAnswer {
     protocol::ResourceReply reply;
     Actions actions;
   };
-  /// A request at a port of kind http.
+  /// Handles a request at a port of kind http.
   HttpAnswer on_http(const protocol::Port& port, const protocol::ResourceRequest& request, Time now);
 
   // ---- time
@@ -84,26 +83,26 @@ class Sonar {
   Actions on_tick(Time now);
   /// The next time at which on_tick() must be called.
   std::optional<Time> next_tick() const;
-  // The stepped clock advances to the next of these and performs them one by one.
+  // The stepped clock advances to the earliest of these times.
   std::optional<Time> next_ping() const { return source_.next_ping(); }
   /// A tick of a dialogue, or a ping that a slow device sends.
   std::optional<Time> next_conversation() const;
   /// When a conversation will request a ping by itself.
   std::optional<Time> next_request() const;
   Actions tick_pacer(Time now) { return source_.tick(now); }
-  /// The conversations, the faults and the pings that are held back.
+  /// Does what is due in conversations, faults and held pings.
   Actions tick_conversations(Time now);
   std::optional<Time> next_tick_of_conversations() const;
   /// Call it when stepped time jumps ahead.
   void skip(std::chrono::nanoseconds by);
-  /// True if no ping is being computed and every client has received all that it was sent.
+  /// True if no ping is being computed and nothing waits to be sent to any client.
   bool settled() const { return !busy() && connections().settled(); }
 
   // ---- control
 
-  /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
+  /// Changes settings as a client would. An error states what the product can do; the settings then stay.
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
-  /// Lets the sonar make pings by itself while it has no client, as a range finder whose distances an autopilot gets.
+  /// Lets the sonar ping without a client, for example a range finder whose distances an autopilot gets.
   void run_itself(bool on, Time now) { source_.run_itself(on, now); }
   /// Returns whether the setting changed.
   bool set_transmit(bool on) { return source_.set_transmit(on); }
@@ -112,15 +111,15 @@ class Sonar {
   const std::string& asked_by() const { return source_.asked_by(); }
   Pose pose_at(Time at) const { return data_.pose_at(at); }  // in world
   void move_mount(const Pose& mount, Time now);
-  /// Uses vehicle and mount of a configuration that is otherwise the same.
+  /// Takes vehicle and mount from `config`, which is otherwise equal to the present one.
   void move(const SonarConfig& config, Time now);
   void use_water(const Water& water, Time now) { source_.use_water(water, now); }
 
-  /// Why this sonar cannot have these faults; nullopt = it can.
+  /// The reason why this sonar cannot have these faults; nullopt if it can.
   std::optional<FaultRefusal> why_no_faults(const std::vector<Fault>& faults) const { return faults_.why_not(faults); }
   /// Adds those of `faults` that are for this sonar and take effect on it.
   Actions add_faults(const std::vector<Fault>& faults, bool manual, Time now);
-  /// Ends the faults of that name, or all if `name` is empty. Returns false if there is none.
+  /// Ends the faults with this name, or all if `name` is empty. Returns false if there is none.
   bool end_faults(const std::string& name, Time now, Actions& actions);
   const Faults& faults() const { return faults_; }
 
@@ -134,11 +133,11 @@ class Sonar {
   bool busy() const { return source_.busy(); }
   bool wants_pings() const { return source_.wants_pings(); }
   DeviceFigures figures() const;
-  /// Counts of pings that at least one client received, and of pings that were made.
+  /// Number of pings that at least one client received; number of computed pings.
   std::uint64_t served() const { return data_.figures.served; }
   std::uint64_t pings() const { return data_.figures.pings; }
-  /// A request for a ping as a client would get it now, but with a number and noise that no client's ping has. The sonar does not
-  /// change. nullopt if poses are stale and the rule for stale poses forbids pings.
+  /// A request for a ping as a client would get it now, but with its own number and noise. The sonar does not change. nullopt
+  /// if poses are stale and the rule for stale poses forbids pings.
   std::optional<PingRequest> preview_request(PingNumber number, Time at) const { return source_.preview_request(number, at); }
 
  private:

@@ -17,8 +17,8 @@
 namespace sonar {
 
 struct SonarData {
-  /// All outlive the sonar, which reads from the configuration what all sonars share: water, seed, switches, rules for stale
-  /// poses.
+  /// The objects must outlive the sonar. The configuration has the values that all sonars share: water, seed, switches, rules
+  /// for stale poses.
   struct Surroundings {
     const Config& config;
     const World& world;
@@ -38,13 +38,13 @@ struct SonarData {
   Surroundings around;
   SonarConfig config;
   const protocol::Vendor& vendor;
-  std::uint32_t index;  // keys its noise
+  std::uint32_t index;  // part of the key of its noise
   protocol::DeviceState state;
   DeviceFigures figures;
 
-  /// Converts to the time of conversations, which leaves out what stepped time has jumped over.
+  /// Converts to the time of conversations, which does not include the jumps of stepped time.
   Time unskipped(Time now) const { return now - state.skipped; }
-  /// Converts back to the daemon's time, if nothing more is skipped.
+  /// Converts back to the daemon's time, assuming no further jump.
   Time clock_time(Time unskipped) const {
     return unskipped > Time::max() - state.skipped ? Time::max() : unskipped + state.skipped;
   }

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-constexpr float dimmed = 0.4f;  // brightness of parts that the messages do not carry
+constexpr float dimmed = 0.4f;  // brightness of parts that the messages do not contain
 
 /// The messages of a ping, over TCP or as datagrams.
 std::vector<protocol::Bytes> messages_of(const Ping& ping, const protocol::Vendor& vendor, const protocol::DeviceState& state) {
@@ -25,7 +25,7 @@ std::unique_ptr<protocol::Host> host_of(const protocol::Make& make) {
   return host ? *std::move(host) : nullptr;
 }
 
-/// Null: the host shows nothing of this ping.
+/// Null: the host shows nothing for this ping.
 DriverPicture::Drawing read_by(protocol::Host& host, const protocol::Make& make, const Ping& ping,
                                const protocol::DeviceState& state) {
   DriverPicture::Drawing drawing;
@@ -52,7 +52,7 @@ DriverPicture::DriverPicture(const protocol::Make& make) : make_(make) {
   if (make.picture == PictureKind::sweep || make.picture == PictureKind::waterfall) host_ = host_of(make);
 }
 
-/// Pictures that add up many pings need every ping, so a host reads it now. Others are decoded when the drawing is called.
+/// If a picture combines many pings, the host reads each ping now. Other pings are decoded when the drawing is called.
 DriverPicture::Drawing DriverPicture::after(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state) {
   if (make_.picture == PictureKind::fan)
     return [ping, shades = make_.shades] { return SonarPicture{.image = polar_image_of(*ping, shades)}; };

@@ -1,4 +1,4 @@
-// Makes the picture of a sonar for viewers. The host of the make (protocol/host.hpp), which sonarctl uses too, decodes the
+// Makes the picture of a sonar for viewers. The make's host (protocol/host.hpp), which sonarctl also uses, decodes the
 // messages, so viewers see what a driver sees. Pure.
 #pragma once
 
@@ -17,14 +17,14 @@ class DriverPicture {
 
   explicit DriverPicture(const protocol::Make& make);
   PictureKind kind() const { return make_.picture; }
-  /// The drawing after the next ping; pings come in order, `state` is that of the device that fired them. The call is quick for
-  /// every make. Calling the drawing takes long, because it may encode and decode the ping; any thread may do that, also when
-  /// this object is gone. Null: there is nothing to see yet.
+  /// The drawing after the next ping. Pings must be passed in order; `state` is that of the device that fired them. This call
+  /// is fast. Calling the returned function is slow, because it may encode and decode the ping; any thread may do so, even
+  /// after the end of this object. Null: nothing to show yet.
   Drawing after(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state);
 
  private:
   const protocol::Make& make_;
-  std::unique_ptr<protocol::Host> host_;  // for a make whose picture adds up many pings
+  std::unique_ptr<protocol::Host> host_;  // only for makes whose picture combines many pings
 };
 
 }  // namespace sonar

@@ -82,7 +82,8 @@ PolarImage polar_image_of(const Ping& ping, const Shades& shades) {
   for (std::size_t i = 0; i < image.rows * image.beams; ++i)
     image.samples.push_back(static_cast<float>(sample_code(ping.samples, i, bytes)));
   image.full_scale = static_cast<float>(s.format.max_code);
-  if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear) image.shade(shades);  // they rarely come near their maximum
+  if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear)
+    image.shade(shades);  // such samples rarely come near their maximum
   return image;
 }
 

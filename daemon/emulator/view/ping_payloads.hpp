@@ -1,5 +1,4 @@
-// The messages of a ping for viewers, each made from the ping alone and once for all viewers. Functions marked "Takes long"
-// are called on a thread of their own. Pure.
+// Makes the messages of a ping for viewers, each once for all viewers. Functions marked "Slow" run on a separate thread. Pure.
 #pragma once
 
 #include <memory>
@@ -11,7 +10,7 @@
 
 namespace sonar {
 
-/// The picture of a ping. `shades`: of its make, for wide linear samples.
+/// The picture of a ping. `shades`: those of its make, for wide linear samples.
 PolarImage polar_image_of(const Ping& ping, const Shades& shades = {});
 
 using PingPointer = std::shared_ptr<const Ping>;
@@ -24,11 +23,11 @@ ViewPayloadPointer truth_payload(const Ping& ping);
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);
 /// The style of fan_payload(): gray, without rings.
 FanStyle view_fan_style();
-/// The picture that `painter` draws in view_fan_style(), 0 outside. Takes long. Null: it cannot be drawn.
+/// The picture that `painter` draws in view_fan_style(), 0 outside. Slow. Null: it cannot be drawn.
 ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPicture& picture, PicturePainter& painter);
 /// The axes of fan_payload(), as sonar.v1.Picture.
 ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture);
-/// The samples above `threshold` of the full scale in the plane of the fan, the 20,000 brightest. Takes long.
+/// The samples above the fraction `threshold` of full scale, in the plane of the fan, at most the 20,000 brightest. Slow.
 ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold);
 
 /// A payload of one piece.

@@ -5,7 +5,7 @@
 namespace sonar {
 namespace {
 
-constexpr std::chrono::milliseconds slack{1};  // a change of speed or a pause rounds
+constexpr std::chrono::milliseconds slack{1};  // for the rounding at a change of speed or a pause
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// The state of playback that viewers of a vehicle's trajectory see (docs/live-view.md): the trajectory's time for a time of the
-// daemon, and changes by steps: pause, speed, the end, a jump to another time. Pure.
+// The state of playback for viewers of a vehicle's trajectory (docs/live-view.md): the trajectory's time for a time of the
+// daemon, and sudden changes: pause, speed, the end, a seek. Pure.
 #pragma once
 
 #include <optional>
@@ -13,11 +13,11 @@ class PlaybackWatch {
  public:
   PlaybackWatch(const motion::Playback& of, Time now);
 
-  /// Returns the state if it changed by a step since the last look; nullopt if it was played on. The begin of a new round of a
-  /// loop counts as a seek. `of`: null = the vehicle follows its trajectory no longer, which counts as a pause.
+  /// Returns the state if it changed suddenly since the last call; nullopt if playing just continued. The start of a new round
+  /// of a loop counts as a seek. `of`: null = the vehicle no longer follows its trajectory, which counts as a pause.
   std::optional<foxglove::PlaybackState> look(const motion::Playback* of, Time now);
   foxglove::PlaybackState state(Time now) const;
-  /// The trajectory's time, from 0 to end(). A time before the last seek counts as if it had been played until then.
+  /// The trajectory's time, from 0 to end(). Times before the last seek are computed as if playing had always continued.
   Time stamp(Time daemon) const { return Time{} + playback_.place(daemon).at; }
   Time end() const { return Time{} + playback_.duration(); }
 

@@ -15,7 +15,7 @@ std::chrono::nanoseconds Preview::period(const Sonar& sonar) {
   return std::max<std::chrono::nanoseconds>(s.beam_count > 1 ? shortest_period : shortest_of_one_beam, ping_period(s));
 }
 
-/// A sonar in standby shows the picture that it would have.
+/// A sonar in standby shows the picture that it would have if it pinged.
 std::optional<PingRequest> Preview::due(const Sonar& sonar, Time now) {
   if (!on() || busy_) return std::nullopt;
   if (fired_at_ && now < *fired_at_ + period(sonar)) return std::nullopt;
@@ -34,7 +34,7 @@ void Preview::done(bool made) {
 
 void Preview::end() {
   until_.reset();
-  made_ = {};  // the pause before the next preview does not count for its rate
+  made_ = {};  // so that the pause before the next preview does not count
 }
 
 }  // namespace sonar

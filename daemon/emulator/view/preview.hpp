@@ -1,6 +1,6 @@
-// Pings for viewers while no driver is connected: at most 5 a second, or 25 with one beam. They have numbers and noise of their
-// own, so that the pings of the first driver do not depend on them. Pure: the caller computes the pings that are due, and calls
-// why_over() regularly.
+// Pings for viewers while no driver is connected: at most 5 per second, or 25 with one beam. They have their own numbers and
+// noise, so that they do not affect a driver's pings. Pure: the caller computes the pings that are due, and calls why_over()
+// regularly.
 #pragma once
 
 #include <chrono>
@@ -22,12 +22,12 @@ class Preview {
   bool on() const { return until_.has_value(); }
   /// The time between two previews of this sonar.
   static std::chrono::nanoseconds period(const Sonar& sonar);
-  /// Returns why the preview must end now, for the log; empty if it may continue.
+  /// The reason, for the log, why the preview must end now; empty if it may continue.
   std::string why_over(const Sonar& sonar, Time now) const;
   /// Returns the ping that is due. Call done() when it is computed; until then no other is due.
   std::optional<PingRequest> due(const Sonar& sonar, Time now);
   void done(bool made);
-  /// Previews a second, as RecentRate measures them; 0 = none.
+  /// Previews per second, measured by RecentRate; 0 = none.
   double hz(Time now) const { return made_.hz(now); }
 
  private:

@@ -29,7 +29,7 @@ bool RecordingPlayer::measure() {
   return false;
 }
 
-/// Recordings can only be read forwards: for an earlier time it begins at the start again.
+/// Recordings can only be read forwards; for an earlier time reading begins at the start again.
 bool RecordingPlayer::approach(Ns at) {
   if (shown_ && at < shown_->at) {
     pings_.rewind();

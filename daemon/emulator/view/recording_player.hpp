@@ -1,5 +1,5 @@
-// Finds the ping of a recording that is shown at a moment (the last one at or before it), and the length of the recording. Pure;
-// the caller chooses how many steps it takes at a time.
+// Finds the ping of a recording to show at a time (the last one at or before it), and the length of the recording. Pure; it
+// works in steps, whose number the caller chooses.
 #pragma once
 
 #include <cstdint>
@@ -17,20 +17,20 @@ class RecordingPlayer {
     protocol::HostPing ping;
   };
 
-  /// `interval`: between pings of recordings that store no times.
+  /// `interval`: time between pings if the recording stores no times.
   RecordingPlayer(recording::RecordedPings pings, Ns interval) : pings_(std::move(pings)), interval_(interval) {}
 
-  /// Reads one ping more to find the recording's length. False: there are no more, and the recording is at its start again.
+  /// Reads one more ping to find the recording's length. False: there are no more, and the recording is at its start again.
   bool measure();
   Time begin() const { return begin_.value_or(Time{}); }
-  /// Time from the first ping to the last.
+  /// Time time since the first ping to the last.
   Ns length() const { return length_; }
   std::uint64_t count() const { return count_; }
   const recording::SentBy& by() const { return pings_.by(); }
 
-  /// Reads one ping more towards the last one at or before `at`; false: that one is shown.
+  /// Reads one more ping towards the last one at or before `at`. False: that one is now shown.
   bool approach(Ns at);
-  /// Null: none was read yet.
+  /// Null: no ping was read yet.
   const Shown* shown() const { return shown_ ? &*shown_ : nullptr; }
 
  private:

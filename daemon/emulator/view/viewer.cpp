@@ -14,7 +14,7 @@ constexpr int most_complaints = 10;
 constexpr std::size_t most_passing = 64, longest_name_said = 256;
 constexpr milliseconds between_times{33};
 constexpr seconds slow_is_said_for{5}, refusal_is_said_for{10};
-// Viewers look for exactly these words to give a hint.
+// Viewers recognise exactly this text and show a hint.
 constexpr const char* too_slow = "Send buffer limit reached";
 constexpr const char* slow_id = "slow";
 
@@ -56,7 +56,7 @@ void Viewer::on_binary(wire::BytesView frame, Moment now) {
   host_.call(*this, *call);
 }
 
-/// A bucket of messages: a viewer that sends more than 100 a second is closed.
+/// A token bucket: a viewer that sends more than 100 messages a second is disconnected.
 bool Viewer::has_room_for_message(Moment now) {
   if (allowance_at_) allowance_ = std::min(burst, allowance_ + messages_per_s * sonar::seconds(now - *allowance_at_));
   allowance_at_ = now;
@@ -65,14 +65,14 @@ bool Viewer::has_room_for_message(Moment now) {
   return close_ == CloseCode::none;
 }
 
-/// Reports a message that cannot be read; after the last permitted one the viewer is closed.
+/// Reports an unreadable message; a viewer with too many of them is disconnected.
 void Viewer::complain(const std::string& why) {
   say_status(foxglove::StatusLevel::error, why);
   if (++complaints_ >= most_complaints) close_ = CloseCode::policy;
 }
 
-// Each subscription gets a slot, which holds what waits for it: events in a queue of limited depth; of other channels only the
-// newest message.
+// Each subscription has a slot for waiting messages: events in a queue of limited depth; for other channels only the newest
+// message.
 void Viewer::on_word(const foxglove::Subscribe& word, Moment) {
   for (const auto& [id, channel] : word.subscriptions) {
     const ViewChannel* const offered = host_.channel(channel);
@@ -86,7 +86,7 @@ void Viewer::on_word(const foxglove::Subscribe& word, Moment) {
     } else {
       const Moment own = offered->kind == ViewChannel::Kind::picture ? interval_of(rights_.most_hz) : Moment{0};
       slots_[id] = {channel, offered->kind, std::max(interval_of(offered->most_hz), own), offered->deepest, {}, {}};
-      dropped_[channel];  // none so far
+      dropped_[channel];  // so that the channel is listed with 0
       host_.on_subscribed(*this, channel);
     }
   }
@@ -101,7 +101,7 @@ void Viewer::on_word(const foxglove::GetParameters& word, Moment) {
   say(foxglove::parameter_values(host_.parameters(*this, word.names), word.request));
 }
 
-/// The answer has the values that are in force afterwards.
+/// The answer has the resulting values.
 void Viewer::on_word(const foxglove::SetParameters& word, Moment now) {
   std::vector<std::string> names;
   for (const foxglove::Parameter& wanted : word.parameters) {
@@ -109,7 +109,7 @@ void Viewer::on_word(const foxglove::SetParameters& word, Moment now) {
     const std::string why = rights_.may_steer ? host_.set_parameter(*this, wanted) : may_only_look;
     const std::string name = wanted.name.substr(0, longest_name_said);
     if (!why.empty()) say_for_now(name + ": " + why, "param:" + name, now, refusal_is_said_for);
-    if (!rights_.may_steer) break;  // once is enough
+    if (!rights_.may_steer) break;  // one error is enough
   }
   if (!names.empty()) say(foxglove::parameter_values(host_.parameters(*this, names), word.request));
 }
@@ -145,14 +145,14 @@ void Viewer::say_ignored(const std::string& what) {
 void Viewer::say(std::string word) { add_word({true, bytes_of(word), {}}); }
 void Viewer::say_frame(wire::Bytes frame) { add_word({false, std::move(frame), {}}); }
 
-/// Words are never dropped. A viewer that is too slow for them is closed, and may connect again.
+/// JSON texts are never dropped. A viewer that is too slow for them is disconnected, and may connect again.
 void Viewer::add_word(ViewMessage word) {
   word_bytes_ += word.head.size();
   words_.push_back(std::move(word));
   if (words_.size() > most_words || word_bytes_ > most_word_bytes) close_ = CloseCode::try_again_later;
 }
 
-/// The status is removed after `lasts`; next() does so. Beyond 64 such statuses a further one stays.
+/// Shows a status that next() removes after `lasts`. If 64 such statuses exist, the new one is not removed.
 void Viewer::say_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts) {
   if (passing_.size() >= most_passing && !passing_.contains(id)) return say_status(foxglove::StatusLevel::error, text);
   say_status(foxglove::StatusLevel::error, text, id);
@@ -167,7 +167,7 @@ void Viewer::forget(std::uint32_t channel) {
   std::erase_if(slots_, [channel](const auto& slot) { return slot.second.channel == channel; });
 }
 
-/// Events queue up to a bound, and the oldest is dropped. Of other kinds one payload waits.
+/// Events queue up to a limit, beyond which the oldest is dropped. For other kinds one payload waits.
 void Viewer::offer(std::uint32_t channel, const ViewPayloadPointer& payload, Moment now) {
   for (auto& [id, slot] : slots_) {
     if (slot.channel != channel) continue;
@@ -184,8 +184,8 @@ void Viewer::offer(std::uint32_t channel, const ViewPayloadPointer& payload, Mom
   }
 }
 
-/// Merges a payload into the waiting one, or replaces that. A replaced one counts as dropped unless it waited for its channel's
-/// rate alone.
+/// Merges a payload into the waiting one, or replaces it. A replaced payload counts as dropped unless it only waited for its
+/// channel's rate.
 void Viewer::merge(Slot& slot, const ViewPayloadPointer& payload, Moment now) {
   ViewPayloadPointer& waiting = slot.waiting.front();
   if (payload->merges) {
@@ -212,7 +212,7 @@ void Viewer::answer(const foxglove::ServiceCall& answer) {
 void Viewer::fail(const foxglove::ServiceCall& call, const std::string& why) {
   open_calls_ -= std::min<std::size_t>(open_calls_, 1);
   say(foxglove::service_failure(call.service, call.call, why));
-  say_status(foxglove::StatusLevel::error, why);  // Lichtblick shows this, and ignores the failure
+  say_status(foxglove::StatusLevel::error, why);  // Lichtblick shows this status but ignores the failure
 }
 
 void Viewer::on_parameters(std::span<const foxglove::Parameter> changed) {
@@ -237,7 +237,7 @@ Viewer::Slot* Viewer::next_slot(bool last_values, Moment now, std::uint32_t& sub
   return best;
 }
 
-/// The order: removed statuses, words, the time, last values, then pictures and events.
+/// Order: removed statuses, JSON texts, the time, last values, then pictures and events.
 std::optional<ViewMessage> Viewer::next(Moment now) {
   if (slow_since_ && now - *slow_since_ >= slow_is_said_for) {
     slow_since_.reset();
@@ -270,7 +270,7 @@ std::optional<ViewMessage> Viewer::next(Moment now) {
   return message;
 }
 
-/// Must consider everything that next() may return later; otherwise it would wait for another message.
+/// Must consider everything that next() may return later; otherwise a due message would wait for the next event.
 std::optional<Viewer::Moment> Viewer::next_due(Moment now) const {
   std::optional<Moment> due;
   const auto consider = [&due](Moment at) { due = due ? std::min(*due, at) : at; };

@@ -1,8 +1,9 @@
-// One viewer of the live view, without its socket. Its messages become requests to its host; its subscriptions become messages to
-// write, of which newer ones replace those for which it is too slow. No I/O: bytes and time go in, messages come out.
+// One viewer of the live view, without its socket. It converts the viewer's messages to requests to its host, and subscriptions
+// to messages to write; if the viewer is slow, newer messages replace older ones. No I/O: bytes and time go in, messages come
+// out.
 //
-// Three kinds of messages leave in this order: JSON texts and answers, never dropped; last values, of which a newer one replaces
-// an older one; pictures and events. Of a channel's pictures one waits, the newest; of its events the newest 64.
+// Messages are sent in this order: JSON texts and answers, which are never dropped; last values, of which a newer one replaces
+// an older one; pictures and events. Per channel, only the newest picture or the newest 64 events wait.
 #pragma once
 
 #include <chrono>
@@ -25,32 +26,32 @@ namespace sonar {
 
 using ViewBytes = std::shared_ptr<const wire::Bytes>;
 
-/// A channel that is offered to all viewers.
+/// A channel, offered to all viewers.
 struct ViewChannel {
   enum class Kind { last_value, picture, event };
   foxglove::Channel advertised;
   Kind kind = Kind::last_value;
-  double most_hz = 0;        // 0 = no bound
-  std::size_t deepest = 64;  // events that wait
+  double most_hz = 0;        // 0 = no limit
+  std::size_t deepest = 64;  // most waiting events
 };
 
-/// A message of a channel: its pieces one after the other, shared by all viewers.
+/// A message of a channel, in pieces; all viewers share it.
 struct ViewPayload {
   struct Piece {
-    std::string key;  // key of a message part that a later one with the same key replaces
+    std::string key;  // a later piece with the same key replaces this one
     ViewBytes bytes;
   };
   Time at{};
   std::vector<Piece> pieces;
-  bool merges = false;  // pieces of other keys that wait are kept: their bytes together are one message
+  bool merges = false;  // waiting pieces with other keys are kept; all pieces together are one message
 };
 using ViewPayloadPointer = std::shared_ptr<const ViewPayload>;
 
 /// One WebSocket message to write.
 struct ViewMessage {
   bool is_text = false;
-  wire::Bytes head;               // all of it, except for channels
-  std::vector<ViewBytes> pieces;  // what follows
+  wire::Bytes head;               // the whole message, except for channels
+  std::vector<ViewBytes> pieces;  // bytes after `head`
 };
 
 struct ViewerFigures {
@@ -61,19 +62,19 @@ struct ViewerFigures {
 
 class Viewer;
 
-/// The part of the daemon that answers viewers; outlives them. May call the viewer back.
+/// The part of the daemon that answers viewers. It must outlive them, and may call the viewer back.
 class ViewerHost {
  public:
   virtual ~ViewerHost() = default;
-  /// Returns the channel of that id, or null.
+  /// The channel with this id, or null.
   virtual const ViewChannel* channel(std::uint32_t id) const = 0;
   /// Offers the present values of a channel to a new subscriber.
   virtual void on_subscribed(Viewer& viewer, std::uint32_t channel) = 0;
-  /// Returns the parameters of these names, or all if `names` is empty. Unknown names are left out.
+  /// The parameters with these names, or all if `names` is empty. Unknown names are ignored.
   virtual std::vector<foxglove::Parameter> parameters(const Viewer& viewer, const std::vector<std::string>& names) = 0;
-  /// Sets a parameter. Returns an empty text, or why it was not set.
+  /// Sets a parameter. Returns the reason if it was not set, else an empty text.
   virtual std::string set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) = 0;
-  /// Steers the trajectory and answers with its state. Returns false if the viewer looks at no trajectory.
+  /// Controls the trajectory and answers with its state. Returns false if the viewer does not look at a trajectory.
   virtual bool steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) = 0;
   /// Performs a call and answers with Viewer::answer() or fail(), now or later.
   virtual void call(Viewer& viewer, const foxglove::ServiceCall& call) = 0;
@@ -81,7 +82,7 @@ class ViewerHost {
 
 class Viewer {
  public:
-  /// A time that never decreases, from any origin.
+  /// A time that never decreases, with any origin.
   using Moment = std::chrono::nanoseconds;
   struct Rights {
     bool may_steer = false;
@@ -91,13 +92,13 @@ class Viewer {
   static constexpr const char* may_only_look = "this connection may only look";
   static constexpr std::size_t most_subscriptions = 256, most_words = 256, most_word_bytes = std::size_t{1} << 20, most_calls = 4;
 
-  /// `who` = its address, for the log.
+  /// `who`: the viewer's address, for the log.
   Viewer(ViewerHost& host, Rights rights, std::string who) : host_(host), rights_(rights), who_(std::move(who)) {}
 
   // ---- from the socket
   void on_text(std::string_view text, Moment now);
   void on_binary(wire::BytesView frame, Moment now);
-  /// The next message to write; nothing: wait until something is offered, or until next_due().
+  /// The next message to write; nullopt: wait until something is offered, or until next_due().
   std::optional<ViewMessage> next(Moment now);
   /// The time at which next() must be called again for a message that waits for its rate, or for the end of a warning.
   std::optional<Moment> next_due(Moment now) const;
@@ -105,7 +106,7 @@ class Viewer {
   CloseCode close_code() const { return close_; }
 
   // ---- from the host
-  /// Adds one of the first messages, of which there may be many.
+  /// Adds a message of the greeting; the limit of waiting messages does not apply.
   void greet(std::string word) { words_.push_back({true, bytes_of(word), {}}); }
   void say(std::string word);
   void say_frame(wire::Bytes frame);
@@ -117,9 +118,9 @@ class Viewer {
   void offer(std::uint32_t channel, const ViewPayloadPointer& payload, Moment now);
   bool subscribes(std::uint32_t channel) const;
   bool subscribes_any() const { return !slots_.empty(); }
-  /// Drops a channel that is gone, with its waiting messages.
+  /// Removes a channel that no longer exists, with its waiting messages.
   void forget(std::uint32_t channel);
-  /// The daemon's time, at most 30 times a second, the last one always.
+  /// Sends the daemon's time, at most 30 times a second; the last value is always sent.
   void set_time(Time now) {
     if (std::exchange(newest_time_, now) != now) time_ = now;
   }
@@ -129,10 +130,10 @@ class Viewer {
   void on_parameters(std::span<const foxglove::Parameter> changed);
   bool watches_parameters() const { return watches_all_ || !watched_.empty(); }
 
-  /// The vehicle whose trajectory the viewer looks at, in the time of the trajectory; empty = none.
+  /// Sets the vehicle whose trajectory the viewer looks at, in the trajectory's time; empty = none.
   void play(std::string vehicle) { playback_ = std::move(vehicle); }
   const std::string& playback() const { return playback_; }
-  /// Parameters of this connection only.
+  /// Sets a parameter of this connection only.
   void choose(const std::string& parameter, double value) { choices_[parameter] = value; }
   double choice(const std::string& parameter, double usual) const {
     const auto found = choices_.find(parameter);
@@ -179,10 +180,10 @@ class Viewer {
   std::map<std::uint32_t, std::uint64_t> dropped_;
   std::optional<Time> time_, newest_time_;
   std::optional<Moment> time_sent_, slow_since_, allowance_at_;
-  std::map<std::string, Moment> passing_;  // statuses that go by themselves
+  std::map<std::string, Moment> passing_;  // statuses with the time of their removal
   std::set<std::string> watched_;
   bool watches_all_ = false, said_unknown_ = false;
-  double allowance_ = 200;  // messages that may come now
+  double allowance_ = 200;  // number of messages that the viewer may send now
   int complaints_ = 0;
   std::size_t open_calls_ = 0;
   CloseCode close_ = CloseCode::none;

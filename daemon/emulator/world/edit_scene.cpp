@@ -29,7 +29,7 @@ bool is_printable(std::string_view name) {
   return std::all_of(name.begin(), name.end(), [](char c) { return std::isprint(static_cast<unsigned char>(c)) != 0; });
 }
 
-/// Returns why an object cannot have this name; empty if it can.
+/// The reason why an object cannot have this name; empty if it can.
 std::string complaint_about(const Scene& scene, const std::string& name) {
   if (name.empty() || name.size() > longest_name || !is_printable(name))
     return "an object needs a name of 1 to 64 printable characters";
@@ -153,8 +153,8 @@ Result<ScenePointer> with_object_set(const Scene& scene, const control::SetObjec
 }
 
 bool is_same(const Scene& a, const Scene& b) {
-  // All members are named, so that adding one to Scene breaks this line: then compare the new one here, too. Name and notes are
-  // not compared, because they do not change the pings.
+  // All members are listed, so that a new member of Scene breaks this line and is compared too. Name and notes are not
+  // compared, because they do not change the pings.
   const auto& [name, materials, objects, point_targets, body_names, bodies_in_world, sea_surface, water_column, other_sonars,
                ray_origin, notes] = a;
   return ray_origin_of(a) == ray_origin_of(b) && materials == b.materials && point_targets == b.point_targets &&

@@ -21,10 +21,10 @@ constexpr double turned_over = -0.5;           // the z axis points down, by mor
 constexpr std::size_t most_looked_at = 10000;  // poses of a trajectory, triangles of a mesh
 constexpr double ground_flatness = 0.05;       // height over width; flatter objects are ground, which may be long
 constexpr double least_ground_m = 2;           // width; a flat plate that is narrower is not ground
-constexpr double far_from_origin_m = 1000;     // within it vehicles may drive to the scene
-constexpr double long_ranges = 5;              // lengths of the longest range that an object may have
+constexpr double far_from_origin_m = 1000;     // vehicles may drive this far to the scene
+constexpr double long_ranges = 5;              // an object may be this many times as long as the longest range
 
-// Each cure is one kind of note: a kind is reported once.
+// Each cure identifies a kind of note; a kind is reported once.
 constexpr const char* surface_cure =
     "was NED taken for ENU, or the reverse? ENU_FLU counts z upwards, NED_FRD downwards: 3 m deep is z = -3 in the one and z = 3 "
     "in the other; state the frame that was sent";
@@ -53,7 +53,7 @@ struct Doubt {
   const char* cure;
 };
 
-/// The lowest point of all ground above or below that place; nothing when there is no ground.
+/// The lowest point of all ground above or below a place; nullopt without ground.
 std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around) {
   std::optional<double> lowest;
   for (const Extent& ground : around.ground)
@@ -65,7 +65,7 @@ std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around)
 enum class Location { fine, above_water, below_ground, far_away };
 Location judge_location(Vec3d sonar_m, const Surroundings& around) {
   const Extent& scene = around.scene;
-  const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // then the scene is wrong
+  const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // then the scene is wrong, not the pose
   if (sonar_m.z > least_depth_m && !lies_above) return Location::above_water;
   if (const auto ground_m = lowest_ground_m(sonar_m, around); ground_m && sonar_m.z < *ground_m) return Location::below_ground;
   return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Location::far_away : Location::fine;
@@ -105,14 +105,14 @@ std::optional<Doubt> doubt_of_attitude(const std::string& body, Quatd q) {
   return Doubt{body + format(" is upside down, %.0f deg from upright", deg_from_rad(from_upright_rad)), turned_cure};
 }
 
-/// Returns whether a body is upright if w is at the other end of the four numbers, in the frame in which they were written.
+/// Whether a body is upright, in the frame of the file, if w is at the other end of the four numbers.
 bool is_upright_in_another_order(Quatd q) {
   const auto reordered = [](Quatd r) { return std::array{upright({r.x, r.y, r.z, r.w}), upright({r.z, r.w, r.x, r.y})}; };
   const auto as_enu = reordered(q), as_ned = reordered(enu_flu_from_ned_frd(q));
   return std::max({as_enu[0], as_enu[1], as_ned[0], as_ned[1]}) > tilted;
 }
 
-/// CSV files name their columns and KITTI's have matrices: only here can w stand at the wrong end. `about` begins with the
+/// Whether w can be at the wrong end: CSV files name their columns, and KITTI files have matrices. `about` begins with the
 /// format.
 bool has_nameless_quaternions(const motion::Plan& plan) {
   const auto is = [&](motion::Format format) {
@@ -121,7 +121,7 @@ bool has_nameless_quaternions(const motion::Plan& plan) {
   return is(motion::Format::tum) || is(motion::Format::euroc);
 }
 
-/// The pose is tilted as no carrier of a sonar is, and would be upright with the numbers in another order.
+/// Whether the poses are implausibly tilted, but upright with the numbers in another order.
 bool is_out_of_order(const std::vector<Pose>& poses) {
   std::size_t lying = 0, explained = 0;
   for (const Pose& p : poses) {
@@ -132,7 +132,7 @@ bool is_out_of_order(const std::vector<Pose>& poses) {
   return 10 * lying >= poses.size() && 100 * explained >= 99 * lying;
 }
 
-/// Looks at all, or at every second, third, ..., so that there are at most most_looked_at.
+/// All poses, or every second, third, ..., so that there are at most most_looked_at.
 std::vector<Pose> some_poses_of(const motion::Plan& plan) {
   const std::vector<Pose>& all = plan.trajectory->points().poses;
   const std::size_t step = 1 + (all.size() - 1) / most_looked_at;
@@ -141,7 +141,7 @@ std::vector<Pose> some_poses_of(const motion::Plan& plan) {
   return some;
 }
 
-/// The note on the first doubtful pose, and the number of doubtful poses.
+/// A note on the first doubtful pose, with the number of doubtful poses.
 std::optional<Doubt> doubt_of_all(const std::vector<Pose>& poses, const motion::Plan& plan,
                                   const std::function<bool(const Pose&)>& is_doubtful,
                                   const std::function<std::optional<Doubt>(const Pose&)>& doubt_of) {
@@ -168,7 +168,7 @@ Extent in_world(const Extent& own, const Pose& place) {
   return out;
 }
 
-/// All triangles that were looked at face up. So from above no part of the object hides another.
+/// Whether all checked triangles face up, so that from above no part of the object hides another.
 bool is_height_field(const Mesh& mesh) {
   const std::size_t step = 1 + mesh.triangles.size() / most_looked_at;
   for (std::size_t i = 0; i < mesh.triangles.size(); i += step) {
@@ -186,12 +186,12 @@ MeshShape shape_of(const Mesh& mesh) {
   return shape;
 }
 
-/// The sheet that the loader makes of the scene's sea_surface.
+/// Whether an object is the sheet that the loader makes for the scene's sea_surface.
 bool is_sea_surface(const Scene& scene, const Object& o) {
   return scene.sea_surface.present && o.primitive.kind == Primitive::Kind::plane && o.name == "sea surface";
 }
 
-/// Poses are judged alike.
+/// Whether poses are judged equally in both.
 bool is_same(const Surroundings& a, const Surroundings& b) {
   return a.scene == b.scene && a.longest_range_m == b.longest_range_m && a.ground == b.ground;
 }
@@ -214,7 +214,7 @@ std::vector<Note> notes_on_plans(const Config& config, const Surroundings& aroun
   return notes;
 }
 
-/// All vehicles but those on trajectories. A vehicle without an initial pose that waits for its first pose has no pose to check.
+/// Notes on the initial poses of vehicles without trajectories. A vehicle that waits for its first pose has none to check.
 std::vector<Note> notes_on_start(const Config& config, const Scene& scene, const Surroundings& around) {
   const std::vector<Carrier> carriers = carriers_of(config);
   std::vector<Note> notes = notes_on_mounts(config);
@@ -340,7 +340,7 @@ std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surro
 std::vector<Note> Plausibility::untold(const std::vector<Note>& notes) {
   std::vector<Note> fresh;
   for (const Note& n : notes)
-    // A note on a vehicle is given once for each cure, even if its numbers differ; a note on the scene once for each text.
+    // A vehicle gets one note per cure, even if numbers differ; the scene gets one note per text.
     if (told_.insert(n.vehicle.empty() ? n.text : n.vehicle + "|" + n.cure).second) fresh.push_back(n);
   return fresh;
 }
@@ -367,13 +367,13 @@ void Plausibility::judge(const Carrier& carrier, LastPose& last) const {
   last.notes = notes_on_pose(carrier, last.vehicle_in_world, around_);
   auto degrees = notes_on_angles(carrier.vehicle, last.largest_angle_rad);
   if (degrees.empty()) return;
-  std::erase_if(last.notes, [](const Note& n) { return n.cure == turned_cure; });  // it follows from that
+  std::erase_if(last.notes, [](const Note& n) { return n.cure == turned_cure; });  // a consequence of the other note
   add(last.notes, std::move(degrees));
 }
 
 std::vector<Note> Plausibility::use(const control::PoseSample& sample) {
   const auto carrier = std::find_if(carriers_.begin(), carriers_.end(), [&](const Carrier& c) {
-    return c.vehicle == sample.name || sample.name.empty();  // it is the only one then
+    return c.vehicle == sample.name || sample.name.empty();  // an empty name means the only vehicle
   });
   if (carrier == carriers_.end()) return {};
   LastPose& last = of_poses_[carrier->vehicle];

@@ -1,6 +1,6 @@
 // Finds probable mistakes: poses above the water, degrees instead of radians, quaternions in the wrong order,
-// sonars upside down, meshes in millimetres. Pure functions from facts to notes; `sonard check`, the log at the start, the log
-// when a pose shows it and the daemon's status (for `sonarctl doctor`) use them.
+// sonars upside down, meshes in millimetres. Pure functions from facts to notes. Used by `sonard check`, by the log (at the
+// start and at the first implausible pose), and by the daemon's status for `sonarctl doctor`.
 #pragma once
 
 #include <map>
@@ -17,9 +17,9 @@ namespace sonar {
 
 /// A probable mistake, or a missing step.
 struct Note {
-  std::string vehicle;  // the note's subject; empty = the scene or a sonar
+  std::string vehicle;  // the vehicle concerned; empty = the scene or a sonar
   std::string text;     // a sentence
-  std::string cure;     // what to change
+  std::string cure;     // the change to make
 };
 
 /// "the sonar of rov is 3.0 m above the water's surface (z = 0); ENU_FLU counts z upwards ..."
@@ -28,21 +28,21 @@ std::string text_of(const Note& note);
 /// Size of a mesh along its own axes.
 struct MeshShape {
   Extent own;
-  bool is_ground = false;  // flat, or every triangle faces up: it may be long
+  bool is_ground = false;  // flat, or every triangle faces up; such a mesh may be long
 };
 using MeshShapes = std::map<std::shared_ptr<const Mesh>, MeshShape>;
 
-/// Facts against which poses are judged. The sea surface is not one of them.
+/// Facts with which poses are compared. The sea surface is not included.
 struct Surroundings {
-  Extent scene;                // where the scene puts what can be seen
-  std::vector<Extent> ground;  // extent of each plane, seabed and height map that stands still
+  Extent scene;                // extent of all visible objects
+  std::vector<Extent> ground;  // extent of each static plane, seabed and height map
   double longest_range_m = 0;  // longest range of any sonar
-  MeshShapes meshes;           // that can be seen
+  MeshShapes meshes;           // of visible objects
 };
 /// `known`: shapes of the previous scene, whose meshes are not examined again.
 Surroundings surroundings_of(const Config& config, const Scene& scene, const MeshShapes& known = {});
 
-/// A vehicle, by name, and where its sonars sit on it (FLU).
+/// A vehicle's name, and the mounts of its sonars (FLU).
 struct Carrier {
   std::string vehicle;
   std::vector<Pose> mounts;
@@ -50,15 +50,16 @@ struct Carrier {
 std::vector<Carrier> carriers_of(const Config& config);
 
 std::vector<Note> notes_on_mounts(const Config& config);
-/// `around`: of this scene.
+/// `around`: the surroundings of this scene.
 std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around);
-/// Whether the scene is near the origin of a world that has a latitude and longitude.
+/// Notes on scenes far from the origin of a world with latitude and longitude.
 std::vector<Note> notes_on_origin(const Surroundings& around);
 /// Returns at most one note on the position and one on the attitude.
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
 /// `largest_angle_rad`: as in PoseSample.
 std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad);
-/// Notes on at most some 10,000 poses, evenly spread. A carrier without mounts is a moving object: its place is not judged.
+/// Notes on at most about 10,000 poses, evenly spread. A carrier without mounts is a moving object, whose position is not
+/// checked.
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around);
 
 /// Returns all notes that need no pose.
@@ -67,12 +68,12 @@ std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surro
 /// The notes of a running daemon: of its configuration and scene, and of the newest pose of each vehicle.
 class Plausibility {
  public:
-  /// Call it at the start, and after configuration or scene has changed. Returns notes that were not returned before. Judges
-  /// trajectories and poses again if positions in the scene have changed.
+  /// Call it at the start and after a change of configuration or scene. Returns new notes only. Checks trajectories and poses
+  /// again if positions in the scene have changed.
   std::vector<Note> use(const Config& config, const Scene& scene);
-  /// Judges an accepted pose of a vehicle; returns the notes that were not returned before for this vehicle.
+  /// Checks an accepted pose of a vehicle; returns only notes that are new for this vehicle.
   std::vector<Note> use(const control::PoseSample& sample);
-  /// Notes that hold now. Those on poses replace those on a vehicle's start or trajectory.
+  /// The present notes. Notes on poses replace those on a vehicle's start or trajectory.
   std::vector<Note> all() const;
 
  private:
@@ -87,7 +88,7 @@ class Plausibility {
   Surroundings around_;
   std::vector<Carrier> carriers_;
   std::vector<std::shared_ptr<const motion::Trajectory>>
-      played_;                                // the trajectories that of_plans_ is about; a reload reads new ones
+      played_;                                // the trajectories for which of_plans_ was made; a reload reads new ones
   std::vector<Note> of_plans_, of_setup_;     // of_setup_ contains of_plans_
   std::map<std::string, LastPose> of_poses_;  // by vehicle
   std::set<std::string> told_;

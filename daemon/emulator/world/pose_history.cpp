@@ -29,8 +29,8 @@ PoseHistory::Motion PoseHistory::between(const Sample& before, const Sample& aft
           per_s * rotation_between(before.pose.orientation, after.pose.orientation)};
 }
 
-/// Velocities that the sender states replace the difference of the last two poses. A difference that is a jump is not a motion:
-/// a vehicle that was put elsewhere stays there.
+/// Velocities from the sender replace the difference of the last two poses. A jump counts as no motion: a vehicle that was
+/// moved elsewhere stays there.
 PoseHistory::Motion PoseHistory::newest_motion() const {
   const Sample& last = samples_.back();
   Motion motion;

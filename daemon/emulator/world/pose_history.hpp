@@ -1,5 +1,5 @@
 // The poses of one body in the last two seconds, and its pose at any time: interpolated, extrapolated for a short time, or held.
-// World has one for each vehicle and moving object. Times are those of the sender.
+// World has one for each vehicle and moving object. Times are the sender's stamps, converted to our time.
 #pragma once
 
 #include <deque>
@@ -31,14 +31,15 @@ class PoseHistory {
 
   /// Adds a sample. `sample.at` must not be before newest().at; an equal time replaces the newest sample.
   void put(const Sample& sample);
-  /// Replaces newest(), for poses that come too fast. `sample.at` must not be before newest().at; the history must not be empty.
-  void replace_newest(const Sample& sample) { samples_.back() = sample; }
-  /// Between samples: interpolated (lerp, slerp). Before the first: held. After the last: extrapolated by its velocity, or by
-  /// the difference of the last two unless that is a jump, for at most `extrapolate_max`, then held. The history must not be
+  /// Replaces newest(), for poses above the rate limit. `sample.at` must not be before newest().at; the history must not be
   /// empty.
+  void replace_newest(const Sample& sample) { samples_.back() = sample; }
+  /// Between samples the pose is interpolated (lerp, slerp); before the first it is held. After the last it is extrapolated for
+  /// at most `extrapolate_max`, by the sample's velocity or else by the difference of the last two samples unless that is a
+  /// jump; then it is held. The history must not be empty.
   Pose at(Time t, std::chrono::nanoseconds extrapolate_max) const;
-  /// The motion of the pose of at(): between samples, their difference over time; after the newest, its velocity; before the
-  /// first and where it is held, none.
+  /// The motion of the pose of at(): between samples, their difference per time; after the newest, its velocity; where the pose
+  /// is held, zero.
   Motion motion_at(Time t, std::chrono::nanoseconds extrapolate_max) const;
 
  private:

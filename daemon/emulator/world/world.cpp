@@ -35,7 +35,7 @@ World::World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyS
 void World::use_vehicles(std::vector<BodyStart> vehicles, Time now) { vehicles_ = taken_over(vehicles_, vehicles, now); }
 void World::use_objects(std::vector<BodyStart> objects, Time now) { objects_ = taken_over(objects_, objects, now); }
 
-/// Bodies of a known name keep their poses. A new body begins with a full allowance, and a changed trajectory begins now.
+/// Bodies with a known name keep their poses. A new body begins with a full allowance; a changed trajectory begins now.
 std::vector<World::Track> World::taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const {
   std::vector<Track> tracks;
   for (BodyStart& b : bodies) {
@@ -70,12 +70,12 @@ World::Track* World::find(PoseSample::Of of, const std::string& name, std::strin
   return nullptr;
 }
 
-/// Whether a pose belongs to the history of the body: the same sender and kind of time stamp, and no long silence.
+/// Whether a pose continues the body's history: the same sender and kind of time stamp, and no long silence before it.
 bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) const {
   const bool known = !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain;
   if (!known) return false;
-  // With clock: follow time stands still while no stamps come, so silence cannot be seen. A stamp far behind the newest one shows
-  // a simulator that started again.
+  // With `clock: follow`, time stops while no stamps arrive, so silence cannot be detected. A stamp far behind the newest one
+  // means that the simulator has restarted.
   return rules_.follows ? at >= track.history.newest().at - rules_.stale_after : now - track.last_arrival <= rules_.stale_after;
 }
 
@@ -203,7 +203,7 @@ void World::keep(Track& track, const PoseSample& sample, const Sender& sender, T
   track.hidden_for_now = false;
   track.stale_reported = false;
   const PoseHistory::Sample kept{at, sample.pose, sample.velocity_mps, sample.angular_velocity_radps};
-  // A pose beyond the rate replaces the newest one: the history stays short and ends with the latest news.
+  // A pose above the rate limit replaces the newest one, so that the history stays short and up to date.
   if (over_rate(track, now) && !track.history.empty()) {
     ++counters_.over_rate;
     track.history.replace_newest(kept);
@@ -228,7 +228,7 @@ Time World::last_news(const Track& track) const {
 
 std::vector<World::Stale> World::newly_stale(Time now) {
   std::vector<Stale> sentences;
-  for (Track& t : vehicles_) {  // objects may rest where they were put; a vehicle without news is a broken link
+  for (Track& t : vehicles_) {  // only vehicles: objects may rest, but a vehicle without poses means a broken link
     if (t.stale_reported || !is_stale(t, now)) continue;
     t.stale_reported = true;
     ++counters_.stale;
@@ -240,7 +240,7 @@ std::vector<World::Stale> World::newly_stale(Time now) {
 }
 
 /// The first of these that applies: hidden far above the scene, received poses, a trajectory, the orbit of the demo, the
-/// initial pose. Without news for stale_after a body is where its newest pose put it, not where it was extrapolated to.
+/// initial pose. If no pose has arrived for stale_after, a body returns to its newest received pose, without extrapolation.
 Pose World::pose_at(const Track& track, Time t) const {
   if (track.hidden) return {{0, 0, hidden_height_m}, {}};
   if (!track.history.empty()) {

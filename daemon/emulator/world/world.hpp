@@ -20,21 +20,21 @@ struct PoseRules {
   std::chrono::nanoseconds extrapolate_max = std::chrono::milliseconds(200);
   std::chrono::nanoseconds stale_after = std::chrono::seconds(1);
   double max_jump_m = 50;
-  bool stepped = false;      // simulated time: WALL stamps are then those of the sender's own clock, and the rate is not limited
+  bool stepped = false;      // simulated time: WALL stamps then belong to the sender's own clock, and the rate is not limited
   bool follows = false;      // simulated time that follows the stamps of the vehicles (world_follows.cpp)
-  double most_per_s = 1000;  // poses kept of one body; faster ones replace the newest
-  double burst = 64;         // poses that may come at once, because networks delay and then deliver several
+  double most_per_s = 1000;  // stored poses of one body per second; faster ones replace the newest
+  double burst = 64;         // poses that may arrive at once, because networks deliver delayed ones together
 };
 
 /// A vehicle, or a moving object of the scene.
 struct BodyStart {
   std::string name;
   Pose initial_pose;    // pose in the world
-  bool orbits = false;  // circles the world's z axis until the first accepted pose
+  bool orbits = false;  // circles about the world's z axis until the first accepted pose
   motion::Plan plan{};  // followed until the first accepted pose
 };
 
-/// Sender of a pose. A different `id` starts a new history; a different `source` is worth a log line.
+/// Sender of a pose. A different `id` starts a new history; a different `source` is logged.
 struct Sender {
   std::string id;      // "json udp 127.0.0.1:40123"
   std::string source;  // "json 127.0.0.1"
@@ -44,9 +44,9 @@ enum class PoseVerdict { accepted, late, unknown_name, bad_time };
 
 struct PoseOutcome {
   PoseVerdict verdict = PoseVerdict::accepted;
-  std::string refusal;  // one sentence when not accepted
-  std::string notice;   // worth a log line: the source changed, poses came back
-  std::string body;     // the body that the notice is about
+  std::string refusal;  // one sentence if the pose is not accepted
+  std::string notice;   // for the log: the source changed, or poses arrive again
+  std::string body;     // the body of the notice
 };
 
 struct PoseCounters {
@@ -54,22 +54,22 @@ struct PoseCounters {
   std::uint64_t refused = 0;    // malformed, unknown name, impossible time
   std::uint64_t late = 0;       // out of order or repeated
   std::uint64_t replaced = 0;   // equal stamps
-  std::uint64_t over_rate = 0;  // replaced the newest because they came too fast
+  std::uint64_t over_rate = 0;  // replaced the newest pose because of the rate limit
   std::uint64_t jumps = 0;      // beyond max_jump
   std::uint64_t resets = 0;     // reset counter changed
-  std::uint64_t histories = 0;  // histories begun: by a first pose, another sender, or after silence
-  std::uint64_t stale = 0;      // times a body's poses stopped coming
+  std::uint64_t histories = 0;  // histories begun by a first pose, another sender, or after silence
+  std::uint64_t stale = 0;      // times that a body's poses stopped
 };
 
-/// The motion of a sonar that is mounted on a body, with the speed that a rotation gives to its lever arm.
+/// The motion of a sonar mounted on a body, including the velocity of its lever arm by the body's rotation.
 Twist mounted_moves(const PoseHistory::Motion& body_moves, const Pose& body_in_world, const Pose& mount);
 
 class World {
  public:
   World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start);
 
-  // Call these when the configuration is read again or the scene changes. Bodies of the same name keep their poses, and equal
-  // trajectories play on; others begin at `now`.
+  // Call these when the configuration is read again or the scene changes. Bodies with the same name keep their poses, and equal
+  // trajectories continue; others begin at `now`.
   void use_rules(const PoseRules& rules) { rules_ = rules; }
   void use_vehicles(std::vector<BodyStart> vehicles, Time now);
   void use_objects(std::vector<BodyStart> objects, Time now);
@@ -77,7 +77,8 @@ class World {
   PoseOutcome accept(const control::PoseSample& sample, const Sender& sender, Time now);
   void count_refused() { ++counters_.refused; }
 
-  /// Pauses, resumes, seeks a trajectory or changes its speed, from `now` on. Empty, or one sentence why not.
+  /// Pauses, resumes, seeks a trajectory or changes its speed, from `now` on. Returns one sentence if that is not possible,
+  /// else an empty text.
   std::string steer(const control::SetTrajectory& asked, Time now);
   /// The trajectory that a body follows; valid until the World changes.
   struct Played {
@@ -88,16 +89,16 @@ class World {
   std::optional<Played> object_plays(std::size_t object) const { return plays(objects_[object]); }
 
   Pose vehicle_at(std::size_t vehicle, Time t) const { return pose_at(vehicles_[vehicle], t); }
-  /// The motion with which vehicle_at() extrapolates; zero if it is faster than any vehicle with a sonar.
+  /// The motion with which vehicle_at() extrapolates; zero if it is implausibly fast.
   PoseHistory::Motion vehicle_moves(std::size_t vehicle, Time t) const;
   std::vector<Pose> objects_at(Time t) const;
   Pose object_at(std::size_t object, Time t) const { return pose_at(objects_[object], t); }
   bool is_hidden(std::size_t object) const { return objects_[object].hidden; }
   /// Hides an object until its next pose, or until show_again().
   void hide(std::size_t object, bool hidden) { objects_[object].hidden = objects_[object].hidden_for_now = hidden; }
-  /// Shows objects that hide() has hidden; those that poses have hidden stay hidden.
+  /// Shows objects that hide() has hidden; objects that poses have hidden stay hidden.
   void show_again();
-  /// True if poses came before and then stopped for longer than the rules allow.
+  /// True if poses had arrived and then stopped for longer than the rules allow.
   bool is_stale(std::size_t vehicle, Time now) const { return is_stale(vehicles_[vehicle], now); }
   struct Stale {
     std::string vehicle, sentence;
@@ -105,12 +106,12 @@ class World {
   /// The vehicles whose poses stopped since the last call.
   std::vector<Stale> newly_stale(Time now);
 
-  // When the rules follow the vehicles' stamps.
-  /// Time may advance to this: the smallest of the vehicles' newest stamps, without vehicles that lag by more than stale_after.
-  /// nullopt before the first pose.
+  // The following are for rules that follow the vehicles' stamps.
+  /// The time to which time may advance: the minimum of the vehicles' newest stamps, ignoring vehicles that lag by more than
+  /// stale_after. nullopt before the first pose.
   std::optional<Time> followed_until() const;
-  /// How far the stamps have jumped ahead since the last call, at the first pose for example. Orbits and
-  /// trajectories do not advance by it.
+  /// By how much stamps have jumped ahead since the last call, for example at the first pose. Orbits and trajectories do not
+  /// advance by it.
   std::chrono::nanoseconds take_skipped();
 
   std::string_view source_of(std::size_t vehicle) const { return vehicles_[vehicle].source; }
@@ -123,32 +124,32 @@ class World {
     motion::Playback playback{};  // playback of body.plan
     std::string sender_id, source;
     std::string earlier_sender_id;  // the sender before the last change; empty after silence
-    bool rival_reported = false;    // that two senders alternate
+    bool rival_reported = false;    // whether it was reported that two senders alternate
     std::uint64_t seq = 0;
     std::uint32_t reset_counter = 0;
     control::ClockDomain domain{};
     Time last_arrival{};
     std::chrono::nanoseconds offset{0};  // our time = sender's time + offset
     bool hidden = false, hidden_for_now = false, stale_reported = false;
-    double allowance = 0;  // poses that may be kept now; refilled with time
+    double allowance = 0;  // poses that may be stored now; refilled with time
     Time allowance_at{};
   };
   using Ns = std::chrono::nanoseconds;
 
   std::vector<Track> taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const;
   Track* find(control::PoseSample::Of kind, const std::string& name, std::string& refusal);
-  /// True for WALL stamps in real time: they are of the common clock.
+  /// True for WALL stamps in real time, which use the common clock.
   bool has_shared_clock(const control::PoseSample& sample) const {
     return sample.stamp.domain == control::ClockDomain::wall && !rules_.stepped;
   }
-  /// Empty, or one sentence about a time stamp that cannot be accepted.
+  /// One sentence if the time stamp cannot be accepted, else empty.
   std::string why_bad_time(const control::PoseSample& sample, Time at, Time now) const;
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now) const;
   /// Returns whether the pose continues the history. Refuses late poses, and clears the history at a jump.
   bool is_next(Track& track, const control::PoseSample& sample, Time at, PoseOutcome& out);
   bool has_rival(Track& track, const Sender& sender, Time now) const;
   void keep(Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now);
-  /// Returns the offset of our time from the sender's clock, which stamped a pose with `at`.
+  /// Our time minus the time of the sender's clock, which stamped a pose with `at`.
   Ns offset_for(const Track& track, Time at, Time now, bool goes_on);
   Ns followed_offset_for(const Track& track, Time at, Time now);
   bool is_followed(const Track& track, Time newest) const;
@@ -167,7 +168,7 @@ class World {
   PoseRules rules_;
   std::vector<Track> vehicles_, objects_;
   Time start_;
-  std::optional<Time> newest_followed_;  // ours
+  std::optional<Time> newest_followed_;  // in our time
   Ns skipped_{0};
   PoseCounters counters_;
 };

@@ -6,7 +6,7 @@
 
 namespace sonar {
 namespace {
-__extension__ using Wide = __int128;  // a foreign stamp and the time it is mapped to may lie further apart than 64 bits reach
+__extension__ using Wide = __int128;  // the difference between a sender's stamp and our time may exceed 64 bits
 Wide wide(Time t) { return t.time_since_epoch().count(); }
 }  // namespace
 
@@ -14,9 +14,9 @@ bool World::is_followed(const Track& track, Time newest) const {
   return !track.history.empty() && track.history.newest().at + track.offset >= newest - rules_.stale_after;
 }
 
-/// Offset from the stamps of a sender to sonard's time. The offset of this vehicle, 0, or that of another vehicle is taken if
-/// it puts the stamp near the newest one. Otherwise the sender's clock has jumped, or this is the first pose. If the stamp is
-/// ahead, and no other vehicle is followed, the time between is skipped. In all other cases the stamp becomes the present time.
+/// Offset from the stamps of a sender to sonard's time. It is the first of these that places the stamp near the newest one: the
+/// vehicle's present offset, 0, the offset of another vehicle. If none does, this is the first pose or the sender's clock has
+/// jumped: a stamp ahead skips the time between if no other vehicle is followed; any other stamp becomes the present time.
 World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
   const Time newest = newest_followed_.value_or(now);
   const bool vehicle = std::any_of(vehicles_.begin(), vehicles_.end(), [&](const Track& t) { return &t == &track; });
@@ -29,7 +29,7 @@ World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
     const Wide by = lead(offset);
     return (by < 0 ? -by : by) <= rules_.stale_after.count();
   };
-  if (!vehicle || newest_followed_) {  // the first pose is where time begins, however soon after 0
+  if (!vehicle || newest_followed_) {  // time begins with the first pose, however soon after 0
     if (is_near(track.offset)) return take(track.offset);
     if (is_near(Ns{0})) return take(Ns{0});
     for (const Track& other : vehicles_)
@@ -47,7 +47,7 @@ World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
 
 std::optional<Time> World::followed_until() const {
   if (!newest_followed_) return std::nullopt;
-  // The slowest vehicle limits time. A vehicle whose poses are older than stale_after is no longer waited for.
+  // The slowest vehicle limits time, except vehicles whose poses are older than stale_after.
   Time least = *newest_followed_;
   for (const Track& t : vehicles_)
     if (is_followed(t, *newest_followed_)) least = std::min(least, t.history.newest().at + t.offset);
@@ -56,8 +56,8 @@ std::optional<Time> World::followed_until() const {
 
 World::Ns World::take_skipped() {
   const Ns skipped = std::exchange(skipped_, Ns{0});
-  // Nothing moves during the skipped time: orbits begin later by that much, received poses of objects keep their age, and
-  // trajectories stay where they were.
+  // Nothing moves during the skipped time: orbits are delayed by it, received poses of objects keep their age, and trajectories
+  // stop.
   start_ += skipped;
   for (Track& t : objects_)
     if (!t.history.empty()) t.offset += skipped;
